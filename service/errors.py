@@ -1,0 +1,72 @@
+"""The one error tree of Tauscope.
+
+TauscopeError
+├── RobotFileError        (ValueError)    robot-file          the robot file cannot be read or is not valid
+│   └── UnphysicalModelError              robot-unphysical    its model block describes an impossible body
+├── RecordingError        (ValueError)    recording           the recording cannot be read or is not valid
+│   └── RecordingMismatchError            recording-mismatch  the recording does not fit the robot
+├── IdentificationError   (ValueError)    identification      the data cannot answer the question
+├── ExportError           (ValueError)    export              a model cannot be written in the asked format
+├── NotFoundError         (LookupError)   not-found           nothing of that name is kept here
+└── LimitExceededError    (ValueError)    limit-exceeded      an upload or a request is larger than allowed
+
+Every leaf also inherits the builtin that a caller would expect, so that ``except ValueError`` keeps working. `code` is
+stable: scripts and the pages below ``docs/errors/`` rely on it. A message is one line; it names the file, column, row or
+joint, and what to do next.
+"""
+
+from typing import ClassVar
+
+
+class TauscopeError(Exception):
+    """Any failure that Tauscope foresees; its message is written for the user."""
+
+    code: ClassVar[str] = "error"
+
+
+class RobotFileError(TauscopeError, ValueError):
+    """The robot file, or the URDF that it names, cannot be read or is not valid."""
+
+    code = "robot-file"
+
+
+class UnphysicalModelError(RobotFileError):
+    """A link of the robot's model has a mass or an inertia that no rigid body can have."""
+
+    code = "robot-unphysical"
+
+
+class RecordingError(TauscopeError, ValueError):
+    """The recording cannot be read or is not valid."""
+
+    code = "recording"
+
+
+class RecordingMismatchError(RecordingError):
+    """The recording is sound but belongs to another robot: its number of joints differs."""
+
+    code = "recording-mismatch"
+
+
+class IdentificationError(TauscopeError, ValueError):
+    """The recordings cannot answer the question: too short, too poor, or without motion."""
+
+    code = "identification"
+
+
+class ExportError(TauscopeError, ValueError):
+    """A model cannot be written in the format that was asked for."""
+
+    code = "export"
+
+
+class NotFoundError(TauscopeError, LookupError):
+    """Nothing of that name is kept here."""
+
+    code = "not-found"
+
+
+class LimitExceededError(TauscopeError, ValueError):
+    """An upload or a request is larger than this service accepts."""
+
+    code = "limit-exceeded"

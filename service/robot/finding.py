@@ -1,0 +1,29 @@
+"""What a reader noticed about a robot and did not want to keep to itself."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Severity(StrEnum):
+    """How much a finding matters: an error refuses the robot, a warning may spoil results, the rest is good to know."""
+
+    ERROR = "error"
+    WARNING = "warning"
+    INFO = "info"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One remark on a robot.
+
+    severity : Severity
+        how much it matters
+    where : str
+        file, line and place that it is about
+    text : str
+        what is so, and what to do about it
+    """
+
+    severity: Severity
+    where: str
+    text: str

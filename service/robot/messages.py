@@ -1,0 +1,62 @@
+"""One-line messages: safe to print whatever the user's file holds."""
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+from itertools import islice
+
+LONGEST_VALUE = 60
+LONGEST_MESSAGE = 600
+MOST_CANDIDATES = 1000
+
+
+def one_line(text: str) -> str:
+    """A message as one printable line: white space folded, control characters escaped, cut where it is endless.
+
+    Parameters
+    ----------
+    text : str
+        any text, perhaps with parts of a user's file in it
+    """
+    folded = " ".join(text.split())
+    printable = "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in folded)
+    return printable if len(printable) <= LONGEST_MESSAGE else printable[: LONGEST_MESSAGE - 1] + "…"
+
+
+def shown(value: object) -> str:
+    """A value of the user's file as a message shows it: quoted text, and cut where it is long.
+
+    Parameters
+    ----------
+    value : object
+        plain data: text, a number, a list, a mapping or None
+    """
+    if isinstance(value, dict):
+        return "a mapping"
+    if isinstance(value, list | tuple):
+        return f"a list of {len(value)}"
+    if value is None:
+        return "nothing"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int) and abs(value) >= 10**LONGEST_VALUE:
+        return f"an integer of {value.bit_length()} bits"
+    text = repr(value)
+    return text if len(text) <= LONGEST_VALUE else text[: LONGEST_VALUE - 1] + "…"
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """A hint at what was meant: the known name nearest to `name`, or the known names where none is near.
+
+    Parameters
+    ----------
+    name : str
+        what the user wrote
+    known : iterable of str
+        what could have been written
+    """
+    names = sorted(islice(known, MOST_CANDIDATES))
+    match = get_close_matches(name[:200], names, n=1, cutoff=0.6)
+    if match:
+        return f"did you mean {match[0]!r}?"
+    few = ", ".join(names[:12])
+    return f"known here: {few}{', …' if len(names) > 12 else ''}" if names else "none is known here"

@@ -1,0 +1,282 @@
+"""The robot file: every refusal names file, line, place, joint and what to do."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from robot.robot_texts import ROBOT_YAML, URDF, URDF_ROBOT_YAML, replaced, write_robot
+from service.errors import RobotFileError, UnphysicalModelError
+from service.robot import read_robot
+
+LINK_2 = "{mass: 1.4, first_moment: [0.1, 0, 0], inertia: {xx: 0.02, yy: 0.03, zz: 0.03, xy: 0, xz: 0, yz: 0}}"
+
+ERRORS = {
+    "limits reversed": (
+        "[-2.9, 2.9]",
+        "[2.0, 1.0]",
+        "9: joints[0].limits.position (joint 1, 'shoulder'): lower bound 2 is not below upper bound 1; swap them",
+    ),
+    "limits equal": (
+        "[-2.9, 2.9]",
+        "[1.0, 1.0]",
+        "9: joints[0].limits.position (joint 1, 'shoulder'): lower and upper",
+    ),
+    "three limits": ("[-2.9, 2.9]", "[1, 2, 3]", "9: joints[0].limits.position (joint 1, 'shoulder'): must be two"),
+    "limit no list": ("[-2.9, 2.9]", "2.9", "9: joints[0].limits.position (joint 1, 'shoulder'): must be a list"),
+    "text in a number": ("2.0, acc", "fast, acc", "9: joints[0].limits.velocity (joint 1, 'shoulder'): 'fast' is text"),
+    "number in quotes": ("2.0, acc", "'2.0', acc", "9: joints[0].limits.velocity (joint 1, 'shoulder'): '2.0' is text"),
+    "unit": ("torque: 40", "torque: 40 Nm", "9: joints[0].limits.torque (joint 1, 'shoulder'): '40 Nm' is text"),
+    "zero velocity": ("2.0, acc", "0, acc", "limits.velocity (joint 1, 'shoulder'): must be above zero, but is 0"),
+    "negative torque": (
+        "torque: 40",
+        "torque: -4",
+        "limits.torque (joint 1, 'shoulder'): must be above zero, but is -4",
+    ),
+    "truth for a number": ("2.0, acc", "true, acc", "(joint 1, 'shoulder'): must be a number, but is true"),
+    "NaN": ("d: 0.3", "d: .nan", "4: kinematics.dh[0].d (joint 1, 'shoulder'): must be a finite number, but is nan"),
+    "infinity": ("d: 0.3", "d: -.inf", "4: kinematics.dh[0].d (joint 1, 'shoulder'): must be a finite number"),
+    "overflow": ("d: 0.3", "d: 1e999", "4: kinematics.dh[0].d (joint 1, 'shoulder'): must be a finite number"),
+    "huge": ("d: 0.3", "d: 1e99", "4: kinematics.dh[0].d (joint 1, 'shoulder'): 1e+99 is beyond 1e+09; check the unit"),
+    "huge integer": (
+        "d: 0.3",
+        "d: " + "9" * 400,
+        "4: kinematics.dh[0].d (joint 1, 'shoulder'): an integer of 1329 bits",
+    ),
+    "endless integer": ("d: 0.3", "d: " + "9" * 9000, "4: '99999"),
+    "octal or decimal": ("d: 0.3", "d: 010", "4: '010' cannot be read as a number"),
+    "joint type": ("prismatic", "slider", "5: kinematics.dh[1].type (joint 2, 'slide'): 'slider' is not a joint type"),
+    "missing row key": (
+        "d: 0.3, ",
+        "",
+        "4: kinematics.dh[0].d (joint 1, 'shoulder'): the key 'd' is missing; add it",
+    ),
+    "unknown row key": ("d: 0.3", "D: 0.3", "4: kinematics.dh[0].D (joint 1, 'shoulder'): unknown key 'D'"),
+    "empty rows": (
+        ROBOT_YAML[ROBOT_YAML.index("  dh:") : ROBOT_YAML.index("gravity")],
+        "  dh: []\n",
+        "must not be an empty",
+    ),
+    "two descriptions": (
+        "  dh:",
+        "  urdf: {file: a, base: b, tip: c}\n  dh:",
+        "2: kinematics: must hold exactly one of dh,",
+    ),
+    "no description": (
+        "  dh:",
+        "  dh: null\nx:",
+        "unknown key 'x'; known here: gravity, joints, kinematics, model, name",
+    ),
+    "unknown description": ("  dh:", "  mdhh:", "3: kinematics.mdhh: unknown key 'mdhh'; did you mean 'mdh'?"),
+    "unknown key": (
+        "gear_ratio",
+        "gearratio",
+        "10: joints[0].gearratio (joint 1, 'shoulder'): unknown key 'gearratio'; did",
+    ),
+    "unknown limit": (
+        "velocity: 2",
+        "speed: 2",
+        "9: joints[0].limits.speed (joint 1, 'shoulder'): unknown key 'speed'",
+    ),
+    "unknown top key": (
+        "gravity:",
+        "gravitation:",
+        "6: gravitation: unknown key 'gravitation'; did you mean 'gravity'?",
+    ),
+    "gravity": ("[0, 0, -9.81]", "-9.81", "6: gravity: must be a list, but is -9.81"),
+    "gravity of two": ("[0, 0, -9.81]", "[0, -9.81]", "6: gravity: must be three numbers [x, y, z], but holds 2"),
+    "no name": ("name: two-joint-arm\n", "", "name: the key 'name' is missing; add it"),
+    "number as name": ("two-joint-arm", "5", "1: name: must be text, but is 5; put it in quotes"),
+    "empty name": ("two-joint-arm", "''", "1: name: must not be empty"),
+    "unprintable name": ("two-joint-arm", '"a\\nb"', "1: name: 'a\\nb' must be printable text"),
+    "joint without name": (
+        "- name: slide\n    lim",
+        "- lim",
+        "15: joints[1].name (joint 2): the key 'name' is missing",
+    ),
+    "joint is text": (
+        "- name: slide\n    limits: {position: [0.0, 0.4]}",
+        "- slide",
+        "15: joints[1] (joint 2): must be a mapping",
+    ),
+    "joints are a mapping": ("joints:\n  - name: shoulder\n", "joints:\n    name: shoulder\n", "not valid YAML"),
+    "one joint too few": (
+        "  - name: slide\n    limits: {position: [0.0, 0.4]}\n",
+        "",
+        "7: joints: number of entries is 1, of joints in kinematics.dh 2; write one entry a joint",
+    ),
+    "same name twice": (
+        "name: slide",
+        "name: shoulder",
+        "7: joints: joints 1 and 2 are both named 'shoulder'; rename one",
+    ),
+    "sign": ("sign: -1", "sign: 2", "12: joints[0].sign (joint 1, 'shoulder'): must be 1 or -1, but is 2"),
+    "sign as truth": (
+        "sign: -1",
+        "sign: true",
+        "12: joints[0].sign (joint 1, 'shoulder'): must be 1 or -1, but is true",
+    ),
+    "torque constant": (
+        "0.5\n    sign",
+        "0\n    sign",
+        "11: joints[0].torque_constant (joint 1, 'shoulder'): must not be zero",
+    ),
+    "gear ratio": (
+        "gear_ratio: 100",
+        "gear_ratio: 0.0",
+        "10: joints[0].gear_ratio (joint 1, 'shoulder'): must not be zero",
+    ),
+    "friction shape": ("k_v: 500", "k_v: -5", "13: joints[0].friction_shape.k_v (joint 1, 'shoulder'): must be above"),
+    "drive": ("{bus: can0, node: 3}", "can0", "14: joints[0].drive (joint 1, 'shoulder'): must be a mapping"),
+    "drive with NaN": ("node: 3", "node: .nan", "14: joints[0].drive (joint 1, 'shoulder'): must hold finite numbers"),
+    "one link too few": (
+        f"    - {LINK_2}\n",
+        "",
+        "18: model.links: number of entries is 1, of joints in kinematics.dh 2",
+    ),
+    "one friction too few": (
+        "    - {stiction: 1.0, stribeck: -0.2, viscous: 0.25}\n",
+        "",
+        "21: model.friction: number of entries is 1, of joints in kinematics.dh 2",
+    ),
+    "inertia key": (
+        "xx: 0.02",
+        "Ixx: 0.02",
+        "20: model.links[1].inertia.Ixx (link 2, 'slide'): unknown key 'Ixx'; did",
+    ),
+    "friction NaN": (
+        "stiction: 2.0",
+        "stiction: .nan",
+        "22: model.friction[0].stiction (joint 1, 'shoulder'): must be a",
+    ),
+    "key twice": ("sign: -1", "gear_ratio: 2", "12: the key 'gear_ratio' stands twice, first on line 10; remove one"),
+    "key no text": ("sign: -1", "1: -1", "12: a key must be text; put it in quotes"),
+    "merge key": ("sign: -1", "<<: {sign: -1}", "12: merge keys (<<) are not accepted"),
+    "tag": ("sign: -1", "sign: !!python/name:os.system x", "12: the tag 'tag:yaml.org,2002:python/name:os.system' is"),
+    "tagged mapping": ("kinematics:", "kinematics: !x", "2: the tag '!x' is not accepted"),
+    "undefined alias": ("sign: -1", "sign: *x", "12: not valid YAML: found undefined alias 'x'"),
+    "tab": ("    sign: -1", "\tsign: -1", "12: not valid YAML: found character"),
+    "second document": ("joints:", "---\njoints:", "not valid YAML: but found another document"),
+}
+
+
+@pytest.mark.parametrize("name", ERRORS)
+def test_invalid_robot_file_is_refused_by_line_place_and_joint(tmp_path: Path, name: str) -> None:
+    old, new, message = ERRORS[name]
+    path = write_robot(tmp_path, replaced(ROBOT_YAML, old, new))
+    with pytest.raises(RobotFileError) as caught:
+        read_robot(path)
+    text = str(caught.value)
+    assert text.startswith(f"{path}:")
+    assert message in text
+    assert text.isprintable()
+    if re.match("[0-9]+:", message):
+        assert text.startswith(f"{path}:{message}")
+
+
+def test_first_of_several_errors_is_said_to_be_so(tmp_path: Path) -> None:
+    path = write_robot(tmp_path, ROBOT_YAML.replace("theta: 0", "theta: x0"))
+    with pytest.raises(RobotFileError, match=r"kinematics\.dh\[0\]\.theta .*\(the first of 2 errors\)"):
+        read_robot(path)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "the file is empty"),
+        (b"# nothing\n", "the file holds no entries"),
+        (b"name: a\n\n\xff\n", ":3: byte 0xff is not UTF-8 text"),
+        (ROBOT_YAML.encode("utf-16"), "is not UTF-8 text"),
+        (b"name: \x00", "not valid YAML"),
+        (b"just text", ":1: must be a mapping with name and kinematics, but is 'just text'"),
+        (b"- a\n- b\n", ":1: must be a mapping with name and kinematics, but is a list of 2"),
+        (URDF.encode(), "is XML; write a robot file"),
+        (b'a: "\\UFFFFFFFF"', "not valid YAML"),
+        (b"[" * 5000, ":1: nested deeper than 24 levels"),
+        (b"- " * 5000, ":1: nested deeper than 24 levels"),
+        (b"- 1\n" * 100_000, ":20000: more than 20000 entries"),
+        (b"#" * (1024 * 1024 + 1), "the file is larger than 1024 KiB"),
+        (b"a: &a [*a]\n", "aliases (*name) expand without end"),
+    ],
+)
+def test_what_is_no_robot_file_is_refused(tmp_path: Path, content: bytes, message: str) -> None:
+    path = write_robot(tmp_path, content)
+    with pytest.raises(RobotFileError) as caught:
+        read_robot(path)
+    assert str(caught.value).startswith(str(path))
+    assert message in str(caught.value)
+    assert str(caught.value).isprintable()
+
+
+def test_alias_bomb_is_refused_unexpanded(tmp_path: Path) -> None:
+    levels = "".join(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]\n" for i in range(1, 12))
+    path = write_robot(tmp_path, f"a0: &a0 bomb\n{levels}")
+    with pytest.raises(RobotFileError, match="expand without end"):
+        read_robot(path)
+
+
+def test_missing_file_folder_and_device_are_refused(tmp_path: Path) -> None:
+    for path, message in (
+        (tmp_path / "none.yaml", "none.yaml: no such file; check the path"),
+        (tmp_path, "is a directory; give the path of a file"),
+        (Path("/dev/null"), "is not a regular file"),
+        (Path("a\0b"), "cannot be read"),
+    ):
+        with pytest.raises(RobotFileError) as caught:
+            read_robot(path)
+        assert message in str(caught.value)
+
+
+def test_missing_urdf_names_the_place_in_the_robot_file(tmp_path: Path) -> None:
+    path = write_robot(tmp_path, URDF_ROBOT_YAML)
+    with pytest.raises(RobotFileError, match=r"arm\.yaml:3: kinematics\.urdf\.file: .*arm\.urdf: no such file"):
+        read_robot(path)
+
+
+def test_joint_named_otherwise_than_in_the_urdf_is_refused_with_both_names(tmp_path: Path) -> None:
+    path = write_robot(tmp_path, URDF_ROBOT_YAML + "joints:\n  - name: elbow\n  - name: shoulder\n", URDF)
+    with pytest.raises(
+        RobotFileError, match=r":5: joints\[0\]\.name \(joint 1, 'elbow'\): 'elbow' is joint 'shoulder'"
+    ):
+        read_robot(path)
+
+
+def test_urdf_with_another_number_of_joints_is_refused(tmp_path: Path) -> None:
+    path = write_robot(tmp_path, URDF_ROBOT_YAML + "joints:\n  - name: shoulder\n", URDF)
+    with pytest.raises(RobotFileError, match=r":4: joints: number of entries is 1, of joints in kinematics\.urdf 2"):
+        read_robot(path)
+
+
+def test_error_in_the_urdf_names_the_urdf_and_its_line(tmp_path: Path) -> None:
+    path = write_robot(tmp_path, URDF_ROBOT_YAML, replaced(URDF, 'value="2.0"', 'value="two"'))
+    with pytest.raises(RobotFileError, match=r"arm\.urdf:7: mass: value='two' is not a finite number"):
+        read_robot(path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("mass: 1.4", "mass: -1.4", "mass -1.4 kg is negative"),
+        ("mass: 1.4", "mass: 0", "mass is zero but the first moment is [0.1, 0, 0] kg m"),
+        ("xx: 0.02, yy: 0.03", "xx: -0.02, yy: 0.03", "inertia is not positive semidefinite: principal moments"),
+        ("zz: 0.03, xy", "zz: 0.08, xy", "inertia breaks the triangle inequality: principal moments"),
+        ("xx: 0.02, yy: 0.03, zz: 0.03", "xx: 0.01, yy: 0.006, zz: 0.006", "inertia is not positive semidefinite"),
+        ("xy: 0, xz: 0, yz: 0}}\n  fr", "xy: 0.1, xz: 0, yz: 0}}\n  fr", "inertia is not positive semidefinite"),
+    ],
+)
+def test_impossible_body_in_the_model_is_refused_by_link_and_condition(
+    tmp_path: Path, old: str, new: str, message: str
+) -> None:
+    path = write_robot(tmp_path, replaced(ROBOT_YAML, old, new))
+    with pytest.raises(UnphysicalModelError) as caught:
+        read_robot(path)
+    assert str(caught.value).startswith(f"{path}:20: model.links[1] (link 2, 'slide'): {message}")
+    assert "about the link frame's origin" in str(caught.value)
+
+
+def test_impossible_inertial_of_a_urdf_is_refused(tmp_path: Path) -> None:
+    path = write_robot(tmp_path, URDF_ROBOT_YAML, replaced(URDF, 'izz="0.04"', 'izz="0.4"'))
+    with pytest.raises(
+        UnphysicalModelError, match=r"arm\.urdf:5: inertial of link 'upper': inertia breaks the triangle"
+    ):
+        read_robot(path)
