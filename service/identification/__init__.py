@@ -1,0 +1,6 @@
+"""Parameters from recordings: terms, noise, LS and WLS, uncertainty, physical consistency, compensation."""
+
+from service.identification.identification import Estimator, Identification, Options, identify
+from service.identification.result import IdentificationDocument, document
+
+__all__ = ["Estimator", "Identification", "IdentificationDocument", "Options", "document", "identify"]

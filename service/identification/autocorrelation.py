@@ -1,0 +1,109 @@
+"""Autocorrelation of residuals: autoregressive models with their order chosen by BIC.
+
+A residual that leaves noise behind is rarely white: filters, friction and what the model lacks colour it. Standard errors
+that ignore this are too small. An order that is fixed instead of chosen finds colour in white noise.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import signal
+
+from service.recording.recording import Array
+
+LARGEST_ORDER = 30
+
+
+@dataclass(frozen=True, eq=False)
+class Autoregression:
+    """e_t = Σ a_k e_{t-k} + ε_t.
+
+    coefficients : (p,) float64
+        a_1 … a_p; empty for white noise
+    innovation_variance : float
+        variance of ε
+    variance : float
+        variance of e
+    """
+
+    coefficients: Array
+    innovation_variance: float
+    variance: float
+
+    @property
+    def order(self) -> int:
+        """Number of coefficients p."""
+        return len(self.coefficients)
+
+    @property
+    def long_run_ratio(self) -> float:
+        """Spectral density at frequency zero over that of white noise of the same variance, at least 1.
+
+        By this much a slowly varying coefficient's variance exceeds what independent residuals would give it.
+        """
+        if self.variance <= 0.0:
+            return 1.0
+        gain = 1.0 / (1.0 - self.coefficients.sum()) ** 2
+        return max(1.0, float(self.innovation_variance * gain / self.variance))
+
+    def colour(self, columns: Array) -> Array:
+        """Columns run through σ_ε / a(z): their Gram matrix is LᵀΩL, Ω the residual's covariance.
+
+        Parameters
+        ----------
+        columns : (k, M) float64
+            signals, time last
+        """
+        scale = np.sqrt(self.innovation_variance)
+        if self.order == 0:
+            return columns * scale
+        return signal.lfilter([scale], np.append(1.0, -self.coefficients), columns, axis=-1)
+
+
+class AutocovarianceSum:
+    """Lagged products of a residual, summed over pieces with samples missing."""
+
+    def __init__(self, lags: int = LARGEST_ORDER) -> None:
+        self._products = np.zeros(lags + 1)
+        self._counts = np.zeros(lags + 1)
+
+    def add(self, residual: Array, used: NDArray[np.bool_]) -> None:
+        """Add one piece.
+
+        Parameters
+        ----------
+        residual : (M,) float64
+            consecutive samples
+        used : (M,) bool
+            which of them count
+        """
+        whole = bool(used.all())
+        kept = residual if whole else np.where(used, residual, 0.0)
+        presence = None if whole else used.astype(float)
+        for lag in range(min(len(self._products), len(kept))):
+            stop = len(kept) - lag
+            self._products[lag] += kept[:stop] @ kept[lag:]
+            self._counts[lag] += stop if presence is None else presence[:stop] @ presence[lag:]
+
+    def model(self) -> Autoregression:
+        """The autoregressive model of smallest BIC = N log σ_ε² + p log N, by Levinson's recursion."""
+        count = self._counts[0]
+        if count < 2 or self._products[0] <= 0.0:
+            return Autoregression(np.empty(0), 0.0, 0.0)
+        # Divided by N at every lag, not by the pairs at that lag: the sequence stays positive definite.
+        covariance = self._products / count
+        largest = int(min(LARGEST_ORDER, len(covariance) - 1, count // 10))
+        best = (np.empty(0), covariance[0])
+        best_score = count * np.log(covariance[0])
+        coefficients, variance = np.empty(0), covariance[0]
+        for order in range(1, largest + 1):
+            reflection = (covariance[order] - coefficients @ covariance[order - 1 : 0 : -1]) / variance
+            coefficients = np.append(coefficients - reflection * coefficients[::-1], reflection)
+            variance *= 1.0 - reflection**2
+            if variance <= 0.0:
+                break
+            score = count * np.log(variance) + order * np.log(count)
+            if score < best_score:
+                best, best_score = (coefficients.copy(), variance), score
+        return Autoregression(best[0], float(best[1]), float(covariance[0]))

@@ -1,0 +1,115 @@
+"""Standard errors that stay right when the residual is autocorrelated.
+
+cov Θ̂ = B M B,  B = (Σ_j w_j² A_jᵀ A_j)⁻¹,  M = Σ_j w_j⁴ A_jᵀ Ω_j A_j,
+
+with Ω_j the covariance of joint j's residual by its autoregressive model and w_j = 1/σ_j (WLS) or 1 (LS). For white
+residuals this is (LᵀΣ⁻¹L)⁻¹. Estimated shape constants of the friction enter as columns of their own, so that what they
+leave uncertain shows in the coefficients.
+"""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from service.dynamics.friction import smooth_sign_slope
+from service.identification.autocorrelation import Autoregression
+from service.identification.dataset import PreparedMotion
+from service.identification.least_squares import JointFactor
+from service.identification.structure import ModelStructure
+from service.recording.recording import Array
+
+ShapeParameter = tuple[int, str]
+"""Joint index and ``k_v`` or ``delta``: a shape constant that was estimated, as its logarithm."""
+
+
+def parameter_covariance(
+    motions: Iterable[PreparedMotion],
+    structure: ModelStructure,
+    parameters: Array,
+    factors: Sequence[JointFactor],
+    weight: Array,
+    autoregressions: Sequence[Autoregression],
+    shapes: Sequence[ShapeParameter] = (),
+) -> Array:
+    """Covariance of all parameters, with the estimated shape constants appended.
+
+    Parameters
+    ----------
+    motions : iterable of PreparedMotion
+        the data, in pieces; gone through only for joints whose residual is coloured or whose shape was estimated
+    structure : ModelStructure
+        the model's columns
+    parameters : (p,) float64
+        the estimate
+    factors : sequence of JointFactor, length n
+        of this model on these data
+    weight : (n,) float64
+        w_j, the weights that the estimate was made with
+    autoregressions : sequence of Autoregression, length n
+        of each joint's residual in the common band
+    shapes : sequence of ShapeParameter
+        shape constants that were estimated, s of them
+
+    Returns
+    -------
+    (p + s, p + s) float64
+        covariance of Θ and of the logarithms of the shape constants
+    """
+    size = structure.size + len(shapes)
+    bread, meat = np.zeros((size, size)), np.zeros((size, size))
+    extended = {joint for joint, _ in shapes}
+    passed = [joint for joint, model in enumerate(autoregressions) if model.order > 0 or joint in extended]
+    for joint, (factor, model) in enumerate(zip(factors, autoregressions, strict=True)):
+        if joint not in passed:
+            columns = factor.triangle[:, :-1]
+            square = columns.T @ columns
+            place = np.ix_(factor.columns, factor.columns)
+            bread[place] += weight[joint] ** 2 * square
+            meat[place] += weight[joint] ** 4 * model.variance * square
+    for prepared in motions if passed else ():
+        for joint in passed:
+            columns, index = _columns_with_shapes(prepared, structure, joint, parameters, shapes)
+            used = prepared.used[joint]
+            columns = prepared.row_weight * (columns if used.all() else columns * used)
+            coloured = autoregressions[joint].colour(columns)
+            place = np.ix_(index, index)
+            bread[place] += weight[joint] ** 2 * (columns @ columns.T)
+            meat[place] += weight[joint] ** 4 * (coloured @ coloured.T)
+    rows = sum(factor.rows for factor in factors)
+    inverse = _pseudo_inverse(bread)
+    return rows / max(rows - size, 1) * inverse @ meat @ inverse
+
+
+def _columns_with_shapes(
+    prepared: PreparedMotion,
+    structure: ModelStructure,
+    joint: int,
+    parameters: Array,
+    shapes: Sequence[ShapeParameter],
+) -> tuple[Array, Array]:
+    """A joint's columns and those of its shape constants, ∂τ/∂log K = c · K · ∂A(K q̇)/∂K, with their global places."""
+    columns = prepared.joint_columns(structure, joint)
+    index = structure.joint_columns(joint)
+    extra = [(place, name) for place, (owner, name) in enumerate(shapes) if owner == joint]
+    if not extra:
+        return columns, index
+    velocity = prepared.motion.velocity[:, joint]
+    rows = []
+    for _, name in extra:
+        value = structure.terms[joint].k_v if name == "k_v" else structure.terms[joint].delta or 0.0
+        coefficient = structure.coefficient(joint, "stiction" if name == "k_v" else "stribeck")
+        amplitude = 0.0 if coefficient is None else parameters[coefficient]
+        rows.append(amplitude * value * smooth_sign_slope(velocity, value))
+    sensitivity = prepared.motion.band.reduce(np.stack(rows))
+    places = structure.size + np.array([place for place, _ in extra])
+    return np.concatenate([columns, sensitivity]), np.concatenate([index, places])
+
+
+def _pseudo_inverse(matrix: Array) -> Array:
+    """Inverse in scaled columns; directions without information stay without variance, and are flagged elsewhere."""
+    scale = np.sqrt(np.diag(matrix))
+    scale[scale == 0.0] = 1.0
+    values, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
+    known = values > 1e-14 * values[-1]
+    half = vectors[:, known] / np.sqrt(values[known]) / scale[:, None]
+    return half @ half.T

@@ -1,0 +1,141 @@
+"""The recordings' equations, ready to be summed: kept in memory while they are few, made again when they are many."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from service.dynamics.base_parameters import BaseParameters
+from service.dynamics.regressor import torque_regressor
+from service.identification.structure import ModelStructure
+from service.recording.recording import Array
+from service.recording.conditioning import Conditioner, Mask, Motion
+from service.robot import Robot
+
+MEMORY_LIMIT = 256 * 1024 * 1024
+"""Bytes of columns that are kept between passes; beyond, every pass conditions the recording again."""
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedMotion:
+    """One piece of motion with its rigid-body columns.
+
+    motion : Motion
+        the conditioned motion
+    rigid : (n, m, N) float64
+        base regressor L at the recorded rate
+    reduced_rigid : (n, m, M) float64
+        the same in the common band, decimated
+    reduced_torque : (n, M) float64
+        measured torque in the common band, mean of the repetitions
+    used : (n, M) bool
+        rows that rest on measured torque
+    recording : int
+        index of the recording it came from
+    """
+
+    motion: Motion
+    rigid: Array
+    reduced_rigid: Array
+    reduced_torque: Array
+    used: Mask
+    recording: int
+
+    @property
+    def row_weight(self) -> float:
+        """√P: a mean of P repetitions has 1/P of the noise variance."""
+        return float(np.sqrt(self.motion.repetitions))
+
+    def joint_columns(self, structure: ModelStructure, joint: int) -> Array:
+        """All columns of a joint's equation in the common band, (p_j, M).
+
+        Parameters
+        ----------
+        structure : ModelStructure
+            the model's columns
+        joint : int
+            joint index, from 0
+        """
+        motion = self.motion
+        own = structure.joint_term_columns(joint, motion.velocity[:, joint], motion.acceleration[:, joint])
+        outward = self.reduced_rigid[joint, structure.outward_columns(joint)]
+        return np.concatenate([outward, motion.band.reduce(own)])
+
+    def predicted_torque(self, structure: ModelStructure, parameters: Array) -> Array:
+        """Model torque at the recorded rate, before any filter, (N, n).
+
+        Parameters
+        ----------
+        structure : ModelStructure
+            the model's columns
+        parameters : (p,) float64
+            their coefficients
+        """
+        motion = self.motion
+        torque = np.empty_like(motion.position)
+        for joint in range(torque.shape[1]):
+            own = structure.joint_term_columns(joint, motion.velocity[:, joint], motion.acceleration[:, joint])
+            outward = structure.outward_columns(joint)
+            columns = structure.joint_columns(joint)
+            torque[:, joint] = parameters[columns[: len(outward)]] @ self.rigid[joint, outward]
+            torque[:, joint] += parameters[columns[len(outward) :]] @ own
+        return torque
+
+
+@dataclass(eq=False)
+class Dataset:
+    """All pieces of motion of some recordings, in one band, that can be gone through again and again.
+
+    conditioners : sequence of Conditioner
+        one a recording
+    robot : Robot
+        the arm
+    base : BaseParameters
+        its identifiable combinations
+    cutoff_hz : float or None
+        the common band; None for no filter
+    """
+
+    conditioners: Sequence[Conditioner]
+    robot: Robot
+    base: BaseParameters
+    cutoff_hz: float | None
+    _kept: list[PreparedMotion] | None = field(default=None, repr=False)
+    _too_large: bool = field(default=False, repr=False)
+
+    def __iter__(self) -> Iterator[PreparedMotion]:
+        """The pieces in the order of the recordings; computed once where they fit into `MEMORY_LIMIT`."""
+        if self._kept is not None:
+            yield from self._kept
+            return
+        kept: list[PreparedMotion] = []
+        size = 0
+        for prepared in self._prepare():
+            size += prepared.rigid.nbytes + prepared.reduced_rigid.nbytes
+            self._too_large = self._too_large or size > MEMORY_LIMIT
+            if self._too_large:
+                kept.clear()
+            else:
+                kept.append(prepared)
+            yield prepared
+        if not self._too_large:
+            self._kept = kept
+
+    def _prepare(self) -> Iterator[PreparedMotion]:
+        """Condition, evaluate the regressor, and reduce."""
+        columns = np.asarray(self.base.independent_columns)
+        for index, conditioner in enumerate(self.conditioners):
+            for motion in conditioner.motions(self.cutoff_hz):
+                regressor = torque_regressor(
+                    self.robot, motion.position, motion.velocity, motion.acceleration, columns=columns
+                )
+                rigid = np.moveaxis(regressor, 0, -1)
+                reduce = motion.band.reduce
+                yield PreparedMotion(
+                    motion,
+                    rigid,
+                    reduce(rigid),
+                    reduce(np.ascontiguousarray(motion.mean_torque.T)),
+                    motion.band.reduce_mask(motion.measured.any(axis=0).T),
+                    index,
+                )

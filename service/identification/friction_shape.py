@@ -1,0 +1,362 @@
+"""Shape constants K_v and δ of the friction curve, by separable least squares.
+
+The coefficients of (7) are linear and are eliminated exactly (variable projection); only the shape constants remain. All
+columns Z that do not depend on them (rigid body, viscous, offset) are projected off: with S Sᵀ = (ZᵀZ)⁻¹ from the factors
+at hand, Q = Z S is never formed, only Qᵀ G = Sᵀ (ZᵀG) of the candidate columns G, summed in one pass. What is left are small
+Gram matrices, in which every joint's constants are searched over a logarithmic grid, joint after joint until nothing moves, and
+refined between grid points. A constant that the data cannot tell says so and takes an ordinary value that fits as well:
+never a slope that ran away.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from service.dynamics.friction import smooth_sign
+from service.identification.dataset import PreparedMotion
+from service.identification.least_squares import JointFactor, Solution, restricted, solve
+from service.identification.structure import ModelStructure
+from service.recording.recording import Array
+from service.robot import FrictionShape
+
+GRID_POINTS = 37
+GRID_DECADES = (0.8, 4.3)
+"""K times the joint's rms velocity runs over these powers of ten: from a slope that is still no viscous friction to a step."""
+
+ORDINARY = 100.0
+"""K times the rms velocity of a constant that the data leave open, as near as they allow: a step, but a smooth one."""
+
+SEPARATION = 4.0
+"""K_v is at least this many times δ: closer, their columns are one."""
+
+IMPROVEMENT = 25.0
+"""What a Stribeck term must take off the criterion, in noise variances after autocorrelation: five standard errors."""
+
+IMPROVEMENT_SHARE = 0.02
+"""…and the share of the joint's residual energy that it must explain, so that it is not a proxy of something else."""
+
+KNOWN_BAND = 9.0
+"""Constants whose criterion is within this much of the best are not told apart: three standard errors."""
+
+COLLINEAR = 1e-9
+"""A second column with less than this share of its energy left beside the first adds nothing."""
+
+AS_GOOD = 0.02
+"""Share of the residual's energy that is no practical difference between two constants."""
+
+SWEEPS = 4
+
+
+@dataclass(frozen=True)
+class EstimatedShape:
+    """Shape constants of one joint.
+
+    k_v : float
+        slope of the step at zero velocity [s/rad or s/m]
+    delta : float or None
+        slope of the Stribeck term [s/rad or s/m]; None where the data show no such term
+    k_v_identifiable, delta_identifiable : bool
+        False where the data cannot tell the constant
+    k_v_given, delta_given : bool
+        True where the robot file states it
+    """
+
+    k_v: float
+    delta: float | None
+    k_v_identifiable: bool
+    delta_identifiable: bool
+    k_v_given: bool
+    delta_given: bool
+
+
+@dataclass(frozen=True, eq=False)
+class _JointGrid:
+    """One joint's candidate columns after projection.
+
+    slopes : (g,) float64
+        candidate constants
+    gram : (g, g) float64
+        GᵀG of its columns, before projection
+    inner : (z, g) float64
+        Q_jᵀ G: what the projection takes away
+    target : (g,) float64
+        Gᵀ y after projection
+    """
+
+    slopes: Array
+    gram: Array
+    inner: Array
+    target: Array
+
+    def block(self, other: "_JointGrid", mine: list[int], theirs: list[int]) -> Array:
+        """Projected Gram matrix between columns of two joints."""
+        product = -self.inner[:, mine].T @ other.inner[:, theirs]
+        return product + self.gram[np.ix_(mine, theirs)] if self is other else product
+
+
+def estimate_shapes(
+    motions: Iterable[PreparedMotion],
+    structure: ModelStructure,
+    factors: tuple[JointFactor, ...],
+    noise_std: Array,
+    inflation: Array,
+) -> tuple[EstimatedShape, ...]:
+    """Shape constants of all joints; those that the robot file states are kept.
+
+    Parameters
+    ----------
+    motions : iterable of PreparedMotion
+        the data; gone through twice
+    structure : ModelStructure
+        a preliminary model
+    factors : tuple of JointFactor
+        of that model on these data
+    noise_std : (n,) float64
+        residual standard deviation in the common band, for the weights
+    inflation : (n,) float64
+        variance inflation by autocorrelation, at least 1
+
+    Returns
+    -------
+    tuple of EstimatedShape
+        one a joint
+    """
+    given = [joint.friction_shape for joint in structure.robot.joints]
+    shared = _shared_columns(structure)
+    without_steps = restricted(factors, shared)
+    solution = solve(without_steps, len(shared), noise_std)
+    slopes = _candidate_slopes(motions, structure, given)
+    grids = _projected_grids(motions, structure, shared, solution, noise_std, slopes)
+    chosen = _search(grids, given)
+    squares = (f.squared_residual(solution.parameters) for f in without_steps)
+    energy = sum(square / std**2 for square, std in zip(squares, noise_std, strict=True))
+    rows = sum(factor.rows for factor in factors)
+    variance = max(float(energy - _total_gain(grids, chosen)) / rows, np.finfo(float).eps)
+    return tuple(
+        _described(grids, chosen, joint, given[joint], inflation[joint] * variance, factors[joint].rows * variance)
+        for joint in range(len(grids))
+    )
+
+
+def _candidate_slopes(
+    motions: Iterable[PreparedMotion], structure: ModelStructure, given: Sequence[FrictionShape]
+) -> list[Array]:
+    """Per joint a logarithmic grid relative to its rms velocity, then the stated constants."""
+    squares, count = np.zeros(structure.robot.joint_count), 0
+    for prepared in motions:
+        squares += np.sum(prepared.motion.velocity**2, axis=0)
+        count += len(prepared.motion.velocity)
+    speed = np.sqrt(squares / max(count, 1))
+    grids = []
+    for shape, typical in zip(given, speed, strict=True):
+        grid = np.logspace(*GRID_DECADES, GRID_POINTS) / max(float(typical), 1e-9)
+        stated = [value for value in (shape.k_v, shape.delta) if value is not None]
+        grids.append(np.append(grid, stated))
+    return grids
+
+
+def _shared_columns(structure: ModelStructure) -> NDArray[np.intp]:
+    """Global columns that do not depend on any shape constant."""
+    steps = [
+        structure.coefficient(joint, name)
+        for joint in range(structure.robot.joint_count)
+        for name in ("stiction", "stribeck")
+    ]
+    return np.setdiff1d(np.arange(structure.size), [column for column in steps if column is not None])
+
+
+def _projected_grids(
+    motions: Iterable[PreparedMotion],
+    structure: ModelStructure,
+    shared: NDArray[np.intp],
+    solution: Solution,
+    noise_std: Array,
+    slopes: list[Array],
+) -> list[_JointGrid]:
+    """Candidate columns of every joint, projected off the shared ones; one pass over the data."""
+    joints = range(structure.robot.joint_count)
+    gram = [np.zeros((len(values), len(values))) for values in slopes]
+    cross = [np.zeros((len(shared), len(values))) for values in slopes]
+    target = [np.zeros(len(values)) for values in slopes]
+    for prepared in motions:
+        for joint in joints:
+            columns = prepared.joint_columns(structure, joint)
+            index = structure.joint_columns(joint)
+            kept = np.isin(index, shared)
+            place = np.searchsorted(shared, index[kept])
+            velocity = prepared.motion.velocity[:, joint]
+            weight = prepared.used[joint] * (prepared.row_weight / noise_std[joint])
+            steps = weight * prepared.motion.band.reduce(smooth_sign(velocity, slopes[joint][:, None]))
+            common = weight * columns[kept]
+            residual = weight * prepared.reduced_torque[joint] - solution.parameters[place] @ common
+            gram[joint] += steps @ steps.T
+            cross[joint][place] += common @ steps.T
+            target[joint] += steps @ residual
+    return [_JointGrid(slopes[j], gram[j], solution.spread.T @ cross[j], target[j]) for j in joints]
+
+
+def _search(grids: list[_JointGrid], given: Sequence[FrictionShape]) -> list[list[int]]:
+    """Grid indices [K_v] or [K_v, δ] a joint, each joint's best with the others held, until nothing moves."""
+    options = [_plain_options(grid, shape) for grid, shape in zip(grids, given, strict=True)]
+    chosen = [candidates[len(candidates) // 2] for candidates in options]
+    for _ in range(SWEEPS):
+        before = list(chosen)
+        for joint, candidates in enumerate(options):
+            if len(candidates) > 1:
+                gains = _Conditional.of(grids, chosen, joint).gains(candidates)
+                chosen[joint] = candidates[int(np.argmax(gains))]
+        if chosen == before:
+            break
+    return chosen
+
+
+def _plain_options(grid: _JointGrid, shape: FrictionShape) -> list[list[int]]:
+    """What a joint's constants may be without a Stribeck term of unknown δ; stated constants are kept."""
+    if shape.k_v is not None and shape.delta is not None:
+        return [[GRID_POINTS, GRID_POINTS + 1]]
+    if shape.k_v is not None:
+        return [[GRID_POINTS]]
+    if shape.delta is not None:
+        return [[k, GRID_POINTS] for k in range(GRID_POINTS) if grid.slopes[k] >= SEPARATION * shape.delta]
+    return [[k] for k in range(GRID_POINTS)]
+
+
+def _stribeck_options(grid: _JointGrid, shape: FrictionShape) -> list[list[int]]:
+    """Pairs of constants with a Stribeck term, for joints whose file states no δ."""
+    steep = [GRID_POINTS] if shape.k_v is not None else list(range(GRID_POINTS))
+    slopes = grid.slopes
+    return [[k, d] for k in steep for d in range(GRID_POINTS) if slopes[k] >= SEPARATION * slopes[d]]
+
+
+def _total_gain(grids: list[_JointGrid], chosen: list[list[int]]) -> float:
+    """What the chosen columns of all joints together take off the criterion."""
+    pairs = list(zip(grids, chosen, strict=True))
+    matrix = np.block([[a.block(b, i, j) for b, j in pairs] for a, i in pairs])
+    target = np.concatenate([grid.target[indices] for grid, indices in pairs])
+    return float(target @ linalg.lstsq(matrix, target, cond=1e-12)[0])
+
+
+@dataclass(frozen=True, eq=False)
+class _Conditional:
+    """One joint's candidates after the chosen columns of all other joints are projected off as well."""
+
+    gram: Array
+    target: Array
+
+    @staticmethod
+    def of(grids: list[_JointGrid], chosen: list[list[int]], joint: int) -> "_Conditional":
+        """The candidates of `joint` with the other joints as chosen."""
+        grid, every = grids[joint], list(range(len(grids[joint].slopes)))
+        gram, target = grid.block(grid, every, every), grid.target
+        others = [(grids[k], chosen[k]) for k in range(len(grids)) if k != joint]
+        if not others:
+            return _Conditional(gram, target)
+        matrix = np.block([[a.block(b, i, j) for b, j in others] for a, i in others])
+        cross = np.vstack([other.block(grid, indices, every) for other, indices in others])
+        known = np.concatenate([other.target[indices] for other, indices in others])
+        solved = linalg.lstsq(matrix, np.column_stack([cross, known]), cond=1e-12)[0]
+        return _Conditional(gram - cross.T @ solved[:, :-1], target - cross.T @ solved[:, -1])
+
+    def gains(self, options: list[list[int]]) -> Array:
+        """What each option, one or two columns, takes off the criterion."""
+        first = np.array([option[0] for option in options])
+        energy = np.maximum(np.diag(self.gram), np.finfo(float).tiny)
+        single = self.target[first] ** 2 / energy[first]
+        if len(options[0]) == 1:
+            return single
+        second = np.array([option[1] for option in options])
+        overlap = self.gram[first, second] / energy[first]
+        left = energy[second] - overlap * self.gram[first, second]
+        added = (self.target[second] - overlap * self.target[first]) ** 2
+        return single + np.where(left > COLLINEAR * energy[second], added / np.maximum(left, 1e-300), 0.0)
+
+
+def _described(
+    grids: list[_JointGrid],
+    chosen: list[list[int]],
+    joint: int,
+    shape: FrictionShape,
+    unit: float,
+    residual_energy: float,
+) -> EstimatedShape:
+    """The joint's constants refined, with what the data can tell about them; `unit` is one noise variance."""
+    conditional = _Conditional.of(grids, chosen, joint)
+    indices = chosen[joint]
+    if shape.delta is None:
+        indices = _with_stribeck(conditional, grids[joint], indices, shape, unit, residual_energy)
+    slopes = grids[joint].slopes
+    k_v, k_v_known = float(slopes[indices[0]]), True
+    if shape.k_v is None:
+        k_v, k_v_known = _profiled(conditional, slopes, indices, 0, unit, residual_energy)
+    delta, delta_known = shape.delta, shape.delta is not None
+    if shape.delta is None and len(indices) > 1:
+        delta, delta_known = _profiled(conditional, slopes, indices, 1, unit, residual_energy)
+        delta = delta if delta_known else None
+    return EstimatedShape(k_v, delta, k_v_known, delta_known, shape.k_v is not None, shape.delta is not None)
+
+
+def _with_stribeck(
+    conditional: _Conditional,
+    grid: _JointGrid,
+    plain: list[int],
+    shape: FrictionShape,
+    unit: float,
+    residual_energy: float,
+) -> list[int]:
+    """The best pair [K_v, δ] where it explains enough more than K_v alone, else the plain choice.
+
+    K_v alone may lie between two grid points: it is given the next point's column too, which spans what lies between.
+    """
+    pairs = _stribeck_options(grid, shape)
+    if not pairs:
+        return plain
+    gains = conditional.gains(pairs)
+    best = int(np.argmax(gains))
+    alone = float(conditional.gains([plain])[0])
+    if shape.k_v is None:
+        beside = [[plain[0], plain[0] + step] for step in (-1, 1) if 0 <= plain[0] + step < GRID_POINTS]
+        alone = max(alone, float(conditional.gains(beside).max()))
+    enough = max(IMPROVEMENT * unit, IMPROVEMENT_SHARE * residual_energy)
+    return pairs[best] if gains[best] - alone > enough else plain
+
+
+def _profiled(
+    conditional: _Conditional, slopes: Array, indices: list[int], place: int, unit: float, residual_energy: float
+) -> tuple[float, bool]:
+    """One constant refined along its profile, and whether the profile closes on both sides.
+
+    Where it stays open, the most ordinary of the values that fit practically as well is taken: never one that ran away.
+    """
+    options = [[candidate if k == place else index for k, index in enumerate(indices)] for candidate in range(GRID_POINTS)]
+    profile = conditional.gains(options)
+    best = int(np.argmax(profile))
+    close = np.flatnonzero(profile >= profile[best] - KNOWN_BAND * unit)
+    if close[0] == 0 or close[-1] == GRID_POINTS - 1:
+        ordinary = ORDINARY / 10 ** GRID_DECADES[0] * slopes[0]
+        fitting = np.flatnonzero(profile >= profile[best] - AS_GOOD * residual_energy)
+        return float(slopes[fitting[np.argmin(np.abs(np.log(slopes[fitting] / ordinary)))]]), False
+    left, middle, right = profile[best - 1 : best + 2]
+    curvature = left - 2.0 * middle + right
+    shift = 0.5 * (left - right) / curvature if curvature < 0.0 else 0.0
+    return float(slopes[best] * np.exp(shift * np.log(slopes[1] / slopes[0]))), True
+
+
+def shape_parameters(shapes: Sequence[EstimatedShape]) -> list[tuple[int, str]]:
+    """The constants that were estimated and found: they share in the covariance.
+
+    Parameters
+    ----------
+    shapes : sequence of EstimatedShape
+        one a joint
+    """
+    estimated: list[tuple[int, str]] = []
+    for joint, shape in enumerate(shapes):
+        if shape.k_v_identifiable and not shape.k_v_given:
+            estimated.append((joint, "k_v"))
+        if shape.delta is not None and shape.delta_identifiable and not shape.delta_given:
+            estimated.append((joint, "delta"))
+    return estimated
+

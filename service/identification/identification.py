@@ -1,0 +1,370 @@
+"""From a robot and recordings to parameters: the whole way, in the order of the steps."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Literal
+
+import numpy as np
+from scipy import stats
+
+from service.dynamics.base_parameters import BaseParameters, base_parameters
+from service.errors import RecordingMismatchError
+from service.identification.band import choose_cutoff, preliminary_terms
+from service.identification.consistency import (
+    ConsistentParameters,
+    FrictionColumns,
+    friction_inequalities,
+    nearest_consistent_parameters,
+    plausible_prior,
+)
+from service.identification.covariance import parameter_covariance
+from service.identification.dataset import Dataset
+from service.identification.friction_shape import EstimatedShape, estimate_shapes, shape_parameters
+from service.identification.least_squares import (
+    JointFactor,
+    Solution,
+    condition_number,
+    factorise,
+    restricted,
+    solve,
+)
+from service.identification.residuals import Fit, ResidualStatistics, evaluate
+from service.identification.rotor import kept_columns, needed_rotors, separable_rotors
+from service.identification.structure import JointTerms, ModelStructure
+from service.recording.recording import Array, Recording
+from service.recording.conditioning import Conditioner, ConditioningSummary
+from service.robot import Robot
+
+REWEIGHTINGS = 2
+"""Rounds of estimating σ_j from the residual and solving again; it settles in two."""
+
+CONSISTENCY_LEVEL = 0.999
+"""The free estimate counts as impossible, not merely unlucky, where physics rejects it at this level."""
+
+KNOWN_SHARE = 0.1
+"""A coefficient whose standard error moves the joint's torque by more than this share of its rms is not identifiable."""
+
+Progress = Callable[[str], None]
+
+
+class Estimator(StrEnum):
+    """How the joints' equations are weighted."""
+
+    LS = "ls"
+    WLS = "wls"
+
+
+@dataclass(frozen=True)
+class Options:
+    """What a user may ask of an identification.
+
+    estimator : Estimator
+        LS (17) or WLS (19)
+    cutoff_hz : float, None or "auto"
+        band that torque and regressor share [Hz]; None for no filter; chosen from the data by default
+    rotor_inertia : bool
+        whether rotors are added where the data ask for them
+    """
+
+    estimator: Estimator = Estimator.WLS
+    cutoff_hz: float | Literal["auto"] | None = "auto"
+    rotor_inertia: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """A model of the arm with what is known about its uncertainty.
+
+    robot : Robot
+        the arm
+    structure : ModelStructure
+        the model's columns
+    parameters : (p,) float64
+        the model that is delivered: the free estimate, or the consistent one where physics rejects the free one
+    free_parameters : (p,) float64
+        the LS or WLS estimate
+    consistent_parameters : (p,) float64
+        the nearest physically consistent parameters in the same columns
+    constrained : bool
+        whether `parameters` are the consistent ones
+    covariance : (p + s, p + s) float64
+        of the free estimate, and of the logarithms of the estimated shape constants
+    undetermined : (p,) bool
+        parameters about which the recordings say nothing
+    shapes : tuple of EstimatedShape, length n
+        the friction curves' shape constants
+    consistent : ConsistentParameters
+        full standard parameters of the links
+    condition_number : float
+        of the unweighted regressor
+    residuals : ResidualStatistics
+        of `parameters` on the recordings: fit, noise, autocorrelation
+    consistent_fit, held_out, held_out_consistent : Fit or None
+        fits of the consistent parameters; of `parameters` and of the consistent ones on the held-out recordings
+    cutoff_hz : float or None
+        the band that was used
+    estimator : Estimator
+        how it was weighted
+    conditioning, held_out_conditioning : tuple of ConditioningSummary
+        one a recording
+    identifiable : tuple of dict, length n
+        per joint and coefficient, whether the data can tell it
+    """
+
+    robot: Robot
+    structure: ModelStructure
+    parameters: Array
+    free_parameters: Array
+    consistent_parameters: Array
+    constrained: bool
+    covariance: Array
+    undetermined: np.ndarray
+    shapes: tuple[EstimatedShape, ...]
+    consistent: ConsistentParameters
+    condition_number: float
+    residuals: ResidualStatistics
+    consistent_fit: Fit
+    held_out: Fit | None
+    held_out_consistent: Fit | None
+    cutoff_hz: float | None
+    estimator: Estimator
+    conditioning: tuple[ConditioningSummary, ...]
+    held_out_conditioning: tuple[ConditioningSummary, ...]
+    identifiable: tuple[dict[str, bool], ...]
+
+
+def identify(
+    robot: Robot,
+    recordings: Sequence[Recording],
+    held_out: Sequence[Recording] = (),
+    options: Options = Options(),  # noqa: B008 - frozen
+    progress: Progress = lambda step: None,
+) -> Identification:
+    """Identify a robot arm from recordings.
+
+    Parameters
+    ----------
+    robot : Robot
+        the arm
+    recordings : sequence of Recording
+        what the model is made from; each one continuous motion
+    held_out : sequence of Recording
+        what it is judged by, never used for the estimate
+    options : Options
+        estimator, band, optional terms
+    progress : callable
+        told the name of each step as it begins
+
+    Returns
+    -------
+    Identification
+        the model and its uncertainty
+
+    Raises
+    ------
+    RecordingMismatchError
+        where a recording has another number of joints than the robot
+    RecordingError
+        where a recording is too short or too broken to be used
+    IdentificationError
+        where the recordings hold too little for the parameters
+    """
+    for recording in (*recordings, *held_out):
+        if recording.joint_count != robot.joint_count:
+            raise RecordingMismatchError(
+                f"{recording.name}: has {recording.joint_count} joints, robot {robot.name} has {robot.joint_count}:"
+                " give the robot file that belongs to it"
+            )
+    progress("condition recordings")
+    base = base_parameters(robot)
+    conditioners = [Conditioner.survey(recording, robot) for recording in recordings]
+    cutoff = choose_cutoff(conditioners, robot, base) if options.cutoff_hz == "auto" else options.cutoff_hz
+    motions = Dataset(conditioners, robot, base, cutoff)
+    progress("choose model terms")
+    structure, shapes, factors = _model(motions, robot, base, options)
+    progress("estimate parameters")
+    weights, solution, unweighted = _estimate(factors, structure.size, options.estimator)
+    consistent = _consistent(structure, solution)
+    estimates = (solution.parameters, _in_model_columns(structure, consistent.parameters))
+    progress("evaluate residuals")
+    free, bound = evaluate(motions, structure, estimates)
+    progress("estimate uncertainty")
+    covariance = parameter_covariance(
+        motions, structure, solution.parameters, factors, weights, free.autoregressions, shape_parameters(shapes)
+    )
+    constrained = _is_rejected(consistent, free)
+    progress("evaluate held-out recordings")
+    held_conditioners = [Conditioner.survey(recording, robot) for recording in held_out]
+    held_free, held_bound = _held_out_fits(held_conditioners, structure, cutoff, estimates)
+    return Identification(
+        robot=robot,
+        structure=structure,
+        parameters=estimates[constrained],
+        free_parameters=estimates[0],
+        consistent_parameters=estimates[1],
+        constrained=constrained,
+        covariance=covariance,
+        undetermined=solution.undetermined,
+        shapes=shapes,
+        consistent=consistent,
+        condition_number=condition_number(unweighted.factor),
+        residuals=bound if constrained else free,
+        consistent_fit=bound.fit,
+        held_out=held_bound if constrained else held_free,
+        held_out_consistent=held_bound,
+        cutoff_hz=cutoff,
+        estimator=options.estimator,
+        conditioning=tuple(conditioner.summary(cutoff) for conditioner in conditioners),
+        held_out_conditioning=tuple(conditioner.summary(cutoff) for conditioner in held_conditioners),
+        identifiable=_identifiable(structure, factors, covariance, solution, shapes),
+    )
+
+
+def _model(
+    motions: Dataset, robot: Robot, base: BaseParameters, options: Options
+) -> tuple[ModelStructure, tuple[EstimatedShape, ...], tuple[JointFactor, ...]]:
+    """The terms that the data ask for, and the factors of the model that has them."""
+    given = [joint.friction_shape for joint in robot.joints]
+    structure = ModelStructure(robot, base, preliminary_terms(motions, robot))
+    separable = separable_rotors(robot, base) if options.rotor_inertia else (False,) * robot.joint_count
+    inflation = None
+    if any(shape.k_v is None or shape.delta is None for shape in given):
+        preliminary = _with_rotors(structure, separable)
+        factors = factorise(motions, preliminary)
+        noise_std, inflation = _preliminary_residual(motions, preliminary, factors)
+        shapes = estimate_shapes(motions, preliminary, factors, noise_std, inflation)
+    else:
+        shapes = tuple(EstimatedShape(s.k_v or 0.0, s.delta, True, True, True, True) for s in given)
+    structure = structure.with_terms(tuple(JointTerms(shape.k_v, shape.delta) for shape in shapes))
+    complete = _with_rotors(structure, separable)
+    factors = factorise(motions, complete)
+    if not any(separable):
+        return structure, shapes, factors
+    weights, _, _ = _estimate(factors, complete.size, Estimator.WLS)
+    needed = needed_rotors(factors, complete, 1.0 / weights, np.ones(robot.joint_count))
+    if any(needed):
+        if inflation is None:
+            _, inflation = _preliminary_residual(motions, complete, factors)
+        needed = needed_rotors(factors, complete, 1.0 / weights, inflation)
+    keep = kept_columns(complete, {joint for joint, is_needed in enumerate(needed) if is_needed})
+    return _with_rotors(structure, needed), shapes, restricted(factors, keep)
+
+
+def _with_rotors(structure: ModelStructure, rotors: Sequence[bool]) -> ModelStructure:
+    """The structure with rotor inertia at some joints."""
+    terms = zip(structure.terms, rotors, strict=True)
+    return structure.with_terms(tuple(replace(joint, rotor=rotor) for joint, rotor in terms))
+
+
+def _preliminary_residual(
+    motions: Dataset, structure: ModelStructure, factors: tuple[JointFactor, ...]
+) -> tuple[Array, Array]:
+    """Residual standard deviation in the band and its inflation by autocorrelation, (n,) each."""
+    _, solution, _ = _estimate(factors, structure.size, Estimator.WLS)
+    (statistics,) = evaluate(motions, structure, [solution.parameters])
+    inflation = np.array([model.long_run_ratio for model in statistics.autoregressions])
+    return np.maximum(statistics.fit.band_rms, np.finfo(float).tiny), inflation
+
+
+def _estimate(
+    factors: tuple[JointFactor, ...], size: int, estimator: Estimator
+) -> tuple[Array, Solution, Solution]:
+    """Weights 1/σ_j (ones for LS), the solution, and that of LS; σ_j is the residual's standard deviation in the band."""
+    std = np.ones(len(factors))
+    solution = unweighted = solve(factors, size, std)
+    if estimator is Estimator.WLS:
+        for _ in range(REWEIGHTINGS):
+            std = _residual_std(factors, size, solution.parameters)
+            solution = solve(factors, size, std)
+    return 1.0 / std, solution, unweighted
+
+
+def _residual_std(factors: tuple[JointFactor, ...], size: int, parameters: Array) -> Array:
+    """σ_j with the degrees of freedom that the parameters took, shared by rows; never below rounding."""
+    total = sum(factor.rows for factor in factors)
+    squares = np.array([factor.squared_residual(parameters) for factor in factors])
+    freedom = np.array([factor.rows * max(1.0 - size / total, 1e-3) for factor in factors])
+    torque = np.array([np.sum(factor.triangle[:, -1] ** 2) / factor.rows for factor in factors])
+    smallest = np.maximum(torque.max() * 1e-24, np.finfo(float).tiny)
+    return np.sqrt(np.maximum(squares / freedom, smallest))
+
+
+def _consistent(structure: ModelStructure, solution: Solution) -> ConsistentParameters:
+    """The nearest parameters that bodies and friction can have, in the metric of the estimate."""
+    robot, base = structure.robot, structure.base
+    standard = 10 * robot.joint_count
+    size = standard + structure.size - structure.base_count
+    factor = np.zeros((structure.size, size))
+    factor[:, base.independent_columns] = solution.factor[:, : structure.base_count]
+    factor[:, base.dependent_columns] = solution.factor[:, : structure.base_count] @ base.combination
+    factor[:, standard:] = solution.factor[:, structure.base_count :]
+    columns = _friction_columns(structure, standard - structure.base_count)
+    prior = plausible_prior(robot, factor, solution.target, columns)
+    names = [joint.name for joint in robot.joints]
+    return nearest_consistent_parameters(
+        factor, solution.target, prior, friction_inequalities(columns, size, names)
+    )
+
+
+def _friction_columns(structure: ModelStructure, shift: int) -> FrictionColumns:
+    """Where the joints' coefficients stand when `shift` further columns stand before them."""
+
+    def places(name: str) -> tuple[int | None, ...]:
+        columns = (structure.coefficient(joint, name) for joint in range(structure.robot.joint_count))
+        return tuple(None if column is None else column + shift for column in columns)
+
+    return FrictionColumns(places("stiction"), places("stribeck"), places("viscous"), places("rotor_inertia"))
+
+
+def _in_model_columns(structure: ModelStructure, full: Array) -> Array:
+    """Full standard parameters and friction, projected onto the model's columns: Θ* = Θ_L + B Θ_K."""
+    standard = 10 * structure.robot.joint_count
+    return np.concatenate([structure.base.project(full[:standard]), full[standard:]])
+
+
+def _is_rejected(consistent: ConsistentParameters, free: ResidualStatistics) -> bool:
+    """Whether no body can have the free estimate, beyond what noise explains.
+
+    The cost of consistency is χ²-like in the noise's own units; a residual that is coloured counts for fewer samples.
+    """
+    inflation = float(np.mean([model.long_run_ratio for model in free.autoregressions]))
+    allowed = stats.chi2.ppf(CONSISTENCY_LEVEL, df=len(consistent.parameters)) * inflation
+    return bool(consistent.residual_increase > allowed)
+
+
+def _held_out_fits(
+    conditioners: Sequence[Conditioner],
+    structure: ModelStructure,
+    cutoff_hz: float | None,
+    estimates: tuple[Array, Array],
+) -> tuple[Fit | None, Fit | None]:
+    """Fits of both estimates on recordings that were not used."""
+    if not conditioners:
+        return None, None
+    motions = Dataset(conditioners, structure.robot, structure.base, cutoff_hz)
+    free, bound = evaluate(motions, structure, estimates)
+    return free.fit, bound.fit
+
+
+def _identifiable(
+    structure: ModelStructure,
+    factors: tuple[JointFactor, ...],
+    covariance: Array,
+    solution: Solution,
+    shapes: Sequence[EstimatedShape],
+) -> tuple[dict[str, bool], ...]:
+    """Per joint, which coefficients and shape constants the data can tell."""
+    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    described = []
+    for joint, (factor, shape) in enumerate(zip(factors, shapes, strict=True)):
+        torque = np.linalg.norm(factor.triangle[:, -1])
+        known: dict[str, bool] = {"stribeck": False}
+        for name in structure.terms[joint].names:
+            column = structure.coefficient(joint, name)
+            place = int(np.searchsorted(factor.columns, column))
+            reach = std[column] * np.linalg.norm(factor.triangle[:, place])
+            known[name] = bool(reach < KNOWN_SHARE * torque) and not bool(solution.undetermined[column])
+        known["k_v"], known["delta"] = shape.k_v_identifiable, shape.delta_identifiable
+        described.append(known)
+    return tuple(described)

@@ -1,0 +1,210 @@
+"""LS (16), (17) and WLS (18), (19) from orthogonal factors, in constant memory.
+
+Each joint's rows [A_j | y_j] are reduced to their triangular factor R_j piece by piece (sequential QR): the same sums as the
+normal equations without squaring the condition number. Weights scale R_j, so LS, WLS and every reweighting between
+them need one pass over the data.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service.errors import IdentificationError
+from service.identification.dataset import PreparedMotion
+from service.identification.structure import ModelStructure
+from service.recording.recording import Array
+
+RANK_TOLERANCE = 1e-9
+"""Singular values of the column-scaled factor below this share of the largest are directions without information."""
+
+ROWS_AT_ONCE = 1 << 10
+"""Rows factorised at once: such a block stays in the processor's cache, which halves the time of one tall factorisation."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointFactor:
+    """Triangular factor of one joint's equations.
+
+    columns : (p_j,) int
+        global columns of the model
+    triangle : (p_j + 1, p_j + 1) float64
+        R_j of [A_j | y_j]
+    rows : int
+        number of equations
+    """
+
+    columns: NDArray[np.intp]
+    triangle: Array
+    rows: int
+
+    def squared_residual(self, parameters: Array) -> float:
+        """‖A_j Θ - y_j‖².
+
+        Parameters
+        ----------
+        parameters : (p,) float64
+            all parameters of the model
+        """
+        own = np.append(parameters[self.columns], -1.0)
+        return float(np.sum((self.triangle @ own) ** 2))
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A least-squares estimate.
+
+    parameters : (p,) float64
+        Θ; where a direction has no information, its smallest value
+    factor : (p, p) float64
+        R of the weighted equations
+    target : (p,) float64
+        z, so that the criterion is ‖R Θ - z‖² and a constant
+    spread : (p, r) float64
+        S with S Sᵀ = (Lᵀ W L)⁺, r the rank
+    undetermined : (p,) bool
+        parameters that take part in a direction without information
+    """
+
+    parameters: Array
+    factor: Array
+    target: Array
+    spread: Array
+    undetermined: NDArray[np.bool_]
+
+
+def factorise(motions: Iterable[PreparedMotion], structure: ModelStructure) -> tuple[JointFactor, ...]:
+    """One pass over the data: every joint's triangular factor.
+
+    Parameters
+    ----------
+    motions : iterable of PreparedMotion
+        the data, in pieces
+    structure : ModelStructure
+        the model's columns
+
+    Returns
+    -------
+    tuple of JointFactor
+        one a joint
+
+    Raises
+    ------
+    IdentificationError
+        where a joint has fewer measured rows than parameters
+    """
+    joints = range(structure.robot.joint_count)
+    columns = [structure.joint_columns(joint) for joint in joints]
+    triangles: list[Array | None] = [None] * len(columns)
+    rows = [0] * len(columns)
+    for prepared in motions:
+        for joint in joints:
+            used = prepared.used[joint]
+            equations = np.vstack([prepared.joint_columns(structure, joint), prepared.reduced_torque[None, joint]])
+            if not used.all():
+                equations = equations[:, used]
+            equations *= prepared.row_weight
+            rows[joint] += equations.shape[1]
+            triangles[joint] = _appended(triangles[joint], equations)
+    factors = []
+    for joint in joints:
+        triangle = triangles[joint]
+        if triangle is None or rows[joint] <= len(columns[joint]):
+            name = structure.robot.joints[joint].name
+            raise IdentificationError(
+                f"{name}: {rows[joint]} usable samples for {len(columns[joint])} parameters: record longer, or ask for a"
+                " higher cut-off"
+            )
+        factors.append(JointFactor(columns[joint], triangle, rows[joint]))
+    return tuple(factors)
+
+
+def solve(factors: tuple[JointFactor, ...], size: int, noise_std: Array) -> Solution:
+    """The (weighted) least-squares estimate.
+
+    Θ = argmin Σ_j ‖A_j Θ - y_j‖² / σ_j².
+
+    Parameters
+    ----------
+    factors : tuple of JointFactor
+        one a joint
+    size : int
+        number of parameters p
+    noise_std : (n,) float64
+        σ_j; all ones for LS
+
+    Returns
+    -------
+    Solution
+        the estimate with what its covariance needs
+    """
+    stacked = np.zeros((sum(len(factor.triangle) for factor in factors), size + 1))
+    row = 0
+    for factor, std in zip(factors, noise_std, strict=True):
+        block = slice(row, row + len(factor.triangle))
+        stacked[block, factor.columns] = factor.triangle[:, :-1] / std
+        stacked[block, size] = factor.triangle[:, -1] / std
+        row += len(factor.triangle)
+    triangle = _triangle(stacked)
+    return _solved(triangle[:size, :size], triangle[:size, size])
+
+
+def restricted(factors: tuple[JointFactor, ...], keep: NDArray[np.intp]) -> tuple[JointFactor, ...]:
+    """The factors of a smaller model: columns left out without another pass over the data.
+
+    Parameters
+    ----------
+    factors : tuple of JointFactor
+        factors of the larger model
+    keep : (k,) int
+        its global columns that stay, ascending; they are numbered anew from 0
+    """
+    position = np.full(max(int(factor.columns.max()) for factor in factors) + 1, -1)
+    position[keep] = np.arange(len(keep))
+    smaller = []
+    for factor in factors:
+        stays = np.flatnonzero(position[factor.columns] >= 0)
+        triangle = factor.triangle[:, np.append(stays, len(factor.columns))]
+        smaller.append(JointFactor(position[factor.columns[stays]], _triangle(triangle), factor.rows))
+    return tuple(smaller)
+
+
+def condition_number(factor: Array) -> float:
+    """Condition number of a regressor: largest over smallest singular value.
+
+    Parameters
+    ----------
+    factor : (p, p) float64
+        triangular factor R of the stacked regressor L
+    """
+    singular = np.linalg.svd(factor, compute_uv=False)
+    return float(singular[0] / max(singular[-1], np.finfo(float).tiny))
+
+
+def _appended(triangle: Array | None, equations: Array) -> Array:
+    """The factor of the rows so far and of new ones, (p + 1, M) with time last."""
+    pieces = [] if triangle is None else [triangle]
+    for start in range(0, equations.shape[1], ROWS_AT_ONCE):
+        pieces.append(np.linalg.qr(equations[:, start : start + ROWS_AT_ONCE].T, mode="r"))
+    return _triangle(np.vstack(pieces)) if pieces else np.zeros((len(equations), len(equations)))
+
+
+def _triangle(matrix: Array) -> Array:
+    """R of the QR factorisation, square, with rows of zeros where there are fewer rows than columns."""
+    upper = np.linalg.qr(matrix, mode="r")
+    columns = matrix.shape[1]
+    if len(upper) == columns:
+        return upper
+    return np.vstack([upper, np.zeros((columns - len(upper), columns))])
+
+
+def _solved(factor: Array, target: Array) -> Solution:
+    """Minimum-norm solution in scaled columns."""
+    scale = np.linalg.norm(factor, axis=0)
+    scale[scale == 0.0] = 1.0
+    left, singular, right = np.linalg.svd(factor / scale)
+    known = singular > RANK_TOLERANCE * max(singular[0], np.finfo(float).tiny)
+    spread = right[known].T / singular[known] / scale[:, None]
+    undetermined = (np.abs(right[~known]) > 1e-3).any(axis=0) if not known.all() else np.zeros(len(scale), bool)
+    return Solution(spread @ (left[:, known].T @ target), factor, target, spread, undetermined)

@@ -1,0 +1,139 @@
+"""One pass over the data for everything that residuals tell: fit, noise, autocorrelation."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from service.identification.autocorrelation import AutocovarianceSum, Autoregression
+from service.identification.dataset import PreparedMotion
+from service.identification.structure import ModelStructure
+from service.recording.recording import Array
+from service.recording.conditioning import Stretch, split_periods
+
+FEWEST_PERIOD_SAMPLES = 50
+"""Differences between periods that are needed before their variance is trusted."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """How well a parameter set explains the torque.
+
+    rms : (n,) float64
+        root mean square of the torque residual at the recorded rate, no filter [Nm or N]
+    band_rms : (n,) float64
+        the same in the common band
+    relative_error : float
+        ‖τ - τ̂‖ / ‖τ‖ over all joints, in the common band
+    """
+
+    rms: Array
+    band_rms: Array
+    relative_error: float
+
+
+@dataclass(frozen=True, eq=False)
+class ResidualStatistics:
+    """What the residuals of one parameter set tell.
+
+    fit : Fit
+        sizes of the residual
+    noise_std : (n,) float64
+        standard deviation of the torque noise, a sample at the recorded rate [Nm or N]
+    noise_method : str
+        ``periods`` (model-free) or ``residual``
+    autoregressions : tuple of Autoregression, length n
+        of the residual in the common band
+    """
+
+    fit: Fit
+    noise_std: Array
+    noise_method: str
+    autoregressions: tuple[Autoregression, ...]
+
+
+def evaluate(
+    motions: Iterable[PreparedMotion], structure: ModelStructure, candidates: Sequence[Array]
+) -> tuple[ResidualStatistics, ...]:
+    """Residual statistics of several parameter sets in one pass.
+
+    Parameters
+    ----------
+    motions : iterable of PreparedMotion
+        the data, in pieces
+    structure : ModelStructure
+        the model's columns
+    candidates : sequence of (p,) float64
+        parameter sets
+
+    Returns
+    -------
+    tuple of ResidualStatistics
+        one a parameter set
+    """
+    sums = [_Sums(structure.robot.joint_count) for _ in candidates]
+    for prepared in motions:
+        for parameters, total in zip(candidates, sums, strict=True):
+            total.add(prepared, prepared.predicted_torque(structure, parameters))
+    return tuple(total.statistics() for total in sums)
+
+
+class _Sums:
+    """Running sums for one parameter set."""
+
+    def __init__(self, joint_count: int) -> None:
+        zeros = np.zeros(joint_count)
+        self._raw_squares, self._raw_count = zeros.copy(), zeros.copy()
+        self._band_squares, self._band_count = zeros.copy(), zeros.copy()
+        self._torque_squares = zeros.copy()
+        self._period_squares, self._period_count = zeros.copy(), zeros.copy()
+        self._raw_lags = [AutocovarianceSum() for _ in range(joint_count)]
+        self._band_lags = [AutocovarianceSum() for _ in range(joint_count)]
+
+    def add(self, prepared: PreparedMotion, predicted: Array) -> None:
+        """Add one piece of motion with its predicted torque (N, n)."""
+        motion = prepared.motion
+        residual = motion.torque - predicted
+        kept = np.where(motion.measured, residual, 0.0)
+        self._raw_squares += np.einsum("pij,pij->j", kept, kept)
+        self._raw_count += motion.measured.sum(axis=(0, 1))
+        self._add_periods(prepared, residual)
+        band = prepared.reduced_torque - motion.band.reduce(np.ascontiguousarray(predicted.T))
+        for joint, (row, used) in enumerate(zip(band, prepared.used, strict=True)):
+            weighted = row * prepared.row_weight
+            self._band_lags[joint].add(weighted, used)
+            self._band_squares[joint] += motion.repetitions * np.sum(row[used] ** 2)
+            self._torque_squares[joint] += motion.repetitions * np.sum(prepared.reduced_torque[joint, used] ** 2)
+            self._band_count[joint] += motion.repetitions * used.sum()
+            for repetition in range(motion.repetitions):
+                self._raw_lags[joint].add(residual[repetition, :, joint], motion.measured[repetition, :, joint])
+
+    def statistics(self) -> ResidualStatistics:
+        """The sums, turned into what they stand for."""
+        band_rms = np.sqrt(self._band_squares / np.maximum(self._band_count, 1))
+        relative = np.sqrt(self._band_squares.sum() / max(self._torque_squares.sum(), np.finfo(float).tiny))
+        fit = Fit(np.sqrt(self._raw_squares / np.maximum(self._raw_count, 1)), band_rms, float(relative))
+        by_periods = bool((self._period_count >= FEWEST_PERIOD_SAMPLES).all())
+        if by_periods:
+            noise = np.sqrt(self._period_squares / self._period_count)
+        else:
+            noise = np.sqrt([lags.model().innovation_variance for lags in self._raw_lags])
+        models = tuple(lags.model() for lags in self._band_lags)
+        return ResidualStatistics(fit, noise, "periods" if by_periods else "residual", models)
+
+    def _add_periods(self, prepared: PreparedMotion, residual: Array) -> None:
+        """What differs between repetitions of the same motion is noise, whatever the model."""
+        motion = prepared.motion
+        measured = motion.measured
+        if motion.repetitions == 1:
+            periods = split_periods(
+                Stretch(0.0, motion.rate_hz, residual[0], residual[0], measured[0], motion.period, False)
+            )
+            if periods is None:
+                return
+            residual, measured = periods.torque, periods.measured
+        count = measured.sum(axis=0)
+        mean = np.where(measured, residual, 0.0).sum(axis=0) / np.maximum(count, 1)
+        deviation = np.where(measured, residual - mean, 0.0)
+        self._period_squares += np.einsum("pij,pij->j", deviation, deviation)
+        self._period_count += np.maximum(count - 1, 0).sum(axis=0)
