@@ -1,0 +1,222 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from recording.recording_files import csv_text, message_of, rows_of, snapshot
+from service.errors import RecordingMismatchError
+from service.recording import EffortKind, read_recording
+from service.recording.csv_format import read_csv
+
+LINES = csv_text().splitlines()
+ROWS = np.array([[float(field) for field in line.split(",")] for line in LINES[1:]])
+
+
+def read(folder: Path, content: str | bytes, joint_count: int | None = None):
+    path = folder / "file.csv"
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    before = snapshot(folder)
+    try:
+        return read_recording(path, joint_count)
+    finally:
+        assert snapshot(folder) == before
+
+
+def changed(line: int, text: str) -> str:
+    """The sound file with one line, counted from 1, replaced."""
+    return "\n".join([*LINES[: line - 1], text, *LINES[line:]]) + "\n"
+
+
+def field_changed(line: int, column: str, text: str) -> str:
+    fields = LINES[line - 1].split(",")
+    fields[LINES[0].split(",").index(column)] = text
+    return changed(line, ",".join(fields))
+
+
+SAME = {
+    "as it is": "\n".join(LINES) + "\n",
+    "no newline at the end": "\n".join(LINES),
+    "blank lines at the end": "\n".join(LINES) + "\n\n  \n",
+    "carriage returns": "\r\n".join(LINES) + "\r\n",
+    "byte order mark": "\ufeff" + "\n".join(LINES) + "\n",
+    "comments everywhere": "# one\n\n#two, with, commas\n" + "\n# between\n".join(LINES) + "\n   # last\n",
+    "semicolons": "\n".join(LINES).replace(",", ";") + "\n",
+    "tabs": "\n".join(LINES).replace(",", "\t") + "\n",
+    "blanks around fields": "\n".join(LINES).replace(",", " ,  ") + "\n",
+    "quoted names": ",".join(f'"{name}"' for name in LINES[0].split(",")) + "\n" + "\n".join(LINES[1:]),
+    "comma at each line's end": ",\n".join(LINES) + ",\n",
+    "pandas index": "," + LINES[0] + "\n" + "\n".join(f"{k},{line}" for k, line in enumerate(LINES[1:])),
+    "text in a column that nobody reads": "\n".join(line + (",state" if line == LINES[0] else ",go") for line in LINES),
+    "text in a first column that nobody reads": "\n".join(
+        ("x," if line == LINES[0] else '"go #1",') + line for line in LINES
+    ),
+    "a comment like a row before a column that nobody reads": "\n".join(
+        ("x," if line == LINES[0] else "go,") + line + ("\n# no,9,9,9,9,9" if line == LINES[5] else "")
+        for line in LINES
+    ),
+    "columns in another order": "\n".join(",".join(reversed(line.split(","))) for line in LINES),
+}
+
+
+@pytest.mark.parametrize("name", SAME)
+def test_the_same_recording_written_differently(tmp_path, name):
+    recording = read(tmp_path, SAME[name], 2)
+    assert recording.table.names == ("t", "q1", "q2", "tau1", "tau2")
+    assert np.array_equal(rows_of(recording), ROWS)
+    assert recording.effort_kind is EffortKind.TORQUE
+
+
+@pytest.mark.parametrize("text", ["", "nan", "NaN", "NAN", " nan ", "-nan", " "])
+def test_missed_samples_are_nan(tmp_path, text):
+    expected = ROWS.copy()
+    expected[5, 2] = np.nan
+    assert np.array_equal(rows_of(read(tmp_path, field_changed(7, "q2", text))), expected, equal_nan=True)
+
+
+@pytest.mark.parametrize("text", ["1", "-0", "+1.5", ".5", "-5.", "1e5", "1E+05", "1e-400", "0" * 50 + "1", "9" * 40])
+def test_decimal_numbers_of_any_shape(tmp_path, text):
+    assert rows_of(read(tmp_path, field_changed(9, "tau1", text)))[7, 3] == float(text)
+
+
+def test_current_and_optional_columns(tmp_path):
+    header = "temp2,i1,i2,t,q2,q1,period,qref1,qref2,note"
+    body = "\n".join(f"30,{k},{-k},{k / 10},2,1,{k // 10},{k},{k},fine" for k in range(30))
+    recording = read(tmp_path, f"{header}\n{body}\n", 2)
+    assert recording.effort_kind is EffortKind.CURRENT
+    assert recording.table.names == ("t", "q1", "q2", "i1", "i2", "qref1", "qref2", "temp2", "period")
+    assert recording.ignored_columns == ("note",)
+    samples = recording.samples(10, 12)
+    assert samples.position.tolist() == [[1, 2], [1, 2]]
+    assert samples.effort.tolist() == [[10, -10], [11, -11]]
+    assert samples.reference is not None
+    assert samples.reference.tolist() == [[10, 10], [11, 11]]
+    assert samples.temperature is not None
+    assert np.array_equal(samples.temperature, [[np.nan, 30], [np.nan, 30]], equal_nan=True)
+    assert samples.period is not None
+    assert samples.period.tolist() == [1, 1]
+    assert samples.velocity is None
+    assert samples.link_position is None
+
+
+def test_torque_is_preferred_to_current_and_the_current_is_remembered(tmp_path):
+    text = "\n".join(line + (",i1,i2" if line == LINES[0] else ",7,8") for line in LINES)
+    recording = read(tmp_path, text)
+    assert recording.effort_kind is EffortKind.TORQUE
+    assert np.array_equal(rows_of(recording), ROWS)
+    assert recording.ignored_columns == ("i1", "i2")
+
+
+HEADER_ONLY = LINES[0] + "\n"
+BAD = {
+    "empty": ("", "file is empty"),
+    "comments only": ("# nothing\n\n", "file is empty"),
+    "header only": (HEADER_ONLY, "holds no sample"),
+    "one row": ("\n".join(LINES[:2]), "holds only 1 sample"),
+    "nine rows": ("\n".join(LINES[:10]), "holds only 9 samples"),
+    "no header": ("\n".join(LINES[1:]), "line 1 holds numbers where the column names are expected"),
+    "units row": (changed(1, LINES[0] + "\ns,rad,rad,Nm,Nm"), "line 2 looks like a row of units ('s,rad,rad,Nm,Nm')"),
+    "bracketed units": (changed(1, LINES[0] + "\n[s],[rad],[rad],[Nm],[Nm]"), "line 2 looks like a row of units"),
+    "no time": (changed(1, "time,q1,q2,tau1,tau2"), "column t (time in seconds) is missing; the columns are time, q1"),
+    "no position": (changed(1, "t,p1,p2,tau1,tau2"), "column q1 (position of joint 1) is missing"),
+    "no effort": (changed(1, "t,q1,q2,a,b"), "column tau1 (or i1, torque or current of joint 1) is missing"),
+    "gap in q": (changed(1, "t,q1,q3,tau1,tau2"), "column q2 is missing: the file has columns up to q3"),
+    "more q than tau": (changed(1, "t,q1,q2,tau1,q3"), "column tau2 is missing: the file has columns up to q3"),
+    "more tau than q": (changed(1, "t,q1,tau1,tau2,x"), "column q2 is missing: the file has columns up to tau2"),
+    "joint zero": (changed(1, "t,q0,q1,tau0,tau1"), "column q0 belongs to no joint: joints are numbered from 1"),
+    "twice": (changed(1, "t,q1,q1,tau1,tau2"), "column q1 appears twice (as columns 2 and 3)"),
+    "foreign joint": (changed(1, "t,q1,qd2,tau1,x"), "column qd2 belongs to no joint: the positions are q1 to q1"),
+    "text": (field_changed(17, "tau2", "abc"), "line 17, column tau2: 'abc' is not a number"),
+    "NA": (field_changed(17, "tau2", "NA"), "'NA' is not a number; leave the field empty or write nan"),
+    "hexadecimal": (field_changed(17, "tau2", "0x1A"), "line 17, column tau2: '0x1A' is not a number"),
+    "underscore": (field_changed(17, "tau2", "1_000"), "line 17, column tau2: '1_000' is not a number"),
+    "two numbers": (field_changed(17, "tau2", "1 2"), "line 17, column tau2: '1 2' is not a number"),
+    "nan with payload": (field_changed(17, "tau2", "nan(1)"), "line 17, column tau2: 'nan(1)' is not a number"),
+    "other digits": (field_changed(17, "tau2", "\u0661"), "line 17, column tau2: '\u0661' is not a number"),
+    "quoted number": (field_changed(17, "q1", '"1.5"'), "column q1: '\"1.5\"' is not a number; write numbers without"),
+    "json": (field_changed(17, "q1", "true"), "line 17, column q1: 'true' is not a number"),
+    "null": (field_changed(17, "q1", "null"), "line 17, column q1: 'null' is not a number; leave the field empty"),
+    "infinite": (field_changed(17, "q1", "inf"), "line 17, column q1: 'inf' is not a number; leave the field empty"),
+    "Infinity": (field_changed(17, "q1", "-Infinity"), "line 17, column q1: '-Infinity' is not a number"),
+    "overflow": (field_changed(17, "q1", "1e400"), "line 17, column q1: '1e400' is too large for a number"),
+    "long overflow": (field_changed(17, "q1", "9" * 400), "is too large for a number"),
+    "control character": (field_changed(17, "q1", "\x1b[2J"), "line 17, column q1: '\\x1b[2J' is not a number"),
+    "lone carriage return": (field_changed(17, "q1", "1\r2"), "line 17, column q1: '1\\r2' is not a number"),
+    "time missing": (field_changed(17, "t", ""), "line 17, column t: the time is missing"),
+    "time infinite": (field_changed(17, "t", "inf"), "line 17, column t: 'inf' is not a number"),
+    "time repeats": (field_changed(17, "t", "0.056"), "line 17, column t: time repeats 0.056 s after 0.056 s"),
+    "time decreases": (field_changed(17, "t", "0.01"), "line 17, column t: time runs backwards: 0.01 s after 0.056 s"),
+    "date": (field_changed(2, "t", "2024-05-01 10:00"), "line 2, column t: '2024-05-01 10:00' is not a number"),
+    "few fields": (changed(17, "0.06,1,2"), "line 17 has 3 fields where the header has 5 columns"),
+    "many fields": (changed(17, "0.06,1,2,3,4,5"), "line 17 has 6 fields where the header has 5 columns"),
+    "decimal commas": (changed(17, "0,06,1,5,2,5,3,5,4,5"), "decimal commas? write decimals with a point"),
+    "decimal comma": ("\n".join(LINES).replace(",", ";").replace(".", ",", 1), "'0,0' is not a number; write decimals"),
+    "truncated": (
+        "\n".join([*LINES, "0.16,1,2"]),
+        "line 42 has 3 fields where the header has 5 columns: the last line is",
+    ),
+    "blanks as separators": ("\n".join(LINES).replace(",", " "), "line 1: the columns are separated by blanks"),
+    "NUL": (field_changed(17, "q1", "1\0"), "line 17 holds a NUL byte"),
+    "NUL in the header": (changed(1, "t\0" + LINES[0]), "line 1 holds a NUL byte"),
+    "UTF-16": ("\n".join(LINES).encode("utf-16"), "is UTF-16 text; save it as UTF-8"),
+    "Latin-1 header": (changed(1, LINES[0] + ",°C").encode("latin-1"), "line 1: the header is not UTF-8 text"),
+    "long line": (changed(17, "1," + "2" * 2**21), "line 17 has"),
+    "long header": ("t" * 2**21, "line 1 has more than 1048576 characters"),
+    "gzip": (b"\x1f\x8b\x08\0\0\0", "is compressed by gzip; unpack it first"),
+    "spreadsheet": (b"PK\x03\x04\x14\0", "is a zip archive or a spreadsheet"),
+    "period": ("t,q1,tau1,period\n" + "\n".join(f"{k},0,0,{k / 4}" for k in range(20)), "line 3, column period: 0.25"),
+    "old line ends": ("\r".join(LINES), "the lines end with carriage returns alone"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_files_are_refused_with_the_place(tmp_path, name):
+    content, expected = BAD[name]
+    message = message_of(lambda: read(tmp_path, content))
+    assert message.startswith(f"{tmp_path / 'file.csv'}: ")
+    assert expected in message
+
+
+def test_line_numbers_count_comments_and_blank_lines(tmp_path):
+    text = "# head\n\n" + field_changed(17, "q1", "abc").replace("\n", "\n# again\n")
+    assert f"line {2 + 17 * 2 - 1}, column q1" in message_of(lambda: read(tmp_path, text))
+
+
+def test_line_numbers_far_into_the_file(tmp_path):
+    lines = csv_text(20_000).splitlines()
+    lines[15_000] = lines[15_000].replace(",", ",x", 1)
+    assert "line 15001, column q1: 'x" in message_of(lambda: read(tmp_path, "\n".join(lines)))
+    lines = csv_text(20_000).splitlines()
+    lines[15_000] = "# comment"
+    lines[15_001] = lines[14_999]
+    assert "line 15002, column t: time repeats" in message_of(lambda: read(tmp_path, "\n".join(lines)))
+
+
+@pytest.mark.parametrize(
+    ("joints", "robot", "expected"),
+    [
+        (2, 3, "the recording has 2 joints, the robot has 3 joints: column q3 is missing"),
+        (3, 1, "the recording has 3 joints, the robot has 1 joint: column q2 belongs to no joint"),
+    ],
+)
+def test_another_robots_recording(tmp_path, joints, robot, expected):
+    with pytest.raises(RecordingMismatchError, match=expected):
+        read(tmp_path, csv_text(joints=joints), robot)
+
+
+def test_absent_and_unreadable_files(tmp_path):
+    assert "nothing.csv: no such file" in message_of(lambda: read_recording(tmp_path / "nothing.csv"))
+    assert "a folder without metadata.yaml" in message_of(lambda: read_recording(tmp_path))
+    assert "not a regular file" in message_of(lambda: read_recording("/dev/zero"))
+    assert "no such file" in message_of(lambda: read_recording(tmp_path / "file.csv" / "below"))
+
+
+def test_spooled_reading_gives_the_same_rows(tmp_path):
+    path = tmp_path / "long.csv"
+    path.write_text(csv_text(30_000))
+    kept = read_csv(path, "long")
+    for limit in (1000, 400_000):
+        spooled = read_csv(path, "long", spool_above_bytes=limit)
+        assert type(spooled.table) is not type(kept.table)
+        assert np.array_equal(rows_of(spooled), rows_of(kept))
+        assert np.array_equal(spooled.samples(777, 29_001).effort, kept.samples(777, 29_001).effort)
+    assert [file.name for file in tmp_path.iterdir()] == ["long.csv"]
