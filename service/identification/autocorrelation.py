@@ -1,7 +1,7 @@
 """Autocorrelation of residuals: autoregressive models with their order chosen by BIC.
 
-A residual that leaves noise behind is rarely white: filters, friction and what the model lacks colour it. Standard errors
-that ignore this are too small. An order that is fixed instead of chosen finds colour in white noise.
+A residual that leaves noise behind is rarely white: filters, friction and what the model lacks colour it. Standard
+errors that ignore this are too small. An order that is fixed instead of chosen finds colour in white noise.
 """
 
 from dataclasses import dataclass

@@ -1,9 +1,10 @@
 """Which band torque and regressor share: as wide as the positions allow, no wider than the model explains the torque.
 
-Two bounds, the lower one holds. (1) Noise of the positions, differentiated twice, must stay a small share of q̈, or it biases
-the inertial parameters (`service.recording.conditioning.position_noise`). (2) Beyond the frequency where the unexplained part of the
-torque first outgrows the explained one, more band adds more disturbance than motion; an octave beyond it is kept, because the edges
-of friction's steps lie there. Positions so clean that (1) never binds are not filtered at all: nothing would be gained.
+Two bounds, the lower one holds. (1) Noise of the positions, differentiated twice, must stay a small share of q̈, or
+it biases the inertial parameters (`service.recording.conditioning.position_noise`). (2) Beyond the frequency where
+the unexplained part of the torque first outgrows the explained one, more band adds more disturbance than motion; an
+octave beyond it is kept, because the edges of friction's steps lie there. Positions so clean that (1) never binds are
+not filtered at all: nothing would be gained.
 """
 
 from collections.abc import Sequence

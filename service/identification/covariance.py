@@ -10,6 +10,7 @@ leave uncertain shows in the coefficients.
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from service.dynamics.friction import smooth_sign_slope
 from service.identification.autocorrelation import Autoregression
@@ -86,7 +87,7 @@ def _columns_with_shapes(
     joint: int,
     parameters: Array,
     shapes: Sequence[ShapeParameter],
-) -> tuple[Array, Array]:
+) -> tuple[Array, NDArray[np.intp]]:
     """A joint's columns and those of its shape constants, ∂τ/∂log K = c · K · ∂A(K q̇)/∂K, with their global places."""
     columns = prepared.joint_columns(structure, joint)
     index = structure.joint_columns(joint)

@@ -8,8 +8,8 @@ import numpy as np
 from service.dynamics.base_parameters import BaseParameters
 from service.dynamics.regressor import torque_regressor
 from service.identification.structure import ModelStructure
-from service.recording.recording import Array
 from service.recording.conditioning import Conditioner, Mask, Motion
+from service.recording.recording import Array
 from service.robot import Robot
 
 MEMORY_LIMIT = 256 * 1024 * 1024
@@ -136,6 +136,6 @@ class Dataset:
                     rigid,
                     reduce(rigid),
                     reduce(np.ascontiguousarray(motion.mean_torque.T)),
-                    motion.band.reduce_mask(motion.measured.any(axis=0).T),
+                    motion.band.reduce_mask(np.asarray(motion.measured.any(axis=0)).T),
                     index,
                 )

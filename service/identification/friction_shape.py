@@ -1,11 +1,11 @@
 """Shape constants K_v and δ of the friction curve, by separable least squares.
 
-The coefficients of (7) are linear and are eliminated exactly (variable projection); only the shape constants remain. All
-columns Z that do not depend on them (rigid body, viscous, offset) are projected off: with S Sᵀ = (ZᵀZ)⁻¹ from the factors
-at hand, Q = Z S is never formed, only Qᵀ G = Sᵀ (ZᵀG) of the candidate columns G, summed in one pass. What is left are small
-Gram matrices, in which every joint's constants are searched over a logarithmic grid, joint after joint until nothing moves, and
-refined between grid points. A constant that the data cannot tell says so and takes an ordinary value that fits as well:
-never a slope that ran away.
+The coefficients of (7) are linear and are eliminated exactly (variable projection); only the shape constants remain.
+All columns Z that do not depend on them (rigid body, viscous, offset) are projected off: with S Sᵀ = (ZᵀZ)⁻¹ from the
+factors at hand, Q = Z S is never formed, only Qᵀ G = Sᵀ (ZᵀG) of the candidate columns G, summed in one pass. What is
+left are small Gram matrices, in which every joint's constants are searched over a logarithmic grid, joint after joint
+until nothing moves, and refined between grid points. A constant that the data cannot tell says so and takes an
+ordinary value that fits as well: never a slope that ran away.
 """
 
 from collections.abc import Iterable, Sequence
@@ -24,7 +24,8 @@ from service.robot import FrictionShape
 
 GRID_POINTS = 37
 GRID_DECADES = (0.8, 4.3)
-"""K times the joint's rms velocity runs over these powers of ten: from a slope that is still no viscous friction to a step."""
+"""K times the joint's rms velocity runs over these powers of ten: from a slope that is still no viscous friction to a
+step."""
 
 ORDINARY = 100.0
 """K times the rms velocity of a constant that the data leave open, as near as they allow: a step, but a smooth one."""
@@ -330,7 +331,9 @@ def _profiled(
 
     Where it stays open, the most ordinary of the values that fit practically as well is taken: never one that ran away.
     """
-    options = [[candidate if k == place else index for k, index in enumerate(indices)] for candidate in range(GRID_POINTS)]
+    options = [
+        [candidate if k == place else index for k, index in enumerate(indices)] for candidate in range(GRID_POINTS)
+    ]
     profile = conditional.gains(options)
     best = int(np.argmax(profile))
     close = np.flatnonzero(profile >= profile[best] - KNOWN_BAND * unit)
@@ -359,4 +362,3 @@ def shape_parameters(shapes: Sequence[EstimatedShape]) -> list[tuple[int, str]]:
         if shape.delta is not None and shape.delta_identifiable and not shape.delta_given:
             estimated.append((joint, "delta"))
     return estimated
-

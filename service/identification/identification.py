@@ -32,8 +32,8 @@ from service.identification.least_squares import (
 from service.identification.residuals import Fit, ResidualStatistics, evaluate
 from service.identification.rotor import kept_columns, needed_rotors, separable_rotors
 from service.identification.structure import JointTerms, ModelStructure
-from service.recording.recording import Array, Recording
 from service.recording.conditioning import Conditioner, ConditioningSummary
+from service.recording.recording import Array, Recording
 from service.robot import Robot
 
 REWEIGHTINGS = 2
@@ -43,7 +43,8 @@ CONSISTENCY_LEVEL = 0.999
 """The free estimate counts as impossible, not merely unlucky, where physics rejects it at this level."""
 
 KNOWN_SHARE = 0.1
-"""A coefficient whose standard error moves the joint's torque by more than this share of its rms is not identifiable."""
+"""A coefficient whose standard error moves the joint's torque by more than this share of its rms is not
+identifiable."""
 
 Progress = Callable[[str], None]
 
@@ -138,7 +139,7 @@ def identify(
     robot: Robot,
     recordings: Sequence[Recording],
     held_out: Sequence[Recording] = (),
-    options: Options = Options(),  # noqa: B008 - frozen
+    options: Options = Options(),
     progress: Progress = lambda step: None,
 ) -> Identification:
     """Identify a robot arm from recordings.
@@ -267,10 +268,8 @@ def _preliminary_residual(
     return np.maximum(statistics.fit.band_rms, np.finfo(float).tiny), inflation
 
 
-def _estimate(
-    factors: tuple[JointFactor, ...], size: int, estimator: Estimator
-) -> tuple[Array, Solution, Solution]:
-    """Weights 1/σ_j (ones for LS), the solution, and that of LS; σ_j is the residual's standard deviation in the band."""
+def _estimate(factors: tuple[JointFactor, ...], size: int, estimator: Estimator) -> tuple[Array, Solution, Solution]:
+    """Weights, the solution, and that of LS; a weight is 1/σ_j, the residual's standard deviation in the band."""
     std = np.ones(len(factors))
     solution = unweighted = solve(factors, size, std)
     if estimator is Estimator.WLS:
@@ -302,9 +301,7 @@ def _consistent(structure: ModelStructure, solution: Solution) -> ConsistentPara
     columns = _friction_columns(structure, standard - structure.base_count)
     prior = plausible_prior(robot, factor, solution.target, columns)
     names = [joint.name for joint in robot.joints]
-    return nearest_consistent_parameters(
-        factor, solution.target, prior, friction_inequalities(columns, size, names)
-    )
+    return nearest_consistent_parameters(factor, solution.target, prior, friction_inequalities(columns, size, names))
 
 
 def _friction_columns(structure: ModelStructure, shift: int) -> FrictionColumns:
@@ -362,6 +359,8 @@ def _identifiable(
         known: dict[str, bool] = {"stribeck": False}
         for name in structure.terms[joint].names:
             column = structure.coefficient(joint, name)
+            if column is None:
+                continue
             place = int(np.searchsorted(factor.columns, column))
             reach = std[column] * np.linalg.norm(factor.triangle[:, place])
             known[name] = bool(reach < KNOWN_SHARE * torque) and not bool(solution.undetermined[column])

@@ -1,8 +1,8 @@
 """LS (16), (17) and WLS (18), (19) from orthogonal factors, in constant memory.
 
-Each joint's rows [A_j | y_j] are reduced to their triangular factor R_j piece by piece (sequential QR): the same sums as the
-normal equations without squaring the condition number. Weights scale R_j, so LS, WLS and every reweighting between
-them need one pass over the data.
+Each joint's rows [A_j | y_j] are reduced to their triangular factor R_j piece by piece (sequential QR): the same sums
+as the normal equations without squaring the condition number. Weights scale R_j, so LS, WLS and every reweighting
+between them need one pass over the data.
 """
 
 from collections.abc import Iterable
@@ -20,7 +20,8 @@ RANK_TOLERANCE = 1e-9
 """Singular values of the column-scaled factor below this share of the largest are directions without information."""
 
 ROWS_AT_ONCE = 1 << 10
-"""Rows factorised at once: such a block stays in the processor's cache, which halves the time of one tall factorisation."""
+"""Rows factorised at once: such a block stays in the processor's cache, which halves the time of one tall
+factorisation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,8 +114,8 @@ def factorise(motions: Iterable[PreparedMotion], structure: ModelStructure) -> t
         if triangle is None or rows[joint] <= len(columns[joint]):
             name = structure.robot.joints[joint].name
             raise IdentificationError(
-                f"{name}: {rows[joint]} usable samples for {len(columns[joint])} parameters: record longer, or ask for a"
-                " higher cut-off"
+                f"{name}: {rows[joint]} usable samples for {len(columns[joint])} parameters: record longer, or ask for"
+                " a higher cut-off"
             )
         factors.append(JointFactor(columns[joint], triangle, rows[joint]))
     return tuple(factors)
@@ -186,17 +187,22 @@ def _appended(triangle: Array | None, equations: Array) -> Array:
     """The factor of the rows so far and of new ones, (p + 1, M) with time last."""
     pieces = [] if triangle is None else [triangle]
     for start in range(0, equations.shape[1], ROWS_AT_ONCE):
-        pieces.append(np.linalg.qr(equations[:, start : start + ROWS_AT_ONCE].T, mode="r"))
+        pieces.append(_upper(equations[:, start : start + ROWS_AT_ONCE].T))
     return _triangle(np.vstack(pieces)) if pieces else np.zeros((len(equations), len(equations)))
 
 
 def _triangle(matrix: Array) -> Array:
     """R of the QR factorisation, square, with rows of zeros where there are fewer rows than columns."""
-    upper = np.linalg.qr(matrix, mode="r")
+    upper = _upper(matrix)
     columns = matrix.shape[1]
     if len(upper) == columns:
         return upper
     return np.vstack([upper, np.zeros((columns - len(upper), columns))])
+
+
+def _upper(matrix: Array) -> Array:
+    """R of the QR factorisation."""
+    return np.asarray(np.linalg.qr(matrix, mode="r"))
 
 
 def _solved(factor: Array, target: Array) -> Solution:
@@ -206,5 +212,5 @@ def _solved(factor: Array, target: Array) -> Solution:
     left, singular, right = np.linalg.svd(factor / scale)
     known = singular > RANK_TOLERANCE * max(singular[0], np.finfo(float).tiny)
     spread = right[known].T / singular[known] / scale[:, None]
-    undetermined = (np.abs(right[~known]) > 1e-3).any(axis=0) if not known.all() else np.zeros(len(scale), bool)
-    return Solution(spread @ (left[:, known].T @ target), factor, target, spread, undetermined)
+    undetermined = np.any(np.abs(right[~known]) > 1e-3, axis=0)
+    return Solution(spread @ (left[:, known].T @ target), factor, target, spread, np.asarray(undetermined))

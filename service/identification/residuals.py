@@ -8,8 +8,8 @@ import numpy as np
 from service.identification.autocorrelation import AutocovarianceSum, Autoregression
 from service.identification.dataset import PreparedMotion
 from service.identification.structure import ModelStructure
-from service.recording.recording import Array
 from service.recording.conditioning import Stretch, split_periods
+from service.recording.recording import Array
 
 FEWEST_PERIOD_SAMPLES = 50
 """Differences between periods that are needed before their variance is trusted."""

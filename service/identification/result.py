@@ -1,5 +1,6 @@
 """The identification as a document: what ``identify --json`` writes and the REST API returns (CONTRACT.md)."""
 
+from dataclasses import asdict
 from typing import Literal
 
 import numpy as np
@@ -8,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from service.identification.friction_shape import shape_parameters
 from service.identification.identification import Identification
 from service.identification.residuals import Fit
+from service.recording.conditioning import ConditioningSummary
 from service.robot import STANDARD_PARAMETERS, LinkInertia
 
 
@@ -111,10 +113,12 @@ class IdentificationDocument(Document):
     joints: list[str] = Field(description="names of its joints, in chain order")
     estimator: Literal["ls", "wls"] = Field(description="how the joints' equations were weighted")
     constrained: bool = Field(
-        description="true where no rigid bodies can have the free estimate, so that the delivered values are the nearest"
-        " physically consistent ones"
+        description="true where no rigid bodies can have the free estimate, so that the delivered values are the"
+        " nearest physically consistent ones"
     )
-    cutoff_hz: float | None = Field(description="band shared by torque and regressor [Hz]; null where nothing was filtered")
+    cutoff_hz: float | None = Field(
+        description="band shared by torque and regressor [Hz]; null where nothing was filtered"
+    )
     noise_std: list[float] = Field(description="per joint, torque noise a sample [Nm or N]")
     noise_method: Literal["periods", "residual"] = Field(
         description="from differences between repeated periods (model-free), or from the whitened residual"
@@ -207,7 +211,9 @@ def _friction(result: Identification, parameters: np.ndarray) -> list[FrictionEn
     shape_std = dict(zip(shape_parameters(result.shapes), std[result.structure.size :], strict=True))
     entries = []
     for joint, (shape, known) in enumerate(zip(result.shapes, result.identifiable, strict=True)):
-        columns = {name: result.structure.coefficient(joint, name) for name in ("stiction", "stribeck", "viscous", "offset")}
+        columns = {
+            name: result.structure.coefficient(joint, name) for name in ("stiction", "stribeck", "viscous", "offset")
+        }
         present = {name: column for name, column in columns.items() if column is not None}
         errors = {name: float(std[column]) for name, column in present.items()}
         for name, value in (("k_v", shape.k_v), ("delta", shape.delta)):
@@ -221,7 +227,9 @@ def _friction(result: Identification, parameters: np.ndarray) -> list[FrictionEn
                 k_v=shape.k_v,
                 delta=shape.delta,
                 std=errors,
-                identifiable={name: known[name] for name in ("stiction", "stribeck", "viscous", "offset", "k_v", "delta")},
+                identifiable={
+                    name: known[name] for name in ("stiction", "stribeck", "viscous", "offset", "k_v", "delta")
+                },
             )
         )
     return entries
@@ -259,6 +267,5 @@ def _fit(fit: Fit) -> FitEntry:
     return FitEntry(rms=_floats(fit.rms), band_rms=_floats(fit.band_rms), relative_error=fit.relative_error)
 
 
-def _conditioning(summary: object) -> ConditioningEntry:
-    values = {name: getattr(summary, name) for name in ConditioningEntry.model_fields}
-    return ConditioningEntry(**{name: list(v) if isinstance(v, tuple) else v for name, v in values.items()})
+def _conditioning(summary: ConditioningSummary) -> ConditioningEntry:
+    return ConditioningEntry.model_validate(asdict(summary), strict=False)

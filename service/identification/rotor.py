@@ -1,8 +1,8 @@
 """Reflected rotor inertia: a parameter of its own where the data ask for it.
 
-A geared motor's rotor adds I_a q̈_j to its own joint's torque and nothing to the others'. At the first joints that is one
-with the links' inertia; further out it can be told apart, and some arms (quasi-direct drives, small wrists) are not
-understood without it. Torque sensors behind the gear do not see it, so it is never assumed.
+A geared motor's rotor adds I_a q̈_j to its own joint's torque and nothing to the others'. At the first joints that is
+one with the links' inertia; further out it can be told apart, and some arms (quasi-direct drives, small wrists) are
+not understood without it. Torque sensors behind the gear do not see it, so it is never assumed.
 """
 
 import numpy as np
@@ -21,7 +21,8 @@ STANDARD_ERRORS = 5.0
 """A rotor must be this many standard errors away from zero, and positive."""
 
 GEARED_STANDARD_ERRORS = 2.0
-"""…or this many where the robot file states a gear ratio: a geared motor has a rotor, the question is only whether it shows."""
+"""…or this many where the robot file states a gear ratio: a geared motor has a rotor, the question is only whether it
+shows."""
 
 SMALLEST_SHARE = 0.02
 """…and explain this share of its joint's residual energy: less is more likely a stand-in for something else."""

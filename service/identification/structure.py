@@ -1,8 +1,8 @@
 """Which columns the model has: base parameters of the rigid body, then every joint's friction and rotor.
 
 τ_j = L_j Θ* + τ_s A(K_v q̇_j) + τ_sc A(δ q̇_j) + τ_v q̇_j + offset + I_a q̈_j,  A(x) = (2/π) atan x,
-the paper's (14) and (7)–(9); an offset, because no current sensor is without one, and the rotor's reflected inertia where
-the data ask for it.
+the paper's (14) and (7)–(9); an offset, because no current sensor is without one, and the rotor's reflected inertia
+where the data ask for it.
 """
 
 from dataclasses import dataclass, replace
