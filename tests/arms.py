@@ -50,7 +50,7 @@ def paper_arm(alpha: float = np.pi / 2, theta: float = np.pi / 2) -> Robot:
 
 
 def paper_parameters() -> Array:
-    """Standard parameters of the paper's arm, shape (30,): links 2 and 3 slender rods of √2 kg and 0.5 m, centre at -a/2."""
+    """Standard parameters of the paper's arm, (30,): links 2 and 3 slender rods of √2 kg and 0.5 m, centre at -a/2."""
     mass, length = np.sqrt(2.0), 0.5
     moment = mass * length**2 / 3
     rod = LinkInertia(mass, np.array([-mass * length / 2, 0.0, 0.0]), np.diag([0.0, moment, moment]))
