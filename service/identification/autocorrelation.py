@@ -62,7 +62,13 @@ class Autoregression:
 
 
 class AutocovarianceSum:
-    """Lagged products of a residual, summed over pieces with samples missing."""
+    """Lagged products of a residual, summed over pieces with samples missing.
+
+    Parameters
+    ----------
+    lags : int
+        largest lag; bounds the order of the model
+    """
 
     def __init__(self, lags: int = LARGEST_ORDER) -> None:
         self._products = np.zeros(lags + 1)

@@ -8,6 +8,8 @@ not filtered at all: nothing would be gained.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 from scipy import signal
@@ -29,6 +31,12 @@ ROUNDS = 2
 
 SMALLEST_CYCLES = 20.0
 """A band holds at least this many cycles of its cut-off within the longest stretch of the recording."""
+
+ENOUGH_ROWS = 1 << 17
+"""Rows of a recording that its spectra are taken from: more changes nothing."""
+
+ENOUGH_PIECES = 8
+"""Pieces of motion that tell the joints' typical speeds."""
 
 SPECTRUM_POINTS = 200
 SMOOTHING = np.sqrt(2.0)
@@ -52,6 +60,7 @@ def choose_cutoff(conditioners: Sequence[Conditioner], robot: Robot, base: BaseP
     float or None
         cut-off [Hz]; None where the positions are clean enough for no filter
     """
+    conditioners = [_beginning(conditioner) for conditioner in conditioners]
     limits = [conditioner.noise.limit_hz for conditioner in conditioners]
     bounds = [limit for limit in limits if limit is not None]
     if not bounds:
@@ -68,6 +77,16 @@ def choose_cutoff(conditioners: Sequence[Conditioner], robot: Robot, base: BaseP
             break
         cutoff = min(max(KEPT_BEYOND * crossing, floor), limit)
     return cutoff
+
+
+def _beginning(conditioner: Conditioner) -> Conditioner:
+    """The recording's first `ENOUGH_ROWS` rows."""
+    rows, left = [], ENOUGH_ROWS
+    for start, stop in conditioner.timing.rows:
+        if left > 0:
+            rows.append((start, min(stop, start + left)))
+            left -= stop - start
+    return replace(conditioner, timing=replace(conditioner.timing, rows=tuple(rows)))
 
 
 def _crossing(
@@ -123,7 +142,7 @@ def preliminary_terms(motions: Dataset, robot: Robot) -> tuple[JointTerms, ...]:
         constants that its file states are used
     """
     squares, count = np.zeros(robot.joint_count), 0
-    for prepared in motions:
+    for prepared in islice(motions, ENOUGH_PIECES):
         squares += np.sum(prepared.motion.velocity**2, axis=0)
         count += len(prepared.motion.velocity)
     speed = np.maximum(np.sqrt(squares / max(count, 1)), 1e-9)

@@ -10,17 +10,13 @@ leave uncertain shows in the coefficients.
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from service.dynamics.friction import smooth_sign_slope
 from service.identification.autocorrelation import Autoregression
 from service.identification.dataset import PreparedMotion
 from service.identification.least_squares import JointFactor
+from service.identification.shape_sensitivity import ShapeParameter, columns_with_shapes, pseudo_inverse
 from service.identification.structure import ModelStructure
 from service.recording.recording import Array
-
-ShapeParameter = tuple[int, str]
-"""Joint index and ``k_v`` or ``delta``: a shape constant that was estimated, as its logarithm."""
 
 
 def parameter_covariance(
@@ -69,7 +65,7 @@ def parameter_covariance(
             meat[place] += weight[joint] ** 4 * model.variance * square
     for prepared in motions if passed else ():
         for joint in passed:
-            columns, index = _columns_with_shapes(prepared, structure, joint, parameters, shapes)
+            columns, index = columns_with_shapes(prepared, structure, joint, parameters, shapes)
             used = prepared.used[joint]
             columns = prepared.row_weight * (columns if used.all() else columns * used)
             coloured = autoregressions[joint].colour(columns)
@@ -77,40 +73,5 @@ def parameter_covariance(
             bread[place] += weight[joint] ** 2 * (columns @ columns.T)
             meat[place] += weight[joint] ** 4 * (coloured @ coloured.T)
     rows = sum(factor.rows for factor in factors)
-    inverse = _pseudo_inverse(bread)
+    inverse = pseudo_inverse(bread)
     return rows / max(rows - size, 1) * inverse @ meat @ inverse
-
-
-def _columns_with_shapes(
-    prepared: PreparedMotion,
-    structure: ModelStructure,
-    joint: int,
-    parameters: Array,
-    shapes: Sequence[ShapeParameter],
-) -> tuple[Array, NDArray[np.intp]]:
-    """A joint's columns and those of its shape constants, ∂τ/∂log K = c · K · ∂A(K q̇)/∂K, with their global places."""
-    columns = prepared.joint_columns(structure, joint)
-    index = structure.joint_columns(joint)
-    extra = [(place, name) for place, (owner, name) in enumerate(shapes) if owner == joint]
-    if not extra:
-        return columns, index
-    velocity = prepared.motion.velocity[:, joint]
-    rows = []
-    for _, name in extra:
-        value = structure.terms[joint].k_v if name == "k_v" else structure.terms[joint].delta or 0.0
-        coefficient = structure.coefficient(joint, "stiction" if name == "k_v" else "stribeck")
-        amplitude = 0.0 if coefficient is None else parameters[coefficient]
-        rows.append(amplitude * value * smooth_sign_slope(velocity, value))
-    sensitivity = prepared.motion.band.reduce(np.stack(rows))
-    places = structure.size + np.array([place for place, _ in extra])
-    return np.concatenate([columns, sensitivity]), np.concatenate([index, places])
-
-
-def _pseudo_inverse(matrix: Array) -> Array:
-    """Inverse in scaled columns; directions without information stay without variance, and are flagged elsewhere."""
-    scale = np.sqrt(np.diag(matrix))
-    scale[scale == 0.0] = 1.0
-    values, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
-    known = values > 1e-14 * values[-1]
-    half = vectors[:, known] / np.sqrt(values[known]) / scale[:, None]
-    return half @ half.T

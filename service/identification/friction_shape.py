@@ -22,10 +22,12 @@ from service.identification.structure import ModelStructure
 from service.recording.recording import Array
 from service.robot import FrictionShape
 
-GRID_POINTS = 37
-GRID_DECADES = (0.8, 4.3)
-"""K times the joint's rms velocity runs over these powers of ten: from a slope that is still no viscous friction to a
-step."""
+GRID_POINTS = 42
+GRID_DECADES = (0.2, 4.3)
+"""Candidates times the joint's rms velocity run over these powers of ten: from a gentle Stribeck slope to a step."""
+
+LEAST_STEP = 10**0.8
+"""K_v times the rms velocity is at least this: what is gentler is viscous friction by another name."""
 
 ORDINARY = 100.0
 """K times the rms velocity of a constant that the data leave open, as near as they allow: a step, but a smooth one."""
@@ -34,9 +36,9 @@ SEPARATION = 4.0
 """K_v is at least this many times δ: closer, their columns are one."""
 
 IMPROVEMENT = 25.0
-"""What a Stribeck term must take off the criterion, in noise variances after autocorrelation: five standard errors."""
+"""What a Stribeck term must take off the criterion to be proposed, in residual variances: five standard errors."""
 
-IMPROVEMENT_SHARE = 0.02
+IMPROVEMENT_SHARE = 0.005
 """…and the share of the joint's residual energy that it must explain, so that it is not a proxy of something else."""
 
 KNOWN_BAND = 9.0
@@ -104,6 +106,7 @@ def estimate_shapes(
     factors: tuple[JointFactor, ...],
     noise_std: Array,
     inflation: Array,
+    stribeck: Sequence[bool],
 ) -> tuple[EstimatedShape, ...]:
     """Shape constants of all joints; those that the robot file states are kept.
 
@@ -119,6 +122,8 @@ def estimate_shapes(
         residual standard deviation in the common band, for the weights
     inflation : (n,) float64
         variance inflation by autocorrelation, at least 1
+    stribeck : sequence of bool, length n
+        joints at which a Stribeck term of unknown δ may be proposed
 
     Returns
     -------
@@ -136,10 +141,15 @@ def estimate_shapes(
     energy = sum(square / std**2 for square, std in zip(squares, noise_std, strict=True))
     rows = sum(factor.rows for factor in factors)
     variance = max(float(energy - _total_gain(grids, chosen)) / rows, np.finfo(float).eps)
-    return tuple(
-        _described(grids, chosen, joint, given[joint], inflation[joint] * variance, factors[joint].rows * variance)
-        for joint in range(len(grids))
-    )
+    described = []
+    for joint, (grid, shape) in enumerate(zip(grids, given, strict=True)):
+        conditional, indices = _Conditional.of(grids, chosen, joint), chosen[joint]
+        residual_energy = factors[joint].rows * variance
+        if stribeck[joint] and shape.delta is None:
+            indices = _with_stribeck(conditional, grid, indices, shape, variance, residual_energy)
+        unit = inflation[joint] * variance
+        described.append(_described(conditional, grid, indices, shape, unit, residual_energy))
+    return tuple(described)
 
 
 def _candidate_slopes(
@@ -214,22 +224,28 @@ def _search(grids: list[_JointGrid], given: Sequence[FrictionShape]) -> list[lis
     return chosen
 
 
+def _steps(grid: _JointGrid, shape: FrictionShape) -> list[int]:
+    """Grid indices that K_v may take; the stated one where the robot file states it."""
+    if shape.k_v is not None:
+        return [GRID_POINTS]
+    least = LEAST_STEP / 10 ** GRID_DECADES[0] * grid.slopes[0]
+    return [k for k in range(GRID_POINTS) if grid.slopes[k] >= least]
+
+
 def _plain_options(grid: _JointGrid, shape: FrictionShape) -> list[list[int]]:
     """What a joint's constants may be without a Stribeck term of unknown δ; stated constants are kept."""
-    if shape.k_v is not None and shape.delta is not None:
-        return [[GRID_POINTS, GRID_POINTS + 1]]
+    if shape.delta is None:
+        return [[k] for k in _steps(grid, shape)]
+    stated = len(grid.slopes) - 1
     if shape.k_v is not None:
-        return [[GRID_POINTS]]
-    if shape.delta is not None:
-        return [[k, GRID_POINTS] for k in range(GRID_POINTS) if grid.slopes[k] >= SEPARATION * shape.delta]
-    return [[k] for k in range(GRID_POINTS)]
+        return [[GRID_POINTS, stated]]
+    return [[k, stated] for k in _steps(grid, shape) if grid.slopes[k] >= SEPARATION * shape.delta]
 
 
 def _stribeck_options(grid: _JointGrid, shape: FrictionShape) -> list[list[int]]:
     """Pairs of constants with a Stribeck term, for joints whose file states no δ."""
-    steep = [GRID_POINTS] if shape.k_v is not None else list(range(GRID_POINTS))
     slopes = grid.slopes
-    return [[k, d] for k in steep for d in range(GRID_POINTS) if slopes[k] >= SEPARATION * slopes[d]]
+    return [[k, d] for k in _steps(grid, shape) for d in range(GRID_POINTS) if slopes[k] >= SEPARATION * slopes[d]]
 
 
 def _total_gain(grids: list[_JointGrid], chosen: list[list[int]]) -> float:
@@ -261,8 +277,11 @@ class _Conditional:
         solved = linalg.lstsq(matrix, np.column_stack([cross, known]), cond=1e-12)[0]
         return _Conditional(gram - cross.T @ solved[:, :-1], target - cross.T @ solved[:, -1])
 
-    def gains(self, options: list[list[int]]) -> Array:
-        """What each option, one or two columns, takes off the criterion."""
+    def gains(self, options: list[list[int]], *, physical: bool = False) -> Array:
+        """What each option, one or two columns, takes off the criterion.
+
+        With `physical`, a pair counts only where friction falls from τ_s > 0 to a lower τ_s + τ_sc ≥ 0.
+        """
         first = np.array([option[0] for option in options])
         energy = np.maximum(np.diag(self.gram), np.finfo(float).tiny)
         single = self.target[first] ** 2 / energy[first]
@@ -271,32 +290,62 @@ class _Conditional:
         second = np.array([option[1] for option in options])
         overlap = self.gram[first, second] / energy[first]
         left = energy[second] - overlap * self.gram[first, second]
-        added = (self.target[second] - overlap * self.target[first]) ** 2
-        return single + np.where(left > COLLINEAR * energy[second], added / np.maximum(left, 1e-300), 0.0)
+        apart = left > COLLINEAR * energy[second]
+        stribeck = np.where(apart, self.target[second] - overlap * self.target[first], 0.0) / np.where(apart, left, 1.0)
+        added = stribeck**2 * left
+        if physical:
+            stiction = self.target[first] / energy[first] - overlap * stribeck
+            falls = (stribeck < 0.0) & (stiction + stribeck >= 0.0)
+            added = np.where(falls, added, 0.0)
+        return single + added
 
 
 def _described(
-    grids: list[_JointGrid],
-    chosen: list[list[int]],
-    joint: int,
+    conditional: _Conditional,
+    grid: _JointGrid,
+    indices: list[int],
     shape: FrictionShape,
     unit: float,
     residual_energy: float,
 ) -> EstimatedShape:
     """The joint's constants refined, with what the data can tell about them; `unit` is one noise variance."""
-    conditional = _Conditional.of(grids, chosen, joint)
-    indices = chosen[joint]
-    if shape.delta is None:
-        indices = _with_stribeck(conditional, grids[joint], indices, shape, unit, residual_energy)
-    slopes = grids[joint].slopes
+    slopes = grid.slopes
     k_v, k_v_known = float(slopes[indices[0]]), True
-    if shape.k_v is None:
-        k_v, k_v_known = _profiled(conditional, slopes, indices, 0, unit, residual_energy)
     delta, delta_known = shape.delta, shape.delta is not None
+    if shape.k_v is None:
+        steps = [k for k in _steps(grid, shape) if len(indices) == 1 or slopes[k] >= SEPARATION * slopes[indices[1]]]
+        profile = conditional.gains([[k, *indices[1:]] for k in steps])
+        k_v, k_v_known = _peak(profile, slopes[steps], KNOWN_BAND * unit)
+        if not k_v_known and len(indices) == 1:
+            k_v = _ordinary(profile, slopes[steps], grid, unit, residual_energy)
     if shape.delta is None and len(indices) > 1:
-        delta, delta_known = _profiled(conditional, slopes, indices, 1, unit, residual_energy)
-        delta = delta if delta_known else None
+        gentle = [d for d in range(GRID_POINTS) if slopes[indices[0]] >= SEPARATION * slopes[d]]
+        profile = conditional.gains([[indices[0], d] for d in gentle])
+        delta, delta_known = _peak(profile, slopes[gentle], KNOWN_BAND * unit)
     return EstimatedShape(k_v, delta, k_v_known, delta_known, shape.k_v is not None, shape.delta is not None)
+
+
+def _peak(profile: Array, slopes: Array, band: float) -> tuple[float, bool]:
+    """Where a profile peaks, between grid points, and whether it falls by `band` on both sides."""
+    best = int(np.argmax(profile))
+    if not 0 < best < len(slopes) - 1:
+        return float(slopes[best]), False
+    left, middle, right = profile[best - 1 : best + 2]
+    curvature = left - 2.0 * middle + right
+    shift = 0.5 * (left - right) / curvature if curvature < 0.0 else 0.0
+    return float(slopes[best] * np.exp(shift * np.log(slopes[1] / slopes[0]))), bool(
+        max(profile[0], profile[-1]) < profile[best] - band
+    )
+
+
+def _ordinary(profile: Array, slopes: Array, grid: _JointGrid, unit: float, residual_energy: float) -> float:
+    """The most ordinary slope of those that fit practically as well as the best: never one that ran away."""
+    ordinary = ORDINARY / 10 ** GRID_DECADES[0] * grid.slopes[0]
+    fitting = profile >= profile.max() - AS_GOOD * residual_energy
+    if profile[0] >= profile.max() - KNOWN_BAND * unit:
+        fitting[:] = True  # it could be viscous friction as well: a stand-in, any step will do
+    candidates = slopes[fitting]
+    return float(candidates[np.argmin(np.abs(np.log(candidates / ordinary)))])
 
 
 def _with_stribeck(
@@ -304,7 +353,7 @@ def _with_stribeck(
     grid: _JointGrid,
     plain: list[int],
     shape: FrictionShape,
-    unit: float,
+    variance: float,
     residual_energy: float,
 ) -> list[int]:
     """The best pair [K_v, δ] where it explains enough more than K_v alone, else the plain choice.
@@ -314,37 +363,14 @@ def _with_stribeck(
     pairs = _stribeck_options(grid, shape)
     if not pairs:
         return plain
-    gains = conditional.gains(pairs)
+    gains = conditional.gains(pairs, physical=True)
     best = int(np.argmax(gains))
     alone = float(conditional.gains([plain])[0])
     if shape.k_v is None:
         beside = [[plain[0], plain[0] + step] for step in (-1, 1) if 0 <= plain[0] + step < GRID_POINTS]
         alone = max(alone, float(conditional.gains(beside).max()))
-    enough = max(IMPROVEMENT * unit, IMPROVEMENT_SHARE * residual_energy)
+    enough = max(IMPROVEMENT * variance, IMPROVEMENT_SHARE * residual_energy)
     return pairs[best] if gains[best] - alone > enough else plain
-
-
-def _profiled(
-    conditional: _Conditional, slopes: Array, indices: list[int], place: int, unit: float, residual_energy: float
-) -> tuple[float, bool]:
-    """One constant refined along its profile, and whether the profile closes on both sides.
-
-    Where it stays open, the most ordinary of the values that fit practically as well is taken: never one that ran away.
-    """
-    options = [
-        [candidate if k == place else index for k, index in enumerate(indices)] for candidate in range(GRID_POINTS)
-    ]
-    profile = conditional.gains(options)
-    best = int(np.argmax(profile))
-    close = np.flatnonzero(profile >= profile[best] - KNOWN_BAND * unit)
-    if close[0] == 0 or close[-1] == GRID_POINTS - 1:
-        ordinary = ORDINARY / 10 ** GRID_DECADES[0] * slopes[0]
-        fitting = np.flatnonzero(profile >= profile[best] - AS_GOOD * residual_energy)
-        return float(slopes[fitting[np.argmin(np.abs(np.log(slopes[fitting] / ordinary)))]]), False
-    left, middle, right = profile[best - 1 : best + 2]
-    curvature = left - 2.0 * middle + right
-    shift = 0.5 * (left - right) / curvature if curvature < 0.0 else 0.0
-    return float(slopes[best] * np.exp(shift * np.log(slopes[1] / slopes[0]))), True
 
 
 def shape_parameters(shapes: Sequence[EstimatedShape]) -> list[tuple[int, str]]:

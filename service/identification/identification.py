@@ -7,9 +7,10 @@ from typing import Literal
 
 import numpy as np
 from scipy import stats
+from threadpoolctl import ThreadpoolController
 
 from service.dynamics.base_parameters import BaseParameters, base_parameters
-from service.errors import RecordingMismatchError
+from service.errors import IdentificationError, RecordingMismatchError
 from service.identification.band import choose_cutoff, preliminary_terms
 from service.identification.consistency import (
     ConsistentParameters,
@@ -31,7 +32,8 @@ from service.identification.least_squares import (
 )
 from service.identification.residuals import Fit, ResidualStatistics, evaluate
 from service.identification.rotor import kept_columns, needed_rotors, separable_rotors
-from service.identification.structure import JointTerms, ModelStructure
+from service.identification.shape_sensitivity import refined_structure
+from service.identification.structure import ModelStructure
 from service.recording.conditioning import Conditioner, ConditioningSummary
 from service.recording.recording import Array, Recording
 from service.robot import Robot
@@ -41,6 +43,15 @@ REWEIGHTINGS = 2
 
 CONSISTENCY_LEVEL = 0.999
 """The free estimate counts as impossible, not merely unlucky, where physics rejects it at this level."""
+
+SIGNIFICANT = 5.0
+"""Standard errors by which a Stribeck term must differ from zero to stay in the model."""
+
+SCAN_ROWS = 1 << 16
+
+STANDING_STILL = 10.0
+SMALLEST_MOTION = 1e-9
+"""A joint moves where its range exceeds so many standard deviations of its noise, and this [rad or m]."""
 
 KNOWN_SHARE = 0.1
 """A coefficient whose standard error moves the joint's torque by more than this share of its rms is not
@@ -135,6 +146,7 @@ class Identification:
     identifiable: tuple[dict[str, bool], ...]
 
 
+@ThreadpoolController().wrap(limits=1, user_api="blas")  # factors of 50 columns: threads cost more than they bring
 def identify(
     robot: Robot,
     recordings: Sequence[Recording],
@@ -180,6 +192,7 @@ def identify(
     progress("condition recordings")
     base = base_parameters(robot)
     conditioners = [Conditioner.survey(recording, robot) for recording in recordings]
+    _require_motion(conditioners)
     cutoff = choose_cutoff(conditioners, robot, base) if options.cutoff_hz == "auto" else options.cutoff_hz
     motions = Dataset(conditioners, robot, base, cutoff)
     progress("choose model terms")
@@ -222,34 +235,112 @@ def identify(
     )
 
 
+def _require_motion(conditioners: Sequence[Conditioner]) -> None:
+    """Refuse recordings in which no joint leaves the noise of its own encoder."""
+    for conditioner in conditioners:
+        noise = np.sqrt(conditioner.noise.density * conditioner.timing.rate_hz / 2.0)
+        for start, stop in conditioner.timing.rows:
+            for first in range(start, stop, SCAN_ROWS):
+                position = conditioner.recording.samples(first, min(first + SCAN_ROWS, stop)).position
+                reach = np.nanmax(position, axis=0) - np.nanmin(position, axis=0)
+                if np.any(reach > np.maximum(STANDING_STILL * noise, SMALLEST_MOTION)):
+                    return
+    names = ", ".join(conditioner.recording.name for conditioner in conditioners)
+    raise IdentificationError(
+        f"{names}: no joint moves by more than the noise of its position: record a motion that excites every joint"
+    )
+
+
 def _model(
     motions: Dataset, robot: Robot, base: BaseParameters, options: Options
 ) -> tuple[ModelStructure, tuple[EstimatedShape, ...], tuple[JointFactor, ...]]:
     """The terms that the data ask for, and the factors of the model that has them."""
     given = [joint.friction_shape for joint in robot.joints]
-    structure = ModelStructure(robot, base, preliminary_terms(motions, robot))
     separable = separable_rotors(robot, base) if options.rotor_inertia else (False,) * robot.joint_count
-    inflation = None
+    structure = _with_rotors(ModelStructure(robot, base, preliminary_terms(motions, robot)), separable)
     if any(shape.k_v is None or shape.delta is None for shape in given):
-        preliminary = _with_rotors(structure, separable)
-        factors = factorise(motions, preliminary)
-        noise_std, inflation = _preliminary_residual(motions, preliminary, factors)
-        shapes = estimate_shapes(motions, preliminary, factors, noise_std, inflation)
+        shapes = _refined(motions, structure, _estimated_shapes(motions, structure))
     else:
         shapes = tuple(EstimatedShape(s.k_v or 0.0, s.delta, True, True, True, True) for s in given)
-    structure = structure.with_terms(tuple(JointTerms(shape.k_v, shape.delta) for shape in shapes))
-    complete = _with_rotors(structure, separable)
+    complete = _with_shapes(structure, shapes)
     factors = factorise(motions, complete)
-    if not any(separable):
-        return structure, shapes, factors
-    weights, _, _ = _estimate(factors, complete.size, Estimator.WLS)
-    needed = needed_rotors(factors, complete, 1.0 / weights, np.ones(robot.joint_count))
-    if any(needed):
-        if inflation is None:
-            _, inflation = _preliminary_residual(motions, complete, factors)
-        needed = needed_rotors(factors, complete, 1.0 / weights, inflation)
+    needed = _needed_rotors(motions, complete, factors) if any(separable) else separable
     keep = kept_columns(complete, {joint for joint, is_needed in enumerate(needed) if is_needed})
-    return _with_rotors(structure, needed), shapes, restricted(factors, keep)
+    return _with_rotors(complete, needed), shapes, restricted(factors, keep)
+
+
+def _estimated_shapes(motions: Dataset, structure: ModelStructure) -> tuple[EstimatedShape, ...]:
+    """Shape constants; a Stribeck term stays where it is far from zero against the residual that it leaves.
+
+    Its significance cannot be judged by the residual without it: what it would explain is the colour in that residual.
+    """
+    count = structure.robot.joint_count
+    factors = factorise(motions, structure)
+    noise_std, inflation = _preliminary_residual(motions, structure, factors)
+    proposed = estimate_shapes(motions, structure, factors, noise_std, np.ones(count), (True,) * count)
+    added = [shape.delta is not None and not shape.delta_given for shape in proposed]
+    supported = [False] * count
+    if any(added):
+        extended = _with_shapes(structure, proposed)
+        deviations, inflation = _stribeck_deviations(motions, extended, proposed)
+        supported = [bool(new and deviations[joint] >= SIGNIFICANT) for joint, new in enumerate(added)]
+    return estimate_shapes(motions, structure, factors, noise_std, inflation, supported)
+
+
+def _refined(
+    motions: Dataset, structure: ModelStructure, shapes: tuple[EstimatedShape, ...]
+) -> tuple[EstimatedShape, ...]:
+    """Identifiable constants of all joints moved to their common optimum."""
+    estimated = shape_parameters(shapes)
+    if not estimated:
+        return shapes
+    structure = _with_shapes(structure, shapes)
+    weights, solution, _ = _estimate(factorise(motions, structure), structure.size, Estimator.WLS)
+    refined = refined_structure(motions, structure, solution.parameters, weights, estimated)
+    return tuple(
+        replace(shape, k_v=terms.k_v, delta=terms.delta) for shape, terms in zip(shapes, refined.terms, strict=True)
+    )
+
+
+def _stribeck_deviations(
+    motions: Dataset, structure: ModelStructure, shapes: tuple[EstimatedShape, ...]
+) -> tuple[Array, Array]:
+    """Per joint, how many standard errors its Stribeck term is from zero, and the inflation by autocorrelation."""
+    factors = factorise(motions, structure)
+    weights, solution, _ = _estimate(factors, structure.size, Estimator.WLS)
+    (statistics,) = evaluate(motions, structure, [solution.parameters])
+    covariance = parameter_covariance(
+        motions,
+        structure,
+        solution.parameters,
+        factors,
+        weights,
+        statistics.autoregressions,
+        shape_parameters(shapes),
+    )
+    deviations = np.zeros(len(shapes))
+    for joint in range(len(shapes)):
+        column = structure.coefficient(joint, "stribeck")
+        if column is not None:
+            std = np.sqrt(max(covariance[column, column], np.finfo(float).tiny))
+            deviations[joint] = abs(solution.parameters[column]) / std
+    return deviations, np.array([model.long_run_ratio for model in statistics.autoregressions])
+
+
+def _with_shapes(structure: ModelStructure, shapes: Sequence[EstimatedShape]) -> ModelStructure:
+    """The structure with these shape constants."""
+    terms = zip(structure.terms, shapes, strict=True)
+    return structure.with_terms(tuple(replace(joint, k_v=s.k_v, delta=s.delta) for joint, s in terms))
+
+
+def _needed_rotors(motions: Dataset, complete: ModelStructure, factors: tuple[JointFactor, ...]) -> tuple[bool, ...]:
+    """Rotors that the data ask for; autocorrelation costs a pass and is looked at only where it could matter."""
+    weights, _, _ = _estimate(factors, complete.size, Estimator.WLS)
+    needed = needed_rotors(factors, complete, 1.0 / weights, np.ones(complete.robot.joint_count))
+    if any(needed):
+        _, inflation = _preliminary_residual(motions, complete, factors)
+        needed = needed_rotors(factors, complete, 1.0 / weights, inflation)
+    return needed
 
 
 def _with_rotors(structure: ModelStructure, rotors: Sequence[bool]) -> ModelStructure:

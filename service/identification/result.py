@@ -25,7 +25,7 @@ class BaseParameterEntry(Document):
     name: str = Field(description="readable expression, e.g. Ixx2 - Iyy2 - 0.5*msx2")
     terms: dict[str, float] = Field(description="coefficient of every standard parameter in it, to full precision")
     value: float = Field(description="estimate [kg m², kg m or kg, by its terms]")
-    std: float = Field(description="standard error of the free estimate")
+    std: float | None = Field(description="standard error of the free estimate; null where the recordings are silent")
     independent: bool = Field(description="whether it is one standard parameter by itself")
     free_value: float = Field(description="the LS or WLS estimate before physical constraints")
 
@@ -40,7 +40,9 @@ class FrictionEntry(Document):
     offset: float = Field(description="constant torque [Nm or N]")
     k_v: float = Field(description="K_v [s/rad or s/m]")
     delta: float | None = Field(description="δ [s/rad or s/m]; null where the data show no Stribeck term")
-    std: dict[str, float] = Field(description="standard errors of the entries that were estimated")
+    std: dict[str, float | None] = Field(
+        description="standard errors of the entries that were estimated; null where the recordings are silent"
+    )
     identifiable: dict[str, bool] = Field(description="false for an entry that these data cannot tell")
 
 
@@ -49,7 +51,7 @@ class RotorEntry(Document):
 
     joint: str = Field(description="name of the joint")
     value: float = Field(description="I_a [kg m² or kg]")
-    std: float = Field(description="standard error")
+    std: float | None = Field(description="standard error; null where the recordings are silent")
 
 
 class InertiaEntry(Document):
@@ -101,6 +103,9 @@ class ConditioningEntry(Document):
     resampled: bool = Field(description="whether stamps jittered so that signals were interpolated")
     averaged_periods: int = Field(description="periods averaged into one; 0 where none were")
     position_noise_std: list[float] = Field(description="per joint, noise of the positions [rad or m]")
+    velocity_source: list[str] = Field(
+        description="per joint, what q̇ and q̈ were taken from: position, recorded velocity or recorded acceleration"
+    )
 
 
 class IdentificationDocument(Document):
@@ -186,8 +191,12 @@ def _standard_names(joint_count: int) -> list[str]:
     return [f"{name}{link + 1}" for link in range(joint_count) for name in STANDARD_PARAMETERS]
 
 
-def _std(result: Identification) -> np.ndarray:
-    return np.sqrt(np.maximum(np.diag(result.covariance), 0.0))
+def _std(result: Identification) -> list[float | None]:
+    """Standard errors of all parameters, then of the shape constants' logarithms."""
+    errors: list[float | None] = [*_floats(np.sqrt(np.maximum(np.diag(result.covariance), 0.0)))]
+    for column in np.flatnonzero(result.undetermined):
+        errors[column] = None
+    return errors
 
 
 def _base_parameters(result: Identification) -> list[BaseParameterEntry]:
@@ -197,7 +206,7 @@ def _base_parameters(result: Identification) -> list[BaseParameterEntry]:
             name=base.expressions[place],
             terms=dict(base.terms[place]),
             value=float(result.parameters[place]),
-            std=float(std[place]),
+            std=std[place],
             independent=bool(base.is_independent(place)),
             free_value=float(result.free_parameters[place]),
         )
@@ -215,10 +224,10 @@ def _friction(result: Identification, parameters: np.ndarray) -> list[FrictionEn
             name: result.structure.coefficient(joint, name) for name in ("stiction", "stribeck", "viscous", "offset")
         }
         present = {name: column for name, column in columns.items() if column is not None}
-        errors = {name: float(std[column]) for name, column in present.items()}
+        errors = {name: std[column] for name, column in present.items()}
         for name, value in (("k_v", shape.k_v), ("delta", shape.delta)):
             if value is not None and (joint, name) in shape_std:
-                errors[name] = float(value * shape_std[joint, name])
+                errors[name] = value * (shape_std[joint, name] or 0.0)
         values = {name: float(parameters[present[name]]) if name in present else 0.0 for name in columns}
         entries.append(
             FrictionEntry(
@@ -239,9 +248,7 @@ def _rotors(result: Identification) -> list[RotorEntry]:
     std = _std(result)
     columns = [(j, result.structure.coefficient(j, "rotor_inertia")) for j in range(result.robot.joint_count)]
     return [
-        RotorEntry(
-            joint=result.robot.joints[joint].name, value=float(result.parameters[column]), std=float(std[column])
-        )
+        RotorEntry(joint=result.robot.joints[joint].name, value=float(result.parameters[column]), std=std[column])
         for joint, column in columns
         if column is not None
     ]

@@ -1,12 +1,12 @@
-"""Whole identification of a 6-joint arm from 10,000 samples: ours against FIGAROH, and time and memory of long recordings.
+"""Whole identification of a 6-joint arm from 10,000 samples: ours against FIGAROH; time and memory of long recordings.
 
-    python tests/benchmarks/benchmark_identification.py [--repeats R] [--long SAMPLES] [--json OUT]
+    python tests/benchmarks/benchmark_identification.py [--repeats R] [--long SAMPLES ...] [--json OUT]
 
-Ours: read the CSV file, condition, regressor, base parameters, WLS, covariance, and also what FIGAROH's figure leaves out (noise,
-residual autocorrelation, the physically consistent model). FIGAROH (the `bench` group of pyproject.toml): its basic regressor
-with friction and offset, elimination, double QR and weighted least squares, on exact q̇ and q̈ already in memory. The two
-are timed by turns; the ratio is that of the medians. `--long` identifies a recording of that many samples in a process
-of its own and prints seconds and peak memory.
+Ours: read the CSV file, condition, regressor, base parameters, WLS, covariance, and also what FIGAROH's figure leaves
+out: noise, autocorrelation of the residual, the physically consistent model. FIGAROH (the `bench` group of
+pyproject.toml): its basic regressor with friction and offset, elimination, double QR and weighted least squares, on
+exact q̇ and q̈ already in memory. The two are timed by turns; the ratio is that of the medians. `--long` identifies a
+recording of that many samples in a process of its own and prints seconds and peak memory.
 """
 
 import argparse
@@ -19,6 +19,7 @@ import time
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from statistics import median
 
@@ -110,12 +111,10 @@ def figaroh_identification(
     arm: Robot, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, torque: np.ndarray
 ) -> Callable[[], None]:
     """FIGAROH's regressor, elimination, double QR and weighted least squares as one call."""
-    from figaroh.identification.parameter import add_standard_additional_parameters, get_standard_parameters
-    from figaroh.tools.qrdecomposition import double_QR
-    from figaroh.tools.regressor import build_regressor_basic, build_regressor_reduced, get_index_eliminate
-    from pinocchio.robot_wrapper import RobotWrapper
-
-    robot = RobotWrapper(pinocchio_model(arm))
+    parameter = import_module("figaroh.identification.parameter")
+    regressor_tools = import_module("figaroh.tools.regressor")
+    double_qr = import_module("figaroh.tools.qrdecomposition").double_QR
+    robot = import_module("pinocchio.robot_wrapper").RobotWrapper(pinocchio_model(arm))
     names = [name for name in robot.model.names if name != "universe"]
     config = {
         "has_friction": True,
@@ -139,12 +138,12 @@ def figaroh_identification(
     def run() -> None:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            standard = get_standard_parameters(robot.model, config)
-            standard |= add_standard_additional_parameters(robot.model, config)
-            regressor = build_regressor_basic(robot, q, qd, qdd, config)
-            eliminated, remaining = get_index_eliminate(regressor, standard)
-            reduced = build_regressor_reduced(regressor, eliminated)
-            base, _, _, values, *_ = double_QR(flat, reduced, remaining)
+            standard = parameter.get_standard_parameters(robot.model, config)
+            standard |= parameter.add_standard_additional_parameters(robot.model, config)
+            regressor = regressor_tools.build_regressor_basic(robot, q, qd, qdd, config)
+            eliminated, remaining = regressor_tools.get_index_eliminate(regressor, standard)
+            reduced = regressor_tools.build_regressor_reduced(regressor, eliminated)
+            base, _, _, values, *_ = double_qr(flat, reduced, remaining)
             # Its own function for weighted least squares builds a dense matrix of samples by samples; the same formula:
             residual = (flat - base @ values).reshape(JOINTS, -1)
             weight = np.repeat(1.0 / np.linalg.norm(residual, axis=1), residual.shape[1])

@@ -1,26 +1,43 @@
-"""Repeated excitation: where the periods lie, their average, and derivatives by Fourier series.
+"""Repeated excitation: the periods side by side, their average, and derivatives by Fourier series.
 
 Averaging P periods takes the measurement noise down by √P on both sides of the equation without any filter's bias, and
 what differs from period to period is noise by construction: no model is needed to see it.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from service.recording.conditioning.uniform import Mask, Stretch
 from service.recording.recording import Array
+from service.robot.robot import JointType
 
 REPEATABILITY = 0.05
-"""Largest rms of what differs in q̈ between periods, relative to q̈ itself, at which an average is still the motion: what is
-lost is of second order, a quarter of a percent."""
+"""Largest rms of what differs in q̈ between periods, relative to q̈ itself, at which an average is still the motion:
+what is lost is of second order, a quarter of a percent."""
 
-FRACTIONAL_PERIOD = 0.02
-"""Largest misfit of a period to the sampling grid, in samples over all periods, that needs no resampling."""
+NOISE_ALLOWANCE = 3.0
+"""What differs may be this many times the noise that the positions are known to have: averaging is for noise."""
+
+LIVELIEST_SHARE = 0.1
+"""A joint need not repeat better than if its q̈ were this share of the liveliest joint's: some stand nearly still."""
+
+WHOLE_SAMPLES = 5e-3
+"""Largest misfit of the periods to the sampling grid, in samples over all periods, that needs no interpolation."""
+
+MISLABELLED = 0.5
+"""Lag from period to period, in samples, beyond which the labels, not the positions, must be wrong about a length that
+is a whole number of samples."""
+
+LATE_SAMPLES = 1.0
+"""Samples that the last period may lack."""
+
+SPLINE_DEGREE = 3
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Periods:
     """P complete periods of N samples, aligned.
 
@@ -32,6 +49,12 @@ class Periods:
         where the torque was measured
     rows : (int, int)
         the samples of the stretch that the periods cover
+    start_s : float
+        time of the first sample of the first period
+    velocity, acceleration : (P, N, n) float64 or None
+        recorded q̇ and q̈, where the stretch has them
+    advance : (n,) float64 or None
+        how far each joint gets from one period to the next [rad or m]; None where nobody asked
     """
 
     rate_hz: float
@@ -39,44 +62,89 @@ class Periods:
     torque: Array
     measured: Mask
     rows: tuple[int, int]
+    start_s: float = 0.0
+    velocity: Array | None = None
+    acceleration: Array | None = None
+    advance: Array | None = None
+
+    @property
+    def count(self) -> int:
+        """Number of periods P."""
+        return len(self.position)
 
 
-def split_periods(stretch: Stretch) -> Periods | None:
+def split_periods(stretch: Stretch, refine: bool = False) -> Periods | None:
     """The complete repeated periods of a stretch.
 
     Parameters
     ----------
     stretch : Stretch
-        uniform motion with its column `period`
+        uniform motion with its progress through the repeated excitation
+    refine : bool
+        whether a length that is no whole number of samples is improved until the positions repeat best
 
     Returns
     -------
     Periods or None
-        None where fewer than two complete periods of equal length follow one another
+        as many whole periods as the longest repeated part holds, counted from where it begins, which may be anywhere
+        in a period; None where it holds fewer than two
     """
-    if stretch.period is None:
+    if stretch.period is None or len(stretch.period) < 3:
         return None
-    starts, length = _period_starts(stretch.period)
-    if len(starts) < 2:
+    part = _longest_steady(stretch.period)
+    if part is None:
         return None
-    count = round(length)
-    first = starts[0]
-    whole = [k for k in range(len(starts)) if round(first + k * length) + count <= len(stretch.position)]
-    if len(whole) < 2:
+    first, last = part
+    length = (last - first) / float(stretch.period[last] - stretch.period[first])
+    count = int((last + 1 + LATE_SAMPLES - first) / length)
+    if count < 2 or length < 3:
         return None
-    if abs(length - count) * len(whole) <= FRACTIONAL_PERIOD:
-        index = first + np.arange(len(whole))[:, None] * count + np.arange(count)
-        return Periods(
-            stretch.rate_hz,
-            stretch.position[index],
-            stretch.torque[index],
-            stretch.measured[index],
-            (first, first + len(whole) * count),
-        )
-    return _resampled_periods(stretch, first, length, count, len(whole))
+    periods = _aligned(stretch, first, length, count)
+    if refine and periods is not None:
+        lag = _lag(periods.position) * stretch.rate_hz / periods.rate_hz
+        is_whole = periods.rate_hz == stretch.rate_hz
+        if abs(lag) > (MISLABELLED if is_whole else WHOLE_SAMPLES / count):
+            return _aligned(stretch, first, length + lag, count)
+    return periods
 
 
-def repeats(periods: Periods, cutoff_hz: float) -> bool:
+def _aligned(stretch: Stretch, first: int, length: float, count: int) -> Periods | None:
+    """The periods by their samples where both fit, else by interpolation."""
+    samples = round(length)
+    fits = first + count * samples <= len(stretch.position)
+    if fits and abs(length - samples) * count <= WHOLE_SAMPLES:
+        return _whole(stretch, first, samples, count)
+    return _interpolated(stretch, first, length, count)
+
+
+def with_turns_removed(periods: Periods, joint_types: Sequence[JointType]) -> Periods | None:
+    """The periods with their joints' advance from one to the next known, and whole turns taken out of the positions.
+
+    Parameters
+    ----------
+    periods : Periods
+        the periods
+    joint_types : sequence of JointType, length n
+        a joint that turns may turn on and on; one that slides may not
+
+    Returns
+    -------
+    Periods or None
+        None where a joint ends a period elsewhere than it began: gravity then differs from period to period
+    """
+    steps = periods.count - 1
+    centre = periods.position.mean(axis=1)
+    advance = (centre[-1] - centre[0]) / steps
+    turning = np.array([kind is JointType.REVOLUTE for kind in joint_types])
+    turns = np.where(turning, np.rint(advance / (2.0 * np.pi)), 0.0) * 2.0 * np.pi
+    position = periods.position - np.arange(periods.count)[:, None, None] * turns
+    rest = np.abs(advance - turns) * steps
+    if (rest > REPEATABILITY * np.ptp(position[0], axis=0) + NOISE_ALLOWANCE * _scatter(position)).any():
+        return None
+    return replace(periods, position=position, advance=advance)
+
+
+def repeats(periods: Periods, cutoff_hz: float, noise_density: Array) -> bool:
     """Whether the motion is the same in every period.
 
     Parameters
@@ -85,89 +153,138 @@ def repeats(periods: Periods, cutoff_hz: float) -> bool:
         the periods
     cutoff_hz : float
         only what lies below matters [Hz]
+    noise_density : (n,) float64
+        one-sided spectral density of the positions' noise [rad²/Hz or m²/Hz]
 
     Returns
     -------
     bool
         False where tracking differs so much from period to period that an average would not be a motion
     """
-    count = periods.position.shape[1]
-    frequency = np.fft.rfftfreq(count, 1.0 / periods.rate_hz)[:, None]
+    samples = periods.position.shape[1]
+    frequency = np.fft.rfftfreq(samples, 1.0 / periods.rate_hz)[:, None]
     weight = np.where(frequency <= cutoff_hz, frequency**4, 0.0)
     mean = periods.position.mean(axis=0)
-    motion = (weight * np.abs(np.fft.rfft(mean, axis=0)) ** 2).sum(axis=0)
+    ramp = 0.0 if periods.advance is None else np.arange(samples)[:, None] / samples * periods.advance
+    motion = (weight * np.abs(np.fft.rfft(mean - ramp, axis=0)) ** 2).sum(axis=0)
     deviation = (weight * np.abs(np.fft.rfft(periods.position - mean, axis=1)) ** 2).sum(axis=1).mean(axis=0)
-    return bool((deviation <= REPEATABILITY**2 * motion).all())
+    noise = weight.sum() * samples * noise_density * periods.rate_hz / 2.0
+    motion = np.maximum(motion, LIVELIEST_SHARE**2 * motion.max())
+    return bool((deviation <= REPEATABILITY**2 * motion + NOISE_ALLOWANCE * noise).all())
 
 
-def fourier_derivatives(position: Array, rate_hz: float, cutoff_hz: float) -> tuple[Array, Array, Array]:
+def fourier_derivatives(
+    values: Array, rate_hz: float, cutoff_hz: float, advance: Array | None = None, orders: Sequence[int] = (0, 1, 2)
+) -> tuple[Array, ...]:
     """A periodic motion and its derivatives by its Fourier series, cut at the cut-off.
 
     q̇ = Σ i ω_l c_l e^{i ω_l t},  q̈ = −Σ ω_l² c_l e^{i ω_l t}.
 
     Parameters
     ----------
-    position : (N, n) float64
-        exactly one period of q [rad or m]
+    values : (N, n) float64
+        exactly one period of q [rad or m], or of a derivative of it
     rate_hz : float
         sampling rate [Hz]
     cutoff_hz : float
         highest harmonic kept [Hz]
+    advance : (n,) float64 or None
+        what a joint that turns on and on gains in one period: the series is that of q less this ramp
+    orders : sequence of int
+        which derivatives are wanted
 
     Returns
     -------
     tuple of (N, n) float64
-        q, q̇, q̈
+        q, q̇, q̈, or those that `orders` names
     """
-    count = len(position)
-    spectrum = np.fft.rfft(position, axis=0)
+    count = len(values)
+    ramp = np.zeros(values.shape[1]) if advance is None else advance
+    spectrum = np.fft.rfft(values - np.arange(count)[:, None] / count * ramp, axis=0)
     frequency = np.fft.rfftfreq(count, 1.0 / rate_hz)[:, None]
-    spectrum[frequency[:, 0] > cutoff_hz] = 0.0
+    spectrum[frequency[:, 0] > cutoff_hz * (1.0 + 1e-9)] = 0.0
     rate = 2j * np.pi * frequency
     if count % 2 == 0:
         rate[-1] = 0.0  # the derivative of the Nyquist term is not determined by its samples
-    series = (spectrum, rate * spectrum, rate**2 * spectrum)
-    smooth, velocity, acceleration = (np.fft.irfft(part, n=count, axis=0) for part in series)
-    return smooth, velocity, acceleration
+    straight = (np.arange(count)[:, None] / count * ramp, ramp * rate_hz / count, np.zeros_like(ramp))
+    return tuple(np.fft.irfft(rate**order * spectrum, n=count, axis=0) + straight[order] for order in orders)
 
 
-def _period_starts(period: Array) -> tuple[list[int], float]:
-    """First samples of the longest run of consecutive periods, and their mean length in samples."""
-    change = np.flatnonzero(np.diff(period) == 1.0) + 1
-    change = change[np.isfinite(period[change - 1])]
-    if len(change) == 0:
-        return [], 0.0
-    begin = int(change[0])
-    while begin > 0 and period[begin - 1] == period[change[0] - 1]:
-        begin -= 1
-    if len(change) == 1:
-        # One boundary: either period may be cut short, the longer one is the measure of their length.
-        after = period[change[0] :] == period[change[0]]
-        end = int(change[0]) + (len(after) if after.all() else int(np.argmin(after)))
-        length = max(int(change[0]) - begin, end - int(change[0]))
-        starts = [int(change[0]) - length, int(change[0])]
-        return [start for start in starts if start >= 0], float(length)
-    length = float(np.median(np.diff(change)))
-    if np.ptp(np.diff(change)) > 2:
-        return [], 0.0
-    mean_length = float((change[-1] - change[0]) / (len(change) - 1))
-    starts = [int(value) for value in change]
-    if abs(change[0] - begin - length) <= 2:
-        starts.insert(0, max(0, int(round(change[0] - mean_length))))
-    return starts, mean_length
+def _longest_steady(progress: Array) -> tuple[int, int] | None:
+    """First and last sample of the longest part in which progress grows by the same from sample to sample."""
+    step = np.diff(progress)
+    finite = np.isfinite(step)
+    if not finite.any():
+        return None
+    typical = float(np.median(step[finite]))
+    steady = finite & (np.abs(step - typical) <= 0.25 * abs(typical)) & (step > 0)
+    edges = np.flatnonzero(np.diff(steady, prepend=False, append=False)).reshape(-1, 2)
+    if not len(edges):
+        return None
+    first, last = edges[np.argmax(edges[:, 1] - edges[:, 0])]
+    return int(first), int(last)
 
 
-def _resampled_periods(stretch: Stretch, first: int, length: float, count: int, periods: int) -> Periods:
-    """Periods whose length is no whole number of samples, brought onto a common grid of phases."""
-    phase = first + (np.arange(periods)[:, None] + np.arange(count) / count) * length
-    phase = np.minimum(phase, len(stretch.position) - 1)
-    sample = np.arange(len(stretch.position))
-    torque = np.stack([np.interp(phase, sample, column) for column in stretch.torque.T], axis=-1)
-    left = np.minimum(np.floor(phase).astype(int), len(sample) - 2)
+def _whole(stretch: Stretch, first: int, samples: int, count: int) -> Periods:
+    """Periods that are a whole number of samples long."""
+    index = first + np.arange(count)[:, None] * samples + np.arange(samples)
     return Periods(
-        stretch.rate_hz * count / length,
-        make_interp_spline(sample, stretch.position, k=3)(phase),
-        torque,
-        stretch.measured[left] & stretch.measured[left + 1],
-        (first, min(int(np.ceil(first + periods * length)), len(sample))),
+        rate_hz=stretch.rate_hz,
+        position=stretch.position[index],
+        torque=stretch.torque[index],
+        measured=stretch.measured[index],
+        rows=(first, first + count * samples),
+        start_s=stretch.start_s + first / stretch.rate_hz,
+        velocity=None if stretch.velocity is None else stretch.velocity[index],
+        acceleration=None if stretch.acceleration is None else stretch.acceleration[index],
     )
+
+
+def _interpolated(stretch: Stretch, first: int, length: float, count: int) -> Periods | None:
+    """Periods whose length is no whole number of samples, brought onto a common grid of phases by cubic splines."""
+    samples = round(length)
+    while first + count * length > len(stretch.position) + LATE_SAMPLES:
+        count -= 1
+    if count < 2:
+        return None
+    at = first + (np.arange(count)[:, None] + np.arange(samples) / samples) * length
+    knots = np.arange(len(stretch.position))
+
+    def onto(values: Array | None) -> Array | None:
+        if values is None:
+            return None
+        whole = np.isfinite(values).all(axis=0)
+        result = np.full((count, samples, values.shape[1]), np.nan)
+        if whole.any():
+            result[..., whole] = make_interp_spline(knots, values[:, whole], k=SPLINE_DEGREE)(at)
+        return result
+
+    left = np.clip(np.floor(at).astype(int), 0, len(knots) - 2)
+    return Periods(
+        rate_hz=stretch.rate_hz * samples / length,
+        position=make_interp_spline(knots, stretch.position, k=SPLINE_DEGREE)(at),
+        torque=make_interp_spline(knots, stretch.torque, k=SPLINE_DEGREE)(at),
+        measured=stretch.measured[left] & stretch.measured[left + 1] & (at <= knots[-1])[..., None],
+        rows=(first, min(int(np.ceil(first + count * length)), len(knots))),
+        start_s=stretch.start_s + first / stretch.rate_hz,
+        velocity=onto(stretch.velocity),
+        acceleration=onto(stretch.acceleration),
+    )
+
+
+def _lag(position: Array) -> float:
+    """Samples by which each period lies behind the one before, where they lie best on one another (one Newton step)."""
+    mean = position.mean(axis=0)
+    speed = np.gradient(mean, axis=0)
+    speed -= speed.mean(axis=0)
+    difference = (position[-1] - position[0]) / (len(position) - 1)
+    precision = 1.0 / np.maximum(_scatter(position), 1e-6 * np.ptp(mean, axis=0) + np.finfo(float).tiny) ** 2
+    energy = float((precision * (speed**2).sum(axis=0)).sum())
+    # A period that began late shows the motion of an earlier phase: q_k(φ) = q(φ - lag), hence the sign.
+    return -float((precision * (speed * difference).sum(axis=0)).sum()) / energy if energy > 0.0 else 0.0
+
+
+def _scatter(position: Array) -> Array:
+    """Standard deviation of what differs between periods about their own means, (n,)."""
+    own = position - position.mean(axis=1, keepdims=True)
+    return (own - own.mean(axis=0)).std(axis=(0, 1))

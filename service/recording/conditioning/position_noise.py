@@ -4,10 +4,12 @@ Noise of density S_n in q becomes ω⁴ S_n in q̈. It biases every inertial par
 in the energy of q̈ (errors in variables), so the band must end where that share grows too large.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import signal
+from numpy.typing import NDArray
+from scipy import signal, stats
 
 from service.recording.conditioning.uniform import Stretch
 from service.recording.recording import Array
@@ -21,58 +23,157 @@ PLATEAU = (0.6, 0.9)
 STANDING_STILL = 10.0
 """A joint whose range is below this many noise standard deviations does not move, and sets no band."""
 
+SEGMENT = 1024
+"""Samples in one segment of the averaged spectra."""
+
+SEGMENT_OVERLAP_LOSS = 0.9
+"""Independent segments among half-overlapping ones under a Hann window, relative to their number."""
+
+DIFFERENCE_ORDER = 2
+"""The second difference of q is nearly white where q itself is not: its spectrum's leakage stays below the noise."""
+
 
 @dataclass(frozen=True, eq=False)
 class PositionNoise:
     """Noise of the measured positions.
 
     density : (n,) float64
-        one-sided spectral density S_n [rad²/Hz]
+        one-sided spectral density S_n [rad²/Hz or m²/Hz]
     limit_hz : float or None
-        widest band in which q̈ keeps to `NOISE_SHARE`; None where the whole spectrum does
+        widest band in which the q̈ that is used keeps to `NOISE_SHARE`; None where the whole spectrum does
+    joint_limits_hz : (n,) float64
+        the same joint by joint; infinite where the whole spectrum does, or where the joint stands still
     """
 
     density: Array
     limit_hz: float | None
+    joint_limits_hz: Array
 
 
-def position_noise(stretch: Stretch) -> PositionNoise:
+@dataclass(frozen=True, eq=False)
+class AccelerationSpectrum:
+    """Spectrum of q̈ from some signal, and the noise in it.
+
+    frequency : (F,) float64
+        [Hz]
+    power : (F, n) float64
+        one-sided spectral density of q̈, with its noise
+    gain : (F,) float64
+        squared gain from the signal's noise to that of q̈
+    density : (n,) float64
+        one-sided spectral density of the signal's noise
+    """
+
+    frequency: Array
+    power: Array
+    gain: Array
+    density: Array
+
+    def widest_band(self, rate_hz: float) -> Array:
+        """Widest band in which noise keeps to `NOISE_SHARE` of q̈, (n,) [Hz]; infinite where it does everywhere.
+
+        Parameters
+        ----------
+        rate_hz : float
+            sampling rate [Hz]
+        """
+        usable = self.frequency <= PLATEAU[1] * rate_hz / 2.0
+        noise = (self.density * np.cumsum(self.gain)[:, None])[usable]
+        motion = np.maximum(np.cumsum(self.power[usable], axis=0) - noise, 0.0)
+        bearable = noise <= NOISE_SHARE**2 * np.maximum.accumulate(motion, axis=0)
+        last = len(bearable) - 1 - np.argmax(bearable[::-1], axis=0)
+        limit = self.frequency[np.maximum(last, 1)]
+        return np.where(bearable.all(axis=0), np.inf, limit)
+
+
+def position_noise(stretches: Stretch | Sequence[Stretch], step: Array | None = None) -> PositionNoise:
     """Noise density of every joint's position from the plateau of its spectrum, and the band that it allows.
 
     Parameters
     ----------
-    stretch : Stretch
-        a stretch of motion, the longer the better
+    stretches : Stretch or sequence of Stretch
+        stretches of motion at one rate, the longer the better
+    step : (n,) float64 or None
+        the encoders' steps, as `encoder_step` finds them [rad or m]
 
     Returns
     -------
     PositionNoise
         density and limit; the quantisation step's own density, step²/(6 fs), is the least that is assumed
     """
-    rate = stretch.rate_hz
-    nyquist = rate / 2.0
-    # The second difference is nearly white where q itself is not: the spectrum's leakage then stays below the noise.
-    acceleration = np.diff(stretch.position, n=2, axis=0) * rate**2
-    frequency, spectrum = signal.welch(acceleration, rate, nperseg=min(1024, len(acceleration)), axis=0)
-    shape = (2.0 * rate * np.sin(np.pi * frequency / rate)) ** 4
-    plateau = (frequency >= PLATEAU[0] * nyquist) & (frequency <= PLATEAU[1] * nyquist)
-    density = np.median(spectrum[plateau] / shape[plateau, None], axis=0)
-    density = np.maximum(density, _quantisation_density(stretch))
-    noise = density * np.cumsum(shape)[:, None]
-    motion = np.maximum(np.cumsum(spectrum, axis=0) - noise, 0.0)
-    moving = np.ptp(stretch.position, axis=0) > STANDING_STILL * np.sqrt(density * nyquist)
-    bearable = (noise <= NOISE_SHARE**2 * np.maximum.accumulate(motion, axis=0))[:, moving].all(axis=1)
-    usable = frequency <= PLATEAU[1] * nyquist
-    if not moving.any() or bearable[usable].all():
-        return PositionNoise(density, None)
-    last = np.flatnonzero(bearable & usable)
-    return PositionNoise(density, float(frequency[max(last[-1], 1)]) if len(last) else float(frequency[1]))
+    stretches = [stretches] if isinstance(stretches, Stretch) else list(stretches)
+    rate = stretches[0].rate_hz
+    floor = 0.0 if step is None else np.square(step) / (6.0 * rate)
+    spectrum = acceleration_spectrum([s.position for s in stretches], rate, DIFFERENCE_ORDER, floor)
+    reach = np.max([np.ptp(stretch.position, axis=0) for stretch in stretches], axis=0)
+    moving = reach > STANDING_STILL * np.sqrt(spectrum.density * rate / 2.0)
+    limits = np.where(moving, spectrum.widest_band(rate), np.inf)
+    return PositionNoise(spectrum.density, lowest_limit(limits), limits)
 
 
-def _quantisation_density(stretch: Stretch) -> Array:
-    """Density of the rounding error of an encoder's step; the smallest difference between values is the step."""
-    steps = []
-    for column in stretch.position.T:
-        differences = np.diff(np.unique(column))
-        steps.append(differences.min() if len(differences) and not stretch.resampled else 0.0)
-    return np.square(steps) / (6.0 * stretch.rate_hz)
+def lowest_limit(limits_hz: Array) -> float | None:
+    """The joint that stands least sets the band of all; None where none sets one.
+
+    Parameters
+    ----------
+    limits_hz : (n,) float64
+        joint by joint, infinite where there is none [Hz]
+    """
+    lowest = float(limits_hz.min())
+    return lowest if np.isfinite(lowest) else None
+
+
+def acceleration_spectrum(
+    signals: Sequence[Array], rate_hz: float, order: int, floor: Array | float = 0.0
+) -> AccelerationSpectrum:
+    """Spectrum of q̈ by differences of a measured signal.
+
+    Parameters
+    ----------
+    signals : sequence of (N, n) float64
+        pieces of q (order 2), q̇ (order 1) or q̈ (order 0)
+    rate_hz : float
+        sampling rate [Hz]
+    order : int
+        how many differences lead to q̈
+    floor : (n,) float64 or float
+        least density of the signal's noise
+
+    Returns
+    -------
+    AccelerationSpectrum
+        the noise density is the median over `PLATEAU`, corrected for the skewness of few averages
+    """
+    accelerations = [np.diff(values, n=order, axis=0) * rate_hz**order for values in signals]
+    length = min(SEGMENT, max(len(values) for values in accelerations))
+    pieces = [values for values in accelerations if len(values) >= length]
+    segments = np.array([1 + 2 * (len(values) - length) // length for values in pieces])
+    spectra = [signal.welch(values, rate_hz, nperseg=length, axis=0) for values in pieces]
+    frequency: Array = np.asarray(spectra[0][0])
+    power: Array = np.average([power for _, power in spectra], axis=0, weights=segments)
+    gain = (2.0 * rate_hz * np.sin(np.pi * frequency / rate_hz)) ** (2 * order)
+    nyquist = rate_hz / 2.0
+    plateau: NDArray[np.bool_] = (frequency >= PLATEAU[0] * nyquist) & (frequency <= PLATEAU[1] * nyquist)
+    freedom = 2.0 * max(1.0, SEGMENT_OVERLAP_LOSS * float(segments.sum()))
+    skewness = float(stats.chi2.median(freedom)) / freedom
+    density = np.median(power[plateau] / gain[plateau, None], axis=0) / skewness
+    return AccelerationSpectrum(frequency, power, gain, np.maximum(density, floor))
+
+
+def encoder_step(positions: Sequence[Array]) -> Array:
+    """Smallest difference between two positions that is no rounding error, (n,) [rad or m]; zero where there is none.
+
+    Parameters
+    ----------
+    positions : sequence of (N, n) float64
+        positions as they were recorded, never interpolated
+    """
+    columns = np.concatenate(positions).T
+    return np.array([_smallest_difference(column[np.isfinite(column)]) for column in columns])
+
+
+def _smallest_difference(values: Array) -> float:
+    """Smallest difference within one joint's positions."""
+    differences = np.diff(np.unique(values))
+    differences = differences[differences > 8.0 * np.spacing(np.abs(values).max(initial=0.0))]
+    return float(differences.min(initial=np.inf)) if len(differences) else 0.0

@@ -1,59 +1,33 @@
 """From time stamps to uniform, gap-free stretches of motion, with what was never measured marked as such.
 
 Drive logs jitter, miss samples and pause. Filters need a uniform grid, statistics must not count what was filled in.
-So short gaps are bridged and *masked*, long gaps split the recording, and both are counted.
+So short gaps are bridged and *masked*; long gaps have split the recording before (`timing`).
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
-from service.errors import RecordingError
+from service.recording.conditioning.timing import Timing
 from service.recording.recording import Array, Recording
 from service.robot.robot import Robot
 
 Mask = NDArray[np.bool_]
 
-SCAN_ROWS = 1 << 17
-"""Rows read at once while looking for gaps."""
-
-WINDOW_ROWS = 1 << 15
-"""Rows conditioned at once: bounds memory whatever the recording's length."""
-
-BRIDGED_SAMPLES = 5.5
-BRIDGED_SECONDS = 0.0125
-"""A gap is bridged up to the longer of the two: an arm moves along a cubic that long, not longer."""
-
 UNIFORM_TOLERANCE = 0.02
 """Largest deviation of a stamp from the uniform grid, in sample intervals, that is not worth resampling."""
 
-SHORTEST_STRETCH = 32
-"""Samples below which a stretch between two long gaps cannot be filtered and is left out (and counted)."""
+STAMP_DECIMALS = 5
+"""Stamps rounded to so many decimals or fewer are recognised: they may be off the grid by half their last digit."""
 
+MANY_MISSED = 1.2
+"""Grid points a sample beyond which stamps that also fit a grid without any hole are taken to be coarse."""
 
-@dataclass(frozen=True, eq=False)
-class Timing:
-    """How a recording was sampled.
-
-    rate_hz : float
-        the inverse of the median interval
-    rows : tuple of (int, int)
-        row ranges without a long gap, each at least `SHORTEST_STRETCH` rows
-    samples, missed, dropped : int
-        rows in the file; rows without a complete position; rows in stretches too short to use
-    gaps : int
-        number of long gaps, at which the recording was split
-    """
-
-    rate_hz: float
-    rows: tuple[tuple[int, int], ...]
-    samples: int
-    missed: int
-    dropped: int
-    gaps: int
+NEARBY = 0.75
+"""A grid point further than this, in sample intervals, from every sample was not measured."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,9 +41,11 @@ class Stretch:
     measured : (N, n) bool
         False where a joint's torque was filled in and must not be counted
     period : (N,) float64 or None
-        index of the repeated period, NaN outside
+        progress through the repeated excitation: index of the period plus the part of it that is over; NaN outside
     resampled : bool
-        the stamps were not uniform enough and both signals were interpolated
+        the stamps were not uniform enough and all signals were interpolated
+    velocity, acceleration : (N, n) float64 or None
+        recorded qd, qdd where there are such columns; a joint of which a sample was missed is NaN throughout
     """
 
     start_s: float
@@ -79,54 +55,28 @@ class Stretch:
     measured: Mask
     period: Array | None
     resampled: bool
+    velocity: Array | None = None
+    acceleration: Array | None = None
 
 
-def find_stretches(recording: Recording) -> Timing:
-    """Row ranges of `recording` that can be filtered in one go.
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Where the samples lie on a uniform grid.
 
-    Parameters
-    ----------
-    recording : Recording
-        the recording; read once, in pieces
-
-    Returns
-    -------
-    Timing
-        the sampling rate, the ranges, and what is missing
-
-    Raises
-    ------
-    RecordingError
-        where no stretch is long enough to be used
+    index : (N,) int
+        grid point of every sample
+    start_s : float
+        instant of grid point 0, relative to the first sample [s]
+    rate_hz : float
+        the grid's rate
     """
-    times, rows = [], []
-    for start in range(0, len(recording), SCAN_ROWS):
-        samples = recording.samples(start, min(start + SCAN_ROWS, len(recording)))
-        complete = np.flatnonzero(np.isfinite(samples.position).all(axis=1))
-        times.append(samples.time[complete])
-        rows.append(complete + start)
-    time, row = np.concatenate(times), np.concatenate(rows)
-    if len(time) < SHORTEST_STRETCH:
-        raise RecordingError(
-            f"{recording.name}: only {len(time)} rows have a position for every joint; at least {SHORTEST_STRETCH} are"
-            " needed: check which q columns are empty"
-        )
-    interval = np.diff(time)
-    typical = float(np.median(interval))
-    breaks = np.flatnonzero(interval > max(BRIDGED_SAMPLES * typical, BRIDGED_SECONDS)) + 1
-    edges = np.concatenate([[0], breaks, [len(time)]])
-    ranges = [(int(row[a]), int(row[b - 1]) + 1, int(b - a)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
-    kept = tuple((start, stop) for start, stop, count in ranges if count >= SHORTEST_STRETCH)
-    if not kept:
-        raise RecordingError(
-            f"{recording.name}: broken by {len(breaks)} gaps into pieces of fewer than {SHORTEST_STRETCH} samples:"
-            " record again, or check column t"
-        )
-    dropped = sum(count for _, _, count in ranges if count < SHORTEST_STRETCH)
-    return Timing(1.0 / typical, kept, len(recording), len(recording) - len(time), dropped, len(breaks))
+
+    index: NDArray[np.int_]
+    start_s: float
+    rate_hz: float
 
 
-def read_stretch(recording: Recording, robot: Robot, start: int, stop: int, rate_hz: float) -> Stretch:
+def read_stretch(recording: Recording, robot: Robot, start: int, stop: int, timing: Timing) -> Stretch:
     """Rows start:stop on a uniform grid.
 
     Parameters
@@ -137,95 +87,141 @@ def read_stretch(recording: Recording, robot: Robot, start: int, stop: int, rate
         gives sign and torque constant of every joint
     start, stop : int
         a row range of `find_stretches`, or a part of one
-    rate_hz : float
-        sampling rate of the grid [Hz]
+    timing : Timing
+        rate of the grid and place of the repeated periods
 
     Returns
     -------
     Stretch
-        the motion; positions follow a cubic spline between samples, torques a straight line
+        the motion; where stamps jitter, all signals follow the same cubic spline between samples, so that torque and
+        motion keep the same band
     """
     samples = recording.samples(start, stop)
     torque = recording.joint_torque(samples.effort, robot)
     complete = np.isfinite(samples.position).all(axis=1)
-    time, position, torque = samples.time[complete], samples.position[complete], torque[complete]
-    period = None if samples.period is None else samples.period[complete]
-    index = (time - time[0]) * rate_hz
-    nearest = np.rint(index)
-    drift = np.polyfit(nearest, index, 1) if len(index) > 1 else np.array([1.0, 0.0])
-    if np.abs(index - np.polyval(drift, nearest)).max() <= UNIFORM_TOLERANCE:
-        return _on_own_grid(time, nearest.astype(int), rate_hz / drift[0], position, torque, period)
-    return _resampled(time, rate_hz, position, torque, period)
+    rows = slice(None) if complete.all() else complete
+    time = samples.time[rows]
+    elapsed = time - time[0]
+    groups = [None if group is None else group[rows] for group in (samples.velocity, samples.acceleration)]
+    grid = uniform_grid(elapsed, timing.rate_hz)
+    if grid is None:
+        rate, begin = timing.rate_hz, 0.0
+        at = np.arange(int(elapsed[-1] * rate + UNIFORM_TOLERANCE) + 1) / rate
+        onto = _spline(elapsed, at)
+        filled, measured = _resampled_torque(elapsed, at, rate, torque[rows], onto)
+    else:
+        rate, begin = grid.rate_hz, grid.start_s
+        at = grid.start_s + np.arange(int(grid.index[-1]) + 1) / rate
+        onto = _same if len(at) == len(elapsed) else _spline(grid.index, np.arange(len(at)))
+        filled, measured = _filled(_spread(torque[rows], grid.index, len(at)))
+    return Stretch(
+        start_s=float(time[0] + begin),
+        rate_hz=rate,
+        position=onto(samples.position[rows]),
+        torque=filled,
+        measured=measured,
+        period=timing.progress(float(time[0]), at),
+        resampled=grid is None,
+        velocity=None if groups[0] is None else onto(groups[0]),
+        acceleration=None if groups[1] is None else onto(groups[1]),
+    )
 
 
-def windows(start: int, stop: int, margin: int) -> Iterator[tuple[int, int]]:
-    """Overlapping row windows that cover start:stop, each losing `margin` rows at both of its ends.
+def uniform_grid(elapsed: Array, rate_hz: float) -> Grid | None:
+    """The uniform grid that the samples lie on, as far as their stamps can tell.
 
     Parameters
     ----------
-    start, stop : int
-        row range of one stretch
-    margin : int
-        rows that filters cannot use at either end of a window
+    elapsed : (N,) float64
+        stamps relative to the first one [s]
+    rate_hz : float
+        nominal sampling rate [Hz]
 
-    Yields
-    ------
-    tuple of (int, int)
-        first and one-past-last row; a recording that fits into one window is never cut
+    Returns
+    -------
+    Grid or None
+        None where the stamps deviate by more than `UNIFORM_TOLERANCE` and half of their own last digit
     """
-    step = max(WINDOW_ROWS - 2 * margin, SHORTEST_STRETCH)
-    first = start
-    while True:
-        last = min(first + step + 2 * margin, stop)
-        if stop - last < step // 2:
-            last = stop
-        yield first, last
-        if last == stop:
-            return
-        first += step
+    tolerance = UNIFORM_TOLERANCE + 0.5 * _last_digit(elapsed) * rate_hz
+    fits = [_fitted(index, elapsed, rate_hz) for index in _possible_indices(elapsed * rate_hz)]
+    good = [(grid, deviation) for grid, deviation in fits if deviation <= tolerance]
+    if not good:
+        return None
+    whole, _ = good[0]
+    if whole.index[-1] == len(elapsed) - 1 and min(g.index[-1] for g, _ in good) > MANY_MISSED * len(elapsed):
+        return whole
+    return min(good, key=lambda fit: fit[1])[0]
 
 
-def _on_own_grid(
-    time: Array, index: NDArray[np.int_], rate_hz: float, position: Array, torque: Array, period: Array | None
-) -> Stretch:
-    """The samples as they are, missing grid points filled in and masked."""
-    count = int(index[-1]) + 1
+def _possible_indices(position: Array) -> list[NDArray[np.int_]]:
+    """Grid points that the samples may have: none missed, the nearest ones, or as the intervals tell."""
+    everything = np.arange(len(position))
+    steps = np.maximum(np.rint(np.diff(position)), 1.0)
+    if (steps == 1.0).all():
+        return [everything]
+    nearest = np.rint(position).astype(int)
+    counted = np.concatenate([[0], np.cumsum(steps)]).astype(int)
+    return [everything, counted, *([nearest] if (np.diff(nearest) > 0).all() else [])]
+
+
+def _fitted(index: NDArray[np.int_], elapsed: Array, rate_hz: float) -> tuple[Grid, float]:
+    """The grid for one numbering of the samples, and the largest deviation of a stamp from it [intervals]."""
+    position = elapsed * rate_hz
+    deviation = position - index
+    slope = 1.0
+    if np.ptp(deviation) > 2.0 * UNIFORM_TOLERANCE and len(index) > 2:
+        slope = float(np.polyfit(index, position, 1)[0])
+        deviation = position - slope * index
+    middle = float(deviation.max() + deviation.min()) / 2.0
+    return Grid(index, middle / rate_hz, rate_hz / slope), float(np.ptp(deviation)) / 2.0
+
+
+def _last_digit(elapsed: Array) -> float:
+    """Value of the last decimal of all stamps [s]; zero where they have more than `STAMP_DECIMALS`."""
+    for decimals in range(STAMP_DECIMALS + 1):
+        scaled = elapsed * 10.0**decimals
+        if np.abs(scaled - np.rint(scaled)).max() < 0.05:  # epoch seconds are exact to 2e-7 only
+            return 10.0**-decimals
+    return 0.0
+
+
+def _same(values: Array) -> Array:
+    """Samples that already lie on the grid; a joint of which one was missed is NaN throughout."""
+    missed = np.isnan(values).any(axis=0)
+    return np.where(missed, np.nan, values) if missed.any() else values
+
+
+def _spline(knots: Array | NDArray[np.int_], at: Array | NDArray[np.int_]) -> Callable[[Array], Array]:
+    """Cubic spline through the samples, evaluated on the grid; a joint of which one was missed is NaN throughout."""
+
+    def onto(values: Array) -> Array:
+        whole = np.isfinite(values).all(axis=0)
+        result = np.full((len(at), values.shape[1]), np.nan)
+        if whole.any():
+            result[:, whole] = make_interp_spline(knots, values[:, whole], k=min(3, len(knots) - 1))(at)
+        return result
+
+    return onto
+
+
+def _spread(values: Array, index: NDArray[np.int_], count: int) -> Array:
+    """Samples at their grid points, NaN where there is none."""
     if count == len(index):
-        filled, measured = _filled(torque)
-        return Stretch(float(time[0]), rate_hz, position, filled, measured, period, resampled=False)
-    grid = np.arange(count)
-    spread = np.full((count, torque.shape[1]), np.nan)
-    spread[index] = torque
-    filled, measured = _filled(spread)
-    return Stretch(
-        float(time[0]),
-        rate_hz,
-        make_interp_spline(index, position, k=3)(grid),
-        filled,
-        measured,
-        None if period is None else period[np.searchsorted(index, grid, side="right") - 1],
-        resampled=False,
-    )
+        return values
+    spread = np.full((count, values.shape[1]), np.nan)
+    spread[index] = values
+    return spread
 
 
-def _resampled(time: Array, rate_hz: float, position: Array, torque: Array, period: Array | None) -> Stretch:
-    """The samples interpolated onto a uniform grid; a point inside a gap or beside a missed torque is masked."""
-    count = int(np.floor((time[-1] - time[0]) * rate_hz)) + 1
-    grid = time[0] + np.arange(count) / rate_hz
-    left = np.clip(np.searchsorted(time, grid, side="right") - 1, 0, len(time) - 2)
-    near = (time[left + 1] - time[left]) * rate_hz < 2.5
-    finite = np.isfinite(torque)
-    filled, _ = _filled(torque)
-    interpolated = np.stack([np.interp(grid, time, column) for column in filled.T], axis=1)
-    return Stretch(
-        float(time[0]),
-        rate_hz,
-        make_interp_spline(time, position, k=3)(grid),
-        interpolated,
-        near[:, None] & finite[left] & finite[left + 1],
-        None if period is None else period[left],
-        resampled=True,
-    )
+def _resampled_torque(
+    time: Array, at: Array, rate_hz: float, torque: Array, onto: Callable[[Array], Array]
+) -> tuple[Array, Mask]:
+    """Torque on the grid, and where it rests on samples close by on both sides."""
+    left = np.clip(np.searchsorted(time, at, side="right") - 1, 0, max(len(time) - 2, 0))
+    right = np.minimum(left + 1, len(time) - 1)
+    nearby = np.minimum(np.abs(at - time[left]), np.abs(time[right] - at)) * rate_hz <= NEARBY
+    filled, finite = _filled(torque)
+    return onto(filled), nearby[:, None] & finite[left] & finite[right]
 
 
 def _filled(torque: Array) -> tuple[Array, Mask]:

@@ -1,0 +1,62 @@
+# Everything a developer does here. Needs Python 3.11 or later and make; the rest is installed into .venv, as locked.
+
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+UV ?= uv
+PYTEST_FLAGS ?=
+
+BIN := .venv/bin
+INSTALLED := .venv/.installed
+
+# One BLAS thread a process: the two test processes already fill two cores.
+export OMP_NUM_THREADS ?= 1
+export OPENBLAS_NUM_THREADS ?= 1
+
+.DEFAULT_GOAL := help
+.PHONY: help venv demo test test-slow bench lint format lock clean
+
+help: ## say what there is
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 20
+
+venv: $(INSTALLED) ## install the locked versions into .venv; does nothing where they are in place
+
+$(INSTALLED): constraints-dev.txt pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Tauscope needs Python 3.11 or later; name one: make PYTHON=...")'
+	@test -x $(BIN)/pip || $(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install -qq --disable-pip-version-check --require-hashes -r constraints-dev.txt
+	$(BIN)/python -m pip install -qq --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@touch $@
+
+demo: $(INSTALLED) ## identify the paper's arm from a simulated recording; look into demo-output/
+	$(BIN)/tauscope demo --out demo-output
+
+test: $(INSTALLED) ## the quick tests
+	$(BIN)/pytest -n 2 $(PYTEST_FLAGS)
+
+test-slow: $(INSTALLED) ## the tests that take long or need something of the host
+	$(BIN)/pytest -n 2 -m "slow or system" $(PYTEST_FLAGS)
+
+bench: $(INSTALLED) ## time and memory; leave the machine alone meanwhile
+	@set -e; for script in tests/benchmarks/benchmark_*.py; do echo "== $$script"; $(BIN)/python $$script; done
+	@$(BIN)/pytest -m benchmark -p no:xdist -s --timeout=0 $(PYTEST_FLAGS) || test $$? -eq 5 # 5: no test of that mark
+
+# import-linter without its cache: that keeps imports resolved as they were before a package was added.
+lint: $(INSTALLED) ## style, types and the direction of imports
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/pyright
+	$(BIN)/lint-imports --no-cache
+
+format: $(INSTALLED) ## put the source into its one format
+	$(BIN)/ruff check --fix
+	$(BIN)/ruff format
+
+COMPILE = $(UV) pip compile pyproject.toml --universal --python-version 3.11 --generate-hashes --no-annotate --no-header --quiet $(if $(UPGRADE),--upgrade)
+
+lock: ## resolve the versions anew from pyproject.toml; UPGRADE=1 takes the newest
+	@command -v $(UV) >/dev/null || { echo "make lock needs uv: pip install uv" >&2; exit 1; }
+	$(COMPILE) --all-extras --group dev --output-file constraints-dev.txt
+	$(COMPILE) --all-extras --group build --constraints constraints-dev.txt --output-file constraints.txt
+
+clean: ## remove what was made, but not .venv
+	rm -rf build dist demo-output .pytest_cache .ruff_cache .hypothesis .import_linter_cache
+	find . -name __pycache__ -type d -not -path './.venv/*' -prune -exec rm -rf {} +

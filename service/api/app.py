@@ -1,0 +1,65 @@
+"""The application: routes, problems and protection put together."""
+
+from collections.abc import AsyncIterator
+from concurrent.futures import Executor
+from contextlib import asynccontextmanager
+
+from fastapi import FastAPI
+
+from service.api import health, pages
+from service.api.body_limit import BodyLimit
+from service.api.identifications.models import IdentificationRequest
+from service.api.identifications.router import router as identifications
+from service.api.openapi import install_openapi
+from service.api.problem_handlers import install_problem_handlers
+from service.api.problems import Problem
+from service.api.protection import KnownCallers, SafeAnswers
+from service.api.recordings.router import router as recordings
+from service.api.robots.models import RobotCheckRequest
+from service.api.robots.router import router as robots
+from service.api.services import open_services
+from service.api.settings import Settings
+
+API_VERSION = "1.0.0"
+"""Of the interface, not of the package; a change of tests/api/openapi.json goes with a change here."""
+
+PREFIX = "/api/v1"
+
+
+def create_app(settings: Settings, executor: Executor | None = None) -> FastAPI:
+    """The application; it takes the data folder when it starts and lets go of it when it stops.
+
+    Parameters
+    ----------
+    settings : Settings
+        of the operator
+    executor : Executor or None
+        where the work is done; processes of our own where None
+    """
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        with open_services(settings, executor) as services:
+            app.state.services = services
+            yield
+
+    app = FastAPI(
+        title="Tauscope",
+        summary="Finds a robot arm's true dynamics from its own motion.",
+        description="Every failed request is answered with a problem (RFC 9457). SI units; joint numbers start at 1.",
+        version=API_VERSION,
+        lifespan=lifespan,
+        docs_url=None,
+        redoc_url=None,
+    )
+    for router in (identifications, recordings, robots):
+        app.include_router(router, prefix=PREFIX)
+    app.include_router(health.router)
+    app.include_router(pages.router)
+    install_problem_handlers(app)
+    install_openapi(app, [IdentificationRequest, RobotCheckRequest, Problem])
+    # The last one added is the first to see a request.
+    app.add_middleware(BodyLimit, limit=settings.max_upload_bytes)
+    app.add_middleware(KnownCallers, allowed_hosts=settings.allowed_hosts)
+    app.add_middleware(SafeAnswers)
+    return app

@@ -1,0 +1,1 @@
+"""Identifications: handed in, followed, their results and exports fetched."""

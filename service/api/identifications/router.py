@@ -1,0 +1,158 @@
+"""Routes about identifications."""
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Path, Query, Request, Response
+
+from service.api.identifications.models import (
+    EXAMPLES,
+    IdentificationAnswer,
+    IdentificationListAnswer,
+    IdentificationRequest,
+)
+from service.api.identifications.status import describe, finished_workspace
+from service.api.identifications.submission import submit_identification
+from service.api.openapi import binary_part, form_body, json_body, model_reference
+from service.api.problems import ProblemError, problem_responses
+from service.api.services import Offered
+from service.errors import ExportError, NotFoundError
+from service.identification import IdentificationDocument
+from service.jobs import EXPORT_FILES, ExportFormat
+from service.robot.messages import nearest, one_line, shown
+
+router = APIRouter(prefix="/identifications", tags=["identifications"], responses=problem_responses("invalid-request"))
+
+Identifier = Annotated[str, Path(description="identifier", examples=["20261103T101502Z-1f2e3d4c"])]
+Limit = Annotated[int, Query(ge=1, le=1000, description="most entries of the list")]
+Format = Annotated[
+    str, Path(alias="format", description="what to write", json_schema_extra={"enum": [*ExportFormat]}, examples=["c"])
+]
+
+_ENDINGS = ("not-finished", "cancelled", "interrupted", "damaged")
+_FILES = {"type": "array", "items": {"type": "string", "contentMediaType": "application/octet-stream"}}
+_BODY = {
+    **json_body(IdentificationRequest, EXAMPLES),
+    **form_body(
+        {
+            "request": model_reference(IdentificationRequest),
+            "robot": binary_part("the robot file (YAML)"),
+            "urdf": binary_part("the URDF that the robot file names, by its bare name"),
+            "recordings": {**_FILES, "description": "recordings that the model is made from"},
+            "held_out": {**_FILES, "description": "recordings that it is judged by"},
+        },
+        required=[],
+        encoding={"request": {"contentType": "application/json"}},
+    ),
+}
+_EXPORT_CONTENT: dict[str, Any] = {
+    media_type: {"schema": {"type": "string"}}
+    for media_type in sorted({file.media_type for file in EXPORT_FILES.values()})
+}
+
+
+@router.post(
+    "",
+    status_code=202,
+    summary="Hand in an identification",
+    response_model=IdentificationAnswer,
+    responses=problem_responses(
+        "bad-request",
+        "not-found",
+        "limit-exceeded",
+        "media-type",
+        "robot-file",
+        "robot-unphysical",
+        "invalid-request",
+        "queue-full",
+        "storage-full",
+    ),
+    openapi_extra={"requestBody": {"required": True, "content": _BODY}},
+)
+async def hand_in(request: Request, response: Response, services: Offered) -> IdentificationAnswer:
+    """The robot is checked at once, recordings are read by the job: follow `Location` until it has ended."""
+    identifier = await submit_identification(request, services)
+    answer = describe(services, identifier, request.url.path)
+    response.headers["Location"] = answer.links.self_
+    return answer
+
+
+@router.get("", summary="List identifications")
+def list_identifications(request: Request, services: Offered, limit: Limit = 100) -> IdentificationListAnswer:
+    """The newest first."""
+    identifiers = services.identifications.identifiers()[:limit]
+    return IdentificationListAnswer(
+        identifications=[describe(services, identifier, request.url.path) for identifier in identifiers]
+    )
+
+
+@router.get("/{identifier}", summary="Follow an identification", responses=problem_responses("not-found"))
+def get_identification(request: Request, identifier: Identifier, services: Offered) -> IdentificationAnswer:
+    """Its state, and where to go on from there."""
+    return describe(services, identifier, _collection(request, 1))
+
+
+@router.get(
+    "/{identifier}/result",
+    summary="Fetch the result",
+    response_class=Response,
+    responses={
+        200: {"model": IdentificationDocument, "description": "the same document as `tauscope identify --json`"},
+        **problem_responses(
+            "not-found",
+            *_ENDINGS,
+            "robot-file",
+            "recording",
+            "recording-mismatch",
+            "identification",
+            "invalid-request",
+            "worker-lost",
+            "internal",
+        ),
+    },
+)
+def get_result(identifier: Identifier, services: Offered) -> Response:
+    """The result of an identification that succeeded; else the problem that it ended in."""
+    content = finished_workspace(services, identifier).read_result()
+    if content is None:
+        raise ProblemError("damaged", f"the result of {identifier} is missing or damaged; hand it in again")
+    return Response(content, media_type="application/json")
+
+
+@router.get(
+    "/{identifier}/exports/{format}",
+    summary="Fetch an export",
+    response_class=Response,
+    responses={
+        200: {"content": _EXPORT_CONTENT, "description": "the file"},
+        **problem_responses("not-found", *_ENDINGS, "export", "recording", "identification", "worker-lost", "internal"),
+    },
+)
+def get_export(identifier: Identifier, format_: Format, services: Offered) -> Response:
+    """The identified model for a controller (json, yaml, c, python) or a simulator (urdf, mjcf)."""
+    if format_ not in set(ExportFormat):
+        raise NotFoundError(one_line(f"there is no export {shown(format_)}; {nearest(format_, set(ExportFormat))}"))
+    workspace = finished_workspace(services, identifier)
+    reason = workspace.refused_exports().get(format_)
+    if reason is not None:
+        raise ExportError(reason)
+    file = EXPORT_FILES[ExportFormat(format_)]
+    disposition = {"Content-Disposition": f'attachment; filename="{file.name}"'}
+    return Response(workspace.read_export(file.name), headers=disposition, media_type=file.media_type)
+
+
+@router.delete(
+    "/{identifier}",
+    summary="Cancel or remove an identification",
+    response_model=IdentificationAnswer,
+    responses={204: {"description": "it had ended, and was removed"}, **problem_responses("not-found")},
+)
+def cancel_or_remove(request: Request, identifier: Identifier, services: Offered) -> IdentificationAnswer | Response:
+    """One that waits or runs is cancelled; one that has ended is removed with all its files."""
+    if services.jobs.cancel_or_remove(identifier):
+        return Response(status_code=204)
+    return describe(services, identifier, _collection(request, 1))
+
+
+def _collection(request: Request, steps_below: int) -> str:
+    """Path of the collection, seen from a request below it."""
+    return request.url.path.rsplit("/", steps_below)[0]

@@ -1,0 +1,27 @@
+"""Base of what requests and answers hold."""
+
+import math
+from typing import Annotated, Any
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict
+
+
+class StrictModel(BaseModel):
+    """No type is converted, no key is overlooked."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+
+class AnswerModel(StrictModel):
+    """An answer; it may be made from an object with attributes of the same names."""
+
+    model_config = ConfigDict(from_attributes=True)
+
+
+def _no_nan(value: Any) -> Any:
+    """JSON knows no NaN: what was not measured is null."""
+    return None if isinstance(value, float) and math.isnan(value) else value
+
+
+Measured = Annotated[float | None, BeforeValidator(_no_nan)]
+"""A number, or null where there was nothing to measure."""

@@ -1,0 +1,104 @@
+"""The OpenAPI document: bodies that the framework does not see, and models that only they refer to."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from fastapi import FastAPI
+from fastapi.openapi.utils import get_openapi
+from pydantic import BaseModel
+from pydantic.json_schema import models_json_schema
+
+_REFERENCE = "#/components/schemas/{model}"
+
+Examples = Mapping[str, tuple[str, Any]]
+"""For each example its summary and its value."""
+
+
+def json_body(model: type[BaseModel], examples: Examples) -> dict[str, Any]:
+    """A JSON body of an operation.
+
+    Parameters
+    ----------
+    model : type
+        of the body; to be given to `install_openapi` too
+    examples : mapping of str to (str, plain data)
+        summary and value by name
+    """
+    shown = {name: {"summary": summary, "value": value} for name, (summary, value) in examples.items()}
+    return {"application/json": {"schema": model_reference(model), "examples": shown}}
+
+
+def form_body(
+    parts: Mapping[str, Any], required: Sequence[str], encoding: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
+    """A multipart body of an operation.
+
+    Parameters
+    ----------
+    parts : mapping of str to dict
+        schema of each part
+    required : sequence of str
+        parts that must be there
+    encoding : mapping of str to dict, or None
+        media types of parts
+    """
+    schema = {"type": "object", "properties": dict(parts), "additionalProperties": False}
+    if required:
+        schema["required"] = list(required)
+    return {"multipart/form-data": {"schema": schema, **({"encoding": dict(encoding)} if encoding else {})}}
+
+
+def binary_part(description: str) -> dict[str, Any]:
+    """The schema of a file in a form.
+
+    Parameters
+    ----------
+    description : str
+        what the file is
+    """
+    return {"type": "string", "contentMediaType": "application/octet-stream", "description": description}
+
+
+def model_reference(model: type[BaseModel]) -> dict[str, str]:
+    """A reference to a model of the document.
+
+    Parameters
+    ----------
+    model : type
+        the model
+    """
+    return {"$ref": _REFERENCE.format(model=model.__name__)}
+
+
+def install_openapi(app: FastAPI, models: Sequence[type[BaseModel]]) -> None:
+    """Have the application's OpenAPI document hold further models.
+
+    Parameters
+    ----------
+    app : FastAPI
+        the application
+    models : sequence of type
+        models that bodies and problems refer to
+    """
+
+    def document() -> dict[str, Any]:
+        if app.openapi_schema is None:
+            app.openapi_schema = _document(app, models)
+        return app.openapi_schema
+
+    app.openapi = document
+
+
+def _document(app: FastAPI, models: Sequence[type[BaseModel]]) -> dict[str, Any]:
+    """The document with all models, sorted so that it changes only where the interface does."""
+    document = get_openapi(
+        title=app.title, version=app.version, summary=app.summary, description=app.description, routes=app.routes
+    )
+    _, definitions = models_json_schema([(model, "validation") for model in models], ref_template=_REFERENCE)
+    components = document.setdefault("components", {}).setdefault("schemas", {})
+    components.update(definitions.get("$defs", {}))
+    # The framework's own form of validation errors is never sent.
+    for unused in ("HTTPValidationError", "ValidationError"):
+        components.pop(unused, None)
+    document["components"]["schemas"] = dict(sorted(components.items()))
+    return document

@@ -1,0 +1,103 @@
+"""What stands before every route: host and origin checks, safe headers, no tracebacks."""
+
+import logging
+from collections.abc import Mapping
+from urllib.parse import urlsplit
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from service.api.problems import make_problem, problem_answer
+
+_log = logging.getLogger("tauscope.api")
+
+HEADERS: Mapping[str, str] = {
+    "X-Content-Type-Options": "nosniff",
+    "Cache-Control": "no-store",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Content-Security-Policy": "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'; base-uri 'none'",
+}
+
+
+class SafeAnswers:
+    """Adds the headers of every answer, and turns an unforeseen exception into a problem without internals."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        """Wrap an application.
+
+        Parameters
+        ----------
+        app : ASGI application
+            what is wrapped
+        """
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request."""
+        if scope["type"] != "http":
+            return await self.app(scope, receive, send)
+        has_begun = False
+
+        async def send_safely(message: Message) -> None:
+            nonlocal has_begun
+            if message["type"] == "http.response.start":
+                has_begun = True
+                headers = MutableHeaders(scope=message)
+                for name, value in HEADERS.items():
+                    headers.setdefault(name, value)
+            await send(message)
+
+        try:
+            await self.app(scope, receive, send_safely)
+        except Exception:
+            _log.exception("%s %s failed for an unforeseen reason", scope["method"], scope["path"])
+            if has_begun:
+                raise
+            detail = "the request met a fault of Tauscope's own; the service's log has the details"
+            answer = problem_answer(make_problem("internal", detail, scope["path"]))
+            await answer(scope, receive, send_safely)
+
+
+class KnownCallers:
+    """Turns away requests for other host names (DNS rebinding) and those that a page of another origin makes."""
+
+    def __init__(self, app: ASGIApp, allowed_hosts: frozenset[str]) -> None:
+        """Wrap an application.
+
+        Parameters
+        ----------
+        app : ASGI application
+            what is wrapped
+        allowed_hosts : frozenset of str
+            names and addresses of this service, in lower case, without ports
+        """
+        self.app = app
+        self.allowed_hosts = allowed_hosts
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request, or turn it away."""
+        if scope["type"] == "http" and (reason := self._reason(Headers(scope=scope))):
+            answer = problem_answer(make_problem(*reason, scope["path"]))
+            return await answer(scope, receive, send)
+        return await self.app(scope, receive, send)
+
+    def _reason(self, headers: Headers) -> tuple[str, str] | None:
+        """Code and detail of the problem with the caller, if there is one."""
+        host, origin = headers.get("host", ""), headers.get("origin")
+        if _host_name(f"//{host}") not in self.allowed_hosts:
+            return "host", f"this service does not answer for the host {host!r}; call it by the address it listens at"
+        own = origin is None or origin.lower() in (f"http://{host.lower()}", f"https://{host.lower()}")
+        if not own or headers.get("sec-fetch-site", "none") not in ("none", "same-origin"):
+            return "origin", "a page of another origin made this request; open the service's own address"
+        return None
+
+
+def _host_name(address: str) -> str | None:
+    """Host name or address of a URL, in lower case; None where it makes no sense."""
+    try:
+        parts = urlsplit(address)
+        has_junk = bool(parts.path or parts.query or parts.fragment or parts.username is not None)
+        return None if has_junk or (parts.port is not None and parts.port < 0) else parts.hostname
+    except ValueError:
+        return None

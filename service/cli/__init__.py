@@ -1,0 +1,9 @@
+"""The command line: ``tauscope identify``, ``robot``, ``recording``, ``serve`` and ``demo``.
+
+Modules named ``*_command`` only declare arguments, and import what does the work when they are called: ``--help``
+answers at once.
+"""
+
+from service.cli.program import main
+
+__all__ = ["main"]

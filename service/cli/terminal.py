@@ -1,0 +1,72 @@
+"""What is shown on a terminal: names as they are, tables that do not wrap in a pipe, progress where it is watched."""
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from rich import box
+from rich.console import Console
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table as RichTable
+from rich.text import Text
+
+from service.report.table import Table
+from service.robot.messages import one_line
+
+PIPE_WIDTH = 240
+"""Columns where nobody looks: wide enough for every table."""
+
+
+def output() -> Console:
+    """Standard output."""
+    if sys.stdout.isatty():
+        return Console(highlight=False, emoji=False)
+    return Console(highlight=False, emoji=False, width=PIPE_WIDTH)
+
+
+def plain(text: str) -> Text:
+    """Text of a user's file: one line, and none of it taken for markup or for a terminal's command.
+
+    Parameters
+    ----------
+    text : str
+        any text
+    """
+    return Text(one_line(text))
+
+
+def table(title: str, view: Table) -> RichTable:
+    """A table of plain text, numbers to the right.
+
+    Parameters
+    ----------
+    title : str
+        stands above it
+    view : Table
+        cells
+    """
+    made = RichTable(title=plain(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
+    for place, column in enumerate(view.columns):
+        is_word = place < view.words
+        made.add_column(plain(column), justify="left" if is_word else "right", no_wrap=not is_word)
+    for row in view.rows:
+        made.add_row(*(plain(cell) for cell in row))
+    return made
+
+
+@contextmanager
+def shown_progress() -> Iterator[Callable[[str], None]]:
+    """Steps of long work on standard error, where that is a terminal.
+
+    Yields
+    ------
+    callable
+        to be told the name of each step as it begins
+    """
+    if not sys.stderr.isatty():
+        yield lambda step: None
+        return
+    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("", total=None)
+        yield lambda step: progress.update(task, description=one_line(step))

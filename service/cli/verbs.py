@@ -1,0 +1,22 @@
+"""Registering functions as commands: what their docstring says first is what ``--help`` shows."""
+
+import inspect
+from collections.abc import Callable
+
+import typer
+from typer.core import TyperCommand
+
+
+def add_verb(app: typer.Typer, function: Callable[..., None], cls: type[TyperCommand] = TyperCommand) -> None:
+    """Make a function a command of the same name; its help ends where its docstring turns to programmers.
+
+    Parameters
+    ----------
+    app : typer.Typer
+        program or group of commands
+    function : callable
+        what the command does
+    cls : type of TyperCommand
+        how its command line is parsed
+    """
+    app.command(cls=cls, help=(inspect.getdoc(function) or "").partition("\n\nParameters\n")[0])(function)

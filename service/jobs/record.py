@@ -1,0 +1,64 @@
+"""What is kept of a job beside its input and output: its state, its times, and the problem that it ended in."""
+
+from datetime import datetime
+from typing import Literal
+
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
+
+from service.jobs.states import JobState, may_follow
+
+
+class StoredModel(BaseModel):
+    """Base of what jobs keep as JSON: no type is converted, no key is overlooked."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+
+class JobProblem(StoredModel):
+    """Why a job did not succeed."""
+
+    code: str = Field(description="code of the error, as in service.errors, or of the way the job ended")
+    detail: str = Field(description="one line: what is wrong, where, and what to do")
+
+
+class JobRecord(StoredModel):
+    """A job's state and times."""
+
+    form: Literal["tauscope.job/1"] = Field(default="tauscope.job/1", description="name and version of this form")
+    state: JobState = Field(description="where the job stands")
+    created: AwareDatetime = Field(description="when it was handed in")
+    started: AwareDatetime | None = Field(default=None, description="when its work began")
+    ended: AwareDatetime | None = Field(default=None, description="when it reached its end state")
+    problem: JobProblem | None = Field(default=None, description="why it did not succeed")
+
+    def may_become(self, state: JobState) -> bool:
+        """Whether a state may follow.
+
+        Parameters
+        ----------
+        state : JobState
+            the new state
+        """
+        return may_follow(self.state, state)
+
+    def moved(self, state: JobState, now: datetime, problem: JobProblem | None = None) -> "JobRecord":
+        """The record after a transition.
+
+        Parameters
+        ----------
+        state : JobState
+            the new state
+        now : datetime
+            the present moment
+        problem : JobProblem or None
+            why the job did not succeed
+
+        Raises
+        ------
+        ValueError
+            if that state may not follow: a fault of the caller's
+        """
+        if not self.may_become(state):
+            raise ValueError(f"a job that is {self.state} cannot become {state}")
+        times = {"started": now} if state is JobState.RUNNING else {"ended": now}
+        return self.model_copy(update={"state": state, "problem": problem, **times})

@@ -1,0 +1,11 @@
+"""The version that stands in what the service writes and answers."""
+
+from importlib.metadata import PackageNotFoundError, version
+
+
+def tauscope_version() -> str:
+    """Version of the installed package; "0+source" where it runs from a source tree that was never installed."""
+    try:
+        return version("tauscope")
+    except PackageNotFoundError:
+        return "0+source"

@@ -1,0 +1,124 @@
+"""Matplotlib figures as inline SVG that takes its colours and fonts from the page, and is the same on every run."""
+
+import io
+import re
+from collections.abc import Callable
+from threading import Lock
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
+INK = "#1b1f24"
+MUTED = "#6b7178"
+GRID = "#dde1e6"
+MEASURED = "#8f969f"
+PREDICTED = "#0072b2"
+RESIDUAL = "#d55e00"
+HELD_OUT = "#009e73"
+BAND = "#cfe3f1"
+"""Colours to draw with, Okabe and Ito's; on the page each stands for a CSS variable (see `VARIABLES`)."""
+
+VARIABLES = {
+    INK: "--ink",
+    MUTED: "--muted",
+    GRID: "--grid",
+    MEASURED: "--measured",
+    PREDICTED: "--predicted",
+    RESIDUAL: "--residual",
+    HELD_OUT: "--held-out",
+    BAND: "--band",
+}
+
+WIDTH_INCHES = 9.2
+"""Width of every figure: text of 8 pt is then as large as the page's small print."""
+
+_STYLE: Any = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "tauscope",
+    "font.family": "DejaVu Sans",
+    "font.size": 8.0,
+    "text.color": INK,
+    "text.parse_math": False,
+    "axes.edgecolor": MUTED,
+    "axes.labelcolor": INK,
+    "axes.labelsize": 8.0,
+    "axes.titlesize": 8.5,
+    "axes.titlelocation": "left",
+    "axes.linewidth": 0.6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": GRID,
+    "grid.linewidth": 0.6,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "legend.frameon": False,
+    "legend.fontsize": 8.0,
+    "lines.linewidth": 1.1,
+    "lines.solid_joinstyle": "round",
+    "path.simplify": True,
+    "path.simplify_threshold": 0.2,
+    "figure.facecolor": "none",
+    "axes.facecolor": "none",
+    "savefig.facecolor": "none",
+}
+
+_DRAWING = Lock()
+"""Matplotlib's settings belong to the whole process; one figure at a time has them."""
+
+
+def draw_svg(name: str, height_inches: float, draw: Callable[[Figure], None]) -> str:
+    """Draw a figure and return it as an ``<svg>`` element that can stand in a page beside others.
+
+    Parameters
+    ----------
+    name : str
+        unique on the page: letters, digits and dashes; begins every id in the drawing
+    height_inches : float
+        height of the drawing for a width of `WIDTH_INCHES`
+    draw : callable
+        draws into the figure that it is given
+
+    Returns
+    -------
+    str
+        SVG without prolog, metadata or any address
+    """
+    with _DRAWING, mpl.rc_context(_STYLE):
+        figure = Figure(figsize=(WIDTH_INCHES, height_inches), layout="constrained")
+        canvas = FigureCanvasSVG(figure)
+        draw(figure)
+        text = io.StringIO()
+        canvas.print_svg(text, metadata={"Date": None})
+    return _for_page(text.getvalue(), name)
+
+
+def _for_page(svg: str, name: str) -> str:
+    """What a drawing needs to be part of a page: its own ids, the page's colours and fonts, short numbers."""
+    svg = svg[svg.index("<svg") :]
+    svg = re.sub(r"<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
+    svg = re.sub(r"<!--.*?-->", "", svg, flags=re.DOTALL)
+    svg = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>", "", svg, flags=re.DOTALL)  # would hold for the whole page
+    svg = re.sub(r' xmlns(:xlink)?="[^"]*"', "", svg)
+    svg = svg.replace("xlink:href=", "href=")
+    svg = re.sub(r'<svg [^>]*?viewBox="([^"]*)"[^>]*>', r'<svg viewBox="\1">', svg, count=1)
+    svg = re.sub(r' id="', f' id="{name}-', svg)
+    svg = re.sub(r'(href="#|url\(#)', rf"\g<1>{name}-", svg)
+    svg = re.sub(r' d="([^"]*)"', lambda path: f' d="{_shortened(path[1])}"', svg)
+    svg = svg.replace("font-family: 'DejaVu Sans'", "font-family: var(--sans)")
+    for colour, variable in VARIABLES.items():
+        svg = svg.replace(colour, f"var({variable})")
+    return re.sub(r">\s+<", "><", svg).strip()
+
+
+def _shortened(path: str) -> str:
+    """Path data to a hundredth of a point, white space folded."""
+    rounded = re.sub(r"-?\d+\.\d+", lambda number: f"{float(number[0]):.2f}".rstrip("0").rstrip("."), path)
+    return " ".join(rounded.split())

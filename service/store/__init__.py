@@ -1,0 +1,24 @@
+"""What is kept: recordings and the folders of finished and waiting work, as plain files that are never half written."""
+
+from service.store.atomic import write_atomically
+from service.store.folder_lock import FolderLock
+from service.store.incoming import IncomingFile, KeptFile, hash_file
+from service.store.items import ItemStore
+from service.store.names import FILE_NAME_RULE, is_file_name, is_identifier, new_identifier
+from service.store.recordings import NameTakenError, RecordingStore, StoredRecording
+
+__all__ = [
+    "FILE_NAME_RULE",
+    "FolderLock",
+    "IncomingFile",
+    "ItemStore",
+    "KeptFile",
+    "NameTakenError",
+    "RecordingStore",
+    "StoredRecording",
+    "hash_file",
+    "is_file_name",
+    "is_identifier",
+    "new_identifier",
+    "write_atomically",
+]

@@ -1,0 +1,140 @@
+"""The service as it is run: a process of its own, a real socket, real workers."""
+
+import json
+import re
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx2
+import pytest
+
+from api.conftest import IDENTIFICATIONS, RECORDINGS
+from api.problem_check import assert_problem
+from service.api import Settings, serve
+from service.errors import TauscopeError
+from shared_data import REPOSITORY
+
+PROGRAM = """
+import sys
+from pathlib import Path
+from service.api import Settings, serve
+serve(Settings(data_folder=Path(sys.argv[1]), port=0, max_upload_bytes=8_000_000), lambda url: print(url, flush=True))
+"""
+
+
+@pytest.fixture(scope="module")
+def data_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("served") / "data"
+
+
+@pytest.fixture(scope="module")
+def server(data_folder: Path) -> Iterator[httpx2.Client]:
+    arguments = [sys.executable, "-c", PROGRAM, str(data_folder)]
+    with subprocess.Popen(
+        arguments, cwd=REPOSITORY, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        try:
+            assert process.stdout is not None
+            url = process.stdout.readline().strip()
+            assert re.fullmatch(r"http://127\.0\.0\.1:[0-9]+", url)
+            with httpx2.Client(base_url=url, timeout=60) as client:
+                yield client
+        finally:
+            process.send_signal(signal.SIGTERM)
+            out, err = process.communicate(timeout=60)
+    assert process.returncode in (0, -signal.SIGTERM)
+    assert (out, err) == ("", "")
+
+
+def ended(server: httpx2.Client, here: str) -> dict[str, Any]:
+    """The state of an identification that has ended; the test's time limit is the only one."""
+    while (status := server.get(here).json())["state"] in ("queued", "running"):
+        assert status["links"]["result"] is None
+    return status
+
+
+def test_all_the_way(server: httpx2.Client, paper_robot: bytes, paper_recordings: tuple[bytes, bytes]) -> None:
+    assert server.get("/healthz").json()["status"] == "ok"
+    kept = server.post(RECORDINGS, files={"file": ("test.csv", paper_recordings[1])})
+    assert kept.status_code == 201
+    report = server.get(f"{RECORDINGS}/test.csv/report").json()
+    assert report["samples"] == 2000
+    answer = server.post(
+        IDENTIFICATIONS,
+        files=[("robot", ("arm.yaml", paper_robot)), ("recordings", ("train.csv", paper_recordings[0]))],
+        data={"request": json.dumps({"held_out": ["test.csv"]})},
+    )
+    assert answer.status_code == 202
+    status = ended(server, answer.headers["location"])
+    assert status["state"] == "succeeded", status
+    result = server.get(status["links"]["result"]).json()
+    assert result["schema"] == "tauscope.identification/1"
+    assert [entry["stiction"] for entry in result["friction"]] == pytest.approx([2, 1, 2], abs=0.5)
+    for link in status["links"]["exports"].values():
+        assert server.get(link).status_code == 200
+
+
+def test_a_broken_recording(server: httpx2.Client, paper_robot: bytes) -> None:
+    files = [
+        ("robot", ("arm.yaml", paper_robot)),
+        ("recordings", ("broken.csv", b"t,q1,q2,q3,tau1,tau2,tau3\n0,0,0,0,0,0\n")),
+    ]
+    here = server.post(IDENTIFICATIONS, files=files).headers["location"]
+    assert ended(server, here)["state"] == "failed"
+    problem = assert_problem(server.get(f"{here}/result"), "recording", 422)
+    assert problem["detail"].startswith("broken.csv: line 2")
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "code", "status"),
+    [("large.csv", 15_000_000, "limit-exceeded", 413), ("..", 7_000_000, "invalid-request", 422)],
+)
+@pytest.mark.parametrize("is_announced", [True, False])
+def test_a_client_that_is_still_sending_gets_its_answer(
+    name: str, size: int, code: str, status: int, is_announced: bool, server: httpx2.Client, data_folder: Path
+) -> None:
+    head = f'--b\r\nContent-Disposition: form-data; name="file"; filename="{name}"\r\n\r\n'.encode()
+    body = head + bytes(size) + b"\r\n--b--\r\n"
+    pieces = [body[start : start + 2**16] for start in range(0, len(body), 2**16)]
+    headers = {"content-type": "multipart/form-data; boundary=b"}
+    answer = server.post(RECORDINGS, content=body if is_announced else iter(pieces), headers=headers)
+    assert_problem(answer, code, status)
+    assert server.get("/healthz").status_code == 200
+    assert not list((data_folder / "recordings").glob(".incoming-*"))
+
+
+def test_a_client_that_asks_for_leave_first_is_refused_at_once(server: httpx2.Client) -> None:
+    url = httpx2.URL(str(server.base_url))
+    request = (
+        f"POST {RECORDINGS} HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: multipart/form-data; boundary=b\r\n"
+        "Content-Length: 99999999\r\nExpect: 100-continue\r\n\r\n"
+    )
+    with socket.create_connection((url.host, url.port or 0), timeout=20) as connection:
+        connection.sendall(request.encode())
+        answer = b""
+        while piece := connection.recv(4096):
+            answer += piece
+    assert answer.startswith(b"HTTP/1.1 413 ")
+    assert b'"code":"limit-exceeded"' in answer
+
+
+def test_a_second_service_says_why_it_does_not_start(server: httpx2.Client, data_folder: Path) -> None:
+    assert server.get("/healthz").status_code == 200
+    with pytest.raises(TauscopeError, match="another tauscope service works with this folder"):
+        serve(Settings(data_folder=data_folder, port=0), lambda _: None)
+
+
+def test_why_a_service_does_not_start(server: httpx2.Client, tmp_path: Path) -> None:
+    port = httpx2.URL(str(server.base_url)).port or 0
+    with pytest.raises(TauscopeError, match="Address already in use"):
+        serve(Settings(data_folder=tmp_path, port=port), lambda _: None)
+    with pytest.raises(TauscopeError, match="others could reach it"):
+        serve(Settings(data_folder=tmp_path, host="0.0.0.0"), lambda _: None)
+    (tmp_path / "file").touch()
+    with pytest.raises(TauscopeError, match="cannot be used as data folder"):
+        serve(Settings(data_folder=tmp_path / "file", port=0), lambda _: None)

@@ -1,0 +1,95 @@
+"""``tauscope demo``."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cli.conftest import Ended
+from service.cli.demo import FILES, HELD_OUT, NOISE_STD_NM, REPORT, RESULT, ROBOT, TRAIN, robot_text_without_model
+from service.cli.demo_folder import MARK, prepare_folder
+from service.errors import ExportError
+from service.recording import read_recording
+from service.robot import read_robot
+from sim_backend.examples import example_robot
+
+Run = Callable[..., Ended]
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """The demo's folder and what it printed, run as a program of its own."""
+    folder = tmp_path_factory.mktemp("demo") / "out"
+    command = [sys.executable, "-m", "service.cli", "demo", "--out", str(folder)]
+    ended = subprocess.run(command, check=False, capture_output=True, text=True, timeout=100)
+    assert (ended.returncode, ended.stderr) == (0, "")
+    return folder, ended.stdout
+
+
+def test_everything_is_there_and_named(demo: tuple[Path, str]) -> None:
+    folder, printed = demo
+    assert sorted(path.name for path in folder.iterdir()) == sorted([MARK, *FILES])
+    for name in FILES:
+        assert f"wrote {folder / name}\n" in printed
+
+
+def test_the_result_holds_the_truth(demo: tuple[Path, str]) -> None:
+    folder, _ = demo
+    result = json.loads((folder / RESULT).read_text(encoding="utf-8"))
+    truth = {"Ixx3 - Iyy3 - 0.5*msx3": 2**0.5 / 24, "m3 + 2*msx3": 0.5**0.5, "m2 + 2*msx2 - 2*msx3": 2**0.5}
+    found = {entry["name"]: entry for entry in result["base_parameters"]}
+    for name, value in truth.items():
+        assert abs(found[name]["value"] - value) < 4 * found[name]["std"]
+    assert [entry["stiction"] for entry in result["friction"]] == pytest.approx([2.0, 1.0, 2.0], abs=0.15)
+    assert result["noise_std"] == pytest.approx(NOISE_STD_NM, rel=0.05)
+    assert result["fit"]["held_out"]["rms"] == pytest.approx(NOISE_STD_NM, rel=0.05)
+
+
+def test_the_identification_is_not_told_the_truth(demo: tuple[Path, str]) -> None:
+    folder, _ = demo
+    robot = read_robot(folder / ROBOT)
+    assert robot.model.links is None
+    assert robot.model.friction is None
+    arm = read_robot(example_robot("paper_arm"))
+    assert [joint.limits for joint in robot.joints] == [joint.limits for joint in arm.joints]
+    assert "model:" not in robot_text_without_model(example_robot("paper_arm"))
+
+
+def test_recordings_are_of_different_motions(demo: tuple[Path, str]) -> None:
+    folder, _ = demo
+    train, held_out = (read_recording(folder / name).samples() for name in (TRAIN, HELD_OUT))
+    assert train.position.shape == held_out.position.shape == (10000, 3)
+    assert np.abs(train.position - held_out.position).max() > 0.5
+
+
+def test_z_scores_are_printed_and_plausible(demo: tuple[Path, str]) -> None:
+    _, printed = demo
+    line = next(line for line in printed.splitlines() if line.startswith("z is"))
+    rms = float(line.split(" is ")[-1].split()[0])
+    assert 0.5 < rms < 1.6
+    assert (demo[0] / REPORT).stat().st_size < 3_000_000
+
+
+def test_it_replaces_its_own_files_only(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    prepare_folder(tmp_path, FILES)
+    (tmp_path / TRAIN).write_text("of the demo")
+    prepare_folder(tmp_path, FILES)
+    assert not (tmp_path / TRAIN).exists()
+    assert (tmp_path / "notes.txt").read_text() == "mine"
+
+
+@pytest.mark.parametrize("name", [TRAIN, MARK])
+def test_somebody_else_s_file_of_the_same_name_stays(run: Run, tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text("mine")
+    with pytest.raises(ExportError, match=name):
+        prepare_folder(tmp_path, FILES)
+    ended = run("demo", "--out", tmp_path)
+    assert ended.status == 1
+    assert len(ended.err.splitlines()) == 1
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+    assert (tmp_path / name).read_text() == "mine"

@@ -1,0 +1,105 @@
+"""The examples of the error pages are what Tauscope says: each is provoked, and its page must hold the message."""
+
+from pathlib import Path
+
+import pytest
+
+from service.errors import TauscopeError
+from service.identification.compensation.drive_units import drive_units
+from service.recording import EffortKind, read_recording
+from service.robot import Joint, read_robot
+from shared_data import REPOSITORY
+
+ROBOT = """\
+name: two-joints
+kinematics:
+  dh:
+    - {theta: 0.0, d: 0.3, a: 0.0, alpha: 1.5707963}
+    - {theta: 0.0, d: 0.0, a: 0.5, alpha: 0.0}
+joints:
+  - name: joint1
+    limits: {position: [-2.9, 2.9]}
+  - name: joint2
+model:
+  links:
+    - {mass: 1.4, first_moment: [0, 0, 0], inertia: {xx: 0.1, yy: 0.1, zz: 0.1, xy: 0, xz: 0, yz: 0}}
+    - {mass: 1.4, first_moment: [-0.35, 0, 0], inertia: {xx: 0.01, yy: 0.12, zz: 0.12, xy: 0, xz: 0, yz: 0}}
+"""
+URDF_ROBOT = """\
+name: arm
+kinematics:
+  urdf: {file: arm.urdf, base: base_link, tip: tool1}
+"""
+URDF = """\
+<robot name="arm">
+  <link name="base_link"/>
+  <link name="tool0"/>
+  <joint name="joint1" type="revolute">
+    <parent link="base_link"/><child link="tool0"/><axis xyz="0 0 1"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/>
+  </joint>
+</robot>
+"""
+
+
+def recording(rows: int = 200) -> list[str]:
+    """Lines of a sound recording of two joints."""
+    return ["t,q1,q2,tau1,tau2", *(f"{0.01 * k:.2f},0.1,0.2,1.5,-0.5" for k in range(rows))]
+
+
+def spoilt_recording(row: int, line: str) -> str:
+    lines = recording()
+    lines[row - 1] = line
+    return "\n".join(lines) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("code", "robot"),
+    [
+        ("robot-file", ROBOT.replace("[-2.9, 2.9]", "[2.9, -2.9]")),
+        ("robot-file", ROBOT.replace("position", "postion")),
+        ("robot-file", URDF_ROBOT),
+        ("robot-unphysical", ROBOT.replace("mass: 1.4, first_moment: [-", "mass: -1.4, first_moment: [-")),
+        ("robot-unphysical", ROBOT.replace("yy: 0.12", "yy: 0.02")),
+    ],
+    ids=["limits reversed", "misspelt key", "missing tip", "negative mass", "triangle inequality"],
+)
+def test_robot_examples(code: str, robot: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("arm.yaml").write_text(robot, encoding="utf-8")
+    Path("arm.urdf").write_text(URDF, encoding="utf-8")
+    with pytest.raises(TauscopeError) as raised:
+        read_robot("arm.yaml")
+    assert_on_page(raised.value, code)
+
+
+@pytest.mark.parametrize(
+    ("code", "text"),
+    [
+        ("recording", spoilt_recording(57, "0.54,0.1,0.2,1.5,-0.5")),
+        ("recording", spoilt_recording(2, "[s],[rad],[rad],[Nm],[Nm]")),
+        ("recording", spoilt_recording(1, "t,q1,tau1,tau2")),
+        ("recording", ""),
+        ("recording-mismatch", "t,q1,tau1\n" + "".join(f"{k},0.1,1.5\n" for k in range(200))),
+    ],
+    ids=["time repeats", "units row", "missing column", "empty file", "one joint of two"],
+)
+def test_recording_examples(code: str, text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("log.csv").write_text(text, encoding="utf-8")
+    with pytest.raises(TauscopeError) as raised:
+        read_recording("log.csv", joint_count=2)
+    assert_on_page(raised.value, code)
+
+
+def test_export_example() -> None:
+    joint = Joint("joint2", drive={"rated_torque_nm": 0})
+    with pytest.raises(TauscopeError) as raised:
+        drive_units(joint, EffortKind.TORQUE)
+    assert_on_page(raised.value, "export")
+
+
+def assert_on_page(error: TauscopeError, code: str) -> None:
+    page = (REPOSITORY / "docs" / "errors" / f"{code}.md").read_text(encoding="utf-8")
+    assert error.code == code
+    assert f"\n{error}\n" in page, f"docs/errors/{code}.md does not show:\n{error}"

@@ -1,0 +1,209 @@
+"""The queue: order, slots, cancelling, failures of every kind, restart."""
+
+from collections.abc import Callable
+from concurrent.futures import BrokenExecutor
+from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
+
+import pytest
+
+from jobs.executors import InlineExecutor, ManualExecutor
+from service.errors import NotFoundError
+from service.jobs import JobProblem, JobQueue, JobState, QueueFullError, Workspace
+from service.store import ItemStore
+
+
+@pytest.fixture
+def items(tmp_path: Path) -> ItemStore:
+    return ItemStore(tmp_path / "jobs", "job")
+
+
+@pytest.fixture
+def executor() -> ManualExecutor:
+    return ManualExecutor()
+
+
+def succeed(_: Path) -> None:
+    return None
+
+
+def fail(_: Path) -> JobProblem:
+    return JobProblem(code="recording", detail="a.csv: row 3")
+
+
+def crash(_: Path) -> None:
+    raise ZeroDivisionError("a bug")
+
+
+def make_queue(
+    items: ItemStore, executor: ManualExecutor, work: Callable[[Path], JobProblem | None] = succeed, slots: int = 1
+) -> JobQueue:
+    return JobQueue(items, work, executor, slots=slots, most_waiting=2)
+
+
+def state_of(items: ItemStore, identifier: str) -> JobState:
+    record = Workspace(items.folder(identifier)).read_record()
+    assert record is not None
+    return record.state
+
+
+def problem_of(items: ItemStore, identifier: str) -> str:
+    record = Workspace(items.folder(identifier)).read_record()
+    assert record is not None
+    assert record.problem is not None
+    return record.problem.code
+
+
+@pytest.mark.parametrize("slots", [1, 2])
+def test_jobs_run_in_their_order_and_never_more_than_there_are_slots(
+    slots: int, items: ItemStore, executor: ManualExecutor
+) -> None:
+    queue = make_queue(items, executor, slots=slots)
+    jobs = [queue.submit(items.stage()) for _ in range(3)]
+    states = [state_of(items, job) for job in jobs]
+    assert states == ["running"] * slots + ["queued"] * (3 - slots)
+    for done in range(3):
+        assert len(executor.tasks) == min(slots, 3 - done)
+        executor.run()
+        assert state_of(items, jobs[done]) == "succeeded"
+    assert executor.tasks == []
+
+
+@pytest.mark.parametrize(
+    ("work", "state", "code"), [(fail, JobState.FAILED, "recording"), (crash, JobState.FAILED, "internal")]
+)
+def test_work_that_fails(
+    work: Callable[[Path], JobProblem | None], state: JobState, code: str, items: ItemStore
+) -> None:
+    job = make_queue(items, InlineExecutor(), work).submit(items.stage())
+    assert (state_of(items, job), problem_of(items, job)) == (state, code)
+
+
+def test_an_unforeseen_failure_is_logged_and_not_told(items: ItemStore, caplog: pytest.LogCaptureFixture) -> None:
+    job = make_queue(items, InlineExecutor(), crash).submit(items.stage())
+    record = Workspace(items.folder(job)).read_record()
+    assert record is not None
+    assert "a bug" not in str(record.problem)
+    assert "ZeroDivisionError: a bug" in caplog.text
+
+
+def test_a_worker_that_dies_fails_its_job_and_the_next_one_runs(items: ItemStore, executor: ManualExecutor) -> None:
+    queue = make_queue(items, executor)
+    lost, following = queue.submit(items.stage()), queue.submit(items.stage())
+    executor.fail(BrokenProcessPool("killed"))
+    assert (state_of(items, lost), problem_of(items, lost)) == ("failed", "worker-lost")
+    executor.run()
+    assert state_of(items, following) == "succeeded"
+
+
+@pytest.mark.parametrize("refusal", [BrokenExecutor("broken"), RuntimeError("shut down"), OSError("no process")])
+def test_an_executor_that_takes_nothing(refusal: Exception, items: ItemStore, executor: ManualExecutor) -> None:
+    executor.refusal = refusal
+    job = make_queue(items, executor).submit(items.stage())
+    assert (state_of(items, job), problem_of(items, job)) == ("failed", "worker-lost")
+
+
+def test_too_many_waiting_jobs(items: ItemStore, executor: ManualExecutor) -> None:
+    queue = make_queue(items, executor)
+    for _ in range(3):
+        queue.submit(items.stage())
+    staged = items.stage()
+    with pytest.raises(QueueFullError, match="2 jobs are waiting already"):
+        queue.submit(staged)
+    assert len(items.identifiers()) == 3
+    executor.run()
+    queue.submit(staged)
+    assert len(items.identifiers()) == 4
+
+
+def test_a_waiting_job_is_cancelled_and_never_runs(items: ItemStore, executor: ManualExecutor) -> None:
+    queue = make_queue(items, executor)
+    _, waiting = queue.submit(items.stage()), queue.submit(items.stage())
+    assert not queue.cancel_or_remove(waiting)
+    executor.run()
+    assert executor.tasks == []
+    assert (state_of(items, waiting), problem_of(items, waiting)) == ("cancelled", "cancelled")
+
+
+def test_a_running_job_is_cancelled_at_once_and_told_to_stop(items: ItemStore, executor: ManualExecutor) -> None:
+    queue = make_queue(items, executor)
+    job = queue.submit(items.stage())
+    workspace = Workspace(items.folder(job))
+    assert not workspace.is_asked_to_stop()
+    queue.cancel_or_remove(job)
+    assert state_of(items, job) == "cancelled"
+    assert workspace.is_asked_to_stop()
+    executor.run()  # the work ends in its own time, and what it says then does not count
+    assert state_of(items, job) == "cancelled"
+
+
+def test_the_slot_of_a_cancelled_job_is_taken_until_its_work_ends(items: ItemStore, executor: ManualExecutor) -> None:
+    queue = make_queue(items, executor)
+    cancelled, following = queue.submit(items.stage()), queue.submit(items.stage())
+    queue.cancel_or_remove(cancelled)
+    queue.cancel_or_remove(cancelled)  # removed, while its work goes on
+    assert items.identifiers() == [following]
+    assert state_of(items, following) == "queued"
+    executor.run()
+    assert state_of(items, following) == "running"
+
+
+def test_an_ended_job_is_removed(items: ItemStore) -> None:
+    queue = make_queue(items, InlineExecutor())
+    job = queue.submit(items.stage())
+    assert queue.cancel_or_remove(job)
+    assert items.identifiers() == []
+    with pytest.raises(NotFoundError):
+        queue.cancel_or_remove(job)
+
+
+@pytest.mark.parametrize("damage", [b"", b"{}", b"\xff\xfe", b'{"state": "flying"}', b'{"state": 1}', b"[" * 100_000])
+def test_a_job_with_a_damaged_record_can_be_removed(damage: bytes, items: ItemStore) -> None:
+    queue = make_queue(items, InlineExecutor())
+    job = queue.submit(items.stage())
+    (items.folder(job) / "state.json").write_bytes(damage)
+    assert Workspace(items.folder(job)).read_record() is None
+    assert queue.cancel_or_remove(job)
+
+
+def test_what_an_earlier_service_left_unfinished_is_interrupted(items: ItemStore, executor: ManualExecutor) -> None:
+    earlier = make_queue(items, executor)
+    done = earlier.submit(items.stage())
+    executor.run()
+    running, waiting = earlier.submit(items.stage()), earlier.submit(items.stage())
+    half_staged = items.stage()
+    # The earlier service is killed here: nothing of it runs any more.
+    make_queue(items, ManualExecutor())
+    assert state_of(items, done) == "succeeded"
+    for job in (running, waiting):
+        assert (state_of(items, job), problem_of(items, job)) == ("interrupted", "interrupted")
+    assert not half_staged.exists()
+
+
+def test_closing_interrupts_and_takes_nothing_more(items: ItemStore, executor: ManualExecutor) -> None:
+    queue = make_queue(items, executor)
+    running, waiting = queue.submit(items.stage()), queue.submit(items.stage())
+    queue.close()
+    assert executor.shutdowns == [True]
+    assert [state_of(items, job) for job in (running, waiting)] == ["interrupted", "interrupted"]
+    with pytest.raises(QueueFullError):
+        queue.submit(items.stage())
+
+
+def test_a_full_disk_when_a_job_ends_does_not_stop_the_queue(
+    items: ItemStore, executor: ManualExecutor, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    queue = make_queue(items, executor)
+    unlucky, following = queue.submit(items.stage()), queue.submit(items.stage())
+    write = Workspace.write_record
+
+    def full_once(self: Workspace, record: object) -> None:
+        monkeypatch.setattr(Workspace, "write_record", write)
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Workspace, "write_record", full_once)
+    executor.run()
+    assert state_of(items, following) == "running"
+    assert "could not be written" in caplog.text
+    make_queue(items, ManualExecutor())
+    assert state_of(items, unlucky) == "interrupted"

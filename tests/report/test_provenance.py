@@ -1,0 +1,44 @@
+"""Hashes of what was read."""
+
+import hashlib
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+from service.errors import RecordingError
+from service.report.provenance import input_files, installed_version, record_provenance
+from service.robot import read_robot
+from sim_backend.examples import example_robot
+
+
+def test_every_file_is_hashed(tmp_path: Path) -> None:
+    recording, bag = tmp_path / "a.csv", tmp_path / "bag"
+    recording.write_bytes(b"t,q1,tau1\n")
+    bag.mkdir()
+    (bag / "metadata.yaml").write_bytes(b"x")
+    (bag / "data.mcap").write_bytes(b"y")
+    robot = replace(read_robot(example_robot("paper_arm")), urdf=recording)
+    made = record_provenance(
+        command=["tauscope"],
+        robot=robot,
+        recordings=[str(recording)],
+        held_out=[str(bag)],
+        created=datetime(2026, 1, 1, tzinfo=UTC),
+    )
+    assert [entry.role for entry in made.inputs] == ["robot", "urdf", "recording", "held out", "held out"]
+    assert [Path(entry.path).name for entry in made.inputs[3:]] == ["data.mcap", "metadata.yaml"]
+    assert made.inputs[2].sha256 == hashlib.sha256(b"t,q1,tau1\n").hexdigest()
+    assert made.inputs[2].size_bytes == 10
+    assert made.inputs[0].path == str(example_robot("paper_arm"))
+
+
+def test_a_file_that_is_gone_is_named(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"gone\.csv"):
+        list(input_files("recording", str(tmp_path / "gone.csv")))
+
+
+def test_versions() -> None:
+    assert installed_version("numpy").count(".") >= 1
+    assert installed_version("no-such-package-of-anybody") == "(not installed)"
