@@ -47,6 +47,9 @@ CONSISTENCY_LEVEL = 0.999
 SIGNIFICANT = 5.0
 """Standard errors by which a Stribeck term must differ from zero to stay in the model."""
 
+FINEST_TORQUE = 1e-6
+"""Share of a joint's torque that counts as its noise at least: no sensor resolves more, and weights stay finite."""
+
 SCAN_ROWS = 1 << 16
 
 STANDING_STILL = 10.0
@@ -371,13 +374,13 @@ def _estimate(factors: tuple[JointFactor, ...], size: int, estimator: Estimator)
 
 
 def _residual_std(factors: tuple[JointFactor, ...], size: int, parameters: Array) -> Array:
-    """σ_j with the degrees of freedom that the parameters took, shared by rows; never below rounding."""
+    """σ_j with the degrees of freedom that the parameters took, shared by rows; never below `FINEST_TORQUE`."""
     total = sum(factor.rows for factor in factors)
     squares = np.array([factor.squared_residual(parameters) for factor in factors])
     freedom = np.array([factor.rows * max(1.0 - size / total, 1e-3) for factor in factors])
-    torque = np.array([np.sum(factor.triangle[:, -1] ** 2) / factor.rows for factor in factors])
-    smallest = np.maximum(torque.max() * 1e-24, np.finfo(float).tiny)
-    return np.sqrt(np.maximum(squares / freedom, smallest))
+    torque = np.sqrt([np.sum(factor.triangle[:, -1] ** 2) / factor.rows for factor in factors])
+    finest = FINEST_TORQUE * np.maximum(torque, FINEST_TORQUE * torque.max()) + np.finfo(float).tiny
+    return np.maximum(np.sqrt(squares / freedom), finest)
 
 
 def _consistent(structure: ModelStructure, solution: Solution) -> ConsistentParameters:

@@ -4,7 +4,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given
+from hypothesis import settings as examples
 from hypothesis import strategies as st
 from starlette.testclient import TestClient
 
@@ -21,16 +22,18 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def form_client(folder: Path) -> Iterator[TestClient]:
-    limits = {"max_upload_bytes": 2000, "max_document_bytes": 500, "max_recordings": 2, "max_waiting": 10_000}
-    with connected(create_app(Settings(data_folder=folder / "data", **limits), ManualExecutor())) as client:
+    settings = Settings(
+        data_folder=folder / "data", max_upload_bytes=2000, max_document_bytes=500, max_recordings=2, max_waiting=10_000
+    )
+    with connected(create_app(settings, ManualExecutor())) as client:
         yield client
 
 
 FRAGMENTS = st.sampled_from(
     [
         b"--b\r\n", b"--b--\r\n", b"--b--", b"\r\n", b"\r\n\r\n", b"--", b"Content-Disposition: form-data; ",
-        b'name="file"', b'name="robot"', b'name="recordings"', b'name="request"', b'; filename="a.csv"', b'; filename=""',
-        b'; filename="../../escaped"', b"; filename*=UTF-8''..%2f", b"Content-Type: text/csv\r\n",
+        b'name="file"', b'name="robot"', b'name="recordings"', b'name="request"', b'; filename="a.csv"',
+        b'; filename=""', b'; filename="../../escaped"', b"; filename*=UTF-8''..%2f", b"Content-Type: text/csv\r\n",
         b"Content-Transfer-Encoding: base64\r\n", b"{}", b'{"recordings": []}', b"t,q1,tau1\n", b"\0", b"\xff\xfe",
         b"x" * 600,
     ]
@@ -41,7 +44,7 @@ NAMES = st.text(st.characters(exclude_categories=["Cs"], exclude_characters='"\r
 @given(
     pieces=st.lists(FRAGMENTS, max_size=25), path=st.sampled_from([RECORDINGS, IDENTIFICATIONS, "/api/v1/robots/check"])
 )
-@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_any_form_is_answered(pieces: list[bytes], path: str, form_client: TestClient, folder: Path) -> None:
     headers = {"content-type": "multipart/form-data; boundary=b"}
     answer = form_client.post(path, content=b"".join(pieces), headers=headers)
@@ -54,7 +57,7 @@ def test_any_form_is_answered(pieces: list[bytes], path: str, form_client: TestC
 
 
 @given(name=NAMES, content=st.binary(max_size=50))
-@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_file_is_kept_under_its_own_name_or_not_at_all(
     name: str, content: bytes, form_client: TestClient, folder: Path
 ) -> None:

@@ -160,7 +160,7 @@ def post_form(client: TestClient, *parts: tuple[str, str | None, bytes]) -> Any:
         ([("recordings", "a\u0000.csv", CSV)], "file name"),
         ([("recordings", "x" * 300, CSV)], "file name"),
         ([("recordings", None, CSV)], "part recordings: is not a file"),
-        ([("request", None, LISTS_B), ("robot", "r", ROBOT_FILE), ("recordings", "a.csv", CSV)], "sent but is not listed"),
+        ([("request", None, LISTS_B), ("robot", "r", ROBOT_FILE), ("recordings", "a.csv", CSV)], "but is not listed"),
         ([("request", None, b"[]")], "part request"),
         ([("request", None, b"{}"), ("request", None, b"{}")], "part request: is there twice"),
         ([("request", None, HAS_ROBOT), ("robot", "r.yaml", ROBOT_FILE)], "the robot came twice"),
