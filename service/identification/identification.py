@@ -1,6 +1,7 @@
 """From a robot and recordings to parameters: the whole way, in the order of the steps."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Literal
@@ -41,6 +42,9 @@ from service.robot import Robot
 REWEIGHTINGS = 2
 """Rounds of estimating σ_j from the residual and solving again; it settles in two."""
 
+NOISE_DECADES = 6
+"""Powers of ten by which the noise may be enlarged where the consistent model is hard to reach."""
+
 CONSISTENCY_LEVEL = 0.999
 """The free estimate counts as impossible, not merely unlucky, where physics rejects it at this level."""
 
@@ -55,6 +59,9 @@ SCAN_ROWS = 1 << 16
 STANDING_STILL = 10.0
 SMALLEST_MOTION = 1e-9
 """A joint moves where its range exceeds so many standard deviations of its noise, and this [rad or m]."""
+
+FASTEST = 1e4
+"""A median speed above this is a mistake of units [rad/s or m/s]."""
 
 KNOWN_SHARE = 0.1
 """A coefficient whose standard error moves the joint's torque by more than this share of its rms is not
@@ -196,13 +203,16 @@ def identify(
     base = base_parameters(robot)
     conditioners = [Conditioner.survey(recording, robot) for recording in recordings]
     _require_motion(conditioners)
-    cutoff = choose_cutoff(conditioners, robot, base) if options.cutoff_hz == "auto" else options.cutoff_hz
+    with _naming(recordings):
+        automatic = options.cutoff_hz == "auto"
+        cutoff = choose_cutoff(conditioners, robot, base) if automatic else options.cutoff_hz
     motions = Dataset(conditioners, robot, base, cutoff)
-    progress("choose model terms")
-    structure, shapes, factors = _model(motions, robot, base, options)
-    progress("estimate parameters")
-    weights, solution, unweighted = _estimate(factors, structure.size, options.estimator)
-    consistent = _consistent(structure, solution)
+    with _naming(recordings):
+        progress("choose model terms")
+        structure, shapes, factors = _model(motions, robot, base, options)
+        progress("estimate parameters")
+        weights, solution, unweighted = _estimate(factors, structure.size, options.estimator)
+        consistent = _consistent(structure, solution)
     estimates = (solution.parameters, _in_model_columns(structure, consistent.parameters))
     progress("evaluate residuals")
     free, bound = evaluate(motions, structure, estimates)
@@ -238,20 +248,47 @@ def identify(
     )
 
 
+@contextmanager
+def _naming(recordings: Sequence[Recording]) -> Iterator[None]:
+    """Put the recordings' names before the message of what they could not answer."""
+    try:
+        yield
+    except IdentificationError as error:
+        raise IdentificationError(f"{', '.join(recording.name for recording in recordings)}: {error}") from error
+
+
 def _require_motion(conditioners: Sequence[Conditioner]) -> None:
-    """Refuse recordings in which no joint leaves the noise of its own encoder."""
+    """Refuse recordings in which no joint leaves the noise of its own encoder, or one moves as nothing can."""
+    moving = False
     for conditioner in conditioners:
         noise = np.sqrt(conditioner.noise.density * conditioner.timing.rate_hz / 2.0)
         for start, stop in conditioner.timing.rows:
             for first in range(start, stop, SCAN_ROWS):
-                position = conditioner.recording.samples(first, min(first + SCAN_ROWS, stop)).position
-                reach = np.nanmax(position, axis=0) - np.nanmin(position, axis=0)
-                if np.any(reach > np.maximum(STANDING_STILL * noise, SMALLEST_MOTION)):
-                    return
-    names = ", ".join(conditioner.recording.name for conditioner in conditioners)
-    raise IdentificationError(
-        f"{names}: no joint moves by more than the noise of its position: record a motion that excites every joint"
-    )
+                samples = conditioner.recording.samples(first, min(first + SCAN_ROWS, stop))
+                _require_plausible_speed(conditioner, samples.time, samples.position)
+                reach = np.nanmax(samples.position, axis=0) - np.nanmin(samples.position, axis=0)
+                moving = moving or bool(np.any(reach > np.maximum(STANDING_STILL * noise, SMALLEST_MOTION)))
+    if not moving:
+        names = ", ".join(conditioner.recording.name for conditioner in conditioners)
+        raise IdentificationError(
+            f"{names}: no joint moves by more than the noise of its position: record a motion that excites every joint"
+        )
+
+
+def _require_plausible_speed(conditioner: Conditioner, time: Array, position: Array) -> None:
+    """Refuse speeds that no joint reaches: time stamps or positions are in another unit."""
+    complete = np.isfinite(position).all(axis=1)
+    if complete.sum() < 2:
+        return
+    speed = np.abs(np.diff(position[complete], axis=0) / np.diff(time[complete])[:, None])
+    typical = np.median(speed, axis=0)
+    joint = int(np.argmax(typical))
+    if typical[joint] > FASTEST:
+        name = conditioner.robot.joints[joint].name
+        raise IdentificationError(
+            f"{conditioner.recording.name}: {name} (column q{joint + 1}) moves at {typical[joint]:.3g} per second most of"
+            " the time: is column t in seconds, and q in rad or m?"
+        )
 
 
 def _model(
@@ -384,7 +421,11 @@ def _residual_std(factors: tuple[JointFactor, ...], size: int, parameters: Array
 
 
 def _consistent(structure: ModelStructure, solution: Solution) -> ConsistentParameters:
-    """The nearest parameters that bodies and friction can have, in the metric of the estimate."""
+    """The nearest parameters that bodies and friction can have, in the metric of the estimate.
+
+    Data that no arm could have made may put the estimate millions of standard errors away from any body. The program is
+    then solved for a noise ten times as large, and so on: the same nearest point, with a prior that weighs more.
+    """
     robot, base = structure.robot, structure.base
     standard = 10 * robot.joint_count
     size = standard + structure.size - structure.base_count
@@ -393,9 +434,22 @@ def _consistent(structure: ModelStructure, solution: Solution) -> ConsistentPara
     factor[:, base.dependent_columns] = solution.factor[:, : structure.base_count] @ base.combination
     factor[:, standard:] = solution.factor[:, structure.base_count :]
     columns = _friction_columns(structure, standard - structure.base_count)
-    prior = plausible_prior(robot, factor, solution.target, columns)
-    names = [joint.name for joint in robot.joints]
-    return nearest_consistent_parameters(factor, solution.target, prior, friction_inequalities(columns, size, names))
+    limits = friction_inequalities(columns, size, [joint.name for joint in robot.joints])
+    for attempt in range(NOISE_DECADES + 1):
+        scale = 10.0**-attempt
+        prior = plausible_prior(robot, scale * factor, scale * solution.target, columns)
+        try:
+            found = nearest_consistent_parameters(scale * factor, scale * solution.target, prior, limits)
+        except IdentificationError:
+            if attempt == NOISE_DECADES:
+                raise
+            continue
+        return replace(
+            found,
+            squared_residual=found.squared_residual / scale**2,
+            free_squared_residual=found.free_squared_residual / scale**2,
+        )
+    raise AssertionError("the last attempt returns or raises")
 
 
 def _friction_columns(structure: ModelStructure, shift: int) -> FrictionColumns:

@@ -172,7 +172,7 @@ def restricted(factors: tuple[JointFactor, ...], keep: NDArray[np.intp]) -> tupl
 
 
 def condition_number(factor: Array) -> float:
-    """Condition number of a regressor: largest over smallest singular value.
+    """Condition number of a regressor: largest over smallest singular value, at most 1/ε: more is rounding.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def condition_number(factor: Array) -> float:
         triangular factor R of the stacked regressor L
     """
     singular = np.linalg.svd(factor, compute_uv=False)
-    return float(singular[0] / max(singular[-1], np.finfo(float).tiny))
+    return float(singular[0] / max(singular[-1], singular[0] * np.finfo(float).eps, np.finfo(float).tiny))
 
 
 def _appended(triangle: Array | None, equations: Array) -> Array:

@@ -136,7 +136,7 @@ def _torque_section(
     length = series.time[-1] - series.time[0]
     shown = f"{series.recording}, {significant(length, 3)} s at {significant(series.rate_hz, 4)} Hz"
     if series.repetitions > 1:
-        shown += f"; the first of {series.repetitions} periods, of which the estimate used the mean"
+        shown += f"; the first of {series.repetitions} periods that were averaged"
     title = "Torque on a held-out recording" if kind == "held-out" else "Torque on the model's own recording"
     return Section(f"torque-{kind}", title, parts, [f"{shown}."])
 

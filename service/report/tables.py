@@ -123,9 +123,10 @@ def conditioning_table(document: IdentificationDocument) -> Table:
             masked = (entry.missed_positions, sum(entry.missed_torques), entry.dropped, entry.gaps)
             periods = str(entry.averaged_periods) if entry.averaged_periods else ABSENT
             rate = significant(entry.rate_hz, 4) + (" (resampled)" if entry.resampled else "")
-            rows.append([entry.recording, used, str(entry.samples), rate, periods, *map(str, masked)])
-    columns = ("recording", "use", "samples", "rate [Hz]", "periods averaged")
-    return Table((*columns, "no position", "no torque", "too short", "gaps"), rows, words=2)
+            sources = ", ".join(sorted(set(entry.velocity_source)))
+            rows.append([entry.recording, used, sources, str(entry.samples), rate, periods, *map(str, masked)])
+    columns = ("recording", "use", "motion taken from", "samples", "rate [Hz]", "periods averaged")
+    return Table((*columns, "no position", "no torque", "too short", "gaps"), rows, words=3)
 
 
 def input_table(provenance: Provenance) -> Table:

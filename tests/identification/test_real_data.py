@@ -1,0 +1,198 @@
+"""Recordings of real arms: the figures that issue 2 asks for, by our own measure and by the data README's recipe.
+
+Bounds are the README's, none is widened. The recipe (zero-phase Butterworth on q and τ, central differences) is worked
+out here with Pinocchio's regressor, so that neither our filter nor our regressor judges itself.
+"""
+
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy import signal
+
+from pinocchio_arm import pinocchio_regressor
+from service.identification import Identification, IdentificationDocument, Options, document, identify
+from service.identification.dataset import Dataset
+from service.identification.residuals import evaluate
+from service.recording import Recording, read_recording
+from service.recording.conditioning import Conditioner
+from service.robot import LinkInertia, Robot, pseudo_inertia, read_robot
+from shared_data import SHARED_DATA, needs_shared_data
+
+pytestmark = needs_shared_data
+
+Array = NDArray[np.float64]
+
+HELD_OUT_BOUNDS = {
+    "emps": (100.0, 4.78),
+    "kuka-lwr4": (8.0, 4.3),
+    "franka-panda": (10.0, 1.81),
+    "double-pendulum": (8.0, 10.1),
+    "bam-xl330": (12.0, 29.7),
+}
+"""Cut-off [Hz] and held-out relative error [%] of the data README (LWR4+: its physically consistent figure); the TX40
+is in `test_found_defects`."""
+
+BANDS = {name: cutoff for name, (cutoff, _) in HELD_OUT_BOUNDS.items()} | {"staubli-tx40": 30.0}
+
+ALL_SETS = (*BANDS, "odrive-cogging")
+
+
+@cache
+def real_set(name: str) -> tuple[Robot, list[Recording], list[Recording]]:
+    """Robot, training recordings, held-out recordings."""
+    folder = SHARED_DATA / name
+    files: Callable[[str], list[Path]] = lambda pattern: sorted(folder.glob(pattern))  # noqa: E731
+    train, held_out = ([read_recording(path) for path in files(kind)] for kind in ("train-*.csv", "held-out-*.csv"))
+    return read_robot(folder / "robot.yaml"), train, held_out
+
+
+@cache
+def identified(name: str, cutoff_hz: float | None = None) -> Identification:
+    """The set identified in a band, or in the band that the data ask for where None."""
+    robot, train, held_out = real_set(name)
+    return identify(robot, train, held_out, Options(cutoff_hz="auto" if cutoff_hz is None else cutoff_hz))
+
+
+def relative_error_by_recipe(result: Identification, parameters: Array, recordings: list[Recording]) -> float:
+    """‖τ - τ̂‖ / ‖τ‖ [%] over all recordings after the README's own filter and differences."""
+    robot, squares, total = result.robot, 0.0, 0.0
+    names = [f"{name}{link + 1}" for link in range(robot.joint_count) for name in STANDARD]
+    leading = [names.index(next(iter(terms))) for terms in result.structure.base.terms]
+    for recording in recordings:
+        samples = recording.samples()
+        rate = (len(recording) - 1) / (samples.time[-1] - samples.time[0])
+        sections = signal.butter(4, result.cutoff_hz, output="sos", fs=rate)
+        torque = signal.sosfiltfilt(sections, recording.joint_torque(samples.effort, robot), axis=0)
+        q = signal.sosfiltfilt(sections, samples.position, axis=0)
+        qd = np.gradient(q, samples.time, axis=0)
+        qdd = np.gradient(qd, samples.time, axis=0)
+        phi = pinocchio_regressor(robot, q, qd, qdd)[:, :, leading]
+        modelled = phi @ parameters[: len(leading)]
+        for joint, terms in enumerate(result.structure.terms):
+            velocity = qd[:, joint]
+            own = {
+                "stiction": 2 / np.pi * np.arctan(terms.k_v * velocity),
+                "stribeck": 2 / np.pi * np.arctan((terms.delta or 0.0) * velocity),
+                "viscous": velocity,
+                "offset": np.ones_like(velocity),
+                "rotor_inertia": qdd[:, joint],
+            }
+            for name in terms.names:
+                column = result.structure.coefficient(joint, name)
+                assert column is not None
+                modelled[:, joint] += parameters[column] * own[name]
+        squares += float(np.sum((torque - modelled) ** 2))
+        total += float(np.sum(torque**2))
+    return 100.0 * np.sqrt(squares / total)
+
+
+STANDARD = ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz", "m", "msx", "msy", "msz")
+
+
+def free_held_out_error(result: Identification, name: str) -> float:
+    """Held-out relative error [%] of the LS or WLS estimate itself, whether it is delivered or not."""
+    robot, _, held_out = real_set(name)
+    conditioners = [Conditioner.survey(recording, robot) for recording in held_out]
+    motions = Dataset(conditioners, robot, result.structure.base, result.cutoff_hz)
+    (free,) = evaluate(motions, result.structure, [result.free_parameters])
+    return 100.0 * free.fit.relative_error
+
+
+def links_of(found: IdentificationDocument) -> list[LinkInertia]:
+    """The links that the document states."""
+    links = []
+    for entry in found.links:
+        i = entry.inertia
+        inertia = np.array([[i.xx, i.xy, i.xz], [i.xy, i.yy, i.yz], [i.xz, i.yz, i.zz]])
+        links.append(LinkInertia(entry.mass, np.array(entry.first_moment), inertia))
+    return links
+
+
+@pytest.mark.parametrize("name", HELD_OUT_BOUNDS)
+def test_held_out_error_is_no_worse_than_the_readmes(name: str) -> None:
+    cutoff, bound = HELD_OUT_BOUNDS[name]
+    result = identified(name, cutoff)
+    assert result.cutoff_hz == cutoff
+    assert result.held_out is not None
+    assert 100.0 * result.held_out.relative_error <= bound
+
+
+@pytest.mark.parametrize("name", HELD_OUT_BOUNDS)
+def test_held_out_error_by_the_readmes_own_recipe(name: str) -> None:
+    cutoff, bound = HELD_OUT_BOUNDS[name]
+    result = identified(name, cutoff)
+    assert relative_error_by_recipe(result, result.parameters, real_set(name)[2]) <= bound
+
+
+@pytest.mark.parametrize("name", BANDS)
+def test_links_are_possible_and_nearly_as_good(name: str) -> None:
+    result = identified(name, BANDS[name])
+    found = document(result)
+    for number, link in enumerate(links_of(found), 1):
+        assert np.linalg.eigvalsh(pseudo_inertia(link)).min() > 0.0, f"link {number}"
+    for entry in found.links_friction:
+        assert entry.stiction >= 0.0
+        assert entry.viscous >= 0.0
+        assert entry.stiction + entry.stribeck >= 0.0
+    assert found.fit.links_held_out is not None
+    consistent = 100.0 * found.fit.links_held_out.relative_error
+    assert consistent <= min(free_held_out_error(result, name), consistent) + 1.0
+
+
+@pytest.mark.parametrize("name", BANDS)
+def test_the_stated_links_give_the_stated_fit(name: str) -> None:
+    """`fit.links_held_out` is that of `links`: their torque, computed from the document alone, agrees."""
+    result = identified(name, BANDS[name])
+    found = document(result)
+    assert found.fit.links_held_out is not None
+    standard = np.concatenate([link.to_vector() for link in links_of(found)])
+    names = [f"{name}{link + 1}" for link in range(result.robot.joint_count) for name in STANDARD]
+    values = dict(zip(names, standard, strict=True))
+    base = [sum(factor * values[term] for term, factor in terms.items()) for terms in result.structure.base.terms]
+    np.testing.assert_allclose(base, result.consistent_parameters[: len(base)], rtol=0, atol=1e-9 * np.abs(base).max())
+    by_recipe = relative_error_by_recipe(result, result.consistent_parameters, real_set(name)[2])
+    assert by_recipe == pytest.approx(100.0 * found.fit.links_held_out.relative_error, rel=0.1)
+
+
+def test_emps_finds_the_published_values() -> None:
+    found = document(identified("emps", HELD_OUT_BOUNDS["emps"][0]))
+    (mass,), (friction,) = found.base_parameters, found.friction
+    assert mass.name == "m1"
+    assert mass.value == pytest.approx(95.11, rel=0.01)
+    assert friction.viscous == pytest.approx(203.5, rel=0.02)
+    assert friction.stiction + friction.stribeck == pytest.approx(20.39, rel=0.02)
+    assert friction.offset == pytest.approx(-3.16, rel=0.05)
+
+
+def test_emps_noise_is_the_scatter_between_its_periods() -> None:
+    found = document(identified("emps", HELD_OUT_BOUNDS["emps"][0]))
+    assert found.noise_method == "periods"
+    assert found.noise_std == pytest.approx([0.33], rel=0.05)
+
+
+def test_the_double_pendulum_has_its_published_moments() -> None:
+    """m2·r2 and m1·r1 + m2·l1, which gravity shows: the README's own fit is off by 1 and 2 %."""
+    found = document(identified("double-pendulum", HELD_OUT_BOUNDS["double-pendulum"][0]))
+    outer, inner = (link.first_moment[0] + link.mass * length for link, length in zip(found.links[::-1], (0.2, 0.3)))
+    assert outer == pytest.approx(0.1111, rel=0.05)
+    assert inner + 0.3 * found.links[1].mass == pytest.approx(0.3491, rel=0.05)
+
+
+@pytest.mark.parametrize("name", ALL_SETS)
+def test_the_automatic_band_suits_the_data(name: str) -> None:
+    robot, train, _ = real_set(name)
+    result = identified(name)
+    rate = max(summary.rate_hz for summary in result.conditioning)
+    assert result.cutoff_hz is None or 0.5 < result.cutoff_hz < rate / 2
+    assert len(result.conditioning) == len(train)
+    assert np.isfinite(result.free_parameters).all()
+    assert np.isfinite(result.covariance).all()
+    assert result.held_out is not None
+    # A band is chosen to help: at or below the error in the README's own band, plus the width of that comparison.
+    if name in HELD_OUT_BOUNDS:
+        assert 100.0 * result.held_out.relative_error <= HELD_OUT_BOUNDS[name][1]
+    assert robot.joint_count == len(result.shapes)
