@@ -10,9 +10,9 @@ TauscopeError
 ├── NotFoundError         (LookupError)   not-found           nothing of that name is kept here
 └── LimitExceededError    (ValueError)    limit-exceeded      an upload or a request is larger than allowed
 
-Every leaf also inherits the builtin that a caller would expect, so that ``except ValueError`` keeps working. `code` is
-stable: scripts and the pages below ``docs/errors/`` rely on it. A message is one line; it names the file, column, row or
-joint, and what to do next.
+Every leaf also inherits the builtin that a caller would expect, so that ``except ValueError`` keeps working. `code`
+is stable: scripts and the pages below ``docs/errors/`` rely on it. A message is one line; it names the file, column,
+row or joint, and what to do next.
 """
 
 from typing import ClassVar

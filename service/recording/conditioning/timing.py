@@ -28,6 +28,12 @@ end."""
 ONE_INTERVAL = 1.75
 """Multiple of the typical interval above which a sample is missing."""
 
+COARSE_SINGLES = 0.85
+"""Share of single intervals below which stamps rounded to the interval itself are taken to be coarse, not missing."""
+
+BURST_TIME = 0.1
+"""Share of the time below which the usual interval cannot be the sampling interval."""
+
 MEDIAN_SAMPLES = 1 << 20
 
 SHORTEST_STRETCH = 32
@@ -163,14 +169,23 @@ def _scan(recording: Recording) -> tuple[Array, NDArray[np.int_], PeriodLabels |
 def _typical_interval(interval: Array) -> tuple[float, float]:
     """Time from sample to sample, and the sampling rate, from intervals of which some are gaps."""
     stride = (len(interval) // MEDIAN_SAMPLES) | 1  # odd: stamps that come in pairs are not seen one-sidedly
-    median = float(np.median(interval[::stride]))
-    bridged = interval <= _longest_bridge(median)
-    mean = float(np.mean(interval, where=bridged))
-    if mean > 2.0 * median:
-        # Stamps in bursts: most samples follow at once, as buffers are emptied. Only their mean is a rate.
-        return mean, 1.0 / mean
+    few = interval[::stride]
+    median = float(np.median(few))
     single = interval < ONE_INTERVAL * median
+    between = interval <= max(BRIDGED_SAMPLES * median, BRIDGED_SECONDS)
+    mean = float(np.mean(interval, where=between))
+    # Stamps in bursts: most samples follow at once, as buffers are emptied. Only their mean is a rate.
+    in_bursts = np.sum(interval, where=single) < BURST_TIME * np.sum(interval, where=between)
+    if in_bursts or (np.mean(single) < COARSE_SINGLES and _is_last_digit(median, few)):
+        return mean, 1.0 / mean
     return median, 1.0 / float(np.mean(interval, where=single))
+
+
+def _is_last_digit(median_s: float, interval: Array) -> bool:
+    """Whether stamps are rounded to the interval itself, so that two of them seem a sample apart that are not."""
+    steps = interval / median_s
+    is_decimal = abs(np.log10(median_s) - np.rint(np.log10(median_s))) < 1e-3
+    return bool(is_decimal and np.abs(steps - np.rint(steps)).max() < 1e-2)
 
 
 def _longest_bridge(typical_s: float) -> float:

@@ -23,9 +23,6 @@ UNIFORM_TOLERANCE = 0.02
 STAMP_DECIMALS = 5
 """Stamps rounded to so many decimals or fewer are recognised: they may be off the grid by half their last digit."""
 
-MANY_MISSED = 1.2
-"""Grid points a sample beyond which stamps that also fit a grid without any hole are taken to be coarse."""
-
 NEARBY = 0.75
 """A grid point further than this, in sample intervals, from every sample was not measured."""
 
@@ -147,9 +144,6 @@ def uniform_grid(elapsed: Array, rate_hz: float) -> Grid | None:
     good = [(grid, deviation) for grid, deviation in fits if deviation <= tolerance]
     if not good:
         return None
-    whole, _ = good[0]
-    if whole.index[-1] == len(elapsed) - 1 and min(g.index[-1] for g, _ in good) > MANY_MISSED * len(elapsed):
-        return whole
     return min(good, key=lambda fit: fit[1])[0]
 
 

@@ -1,0 +1,148 @@
+"""Which terms the model has: as many as the data ask for, tested against the residual that the larger model leaves."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from service.dynamics.base_parameters import BaseParameters
+from service.identification.band import preliminary_terms
+from service.identification.covariance import parameter_covariance
+from service.identification.dataset import Dataset
+from service.identification.estimate import Estimator, estimate
+from service.identification.friction_shape import EstimatedShape, estimate_shapes, shape_parameters
+from service.identification.least_squares import JointFactor, factorise, restricted
+from service.identification.residuals import evaluate
+from service.identification.rotor import kept_columns, needed_rotors, separable_rotors
+from service.identification.shape_sensitivity import refined_structure
+from service.identification.structure import ModelStructure
+from service.recording.recording import Array
+from service.robot import Robot
+
+SIGNIFICANT = 5.0
+"""Standard errors by which a Stribeck term must differ from zero to stay in the model."""
+
+
+def choose_model(
+    motions: Dataset, robot: Robot, base: BaseParameters, *, rotor_inertia: bool
+) -> tuple[ModelStructure, tuple[EstimatedShape, ...], tuple[JointFactor, ...]]:
+    """The terms that the data ask for: friction shapes, Stribeck terms, rotors.
+
+    Parameters
+    ----------
+    motions : Dataset
+        the data
+    robot : Robot
+        the arm; shape constants that its file states are kept
+    base : BaseParameters
+        its identifiable combinations
+    rotor_inertia : bool
+        whether rotors may be added
+
+    Returns
+    -------
+    tuple of ModelStructure, tuple of EstimatedShape and tuple of JointFactor
+        the model's columns, its shape constants, and the data's factors in these columns
+    """
+    given = [joint.friction_shape for joint in robot.joints]
+    separable = separable_rotors(robot, base) if rotor_inertia else (False,) * robot.joint_count
+    structure = _with_rotors(ModelStructure(robot, base, preliminary_terms(motions, robot)), separable)
+    if any(shape.k_v is None or shape.delta is None for shape in given):
+        shapes = _refined(motions, structure, _estimated_shapes(motions, structure))
+    else:
+        shapes = tuple(EstimatedShape(s.k_v or 0.0, s.delta, True, True, True, True) for s in given)
+    complete = _with_shapes(structure, shapes)
+    factors = factorise(motions, complete)
+    needed = _needed_rotors(motions, complete, factors) if any(separable) else separable
+    keep = kept_columns(complete, {joint for joint, is_needed in enumerate(needed) if is_needed})
+    return _with_rotors(complete, needed), shapes, restricted(factors, keep)
+
+
+def _estimated_shapes(motions: Dataset, structure: ModelStructure) -> tuple[EstimatedShape, ...]:
+    """Shape constants; a Stribeck term stays where it is far from zero against the residual that it leaves.
+
+    Its significance cannot be judged by the residual without it: what it would explain is the colour in that residual.
+    """
+    count = structure.robot.joint_count
+    factors = factorise(motions, structure)
+    noise_std, inflation = _preliminary_residual(motions, structure, factors)
+    proposed = estimate_shapes(motions, structure, factors, noise_std, np.ones(count), (True,) * count)
+    added = [shape.delta is not None and not shape.delta_given for shape in proposed]
+    supported = [False] * count
+    if any(added):
+        extended = _with_shapes(structure, proposed)
+        deviations, inflation = _stribeck_deviations(motions, extended, proposed)
+        supported = [bool(new and deviations[joint] >= SIGNIFICANT) for joint, new in enumerate(added)]
+    return estimate_shapes(motions, structure, factors, noise_std, inflation, supported)
+
+
+def _refined(
+    motions: Dataset, structure: ModelStructure, shapes: tuple[EstimatedShape, ...]
+) -> tuple[EstimatedShape, ...]:
+    """Identifiable constants of all joints moved to their common optimum."""
+    estimated = shape_parameters(shapes)
+    if not estimated:
+        return shapes
+    structure = _with_shapes(structure, shapes)
+    weights, solution, _ = estimate(factorise(motions, structure), structure.size, Estimator.WLS)
+    refined = refined_structure(motions, structure, solution.parameters, weights, estimated)
+    return tuple(
+        replace(shape, k_v=terms.k_v, delta=terms.delta) for shape, terms in zip(shapes, refined.terms, strict=True)
+    )
+
+
+def _stribeck_deviations(
+    motions: Dataset, structure: ModelStructure, shapes: tuple[EstimatedShape, ...]
+) -> tuple[Array, Array]:
+    """Per joint, how many standard errors its Stribeck term is from zero, and the inflation by autocorrelation."""
+    factors = factorise(motions, structure)
+    weights, solution, _ = estimate(factors, structure.size, Estimator.WLS)
+    (statistics,) = evaluate(motions, structure, [solution.parameters])
+    covariance = parameter_covariance(
+        motions,
+        structure,
+        solution.parameters,
+        factors,
+        weights,
+        statistics.autoregressions,
+        shape_parameters(shapes),
+    )
+    deviations = np.zeros(len(shapes))
+    for joint in range(len(shapes)):
+        column = structure.coefficient(joint, "stribeck")
+        if column is not None:
+            std = np.sqrt(max(covariance[column, column], np.finfo(float).tiny))
+            deviations[joint] = abs(solution.parameters[column]) / std
+    return deviations, np.array([model.long_run_ratio for model in statistics.autoregressions])
+
+
+def _with_shapes(structure: ModelStructure, shapes: Sequence[EstimatedShape]) -> ModelStructure:
+    """The structure with these shape constants."""
+    terms = zip(structure.terms, shapes, strict=True)
+    return structure.with_terms(tuple(replace(joint, k_v=s.k_v, delta=s.delta) for joint, s in terms))
+
+
+def _needed_rotors(motions: Dataset, complete: ModelStructure, factors: tuple[JointFactor, ...]) -> tuple[bool, ...]:
+    """Rotors that the data ask for; autocorrelation costs a pass and is looked at only where it could matter."""
+    weights, _, _ = estimate(factors, complete.size, Estimator.WLS)
+    needed = needed_rotors(factors, complete, 1.0 / weights, np.ones(complete.robot.joint_count))
+    if any(needed):
+        _, inflation = _preliminary_residual(motions, complete, factors)
+        needed = needed_rotors(factors, complete, 1.0 / weights, inflation)
+    return needed
+
+
+def _with_rotors(structure: ModelStructure, rotors: Sequence[bool]) -> ModelStructure:
+    """The structure with rotor inertia at some joints."""
+    terms = zip(structure.terms, rotors, strict=True)
+    return structure.with_terms(tuple(replace(joint, rotor=rotor) for joint, rotor in terms))
+
+
+def _preliminary_residual(
+    motions: Dataset, structure: ModelStructure, factors: tuple[JointFactor, ...]
+) -> tuple[Array, Array]:
+    """Residual standard deviation in the band and its inflation by autocorrelation, (n,) each."""
+    _, solution, _ = estimate(factors, structure.size, Estimator.WLS)
+    (statistics,) = evaluate(motions, structure, [solution.parameters])
+    inflation = np.array([model.long_run_ratio for model in statistics.autoregressions])
+    return np.maximum(statistics.fit.band_rms, np.finfo(float).tiny), inflation
