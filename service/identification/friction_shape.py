@@ -29,8 +29,8 @@ GRID_DECADES = (0.2, 4.3)
 LEAST_STEP = 10**0.8
 """K_v times the rms velocity is at least this: what is gentler is viscous friction by another name."""
 
-ORDINARY = 100.0
-"""K times the rms velocity of a constant that the data leave open, as near as they allow: a step, but a smooth one."""
+ORDINARY = 1000.0
+"""K times the rms velocity of a constant that the data leave open, as near as they allow: the step of a textbook."""
 
 SEPARATION = 4.0
 """K_v is at least this many times δ: closer, their columns are one."""
@@ -41,8 +41,8 @@ IMPROVEMENT = 25.0
 IMPROVEMENT_SHARE = 0.005
 """…and the share of the joint's residual energy that it must explain, so that it is not a proxy of something else."""
 
-KNOWN_BAND = 9.0
-"""Constants whose criterion is within this much of the best are not told apart: three standard errors."""
+KNOWN_BAND = 25.0
+"""Constants whose criterion is within this much of the best are not told apart: five standard errors."""
 
 COLLINEAR = 1e-9
 """A second column with less than this share of its energy left beside the first adds nothing."""
@@ -374,7 +374,7 @@ def _with_stribeck(
 
 
 def shape_parameters(shapes: Sequence[EstimatedShape]) -> list[tuple[int, str]]:
-    """The constants that were estimated and found: they share in the covariance.
+    """The constants that were estimated and not merely chosen: they are refined, and share in the covariance.
 
     Parameters
     ----------
@@ -385,6 +385,6 @@ def shape_parameters(shapes: Sequence[EstimatedShape]) -> list[tuple[int, str]]:
     for joint, shape in enumerate(shapes):
         if shape.k_v_identifiable and not shape.k_v_given:
             estimated.append((joint, "k_v"))
-        if shape.delta is not None and shape.delta_identifiable and not shape.delta_given:
+        if shape.delta is not None and not shape.delta_given:
             estimated.append((joint, "delta"))
     return estimated

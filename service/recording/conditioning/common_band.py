@@ -5,6 +5,7 @@ decimated together, so that τ = Φ Θ still holds row by row and noise above th
 """
 
 from dataclasses import dataclass
+from math import prod
 from typing import Protocol
 
 import numpy as np
@@ -121,7 +122,8 @@ class Decimator:
         """
         factor = max(1, int(rate_hz / (3.0 * cutoff_hz) + 1e-9))
         length, beta = signal.kaiserord(STOP_BAND_DB, 2.0 * cutoff_hz / rate_hz)
-        taps = int(np.ceil(length / factor)) * factor
+        # An even number of taps has a zero at Nyquist, which nothing but a decimation asks for.
+        taps = length | 1 if factor == 1 else int(np.ceil(length / factor)) * factor
         kernel = signal.firwin(taps, cutoff_hz, window=("kaiser", beta), fs=rate_hz)
         return Decimator(kernel / kernel.sum(), factor, rate_hz / factor)
 
@@ -141,7 +143,7 @@ class Decimator:
         blocks = len(self.kernel) // self.factor
         outputs = self._outputs(values.shape[-1])
         used = outputs + blocks - 1
-        rows = values.reshape(-1, values.shape[-1])
+        rows = values.reshape(prod(values.shape[:-1]), values.shape[-1])
         result = np.empty((len(rows), outputs))
         weight = self.kernel.reshape(blocks, self.factor).T
         group = max(1, BLOCK_VALUES // max(1, used * blocks))
@@ -176,7 +178,7 @@ class Decimator:
 
 def _in_long_gaps(measured: NDArray[np.bool_], bridged: int) -> NDArray[np.bool_]:
     """Samples (..., N) that were not measured and lie in a gap of more than `bridged` of them."""
-    rows = measured.reshape(-1, measured.shape[-1])
+    rows = measured.reshape(prod(measured.shape[:-1]), measured.shape[-1])
     result = np.zeros(rows.shape, dtype=bool)
     for row, known in zip(result, rows, strict=True):
         gaps = np.flatnonzero(np.diff(known, prepend=True, append=True)).reshape(-1, 2)

@@ -19,6 +19,9 @@ STEP_TOLERANCE = 1.5
 LATE_STEPS = 0.4
 """Share of the steps that may lie off the line because the first sample of their period was missed."""
 
+MOST_STEPS = 100
+"""Steps to which the line is fitted."""
+
 SHORTEST_PERIOD = 32
 """Samples below which a period is none."""
 
@@ -126,24 +129,26 @@ def _run(rows: tuple[int, int], label: Array, edge: Array, interval_s: float) ->
     if line is None:
         return None
     second, length = line  # instant at which the second label begins
-    start = max(edge[0], second - length)
-    if abs(edge[0] - (second - length)) <= STEP_TOLERANCE * interval_s:
-        start = second - length
+    slack = STEP_TOLERANCE * interval_s
+    start = edge[0] if edge[0] > second - length - slack else second - length
     last = second + (len(label) - 1) * length
-    stop = last if abs(edge[-1] - last) <= STEP_TOLERANCE * interval_s else min(edge[-1], last)
+    stop = edge[-1] if edge[-1] < last + slack else last
     return PeriodRun(rows, float(start), float(stop), length, float(label[1] - (second - start) / length))
 
 
 def _line(label: Array, step: Array, tolerance: float) -> tuple[float, float] | None:
-    """Instant of the first step and time from step to step; None where the steps are not evenly spaced."""
-    count = label - label[0]
-    slope = float(np.median(np.diff(step)))
-    rest = step - slope * count
-    near = np.abs(rest - np.median(rest)) <= max(tolerance, 1e-12 * abs(step[-1]))
-    if near.sum() < max(2, (1.0 - LATE_STEPS) * len(step)):
+    """Instant of the first step and time from step to step, least absolute deviations; None where unevenly spaced.
+
+    Most steps lie on the line exactly. Where the first sample of a period was missed one lies late, and must not count.
+    """
+    chosen = np.unique(np.linspace(0, len(step) - 1, min(len(step), MOST_STEPS)).astype(int))
+    count, since = (label - label[0])[chosen], (step - step[0])[chosen]  # epoch seconds would cost digits
+    later, earlier = np.tril_indices(len(chosen), -1)
+    slopes = (since[later] - since[earlier]) / (count[later] - count[earlier])
+    rest = since - slopes[:, None] * count
+    starts = np.median(rest, axis=1)
+    deviation = np.abs(rest - starts[:, None])
+    best = int(np.argmin(deviation.sum(axis=1)))
+    if np.mean(deviation[best] <= tolerance) < 1.0 - LATE_STEPS:
         return None
-    origin = step[0]  # epoch seconds would cost digits
-    slope, start = np.polyfit(count[near], step[near] - origin, 1)
-    if np.abs(step[near] - origin - start - slope * count[near]).max() > tolerance:
-        return None
-    return float(origin + start), float(slope)
+    return float(step[0] + starts[best]), float(slopes[best])

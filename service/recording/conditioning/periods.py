@@ -27,9 +27,15 @@ LIVELIEST_SHARE = 0.1
 WHOLE_SAMPLES = 5e-3
 """Largest misfit of the periods to the sampling grid, in samples over all periods, that needs no interpolation."""
 
-MISLABELLED = 0.5
+MISLABELLED = 0.05
 """Lag from period to period, in samples, beyond which the labels, not the positions, must be wrong about a length that
 is a whole number of samples."""
+
+ALIGNED = 1e-4
+"""Lag from period to period, in samples, at which periods lie on one another."""
+
+REFINEMENTS = 4
+"""Newton steps towards the length at which the positions repeat best; it settles in two."""
 
 LATE_SAMPLES = 1.0
 """Samples that the last period may lack."""
@@ -96,15 +102,18 @@ def split_periods(stretch: Stretch, refine: bool = False) -> Periods | None:
         return None
     first, last = part
     length = (last - first) / float(stretch.period[last] - stretch.period[first])
-    count = int((last + 1 + LATE_SAMPLES - first) / length)
-    if count < 2 or length < 3:
-        return None
-    periods = _aligned(stretch, first, length, count)
-    if refine and periods is not None:
+    for _ in range(1 + REFINEMENTS * refine):
+        count = int((last + 1 + LATE_SAMPLES - first) / length)
+        if count < 2 or length < 3:
+            return None
+        periods = _aligned(stretch, first, length, count)
+        if not refine or periods is None:
+            return periods
         lag = _lag(periods.position) * stretch.rate_hz / periods.rate_hz
         is_whole = periods.rate_hz == stretch.rate_hz
-        if abs(lag) > (MISLABELLED if is_whole else WHOLE_SAMPLES / count):
-            return _aligned(stretch, first, length + lag, count)
+        if abs(lag) <= (MISLABELLED if is_whole else ALIGNED):
+            return periods
+        length += lag
     return periods
 
 
