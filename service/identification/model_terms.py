@@ -71,7 +71,7 @@ def _estimated_shapes(motions: Dataset, structure: ModelStructure) -> tuple[Esti
     supported = [False] * count
     if any(added):
         extended = _with_shapes(structure, proposed)
-        deviations, inflation = _stribeck_deviations(motions, extended, proposed)
+        deviations, inflation = _stribeck_deviations(motions, extended)
         supported = [bool(new and deviations[joint] >= SIGNIFICANT) for joint, new in enumerate(added)]
     return estimate_shapes(motions, structure, factors, noise_std, inflation, supported)
 
@@ -91,24 +91,17 @@ def _refined(
     )
 
 
-def _stribeck_deviations(
-    motions: Dataset, structure: ModelStructure, shapes: tuple[EstimatedShape, ...]
-) -> tuple[Array, Array]:
+def _stribeck_deviations(motions: Dataset, structure: ModelStructure) -> tuple[Array, Array]:
     """Per joint, how many standard errors its Stribeck term is from zero, and the inflation by autocorrelation."""
     factors = factorise(motions, structure)
     weights, solution, _ = estimate(factors, structure.size, Estimator.WLS)
     (statistics,) = evaluate(motions, structure, [solution.parameters])
+    # With δ held: how uncertain δ itself is says nothing about whether the term is there.
     covariance = parameter_covariance(
-        motions,
-        structure,
-        solution.parameters,
-        factors,
-        weights,
-        statistics.autoregressions,
-        shape_parameters(shapes),
+        motions, structure, solution.parameters, factors, weights, statistics.autoregressions
     )
-    deviations = np.zeros(len(shapes))
-    for joint in range(len(shapes)):
+    deviations = np.zeros(structure.robot.joint_count)
+    for joint in range(structure.robot.joint_count):
         column = structure.coefficient(joint, "stribeck")
         if column is not None:
             std = np.sqrt(max(covariance[column, column], np.finfo(float).tiny))

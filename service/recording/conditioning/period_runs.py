@@ -125,7 +125,7 @@ def _run(rows: tuple[int, int], label: Array, edge: Array, interval_s: float) ->
             return None
         length = float(max(before, after))
         return PeriodRun(rows, float(edge[1]) - length, float(edge[1]) + length, length, float(label[0]))
-    line = _line(label[1:], edge[1:-1], STEP_TOLERANCE * interval_s)
+    line = _line(label[1:], edge[1:-1], interval_s)
     if line is None:
         return None
     second, length = line  # instant at which the second label begins
@@ -136,10 +136,11 @@ def _run(rows: tuple[int, int], label: Array, edge: Array, interval_s: float) ->
     return PeriodRun(rows, float(start), float(stop), length, float(label[1] - (second - start) / length))
 
 
-def _line(label: Array, step: Array, tolerance: float) -> tuple[float, float] | None:
-    """Instant of the first step and time from step to step, least absolute deviations; None where unevenly spaced.
+def _line(label: Array, step: Array, interval_s: float) -> tuple[float, float] | None:
+    """Instant of the first step and time from step to step; None where they are unevenly spaced.
 
-    Most steps lie on the line exactly. Where the first sample of a period was missed one lies late, and must not count.
+    Least absolute deviations, none counted as more than half a sample: most steps lie on the line as nearly as sampling
+    allows; where the first sample of a period was missed one lies late, by however much.
     """
     chosen = np.unique(np.linspace(0, len(step) - 1, min(len(step), MOST_STEPS)).astype(int))
     count, since = (label - label[0])[chosen], (step - step[0])[chosen]  # epoch seconds would cost digits
@@ -148,7 +149,7 @@ def _line(label: Array, step: Array, tolerance: float) -> tuple[float, float] | 
     rest = since - slopes[:, None] * count
     starts = np.median(rest, axis=1)
     deviation = np.abs(rest - starts[:, None])
-    best = int(np.argmin(deviation.sum(axis=1)))
-    if np.mean(deviation[best] <= tolerance) < 1.0 - LATE_STEPS:
+    best = int(np.argmin(np.minimum(deviation, 0.5 * interval_s).sum(axis=1)))
+    if np.mean(deviation[best] <= STEP_TOLERANCE * interval_s) < 1.0 - LATE_STEPS:
         return None
     return float(step[0] + starts[best]), float(slopes[best])
