@@ -61,6 +61,41 @@ class Autoregression:
         return signal.lfilter([scale], np.append(1.0, -self.coefficients), columns, axis=-1)
 
 
+@dataclass(frozen=True, eq=False)
+class LaggedProducts:
+    """Σ e_t e_{t+k} of one stretch of a residual, and how many products that are.
+
+    products, counts : (K + 1,) float64
+        for the lags k = 0 … K
+    """
+
+    products: Array
+    counts: Array
+
+    @staticmethod
+    def of(residual: Array, used: NDArray[np.bool_], lags: int = LARGEST_ORDER) -> "LaggedProducts":
+        """The products of consecutive samples, those left out that do not count.
+
+        Parameters
+        ----------
+        residual : (M,) float64
+            consecutive samples
+        used : (M,) bool
+            which of them count
+        lags : int
+            largest lag K
+        """
+        sums = LaggedProducts(np.zeros(lags + 1), np.zeros(lags + 1))
+        whole = bool(used.all())
+        kept = residual if whole else np.where(used, residual, 0.0)
+        presence = None if whole else used.astype(float)
+        for lag in range(min(lags + 1, len(kept))):
+            stop = len(kept) - lag
+            sums.products[lag] = kept[:stop] @ kept[lag:]
+            sums.counts[lag] = stop if presence is None else presence[:stop] @ presence[lag:]
+        return sums
+
+
 class AutocovarianceSum:
     """Lagged products of a residual, summed over pieces with samples missing.
 
@@ -71,34 +106,26 @@ class AutocovarianceSum:
     """
 
     def __init__(self, lags: int = LARGEST_ORDER) -> None:
-        self._products = np.zeros(lags + 1)
-        self._counts = np.zeros(lags + 1)
+        self._sums = LaggedProducts(np.zeros(lags + 1), np.zeros(lags + 1))
 
-    def add(self, residual: Array, used: NDArray[np.bool_]) -> None:
+    def add(self, piece: LaggedProducts) -> None:
         """Add one piece.
 
         Parameters
         ----------
-        residual : (M,) float64
-            consecutive samples
-        used : (M,) bool
-            which of them count
+        piece : LaggedProducts
+            its products, to the same largest lag
         """
-        whole = bool(used.all())
-        kept = residual if whole else np.where(used, residual, 0.0)
-        presence = None if whole else used.astype(float)
-        for lag in range(min(len(self._products), len(kept))):
-            stop = len(kept) - lag
-            self._products[lag] += kept[:stop] @ kept[lag:]
-            self._counts[lag] += stop if presence is None else presence[:stop] @ presence[lag:]
+        self._sums.products[:] += piece.products
+        self._sums.counts[:] += piece.counts
 
     def model(self) -> Autoregression:
         """The autoregressive model of smallest BIC = N log σ_ε² + p log N, by Levinson's recursion."""
-        count = self._counts[0]
-        if count < 2 or self._products[0] <= 0.0:
+        count = self._sums.counts[0]
+        if count < 2 or self._sums.products[0] <= 0.0:
             return Autoregression(np.empty(0), 0.0, 0.0)
         # Divided by N at every lag, not by the pairs at that lag: the sequence stays positive definite.
-        covariance = self._products / count
+        covariance = self._sums.products / count
         largest = int(min(LARGEST_ORDER, len(covariance) - 1, count // 10))
         best = (np.empty(0), covariance[0])
         best_score = count * np.log(covariance[0])

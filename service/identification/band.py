@@ -106,7 +106,7 @@ def _crossing(
     frequency = np.linspace(0.0, cutoff_hz, SPECTRUM_POINTS + 1)[1:]
     measured, unexplained = np.zeros(SPECTRUM_POINTS), np.zeros(SPECTRUM_POINTS)
     for prepared in motions:
-        predicted = np.ascontiguousarray(prepared.predicted_torque(structure, solution.parameters).T)
+        (predicted,) = prepared.predicted_torque(structure, solution.parameters[None])
         modelled = prepared.motion.band.reduce(predicted) / noise_std[:, None]
         torque = prepared.reduced_torque / noise_std[:, None]
         rate = prepared.motion.band.rate_hz

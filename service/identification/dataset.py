@@ -61,24 +61,30 @@ class PreparedMotion:
         outward = self.reduced_rigid[joint, structure.outward_columns(joint)]
         return np.concatenate([outward, motion.band.reduce(own)])
 
-    def predicted_torque(self, structure: ModelStructure, parameters: Array) -> Array:
-        """Model torque at the recorded rate, before any filter, (N, n).
+    def predicted_torque(self, structure: ModelStructure, candidates: Array) -> Array:
+        """Model torque at the recorded rate, before any filter, of several parameter sets at once.
 
         Parameters
         ----------
         structure : ModelStructure
             the model's columns
-        parameters : (p,) float64
-            their coefficients
+        candidates : (c, p) float64
+            parameter sets
+
+        Returns
+        -------
+        (c, n, N) float64
+            torque of every set at every joint
         """
         motion = self.motion
-        torque = np.empty_like(motion.position)
-        for joint in range(torque.shape[1]):
+        samples, count = motion.position.shape
+        torque = np.empty((len(candidates), count, samples))
+        for joint in range(count):
             own = structure.joint_term_columns(joint, motion.velocity[:, joint], motion.acceleration[:, joint])
             outward = structure.outward_columns(joint)
             columns = structure.joint_columns(joint)
-            torque[:, joint] = parameters[columns[: len(outward)]] @ self.rigid[joint, outward]
-            torque[:, joint] += parameters[columns[len(outward) :]] @ own
+            rigid = candidates[:, columns[: len(outward)]] @ self.rigid[joint, outward]
+            torque[:, joint] = rigid + candidates[:, columns[len(outward) :]] @ own
         return torque
 
 

@@ -7,8 +7,8 @@ import numpy as np
 from service.identification.least_squares import JointFactor, Solution, solve
 from service.recording.recording import Array
 
-REWEIGHTINGS = 2
-"""Rounds of estimating σ_j from the residual and solving again; it settles in two."""
+REWEIGHTINGS = 1
+"""Rounds of estimating σ_j from the common solution's residual, after a first one from each joint alone."""
 
 FINEST_TORQUE = 1e-6
 """Share of a joint's torque that counts as its noise at least: no sensor resolves more, and weights stay finite."""
@@ -21,7 +21,7 @@ class Estimator(StrEnum):
     WLS = "wls"
 
 
-def estimate(factors: tuple[JointFactor, ...], size: int, estimator: Estimator) -> tuple[Array, Solution, Solution]:
+def estimate(factors: tuple[JointFactor, ...], size: int, estimator: Estimator) -> tuple[Array, Solution]:
     """LS, or WLS with σ_j estimated from the residual and the equations solved again.
 
     Parameters
@@ -35,23 +35,34 @@ def estimate(factors: tuple[JointFactor, ...], size: int, estimator: Estimator) 
 
     Returns
     -------
-    tuple of (n,) float64, Solution and Solution
-        weights 1/σ_j (ones for LS), the solution, and that of LS
+    tuple of (n,) float64 and Solution
+        weights 1/σ_j (ones for LS), and the solution
     """
-    std = np.ones(len(factors))
-    solution = unweighted = solve(factors, size, std)
-    if estimator is Estimator.WLS:
-        for _ in range(REWEIGHTINGS):
-            std = _residual_std(factors, size, solution.parameters)
-            solution = solve(factors, size, std)
-    return 1.0 / std, solution, unweighted
+    if estimator is Estimator.LS:
+        return np.ones(len(factors)), solve(factors, size, np.ones(len(factors)))
+    std = single_joint_std(factors)
+    solution = solve(factors, size, std)
+    for _ in range(REWEIGHTINGS):
+        std = _noise_std(factors, [factor.squared_residual(solution.parameters) for factor in factors], size)
+        solution = solve(factors, size, std)
+    return 1.0 / std, solution
 
 
-def _residual_std(factors: tuple[JointFactor, ...], size: int, parameters: Array) -> Array:
+def single_joint_std(factors: tuple[JointFactor, ...]) -> Array:
+    """A first σ_j of every joint: what its own equations leave, solved without the other joints', (n,).
+
+    Parameters
+    ----------
+    factors : tuple of JointFactor
+        one a joint
+    """
+    return _noise_std(factors, [factor.least_squared_residual for factor in factors], 0)
+
+
+def _noise_std(factors: tuple[JointFactor, ...], squares: list[float], size: int) -> Array:
     """σ_j with the degrees of freedom that the parameters took, shared by rows; never below `FINEST_TORQUE`."""
     total = sum(factor.rows for factor in factors)
-    squares = np.array([factor.squared_residual(parameters) for factor in factors])
     freedom = np.array([factor.rows * max(1.0 - size / total, 1e-3) for factor in factors])
     torque = np.sqrt([np.sum(factor.triangle[:, -1] ** 2) / factor.rows for factor in factors])
     finest = FINEST_TORQUE * np.maximum(torque, FINEST_TORQUE * torque.max()) + np.finfo(float).tiny
-    return np.maximum(np.sqrt(squares / freedom), finest)
+    return np.maximum(np.sqrt(np.array(squares) / freedom), finest)

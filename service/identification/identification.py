@@ -167,7 +167,7 @@ def identify(
         progress("choose model terms")
         structure, shapes, factors = choose_model(motions, robot, base, rotor_inertia=options.rotor_inertia)
         progress("estimate parameters")
-        weights, solution, unweighted = estimate(factors, structure.size, options.estimator)
+        weights, solution = estimate(factors, structure.size, options.estimator)
         consistent = consistent_estimate(structure, solution)
     estimates = (solution.parameters, in_model_columns(structure, consistent.parameters))
     progress("evaluate residuals")
@@ -191,7 +191,7 @@ def identify(
         undetermined=solution.undetermined,
         shapes=shapes,
         consistent=consistent,
-        condition_number=condition_number(unweighted.factor),
+        condition_number=condition_number(factors, structure.size),
         residuals=bound if constrained else free,
         consistent_fit=bound.fit,
         held_out=held_bound if constrained else held_free,

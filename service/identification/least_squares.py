@@ -40,6 +40,11 @@ class JointFactor:
     triangle: Array
     rows: int
 
+    @property
+    def least_squared_residual(self) -> float:
+        """‖A_j Θ_j - y_j‖² where the joint's equations are solved alone: the last entry of R_j, squared."""
+        return float(self.triangle[-1, -1] ** 2)
+
     def squared_residual(self, parameters: Array) -> float:
         """‖A_j Θ - y_j‖².
 
@@ -140,6 +145,22 @@ def solve(factors: tuple[JointFactor, ...], size: int, noise_std: Array) -> Solu
     Solution
         the estimate with what its covariance needs
     """
+    triangle = stacked_factor(factors, size, noise_std)
+    return _solved(triangle[:size, :size], triangle[:size, size])
+
+
+def stacked_factor(factors: tuple[JointFactor, ...], size: int, noise_std: Array) -> Array:
+    """Triangular factor of all joints' equations together, (p + 1, p + 1).
+
+    Parameters
+    ----------
+    factors : tuple of JointFactor
+        one a joint
+    size : int
+        number of parameters p
+    noise_std : (n,) float64
+        σ_j, by which the equations are divided
+    """
     stacked = np.zeros((sum(len(factor.triangle) for factor in factors), size + 1))
     row = 0
     for factor, std in zip(factors, noise_std, strict=True):
@@ -147,8 +168,7 @@ def solve(factors: tuple[JointFactor, ...], size: int, noise_std: Array) -> Solu
         stacked[block, factor.columns] = factor.triangle[:, :-1] / std
         stacked[block, size] = factor.triangle[:, -1] / std
         row += len(factor.triangle)
-    triangle = _triangle(stacked)
-    return _solved(triangle[:size, :size], triangle[:size, size])
+    return _triangle(stacked)
 
 
 def restricted(factors: tuple[JointFactor, ...], keep: NDArray[np.intp]) -> tuple[JointFactor, ...]:
@@ -171,15 +191,18 @@ def restricted(factors: tuple[JointFactor, ...], keep: NDArray[np.intp]) -> tupl
     return tuple(smaller)
 
 
-def condition_number(factor: Array) -> float:
+def condition_number(factors: tuple[JointFactor, ...], size: int) -> float:
     """Condition number of a regressor: largest over smallest singular value, at most 1/ε: more is rounding.
 
     Parameters
     ----------
-    factor : (p, p) float64
-        triangular factor R of the stacked regressor L
+    factors : tuple of JointFactor
+        one a joint; the condition number is that of their unweighted equations
+    size : int
+        number of parameters p
     """
-    singular = np.linalg.svd(factor, compute_uv=False)
+    unweighted = stacked_factor(factors, size, np.ones(len(factors)))[:size, :size]
+    singular = np.linalg.svd(unweighted, compute_uv=False)
     return float(singular[0] / max(singular[-1], singular[0] * np.finfo(float).eps, np.finfo(float).tiny))
 
 

@@ -9,7 +9,7 @@ from service.dynamics.base_parameters import BaseParameters
 from service.identification.band import preliminary_terms
 from service.identification.covariance import parameter_covariance
 from service.identification.dataset import Dataset
-from service.identification.estimate import Estimator, estimate
+from service.identification.estimate import Estimator, estimate, single_joint_std
 from service.identification.friction_shape import EstimatedShape, estimate_shapes, shape_parameters
 from service.identification.least_squares import JointFactor, factorise, restricted
 from service.identification.residuals import evaluate
@@ -84,7 +84,7 @@ def _refined(
     if not estimated:
         return shapes
     structure = _with_shapes(structure, shapes)
-    weights, solution, _ = estimate(factorise(motions, structure), structure.size, Estimator.WLS)
+    weights, solution = estimate(factorise(motions, structure), structure.size, Estimator.WLS)
     refined = refined_structure(motions, structure, solution.parameters, weights, estimated)
     return tuple(
         replace(shape, k_v=terms.k_v, delta=terms.delta) for shape, terms in zip(shapes, refined.terms, strict=True)
@@ -94,7 +94,7 @@ def _refined(
 def _stribeck_deviations(motions: Dataset, structure: ModelStructure) -> tuple[Array, Array]:
     """Per joint, how many standard errors its Stribeck term is from zero, and the inflation by autocorrelation."""
     factors = factorise(motions, structure)
-    weights, solution, _ = estimate(factors, structure.size, Estimator.WLS)
+    weights, solution = estimate(factors, structure.size, Estimator.WLS)
     (statistics,) = evaluate(motions, structure, [solution.parameters])
     # With δ held: how uncertain δ itself is says nothing about whether the term is there.
     covariance = parameter_covariance(
@@ -117,11 +117,11 @@ def _with_shapes(structure: ModelStructure, shapes: Sequence[EstimatedShape]) ->
 
 def _needed_rotors(motions: Dataset, complete: ModelStructure, factors: tuple[JointFactor, ...]) -> tuple[bool, ...]:
     """Rotors that the data ask for; autocorrelation costs a pass and is looked at only where it could matter."""
-    weights, _, _ = estimate(factors, complete.size, Estimator.WLS)
-    needed = needed_rotors(factors, complete, 1.0 / weights, np.ones(complete.robot.joint_count))
+    noise_std = single_joint_std(factors)
+    needed = needed_rotors(factors, complete, noise_std, np.ones(complete.robot.joint_count))
     if any(needed):
         _, inflation = _preliminary_residual(motions, complete, factors)
-        needed = needed_rotors(factors, complete, 1.0 / weights, inflation)
+        needed = needed_rotors(factors, complete, noise_std, inflation)
     return needed
 
 
@@ -135,7 +135,7 @@ def _preliminary_residual(
     motions: Dataset, structure: ModelStructure, factors: tuple[JointFactor, ...]
 ) -> tuple[Array, Array]:
     """Residual standard deviation in the band and its inflation by autocorrelation, (n,) each."""
-    _, solution, _ = estimate(factors, structure.size, Estimator.WLS)
+    _, solution = estimate(factors, structure.size, Estimator.WLS)
     (statistics,) = evaluate(motions, structure, [solution.parameters])
     inflation = np.array([model.long_run_ratio for model in statistics.autoregressions])
     return np.maximum(statistics.fit.band_rms, np.finfo(float).tiny), inflation

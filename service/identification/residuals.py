@@ -2,13 +2,14 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from service.identification.autocorrelation import AutocovarianceSum, Autoregression
+from service.identification.autocorrelation import AutocovarianceSum, Autoregression, LaggedProducts
 from service.identification.dataset import PreparedMotion
 from service.identification.structure import ModelStructure
-from service.recording.conditioning import Stretch, split_periods
+from service.recording.conditioning import AllPass, Stretch, split_periods
 from service.recording.recording import Array
 
 FEWEST_PERIOD_SAMPLES = 50
@@ -38,18 +39,33 @@ class ResidualStatistics:
 
     fit : Fit
         sizes of the residual
-    noise_std : (n,) float64
-        standard deviation of the torque noise, a sample at the recorded rate [Nm or N]
-    noise_method : str
-        ``periods`` (model-free) or ``residual``
-    autoregressions : tuple of Autoregression, length n
-        of the residual in the common band
+    period_noise_std : (n,) float64 or None
+        standard deviation of the torque noise from what differs between periods; None without enough periods
+    raw_lags, band_lags : tuple of AutocovarianceSum, length n
+        autocovariances of the residual at the recorded rate, and in the common band
     """
 
     fit: Fit
-    noise_std: Array
-    noise_method: str
-    autoregressions: tuple[Autoregression, ...]
+    period_noise_std: Array | None
+    raw_lags: tuple[AutocovarianceSum, ...]
+    band_lags: tuple[AutocovarianceSum, ...]
+
+    @property
+    def noise_method(self) -> str:
+        """``periods`` (model-free) or ``residual``."""
+        return "residual" if self.period_noise_std is None else "periods"
+
+    @cached_property
+    def noise_std(self) -> Array:
+        """Standard deviation of the torque noise, a sample at the recorded rate, (n,) [Nm or N]."""
+        if self.period_noise_std is not None:
+            return self.period_noise_std
+        return np.sqrt([lags.model().innovation_variance for lags in self.raw_lags])
+
+    @cached_property
+    def autoregressions(self) -> tuple[Autoregression, ...]:
+        """Autoregressive model of each joint's residual in the common band."""
+        return tuple(lags.model() for lags in self.band_lags)
 
 
 def evaluate(
@@ -73,8 +89,9 @@ def evaluate(
     """
     sums = [_Sums(structure.robot.joint_count) for _ in candidates]
     for prepared in motions:
-        for parameters, total in zip(candidates, sums, strict=True):
-            total.add(prepared, prepared.predicted_torque(structure, parameters))
+        predicted = prepared.predicted_torque(structure, np.stack(candidates))
+        for torque, total in zip(predicted, sums, strict=True):
+            total.add(prepared, torque)
     return tuple(total.statistics() for total in sums)
 
 
@@ -91,22 +108,26 @@ class _Sums:
         self._band_lags = [AutocovarianceSum() for _ in range(joint_count)]
 
     def add(self, prepared: PreparedMotion, predicted: Array) -> None:
-        """Add one piece of motion with its predicted torque (N, n)."""
+        """Add one piece of motion with its predicted torque (n, N)."""
         motion = prepared.motion
-        residual = motion.torque - predicted
+        residual = motion.torque - predicted.T
         kept = np.where(motion.measured, residual, 0.0)
         self._raw_squares += np.einsum("pij,pij->j", kept, kept)
         self._raw_count += motion.measured.sum(axis=(0, 1))
         self._add_periods(prepared, residual)
-        band = prepared.reduced_torque - motion.band.reduce(np.ascontiguousarray(predicted.T))
+        band = prepared.reduced_torque - motion.band.reduce(predicted)
         for joint, (row, used) in enumerate(zip(band, prepared.used, strict=True)):
-            weighted = row * prepared.row_weight
-            self._band_lags[joint].add(weighted, used)
             self._band_squares[joint] += motion.repetitions * np.sum(row[used] ** 2)
             self._torque_squares[joint] += motion.repetitions * np.sum(prepared.reduced_torque[joint, used] ** 2)
             self._band_count[joint] += motion.repetitions * used.sum()
+            lagged = LaggedProducts.of(row * prepared.row_weight, used)
+            self._band_lags[joint].add(lagged)
+            if isinstance(motion.band, AllPass) and motion.repetitions == 1:
+                self._raw_lags[joint].add(lagged)  # nothing was filtered: the same series
+                continue
             for repetition in range(motion.repetitions):
-                self._raw_lags[joint].add(residual[repetition, :, joint], motion.measured[repetition, :, joint])
+                series = residual[repetition, :, joint]
+                self._raw_lags[joint].add(LaggedProducts.of(series, motion.measured[repetition, :, joint]))
 
     def statistics(self) -> ResidualStatistics:
         """The sums, turned into what they stand for."""
@@ -114,12 +135,8 @@ class _Sums:
         relative = np.sqrt(self._band_squares.sum() / max(self._torque_squares.sum(), np.finfo(float).tiny))
         fit = Fit(np.sqrt(self._raw_squares / np.maximum(self._raw_count, 1)), band_rms, float(relative))
         by_periods = bool((self._period_count >= FEWEST_PERIOD_SAMPLES).all())
-        if by_periods:
-            noise = np.sqrt(self._period_squares / self._period_count)
-        else:
-            noise = np.sqrt([lags.model().innovation_variance for lags in self._raw_lags])
-        models = tuple(lags.model() for lags in self._band_lags)
-        return ResidualStatistics(fit, noise, "periods" if by_periods else "residual", models)
+        noise = np.sqrt(self._period_squares / self._period_count) if by_periods else None
+        return ResidualStatistics(fit, noise, tuple(self._raw_lags), tuple(self._band_lags))
 
     def _add_periods(self, prepared: PreparedMotion, residual: Array) -> None:
         """What differs between repetitions of the same motion is noise, whatever the model."""

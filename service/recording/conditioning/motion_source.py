@@ -5,8 +5,8 @@ where two things hold. It is *consistent*: in the band that the positions allow 
 without an offset. And it is *quieter*: its noise is its own, not the positions' noise once more, and less of it reaches
 q̈, so that the band may be wider.
 
-In acceleration, where the fast part of the motion weighs most: q̈_recorded = g q̈ - d q⃛ + c q⃜ + noise, fitted by least
-squares to signals smoothed alike; g is the gain and d the delay.
+In acceleration, where the fast part of the motion weighs most: q̈_recorded = g q̈ - d q⃛ + noise, fitted by least squares
+to signals smoothed alike; g is the gain and d the delay.
 """
 
 from collections.abc import Sequence
@@ -51,8 +51,11 @@ filtered, and its plateau tells nothing about its band."""
 WORTHWHILE = 1.25
 """Least widening of the band for which another source is used."""
 
-UNCERTAINTIES = 2.0
-"""Standard errors by which an estimate must lie inside its tolerance."""
+CLEAR_PART = 0.5
+"""Part of the positions' band in which gain and delay are compared."""
+
+WIDEST = 3.0
+"""Multiple of the positions' band up to which another source widens it: that far its phase can be foretold."""
 
 LOWER_PLATEAU = (0.35, 0.6)
 
@@ -105,6 +108,7 @@ def choose_sources(stretches: Sequence[Stretch], noise: PositionNoise) -> Motion
     """
     joint_count = stretches[0].position.shape[1]
     limits = noise.joint_limits_hz.copy()
+    best = limits.copy()
     chosen = np.zeros((2, joint_count), dtype=bool)
     for order, used in ((1, chosen[0]), (0, chosen[1])):
         recorded = [stretch.velocity if order else stretch.acceleration for stretch in stretches]
@@ -117,22 +121,26 @@ def choose_sources(stretches: Sequence[Stretch], noise: PositionNoise) -> Motion
             if not pieces or not np.isfinite(limits[joint]):
                 continue
             rate = stretches[0].rate_hz
-            wider = _wider_band(pieces, order, rate, float(noise.density[joint]), float(noise.joint_limits_hz[joint]))
-            if wider is not None and wider > WORTHWHILE * limits[joint]:
-                limits[joint], used[joint] = wider, True
+            limit = float(noise.joint_limits_hz[joint])
+            wider = _wider_band(pieces, order, rate, float(noise.density[joint]), limit)
+            if wider is not None and wider > WORTHWHILE * best[joint]:
+                best[joint], used[joint] = wider, True
+                limits[joint] = min(wider, WIDEST * limit)
     return MotionSource(chosen[0], chosen[1], limits)
 
 
 def _wider_band(
     pieces: Sequence[tuple[Array, Array]], order: int, rate_hz: float, density: float, limit_hz: float
 ) -> float | None:
-    """The band [Hz] that a recorded signal, `order` differences below q̈, stands; None where it is not to be trusted."""
+    """The band [Hz] that the noise of a signal, `order` differences below q̈, allows; None where it is doubtful."""
     spectrum = acceleration_spectrum([values[:, None] for _, values in pieces], rate_hz, order)
     if not _is_flat(spectrum, rate_hz):
         return None
     wider = float(spectrum.widest_band(rate_hz)[0])
+    # Gain and delay show where the motion is; the noise at the edge of the positions' band would only blur them.
+    inside = _compare(pieces, order, rate_hz, CLEAR_PART * limit_hz)
     comparison = _compare(pieces, order, rate_hz, limit_hz)
-    if comparison is None or not comparison.is_consistent(min(wider, rate_hz / 2.0), 1.0 / rate_hz):
+    if inside is None or comparison is None or not inside.is_consistent(min(wider, WIDEST * limit_hz), 1.0 / rate_hz):
         return None
     expected = density * _noise_gain(rate_hz, limit_hz, 2)
     own = float(spectrum.density[0]) * _noise_gain(rate_hz, limit_hz, order)
@@ -172,10 +180,10 @@ class _Comparison:
     misfit: float
 
     def is_consistent(self, band_hz: float, interval_s: float) -> bool:
-        """Whether gain, delay and offset keep to the tolerances in a band."""
-        delay = abs(self.delay) + UNCERTAINTIES * self.delay_std
+        """Whether gain and delay, with their standard errors, and offset keep to the tolerances in a band."""
+        delay = abs(self.delay) + self.delay_std
         return bool(
-            abs(self.gain - 1.0) + UNCERTAINTIES * self.gain_std <= GAIN_TOLERANCE
+            abs(self.gain - 1.0) + self.gain_std <= GAIN_TOLERANCE
             and delay <= DELAY_TOLERANCE * interval_s
             and 2.0 * np.pi * band_hz * delay <= PHASE_TOLERANCE
             and abs(self.offset) <= OFFSET_TOLERANCE
@@ -184,14 +192,14 @@ class _Comparison:
 
 def _compare(pieces: Sequence[tuple[Array, Array]], order: int, rate_hz: float, limit_hz: float) -> _Comparison | None:
     """Fit the recorded signal to the derivatives of the positions; None where too little of the motion is left."""
-    margin = smoothing_margin(rate_hz, limit_hz) + 4 * DIFFERENCE_MARGIN
+    margin = smoothing_margin(rate_hz, limit_hz) + 3 * DIFFERENCE_MARGIN
     columns, targets, offsets, squares, count = [], [], 0.0, 0.0, 0
     for position, recorded in pieces:
         if len(position) < 3 * margin:
             continue
         inner = slice(margin, -margin)
         series = [smooth(position[:, None], rate_hz, limit_hz)]
-        for _ in range(4):
+        for _ in range(3):
             series.append(derivative(series[-1], rate_hz))
         target = smooth(recorded[:, None], rate_hz, limit_hz)
         plain = target[inner, 0] - series[2 - order][inner, 0]

@@ -103,7 +103,7 @@ def split_periods(stretch: Stretch, refine: bool = False) -> Periods | None:
     first, last = part
     length = (last - first) / float(stretch.period[last] - stretch.period[first])
     for _ in range(1 + REFINEMENTS * refine):
-        count = int((last + 1 + LATE_SAMPLES - first) / length)
+        count = int((last + 1 + LATE_SAMPLES - first) / length + WHOLE_SAMPLES)
         if count < 2 or length < 3:
             return None
         periods = _aligned(stretch, first, length, count)

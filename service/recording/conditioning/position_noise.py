@@ -29,6 +29,8 @@ SEGMENT = 1024
 SEGMENT_OVERLAP_LOSS = 0.9
 """Independent segments among half-overlapping ones under a Hann window, relative to their number."""
 
+TINY = np.finfo(float).tiny
+
 DIFFERENCE_ORDER = 2
 """The second difference of q is nearly white where q itself is not: its spectrum's leakage stays below the noise."""
 
@@ -78,11 +80,16 @@ class AccelerationSpectrum:
             sampling rate [Hz]
         """
         usable = self.frequency <= PLATEAU[1] * rate_hz / 2.0
+        edge = (self.frequency + self.frequency[1] / 2.0)[usable, None]  # a sum up to a line ends half a line beyond it
         noise = (self.density * np.cumsum(self.gain)[:, None])[usable]
         motion = np.maximum(np.cumsum(self.power[usable], axis=0) - noise, 0.0)
-        bearable = noise <= NOISE_SHARE**2 * np.maximum.accumulate(motion, axis=0)
-        last = len(bearable) - 1 - np.argmax(bearable[::-1], axis=0)
-        limit = self.frequency[np.maximum(last, 1)]
+        allowed = NOISE_SHARE**2 * np.maximum.accumulate(motion, axis=0)
+        bearable = noise <= allowed
+        last = np.clip(len(bearable) - 1 - np.argmax(bearable[::-1], axis=0), 1, len(bearable) - 2)
+        joint = np.arange(noise.shape[1])
+        excess = [np.log(np.maximum(noise, TINY) / np.maximum(allowed, TINY))[last + k, joint] for k in (0, 1)]
+        part = np.clip(-excess[0] / np.maximum(excess[1] - excess[0], TINY), 0.0, 1.0)
+        limit = edge[last, 0] * (edge[last + 1, 0] / edge[last, 0]) ** part
         return np.where(bearable.all(axis=0), np.inf, limit)
 
 
