@@ -1,10 +1,11 @@
 """Which band torque and regressor share: as wide as the positions allow, no wider than the model explains the torque.
 
-Two bounds, the lower one holds. (1) Noise of the positions, differentiated twice, must stay a small share of q̈, or
-it biases the inertial parameters (`service.recording.conditioning.position_noise`). (2) Beyond the frequency where
-the unexplained part of the torque first outgrows the explained one, more band adds more disturbance than motion; an
-octave beyond it is kept, because the edges of friction's steps lie there. Positions so clean that (1) never binds are
-not filtered at all: nothing would be gained.
+Three bounds, the lowest holds. (1) Noise of the positions, differentiated twice, must stay a small share of q̈, or it
+biases the inertial parameters (`service.recording.conditioning.position_noise`). (2) The torque that this noise makes
+in the regressor must stay small beside what the fit leaves, or the bias exceeds the standard errors. (3) Beyond the
+frequency where the unexplained part of the torque first outgrows the explained one, more band adds more disturbance
+than motion; an octave beyond it is kept, because the edges of friction's steps lie there. Positions so clean that (1)
+never binds are not filtered at all: nothing would be gained.
 """
 
 from collections.abc import Sequence
@@ -15,16 +16,26 @@ import numpy as np
 from scipy import signal
 
 from service.dynamics.base_parameters import BaseParameters
+from service.dynamics.regressor import torque_regressor
 from service.identification.dataset import Dataset
+from service.identification.estimate import Estimator, estimate
 from service.identification.friction_shape import ORDINARY
-from service.identification.least_squares import factorise, solve
+from service.identification.least_squares import factorise
 from service.identification.structure import JointTerms, ModelStructure
-from service.recording.conditioning import Conditioner
+from service.recording.conditioning import Conditioner, Source
 from service.recording.recording import Array
 from service.robot import Robot
 
 KEPT_BEYOND = 2.0
 """Width of the band over the frequency where the unexplained torque outgrows the explained one."""
+
+NOISE_TORQUE_SHARE = 0.3
+"""Largest torque that noise of the positions may make in the regressor, relative to what the fit leaves."""
+
+SMALLEST_OWN_SHARE = 0.01
+"""Part of the residual that is the torque's own at least, however much the noise of the positions made of it."""
+
+PROBED_POSTURES = 50
 
 ROUNDS = 2
 """Fits at a narrower band each: a fit disturbed by noise misplaces the crossing."""
@@ -72,10 +83,10 @@ def choose_cutoff(conditioners: Sequence[Conditioner], robot: Robot, base: BaseP
     floor = SMALLEST_CYCLES / longest
     limit = cutoff = max(min(bounds), floor)
     for _ in range(ROUNDS):
-        crossing = _crossing(conditioners, robot, base, cutoff)
-        if crossing is None:
+        bounds = _bounds(conditioners, robot, base, cutoff)
+        if not bounds:
             break
-        cutoff = min(max(KEPT_BEYOND * crossing, floor), limit)
+        cutoff = min(max(min(bounds), floor), limit)
     return cutoff
 
 
@@ -89,26 +100,69 @@ def _beginning(conditioner: Conditioner) -> Conditioner:
     return replace(conditioner, timing=replace(conditioner.timing, rows=tuple(rows)))
 
 
-def _crossing(
-    conditioners: Sequence[Conditioner], robot: Robot, base: BaseParameters, cutoff_hz: float
-) -> float | None:
+def _bounds(conditioners: Sequence[Conditioner], robot: Robot, base: BaseParameters, cutoff_hz: float) -> list[float]:
+    """What a fit in the present band says about the next one: bounds (2) and (3), where they bind."""
+    motions = Dataset(conditioners, robot, base, cutoff_hz)
+    structure = ModelStructure(robot, base, preliminary_terms(motions, robot))
+    factors = factorise(motions, structure)
+    parameters = estimate(factors, structure.size, Estimator.WLS)[1].parameters
+    residual_std = np.sqrt([f.squared_residual(parameters) / f.rows for f in factors]) + np.finfo(float).tiny
+    bounds = [_quiet_band(conditioners, motions, structure, parameters, residual_std)]
+    crossing = _crossing(motions, structure, parameters, residual_std)
+    if crossing is not None:
+        bounds.append(KEPT_BEYOND * crossing)
+    return [bound for bound in bounds if np.isfinite(bound)]
+
+
+def _quiet_band(
+    conditioners: Sequence[Conditioner],
+    motions: Dataset,
+    structure: ModelStructure,
+    parameters: Array,
+    residual_std: Array,
+) -> float:
+    """Widest band in which noise of q̈ makes little torque, by joint j: Σ_k H_jk² S_k (2π)⁴ f⁵/5 ≤ share² · residual.
+
+    The residual, less what that noise put into it, counts as white in the present band.
+    """
+    prepared = next(iter(motions))
+    chosen = np.linspace(0, len(prepared.motion.position) - 1, PROBED_POSTURES).astype(int)
+    inertia = _inertia(structure, parameters, prepared.motion.position[chosen])
+    from_position = np.array([[name == Source.POSITION for name in c.source.names] for c in conditioners])
+    density = np.mean([c.noise.density for c in conditioners] * from_position, axis=0) / prepared.motion.repetitions
+    growth = (inertia**2).mean(axis=0) @ density * (2.0 * np.pi) ** 4 / 5.0
+    cutoff = motions.cutoff_hz or np.inf
+    own = np.maximum(residual_std**2 - growth * cutoff**5, SMALLEST_OWN_SHARE * residual_std**2)
+    with np.errstate(divide="ignore"):
+        return float(((NOISE_TORQUE_SHARE**2 * own / cutoff / growth) ** 0.25).min())
+
+
+def _inertia(structure: ModelStructure, parameters: Array, position: Array) -> Array:
+    """Mass matrix at some postures, (N, n, n), from the base parameters: torque at q̈ = e_k less that at rest."""
+    postures, count = position.shape
+    still = np.zeros_like(position)
+    columns = np.asarray(structure.base.independent_columns)
+
+    def torque(acceleration: Array) -> Array:
+        regressor = torque_regressor(structure.robot, position, still, acceleration, columns=columns)
+        return regressor @ parameters[: structure.base_count]
+
+    rest = torque(still)
+    units = np.eye(count)
+    return np.stack([torque(np.tile(unit, (postures, 1))) - rest for unit in units], axis=2)
+
+
+def _crossing(motions: Dataset, structure: ModelStructure, parameters: Array, residual_std: Array) -> float | None:
     """Lowest frequency above the motion's own at which the model leaves more than half of the torque unexplained.
 
     Measured, not modelled torque is compared: noise of the positions makes modelled torque, which explains nothing.
     """
-    motions = Dataset(conditioners, robot, base, cutoff_hz)
-    structure = ModelStructure(robot, base, preliminary_terms(motions, robot))
-    factors = factorise(motions, structure)
-    noise_std = np.ones(robot.joint_count)
-    for _ in range(2):
-        solution = solve(factors, structure.size, noise_std)
-        noise_std = np.sqrt([max(f.squared_residual(solution.parameters) / f.rows, 1e-300) for f in factors])
-    frequency = np.linspace(0.0, cutoff_hz, SPECTRUM_POINTS + 1)[1:]
+    frequency = np.linspace(0.0, motions.cutoff_hz or 0.0, SPECTRUM_POINTS + 1)[1:]
     measured, unexplained = np.zeros(SPECTRUM_POINTS), np.zeros(SPECTRUM_POINTS)
     for prepared in motions:
-        (predicted,) = prepared.predicted_torque(structure, solution.parameters[None])
-        modelled = prepared.motion.band.reduce(predicted) / noise_std[:, None]
-        torque = prepared.reduced_torque / noise_std[:, None]
+        (predicted,) = prepared.predicted_torque(structure, parameters[None])
+        modelled = prepared.motion.band.reduce(predicted) / residual_std[:, None]
+        torque = prepared.reduced_torque / residual_std[:, None]
         rate = prepared.motion.band.rate_hz
         measured += _power(torque, rate, frequency)
         unexplained += _power(torque - modelled, rate, frequency)

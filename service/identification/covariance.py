@@ -18,6 +18,9 @@ from service.identification.shape_sensitivity import ShapeParameter, columns_wit
 from service.identification.structure import ModelStructure
 from service.recording.recording import Array
 
+MOST_FREEDOM_LOST = 0.25
+"""The covariance is enlarged by no more than the inverse of this for the degrees of freedom that parameters took."""
+
 
 def parameter_covariance(
     motions: Iterable[PreparedMotion],
@@ -72,6 +75,7 @@ def parameter_covariance(
             place = np.ix_(index, index)
             bread[place] += weight[joint] ** 2 * (columns @ columns.T)
             meat[place] += weight[joint] ** 4 * (coloured @ coloured.T)
-    rows = sum(factor.rows for factor in factors)
+    # The parameters took their degrees of freedom out of the residual where it is strongest; coloured rows count less.
+    rows = sum(f.rows / model.long_run_ratio for f, model in zip(factors, autoregressions, strict=True))
     inverse = pseudo_inverse(bread)
-    return rows / max(rows - size, 1) * inverse @ meat @ inverse
+    return rows / max(rows - size, MOST_FREEDOM_LOST * rows) * inverse @ meat @ inverse

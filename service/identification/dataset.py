@@ -1,12 +1,13 @@
 """The recordings' equations, ready to be summed: kept in memory while they are few, made again when they are many."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from service.dynamics.base_parameters import BaseParameters
 from service.dynamics.regressor import torque_regressor
+from service.identification.preconditions import moving_joints
 from service.identification.structure import ModelStructure
 from service.recording.conditioning import Conditioner, Mask, Motion
 from service.recording.recording import Array
@@ -131,7 +132,9 @@ class Dataset:
         """Condition, evaluate the regressor, and reduce."""
         columns = np.asarray(self.base.independent_columns)
         for index, conditioner in enumerate(self.conditioners):
-            for motion in conditioner.motions(self.cutoff_hz):
+            moving = moving_joints(conditioner)
+            for measured in conditioner.motions(self.cutoff_hz):
+                motion = _without_jitter(measured, moving)
                 regressor = torque_regressor(
                     self.robot, motion.position, motion.velocity, motion.acceleration, columns=columns
                 )
@@ -145,3 +148,10 @@ class Dataset:
                     motion.band.reduce_mask(np.asarray(motion.measured.any(axis=0)).T),
                     index,
                 )
+
+
+def _without_jitter(motion: Motion, moving: Mask) -> Motion:
+    """The motion with joints that stand still standing still: their encoder's noise is no friction's velocity."""
+    if moving.all():
+        return motion
+    return replace(motion, velocity=motion.velocity * moving, acceleration=motion.acceleration * moving)

@@ -105,7 +105,7 @@ def estimate_shapes(
     structure: ModelStructure,
     factors: tuple[JointFactor, ...],
     noise_std: Array,
-    inflation: Array,
+    unit: Array,
     stribeck: Sequence[bool],
 ) -> tuple[EstimatedShape, ...]:
     """Shape constants of all joints; those that the robot file states are kept.
@@ -120,8 +120,9 @@ def estimate_shapes(
         of that model on these data
     noise_std : (n,) float64
         residual standard deviation in the common band, for the weights
-    inflation : (n,) float64
-        variance inflation by autocorrelation, at least 1
+    unit : (n,) float64
+        one noise variance, inflated by autocorrelation, relative to `noise_std`²: the measure of what the data can
+        tell; zeros for the best candidates whatever they are worth
     stribeck : sequence of bool, length n
         joints at which a Stribeck term of unknown δ may be proposed
 
@@ -147,8 +148,7 @@ def estimate_shapes(
         residual_energy = factors[joint].rows * variance
         if stribeck[joint] and shape.delta is None:
             indices = _with_stribeck(conditional, grid, indices, shape, variance, residual_energy)
-        unit = inflation[joint] * variance
-        described.append(_described(conditional, grid, indices, shape, unit, residual_energy))
+        described.append(_described(conditional, grid, indices, shape, float(unit[joint]), residual_energy))
     return tuple(described)
 
 

@@ -9,7 +9,7 @@ from service.dynamics.base_parameters import BaseParameters
 from service.identification.band import preliminary_terms
 from service.identification.covariance import parameter_covariance
 from service.identification.dataset import Dataset
-from service.identification.estimate import Estimator, estimate, single_joint_std
+from service.identification.estimate import FINEST_TORQUE, Estimator, estimate, single_joint_std
 from service.identification.friction_shape import EstimatedShape, estimate_shapes, shape_parameters
 from service.identification.least_squares import JointFactor, factorise, restricted
 from service.identification.residuals import evaluate
@@ -65,15 +65,16 @@ def _estimated_shapes(motions: Dataset, structure: ModelStructure) -> tuple[Esti
     """
     count = structure.robot.joint_count
     factors = factorise(motions, structure)
-    noise_std, inflation = _preliminary_residual(motions, structure, factors)
-    proposed = estimate_shapes(motions, structure, factors, noise_std, np.ones(count), (True,) * count)
-    added = [shape.delta is not None and not shape.delta_given for shape in proposed]
-    supported = [False] * count
-    if any(added):
-        extended = _with_shapes(structure, proposed)
-        deviations, inflation = _stribeck_deviations(motions, extended)
-        supported = [bool(new and deviations[joint] >= SIGNIFICANT) for joint, new in enumerate(added)]
-    return estimate_shapes(motions, structure, factors, noise_std, inflation, supported)
+    noise_std, _ = _preliminary_residual(motions, structure, factors)
+    proposed = estimate_shapes(motions, structure, factors, noise_std, np.zeros(count), (True,) * count)
+    # Judged by what the refined candidates leave: beside constants off their optimum every other one looks open.
+    extended = _with_shapes(structure, _refined(motions, structure, proposed))
+    deviations, unit = _stribeck_deviations(motions, extended, noise_std)
+    supported = [
+        shape.delta is not None and not shape.delta_given and bool(deviations[joint] >= SIGNIFICANT)
+        for joint, shape in enumerate(proposed)
+    ]
+    return estimate_shapes(motions, structure, factors, noise_std, unit, supported)
 
 
 def _refined(
@@ -91,8 +92,11 @@ def _refined(
     )
 
 
-def _stribeck_deviations(motions: Dataset, structure: ModelStructure) -> tuple[Array, Array]:
-    """Per joint, how many standard errors its Stribeck term is from zero, and the inflation by autocorrelation."""
+def _stribeck_deviations(motions: Dataset, structure: ModelStructure, noise_std: Array) -> tuple[Array, Array]:
+    """Per joint, how many standard errors its Stribeck term is from zero, and one noise variance.
+
+    The noise variance is inflated by autocorrelation and divided by `noise_std`².
+    """
     factors = factorise(motions, structure)
     weights, solution = estimate(factors, structure.size, Estimator.WLS)
     (statistics,) = evaluate(motions, structure, [solution.parameters])
@@ -106,7 +110,8 @@ def _stribeck_deviations(motions: Dataset, structure: ModelStructure) -> tuple[A
         if column is not None:
             std = np.sqrt(max(covariance[column, column], np.finfo(float).tiny))
             deviations[joint] = abs(solution.parameters[column]) / std
-    return deviations, np.array([model.long_run_ratio for model in statistics.autoregressions])
+    inflation = np.array([model.long_run_ratio for model in statistics.autoregressions])
+    return deviations, inflation * (np.maximum(statistics.fit.band_rms, FINEST_TORQUE * noise_std) / noise_std) ** 2
 
 
 def _with_shapes(structure: ModelStructure, shapes: Sequence[EstimatedShape]) -> ModelStructure:

@@ -1,12 +1,13 @@
 """What recordings must show before anything is estimated from them: motion, and motion that an arm can make."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from service.errors import IdentificationError
 from service.recording.conditioning import Conditioner
-from service.recording.recording import Array
+from service.recording.recording import Array, Samples
 
 SCAN_ROWS = 1 << 16
 
@@ -16,6 +17,22 @@ SMALLEST_MOTION = 1e-9
 
 FASTEST = 1e4
 """A median speed above this is a mistake of units [rad/s or m/s]."""
+
+
+def moving_joints(conditioner: Conditioner) -> NDArray[np.bool_]:
+    """Joints that leave the noise of their own encoder at some time of a recording, (n,).
+
+    Parameters
+    ----------
+    conditioner : Conditioner
+        the surveyed recording
+    """
+    noise = np.sqrt(conditioner.noise.density * conditioner.timing.rate_hz / 2.0)
+    lowest, highest = np.full(len(noise), np.inf), np.full(len(noise), -np.inf)
+    for samples in _samples(conditioner):
+        lowest = np.fmin(lowest, np.nanmin(samples.position, axis=0))
+        highest = np.fmax(highest, np.nanmax(samples.position, axis=0))
+    return highest - lowest > np.maximum(STANDING_STILL * noise, SMALLEST_MOTION)
 
 
 def require_motion(conditioners: Sequence[Conditioner]) -> None:
@@ -31,20 +48,21 @@ def require_motion(conditioners: Sequence[Conditioner]) -> None:
     IdentificationError
         names the recordings, or the recording and the joint
     """
-    moving = False
     for conditioner in conditioners:
-        noise = np.sqrt(conditioner.noise.density * conditioner.timing.rate_hz / 2.0)
-        for start, stop in conditioner.timing.rows:
-            for first in range(start, stop, SCAN_ROWS):
-                samples = conditioner.recording.samples(first, min(first + SCAN_ROWS, stop))
-                _require_plausible_speed(conditioner, samples.time, samples.position)
-                reach = np.nanmax(samples.position, axis=0) - np.nanmin(samples.position, axis=0)
-                moving = moving or bool(np.any(reach > np.maximum(STANDING_STILL * noise, SMALLEST_MOTION)))
-    if not moving:
+        for samples in _samples(conditioner):
+            _require_plausible_speed(conditioner, samples.time, samples.position)
+    if not any(moving_joints(conditioner).any() for conditioner in conditioners):
         names = ", ".join(conditioner.recording.name for conditioner in conditioners)
         raise IdentificationError(
             f"{names}: no joint moves by more than the noise of its position: record a motion that excites every joint"
         )
+
+
+def _samples(conditioner: Conditioner) -> Iterator[Samples]:
+    """The usable rows of a recording, piece by piece."""
+    for start, stop in conditioner.timing.rows:
+        for first in range(start, stop, SCAN_ROWS):
+            yield conditioner.recording.samples(first, min(first + SCAN_ROWS, stop))
 
 
 def _require_plausible_speed(conditioner: Conditioner, time: Array, position: Array) -> None:

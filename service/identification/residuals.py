@@ -15,6 +15,9 @@ from service.recording.recording import Array
 FEWEST_PERIOD_SAMPLES = 50
 """Differences between periods that are needed before their variance is trusted."""
 
+CLEARLY_MORE = 1.3
+"""Ratio of two estimated powers that is no chance."""
+
 
 @dataclass(frozen=True, eq=False)
 class Fit:
@@ -43,12 +46,15 @@ class ResidualStatistics:
         standard deviation of the torque noise from what differs between periods; None without enough periods
     raw_lags, band_lags : tuple of AutocovarianceSum, length n
         autocovariances of the residual at the recorded rate, and in the common band
+    unfiltered : bool
+        whether the common band is the whole spectrum
     """
 
     fit: Fit
     period_noise_std: Array | None
     raw_lags: tuple[AutocovarianceSum, ...]
     band_lags: tuple[AutocovarianceSum, ...]
+    unfiltered: bool
 
     @property
     def noise_method(self) -> str:
@@ -64,8 +70,24 @@ class ResidualStatistics:
 
     @cached_property
     def autoregressions(self) -> tuple[Autoregression, ...]:
-        """Autoregressive model of each joint's residual in the common band."""
-        return tuple(lags.model() for lags in self.band_lags)
+        """Autoregressive model of each joint's residual in the common band.
+
+        Where periods were averaged and nothing was filtered, the single periods show the same noise many times over and
+        tell it best; unless the mean has clearly more power at low frequency, which is then what the model lacks.
+        """
+        means = tuple(lags.model() for lags in self.band_lags)
+        if not self.unfiltered:
+            return means
+        singles = (lags.model() for lags in self.raw_lags)
+        return tuple(
+            mean if _low_power(mean) > CLEARLY_MORE * _low_power(single) else single
+            for mean, single in zip(means, singles, strict=True)
+        )
+
+
+def _low_power(model: Autoregression) -> float:
+    """Power of a residual at low frequency."""
+    return model.variance * model.long_run_ratio
 
 
 def evaluate(
@@ -106,11 +128,13 @@ class _Sums:
         self._period_squares, self._period_count = zeros.copy(), zeros.copy()
         self._raw_lags = [AutocovarianceSum() for _ in range(joint_count)]
         self._band_lags = [AutocovarianceSum() for _ in range(joint_count)]
+        self._unfiltered = True
 
     def add(self, prepared: PreparedMotion, predicted: Array) -> None:
         """Add one piece of motion with its predicted torque (n, N)."""
         motion = prepared.motion
         residual = motion.torque - predicted.T
+        self._unfiltered = self._unfiltered and isinstance(motion.band, AllPass)
         kept = np.where(motion.measured, residual, 0.0)
         self._raw_squares += np.einsum("pij,pij->j", kept, kept)
         self._raw_count += motion.measured.sum(axis=(0, 1))
@@ -136,7 +160,7 @@ class _Sums:
         fit = Fit(np.sqrt(self._raw_squares / np.maximum(self._raw_count, 1)), band_rms, float(relative))
         by_periods = bool((self._period_count >= FEWEST_PERIOD_SAMPLES).all())
         noise = np.sqrt(self._period_squares / self._period_count) if by_periods else None
-        return ResidualStatistics(fit, noise, tuple(self._raw_lags), tuple(self._band_lags))
+        return ResidualStatistics(fit, noise, tuple(self._raw_lags), tuple(self._band_lags), self._unfiltered)
 
     def _add_periods(self, prepared: PreparedMotion, residual: Array) -> None:
         """What differs between repetitions of the same motion is noise, whatever the model."""

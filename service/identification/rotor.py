@@ -9,7 +9,7 @@ import numpy as np
 
 from service.dynamics.base_parameters import BaseParameters
 from service.dynamics.regressor import torque_regressor
-from service.identification.least_squares import JointFactor, restricted, solve
+from service.identification.least_squares import RANK_TOLERANCE, JointFactor, restricted, solve
 from service.identification.structure import ModelStructure
 from service.recording.recording import Array
 from service.robot import Robot
@@ -31,7 +31,7 @@ PROBE_STATES = 60
 
 
 def separable_rotors(robot: Robot, base: BaseParameters, seed: int = 0) -> tuple[bool, ...]:
-    """Joints whose rotor inertia no combination of link parameters can imitate.
+    """Joints whose rotor inertia no combination of link parameters, offsets and viscous friction can imitate.
 
     Parameters
     ----------
@@ -51,7 +51,13 @@ def separable_rotors(robot: Robot, base: BaseParameters, seed: int = 0) -> tuple
     count = robot.joint_count
     states = [scale * rng.standard_normal((PROBE_STATES, count)) for scale in (2.0, 2.0, 4.0)]
     regressor = torque_regressor(robot, *states, columns=np.asarray(base.independent_columns))
-    basis, _ = np.linalg.qr(regressor.reshape(PROBE_STATES * count, -1))
+    own = np.zeros((PROBE_STATES, count, count, 2))
+    for joint in range(count):
+        own[:, joint, joint] = np.stack([np.ones(PROBE_STATES), states[1][:, joint]], axis=1)
+    columns = np.concatenate([regressor, own.reshape(PROBE_STATES, count, -1)], axis=2)
+    stacked = columns.reshape(PROBE_STATES * count, -1)
+    left, singular, _ = np.linalg.svd(stacked / np.linalg.norm(stacked, axis=0), full_matrices=False)
+    basis = left[:, singular > RANK_TOLERANCE * singular[0]]
     separable = []
     for joint in range(count):
         column = np.zeros((PROBE_STATES, count))

@@ -252,7 +252,7 @@ def _whole(stretch: Stretch, first: int, samples: int, count: int) -> Periods:
 def _interpolated(stretch: Stretch, first: int, length: float, count: int) -> Periods | None:
     """Periods whose length is no whole number of samples, brought onto a common grid of phases by cubic splines."""
     samples = round(length)
-    while first + count * length > len(stretch.position) + LATE_SAMPLES:
+    while first + count * length > len(stretch.position) + LATE_SAMPLES + WHOLE_SAMPLES:
         count -= 1
     if count < 2:
         return None
@@ -273,7 +273,7 @@ def _interpolated(stretch: Stretch, first: int, length: float, count: int) -> Pe
         rate_hz=stretch.rate_hz * samples / length,
         position=make_interp_spline(knots, stretch.position, k=SPLINE_DEGREE)(at),
         torque=make_interp_spline(knots, stretch.torque, k=SPLINE_DEGREE)(at),
-        measured=stretch.measured[left] & stretch.measured[left + 1] & (at <= knots[-1])[..., None],
+        measured=stretch.measured[left] & stretch.measured[left + 1] & (at <= knots[-1] + WHOLE_SAMPLES)[..., None],
         rows=(first, min(int(np.ceil(first + count * length)), len(knots))),
         start_s=stretch.start_s + first / stretch.rate_hz,
         velocity=onto(stretch.velocity),
