@@ -66,11 +66,14 @@ class LaggedProducts:
     """Σ e_t e_{t+k} of one stretch of a residual, and how many products that are.
 
     products, counts : (K + 1,) float64
-        for the lags k = 0 … K
+        for the lags k = 0 … K; pairs of which one was not measured are left out of both
+    spans : (K + 1,) float64
+        pairs that there would be if all had been measured
     """
 
     products: Array
     counts: Array
+    spans: Array
 
     @staticmethod
     def of(residual: Array, used: NDArray[np.bool_], lags: int = LARGEST_ORDER) -> "LaggedProducts":
@@ -85,7 +88,7 @@ class LaggedProducts:
         lags : int
             largest lag K
         """
-        sums = LaggedProducts(np.zeros(lags + 1), np.zeros(lags + 1))
+        sums = LaggedProducts(np.zeros(lags + 1), np.zeros(lags + 1), np.zeros(lags + 1))
         whole = bool(used.all())
         kept = residual if whole else np.where(used, residual, 0.0)
         presence = None if whole else used.astype(float)
@@ -93,6 +96,7 @@ class LaggedProducts:
             stop = len(kept) - lag
             sums.products[lag] = kept[:stop] @ kept[lag:]
             sums.counts[lag] = stop if presence is None else presence[:stop] @ presence[lag:]
+            sums.spans[lag] = stop
         return sums
 
 
@@ -106,7 +110,7 @@ class AutocovarianceSum:
     """
 
     def __init__(self, lags: int = LARGEST_ORDER) -> None:
-        self._sums = LaggedProducts(np.zeros(lags + 1), np.zeros(lags + 1))
+        self._sums = LaggedProducts(np.zeros(lags + 1), np.zeros(lags + 1), np.zeros(lags + 1))
 
     def add(self, piece: LaggedProducts) -> None:
         """Add one piece.
@@ -118,14 +122,16 @@ class AutocovarianceSum:
         """
         self._sums.products[:] += piece.products
         self._sums.counts[:] += piece.counts
+        self._sums.spans[:] += piece.spans
 
     def model(self) -> Autoregression:
         """The autoregressive model of smallest BIC = N log σ_ε² + p log N, by Levinson's recursion."""
         count = self._sums.counts[0]
         if count < 2 or self._sums.products[0] <= 0.0:
             return Autoregression(np.empty(0), 0.0, 0.0)
-        # Divided by N at every lag, not by the pairs at that lag: the sequence stays positive definite.
-        covariance = self._sums.products / count
+        # The mean over the pairs at hand, shrunk as if divided by N at every lag: the sequence stays positive definite.
+        taper = self._sums.spans / self._sums.spans[0]
+        covariance = taper * self._sums.products / np.maximum(self._sums.counts, 1.0)
         largest = int(min(LARGEST_ORDER, len(covariance) - 1, count // 10))
         best = (np.empty(0), covariance[0])
         best_score = count * np.log(covariance[0])

@@ -12,7 +12,7 @@ from service.recording.recording import Array, Samples
 SCAN_ROWS = 1 << 16
 
 STANDING_STILL = 10.0
-SMALLEST_MOTION = 1e-9
+SMALLEST_MOTION = 1e-5
 """A joint moves where its range exceeds so many standard deviations of its noise, and this [rad or m]."""
 
 FASTEST = 1e4

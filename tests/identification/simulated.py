@@ -129,8 +129,9 @@ def standard_errors(result: Identification) -> Array:
 
 
 def z_scores(result: Identification, robot: Robot, rotors: Sequence[float] | None = None) -> Array:
-    """(estimate - truth) / standard error of the free estimate, (p,)."""
-    return (result.free_parameters - true_parameters(result, robot, rotors)) / standard_errors(result)
+    """(estimate - truth) / standard error of the free estimate, (p,); NaN for what the recordings say nothing about."""
+    errors = np.where(result.undetermined, np.nan, standard_errors(result))
+    return (result.free_parameters - true_parameters(result, robot, rotors)) / errors
 
 
 def rms(values: Array) -> float:

@@ -1,4 +1,4 @@
-"""K_v and δ of the friction curve: found where the data show them, said to be open where they do not, never invented."""
+"""K_v and δ of the friction curve: found where data show them, said to be open where they do not, never invented."""
 
 from dataclasses import replace
 
@@ -75,9 +75,20 @@ def test_constants_that_the_motion_shows_are_found_within_their_errors(
     for z in (shapes, coefficients):
         if runs >= 60:
             assert 0.85 <= rms(z) <= 1.15
-        least, most = stats.chi2.ppf([1e-6, 1.0 - 1e-6], runs) / runs
+        least, most = (float(stats.chi2.ppf(share, runs)) / runs for share in (1e-6, 1.0 - 1e-6))
         assert (np.mean(z**2, axis=0) >= least).all()
         assert (np.mean(z**2, axis=0) <= most).all()
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_constants_at_a_very_high_signal_to_noise_ratio(seed: int) -> None:
+    arm = simulate(paper_robot(), seed=seed)
+    for run in range(4):
+        result = identified(arm, 0.001 * PAPER_NOISE, run)
+        assert all(shape.k_v_identifiable and shape.delta_identifiable for shape in result.shapes)
+        assert [shape.k_v for shape in result.shapes] == pytest.approx([500.0] * 3, rel=1e-3)
+        assert [shape.delta for shape in result.shapes] == pytest.approx([10.0] * 3, rel=1e-2)
+        assert np.abs(z_scores(result, arm.robot)).max() < 4.5
 
 
 def test_what_the_constants_leave_open_shows_in_the_coefficients() -> None:

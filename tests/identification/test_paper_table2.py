@@ -128,10 +128,11 @@ def oracle_columns(arm: SimulatedArm, result: Identification) -> list[Array]:
 
 def theoretical_covariances(columns: list[Array]) -> tuple[Array, Array]:
     """(LᵀΣ⁻¹L)⁻¹, the Cramér-Rao bound, and (LᵀL)⁻¹ LᵀΣL (LᵀL)⁻¹, what LS has."""
-    grams = [matrix.T @ matrix for matrix in columns]
-    bound = np.linalg.inv(sum(gram / std**2 for gram, std in zip(grams, PAPER_NOISE, strict=True)))
-    bread = np.linalg.inv(sum(grams))
-    meat = sum(gram * std**2 for gram, std in zip(grams, PAPER_NOISE, strict=True))
+    grams = np.array([matrix.T @ matrix for matrix in columns])
+    variance = PAPER_NOISE[:, None, None] ** 2
+    bound = np.linalg.inv((grams / variance).sum(axis=0))
+    bread = np.linalg.inv(grams.sum(axis=0))
+    meat = (grams * variance).sum(axis=0)
     return bound, bread @ meat @ bread
 
 
@@ -160,8 +161,7 @@ def experiment(request: pytest.FixtureRequest, paper_arm: SimulatedArm) -> Monte
 
 
 def test_all_24_rows_have_the_papers_grouping_and_exact_values(paper_arm: SimulatedArm) -> None:
-    faint = paper_arm.white(1e-6, np.random.default_rng(0))
-    found = document(identify(paper_arm.robot, [paper_arm.recording(faint)]))
+    found = document(identify(paper_arm.robot, [paper_arm.recording()]))
     assert {entry.name for entry in found.base_parameters} == set(BASE_ROWS)
     exact = dict(zip(BASE_ROWS, EXACT_BASE_VALUES, strict=True))
     for entry in found.base_parameters:
@@ -174,6 +174,17 @@ def test_all_24_rows_have_the_papers_grouping_and_exact_values(paper_arm: Simula
         assert [getattr(entry, name) for entry in found.friction] == pytest.approx(values, abs=1e-6)
     assert [entry.offset for entry in found.friction] == pytest.approx([0.0, 0.0, 0.0], abs=1e-6)
     assert (len(found.base_parameters), found.rotor_inertia, found.undetermined) == (15, [], [])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_recording_without_noise_is_identified(seed: int) -> None:
+    """Here the links' pseudo-inertia lies on the boundary of what can be, and nothing gives the equations a weight."""
+    arm = simulate(paper_robot(), seed=seed)
+    result = identify(arm.robot, [arm.recording()])
+    truth = true_parameters(result, arm.robot)
+    np.testing.assert_allclose(result.free_parameters, truth, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(result.parameters, truth, rtol=0, atol=1e-6)
+    assert result.residuals.fit.relative_error < 1e-8
 
 
 def test_the_paper_names_the_same_unidentifiable_parameters(paper_arm: SimulatedArm) -> None:
@@ -199,8 +210,8 @@ def test_the_variance_reaches_the_cramer_rao_bound(experiment: MonteCarlo) -> No
 
 def chi_square_range(freedom: int, false_alarm: float) -> tuple[float, float]:
     """Range of χ²/degrees of freedom that is left with this probability."""
-    low, high = stats.chi2.ppf([false_alarm / 2, 1 - false_alarm / 2], freedom) / freedom
-    return float(low), float(high)
+    low, high = (float(stats.chi2.ppf(share, freedom)) for share in (false_alarm / 2, 1 - false_alarm / 2))
+    return low / freedom, high / freedom
 
 
 def test_wls_has_no_larger_variance_than_ls_in_any_row(experiment: MonteCarlo) -> None:
@@ -225,7 +236,7 @@ def test_reported_standard_errors_are_those_of_theory(experiment: MonteCarlo) ->
     assert (wls <= ls * (1.0 + 5e-3)).all()
     for reported, covariance in ((wls, experiment.bound), (ls, experiment.least_squares)):
         theory = np.sqrt(np.diag(covariance))[experiment.rows]
-        np.testing.assert_allclose(np.median(reported, axis=0), theory, rtol=0.01)
+        np.testing.assert_allclose(np.median(reported, axis=0), theory, rtol=0.03)
 
 
 def test_z_scores_have_unit_rms(experiment: MonteCarlo) -> None:

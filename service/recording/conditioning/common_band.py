@@ -182,8 +182,7 @@ def _in_long_gaps(measured: NDArray[np.bool_], bridged: int) -> NDArray[np.bool_
     result = np.zeros(rows.shape, dtype=bool)
     for row, known in zip(result, rows, strict=True):
         gaps = np.flatnonzero(np.diff(known, prepend=True, append=True)).reshape(-1, 2)
-        # Beyond the first and the last measured sample nothing is bridged, only held.
-        long = (gaps[:, 1] - gaps[:, 0] > bridged) | (gaps[:, 0] == 0) | (gaps[:, 1] == len(known))
+        long = gaps[:, 1] - gaps[:, 0] > bridged
         for start, stop in gaps[long]:
             row[start:stop] = True
     return result.reshape(measured.shape)

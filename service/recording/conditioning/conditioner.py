@@ -177,8 +177,7 @@ class Conditioner:
         half = 0.5 / self.timing.rate_hz
         first, last = (row_at(self.recording, time - half, group.rows) for time in (group.start_s, group.stop_s))
         first, last = max(first - PERIOD_SPARE, group.rows[0]), min(last + PERIOD_SPARE, group.rows[1])
-        spare = replace(group, stop_s=group.stop_s + 2.0 * half)  # a grid of its own may begin a part of a sample late
-        timing = replace(self.timing, runs=(spare,))
+        timing = replace(self.timing, runs=(group,))
         periods = self._repeating(read_stretch(self.recording, self.robot, first, last, timing), cutoff_hz)
         if periods is None:
             return None

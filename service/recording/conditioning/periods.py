@@ -42,6 +42,9 @@ LATE_SAMPLES = 1.0
 
 SPLINE_DEGREE = 3
 
+LEAST_WIDTH = 1e-15
+"""Scatter below which a joint stands still [rad or m]."""
+
 
 @dataclass(frozen=True)
 class Periods:
@@ -287,7 +290,9 @@ def _lag(position: Array) -> float:
     speed = np.gradient(mean, axis=0)
     speed -= speed.mean(axis=0)
     difference = (position[-1] - position[0]) / (len(position) - 1)
-    precision = 1.0 / np.maximum(_scatter(position), 1e-6 * np.ptp(mean, axis=0) + np.finfo(float).tiny) ** 2
+    width = np.maximum(_scatter(position), 1e-6 * np.ptp(mean, axis=0))
+    moves = width > LEAST_WIDTH  # a joint that stands still says nothing of the lag
+    precision = np.where(moves, 1.0, 0.0) / np.where(moves, width, 1.0) ** 2
     energy = float((precision * (speed**2).sum(axis=0)).sum())
     # A period that began late shows the motion of an earlier phase: q_k(φ) = q(φ - lag), hence the sign.
     return -float((precision * (speed * difference).sum(axis=0)).sum()) / energy if energy > 0.0 else 0.0

@@ -35,7 +35,7 @@ def harmonics(joints: int = 2, fundamental_hz: float = 0.1, count: int = 5, seed
     rng = np.random.default_rng(seed)
     amplitude = rng.uniform(0.05, 0.3, (joints, count))
     phase = rng.uniform(0.0, 2.0 * np.pi, (joints, count))
-    return Harmonics(fundamental_hz * np.arange(1, count + 1), amplitude, phase, rng.uniform(-1.0, 1.0, joints))
+    return Harmonics(fundamental_hz * np.arange(1.0, count + 1.0), amplitude, phase, rng.uniform(-1.0, 1.0, joints))
 
 
 def robot(joints: int = 2, prismatic: tuple[int, ...] = ()) -> Robot:
@@ -49,11 +49,26 @@ def torque_of(motion: Harmonics, time: Array) -> Array:
     return motion.derivative(time, 2) + 2.0 * motion.derivative(time, 1) + 3.0 * motion.derivative(time, 0)
 
 
-def record(motion: Harmonics, time: Array, **columns: Array) -> Recording:
-    """A recording without noise; other columns replace or complete those of the motion."""
-    position = columns.pop("position", motion.derivative(time, 0))
-    effort = columns.pop("effort", torque_of(motion, time))
-    return Recording.from_arrays("test.csv", time, position, effort, **columns)
+def record(
+    motion: Harmonics,
+    time: Array,
+    *,
+    position: Array | None = None,
+    effort: Array | None = None,
+    velocity: Array | None = None,
+    acceleration: Array | None = None,
+    period: Array | None = None,
+) -> Recording:
+    """A recording without noise, where its columns are not given."""
+    return Recording.from_arrays(
+        "test.csv",
+        time,
+        motion.derivative(time, 0) if position is None else position,
+        torque_of(motion, time) if effort is None else effort,
+        velocity=velocity,
+        acceleration=acceleration,
+        period=period,
+    )
 
 
 def own_samples(motion: Motion) -> Array:

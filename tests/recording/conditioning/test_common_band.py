@@ -100,10 +100,14 @@ def test_no_row_rests_on_more_than_it_may(cutoff: float) -> None:
         measured[start : start + rng.integers(1, 300)] = False
     used = band.reduce_mask(measured[None])[0]
     weight = np.abs(band.kernel) / np.abs(band.kernel).sum()
+    lasting = ~measured
+    for start, stop in np.flatnonzero(np.diff(lasting, prepend=False, append=False)).reshape(-1, 2):
+        lasting[start:stop] = stop - start > band.factor // 4
     for row, is_used in enumerate(used):
         part = ~measured[row * band.factor : row * band.factor + len(weight)]
         if is_used:
             assert weight[part].sum() <= BRIDGED_FRACTION
+            assert weight[lasting[row * band.factor :][: len(weight)]].sum() <= MASKED_FRACTION
         elif not part.any():
             pytest.fail("a row of measured samples was dropped")
         else:
@@ -122,6 +126,7 @@ def test_the_harmonic_band_keeps_its_harmonics_exactly(samples: int) -> None:
     band = HarmonicBand.design(rate, samples, 10 * rate / samples)
     assert band.harmonics == 10
     kept = 1.0 + np.cos(phase) + 0.3 * np.sin(10 * phase)
+    assert band.rate_hz == pytest.approx(21 * rate / samples)
     reduced = band.reduce(kept + np.cos(11 * phase) + np.sin(40 * phase))
     coarse = 2 * np.pi * np.arange(21) / 21
     np.testing.assert_allclose(reduced, 1.0 + np.cos(coarse) + 0.3 * np.sin(10 * coarse), atol=1e-12)
