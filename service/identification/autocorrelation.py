@@ -14,6 +14,10 @@ from service.recording.recording import Array
 
 LARGEST_ORDER = 30
 
+UNBROKEN_SHARE = 0.3
+"""Where samples are missing, orders end where fewer than this share of so many consecutive samples are all there: what
+pairs at longer lags say no longer fits together."""
+
 
 @dataclass(frozen=True, eq=False)
 class Autoregression:
@@ -132,7 +136,9 @@ class AutocovarianceSum:
         # The mean over the pairs at hand, shrunk as if divided by N at every lag: the sequence stays positive definite.
         taper = self._sums.spans / self._sums.spans[0]
         covariance = taper * self._sums.products / np.maximum(self._sums.counts, 1.0)
-        largest = int(min(LARGEST_ORDER, len(covariance) - 1, count // 10))
+        present = count / self._sums.spans[0]
+        unbroken = LARGEST_ORDER if present == 1.0 else np.log(UNBROKEN_SHARE) / np.log(present)
+        largest = int(min(LARGEST_ORDER, len(covariance) - 1, count // 10, unbroken))
         best = (np.empty(0), covariance[0])
         best_score = count * np.log(covariance[0])
         coefficients, variance = np.empty(0), covariance[0]

@@ -14,7 +14,9 @@ from service.identification.least_squares import JointFactor, condition_number, 
 from service.identification.structure import JointTerms, ModelStructure
 from service.recording import Recording
 from service.recording.conditioning import Conditioner
+from service.robot import FrictionShape
 from service.robot.robot import STANDARD_PARAMETERS
+from sim_backend.motion import random_fourier_motion
 
 
 @pytest.fixture(scope="module")
@@ -154,14 +156,62 @@ def test_equations_that_do_not_fit_into_memory_are_made_again(
 ) -> None:
     rng = np.random.default_rng(5)
     recordings = [arm.recording(arm.white(PAPER_NOISE, rng), periods=periods) for _ in range(2)]
-    robot = replace(arm.robot, joints=tuple(replace(joint, friction_shape=SHAPE) for joint in arm.robot.joints))
+    robot = replace(
+        arm.robot, joints=tuple(replace(joint, friction_shape=FrictionShape()) for joint in arm.robot.joints)
+    )
+    calls: list[int] = []
+    regressor = dataset.torque_regressor
+
+    def counted(*arguments, **options):
+        calls.append(1)
+        return regressor(*arguments, **options)
+
+    monkeypatch.setattr(dataset, "torque_regressor", counted)
     kept = identify(robot, recordings, recordings[:1], Options(cutoff_hz=cutoff_hz))
+    kept_calls = len(calls)
     monkeypatch.setattr(dataset, "MEMORY_LIMIT", 1000)
     remade = identify(robot, recordings, recordings[:1], Options(cutoff_hz=cutoff_hz))
+    assert len(calls) - kept_calls > 2 * kept_calls
     assert document(remade) == document(kept)
 
 
-SHAPE = type(paper_robot().joints[0].friction_shape)()
+def held_still(reach: float) -> SimulatedArm:
+    """The paper's arm, joint 3 moving by this much of its usual motion."""
+    robot = paper_robot()
+    moving = random_fourier_motion(robot.joints, np.random.default_rng(2))
+    scale = np.array([1.0, 1.0, reach])[:, None]
+    return simulate(robot, motion=replace(moving, cosine=moving.cosine * scale, sine=moving.sine * scale))
+
+
+@pytest.mark.parametrize("periods", [True, False], ids=["periods", "one motion"])
+@pytest.mark.parametrize("reach", [0.0, 1e-8])
+def test_a_joint_held_still_leaves_its_friction_undetermined(reach: float, periods: bool) -> None:
+    """The rounding of its velocity is no motion: else 1e6 to 1e13 Nm of friction are found, and predicted held out."""
+    arm, other = held_still(reach), simulate(paper_robot(), seed=2)
+    recording = arm.recording(arm.white(PAPER_NOISE, np.random.default_rng(0)), periods=periods)
+    held_out = other.recording(other.white(PAPER_NOISE, np.random.default_rng(1)))
+    result = identify(arm.robot, [recording], [held_out])
+    found = document(result)
+    assert {"stiction joint3", "stribeck joint3", "viscous joint3"} <= set(found.undetermined)
+    assert [found.friction[2].std[name] for name in ("stiction", "stribeck", "viscous")] == [None, None, None]
+    assert not any(found.friction[2].identifiable[name] for name in ("stiction", "stribeck", "viscous"))
+    assert "offset joint3" not in found.undetermined
+    determined = ~result.undetermined
+    assert np.abs(z_scores(result, arm.robot)[determined]).max() < 4.5
+    assert np.abs(result.parameters[~determined]).max() < 1.0  # what has no information takes its smallest value
+    assert found.fit.held_out is not None
+    assert found.fit.held_out.rms[2] < 5.0  # joint 3's friction is 2 Nm
+
+
+@pytest.mark.parametrize("periods", [True, False], ids=["periods", "one motion"])
+def test_a_joint_that_moves_a_millionth_has_honest_errors(periods: bool) -> None:
+    """What the solution keeps of a nearly singular factor, the covariance has to keep too: else -1e9 Nm ± 20 Nm."""
+    arm = held_still(1e-6)
+    recording = arm.recording(arm.white(PAPER_NOISE, np.random.default_rng(0)), periods=periods)
+    result = identify(arm.robot, [recording])
+    determined = ~result.undetermined
+    assert np.abs(z_scores(result, arm.robot)[determined]).max() < 4.5
+    assert not any(document(result).friction[2].identifiable[name] for name in ("stiction", "stribeck", "viscous"))
 
 
 def test_two_columns_that_are_one_are_both_undetermined(arm: SimulatedArm, recording: Recording, result) -> None:

@@ -231,9 +231,7 @@ def test_wls_has_no_larger_variance_than_ls_in_any_row(experiment: MonteCarlo) -
 
 def test_reported_standard_errors_are_those_of_theory(experiment: MonteCarlo) -> None:
     wls, ls = experiment.wls_std[:, experiment.rows], experiment.ls_std[:, experiment.rows]
-    # Run by run each takes the noise from its own residual, which LS makes a little smaller at the noisiest joint.
-    assert (np.median(wls / ls, axis=0) <= 1.0 + 1e-3).all(), "WLS reports a larger standard error than LS"
-    assert (wls <= ls * (1.0 + 5e-3)).all()
+    assert (wls <= ls * (1.0 + 1e-3)).all(), "WLS reports a larger standard error than LS"
     for reported, covariance in ((wls, experiment.bound), (ls, experiment.least_squares)):
         theory = np.sqrt(np.diag(covariance))[experiment.rows]
         np.testing.assert_allclose(np.median(reported, axis=0), theory, rtol=0.03)

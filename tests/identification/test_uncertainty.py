@@ -96,6 +96,17 @@ def test_autocorrelated_noise_widens_the_standard_errors(slow_arm: SimulatedArm,
     assert_unbiased(results, slow_arm)
 
 
+def test_autocorrelated_noise_with_samples_missed(slow_arm: SimulatedArm) -> None:
+    """A sample in twenty: pairs of neighbours are fewer, not less alike."""
+
+    def draw(rng: np.random.Generator) -> Recording:
+        noise = autoregressive(slow_arm, PAPER_NOISE, 0.9, rng)
+        noise[rng.random(noise.shape) < 0.05] = np.nan
+        return slow_arm.recording(noise, periods=False)
+
+    assert 0.85 <= rms(scores(runs_of(slow_arm, 40, draw), slow_arm)) <= 1.2
+
+
 @pytest.mark.parametrize("seed", [3, 4])
 @pytest.mark.parametrize("runs", [25, pytest.param(100, marks=pytest.mark.slow)])
 def test_autocorrelated_noise_in_averaged_periods(seed: int, runs: int) -> None:

@@ -128,7 +128,7 @@ class Conditioner:
                 resampled = resampled or bool(
                     len(time) > 1 and uniform_grid(time - time[0], self.timing.rate_hz) is None
                 )
-        groups = (self._averaged(group, cutoff_hz) for run in self.timing.runs for group in self._groups(run))
+        groups = (self._averaged(group, cutoff_hz) for rows in self.timing.rows for group in self._groups(rows))
         return ConditioningSummary(
             recording=self.recording.name,
             samples=self.timing.samples,
@@ -146,31 +146,29 @@ class Conditioner:
     def _stretch_motions(self, rows: tuple[int, int], cutoff_hz: float | None) -> Iterator[Motion]:
         """Averaged periods where there are any, and what lies between them, in order of time."""
         cursor = rows[0]
-        for run in self.timing.runs:
-            if run.rows != rows:
-                continue
-            for group in self._groups(run):
-                motion = self._averaged(group, cutoff_hz)
-                if motion is None:
-                    continue
-                half = 0.5 / self.timing.rate_hz
+        half = 0.5 / self.timing.rate_hz
+        for group in self._groups(rows):
+            motion = self._averaged(group, cutoff_hz)
+            if motion is not None:
                 begin, end = (row_at(self.recording, time - half, rows) for time in (group.start_s, group.stop_s))
                 yield from self._transients(cursor, begin, rows, cutoff_hz)
                 yield motion
                 cursor = end
         yield from self._transients(cursor, rows[1], rows, cutoff_hz)
 
-    def _groups(self, run: PeriodRun) -> Iterator[PeriodRun]:
-        """Parts of a run with as many whole periods as are averaged at once."""
-        samples = run.length_s * self.timing.rate_hz
-        if samples > LONGEST_PERIOD:
-            return
-        parts = int(np.ceil(run.count / max(2.0, AVERAGED_ROWS // samples)))
-        edges = np.linspace(0, run.count, parts + 1).astype(int)
-        for first, last in pairwise(edges):
-            if last - first >= 2:
-                start, stop = (run.start_s + float(k) * run.length_s for k in (first, last))
-                yield replace(run, start_s=start, stop_s=stop, first=run.first + float(first))
+    def _groups(self, rows: tuple[int, int]) -> Iterator[PeriodRun]:
+        """Parts of a stretch with as many whole periods as are averaged at once."""
+        begin, end = (float(self.recording.samples(row, row + 1).time[0]) for row in (rows[0], rows[1] - 1))
+        interval = 1.0 / self.timing.rate_hz
+        for run in (run.within(rows, begin, end + interval, interval) for run in self.timing.runs):
+            samples = run.length_s * self.timing.rate_hz
+            if run.count < 2 or samples > LONGEST_PERIOD:
+                continue
+            parts = int(np.ceil(run.count / max(2.0, AVERAGED_ROWS // samples)))
+            edges = np.linspace(0, run.count, parts + 1).astype(int)
+            for first, last in pairwise(edges):
+                if last - first >= 2:
+                    yield run.part(int(first), int(last))
 
     def _averaged(self, group: PeriodRun, cutoff_hz: float | None) -> Motion | None:
         """The average of some periods; None where they do not repeat, or where torque is missing in all of them."""

@@ -54,6 +54,37 @@ class PeriodRun:
         """Number of whole periods."""
         return int((self.stop_s - self.start_s) / self.length_s + WHOLE_PERIOD)
 
+    def within(self, rows: tuple[int, int], begin_s: float, end_s: float, interval_s: float) -> "PeriodRun":
+        """What of the run lies within a stretch; its `count` is 0 where nothing does.
+
+        Parameters
+        ----------
+        rows : (int, int)
+            rows of the stretch
+        begin_s, end_s : float
+            instants of its first sample and of the end of its last one [s]
+        interval_s : float
+            time from sample to sample [s]
+        """
+        slack = STEP_TOLERANCE * interval_s
+        start = self.start_s if self.start_s > begin_s - slack else begin_s
+        stop = self.stop_s if self.stop_s < end_s + slack else end_s
+        return PeriodRun(rows, start, max(start, stop), self.length_s, self._at(start))
+
+    def part(self, first: int, last: int) -> "PeriodRun":
+        """Some of its periods, counted from its start.
+
+        Parameters
+        ----------
+        first, last : int
+            the first of them, and the one after the last
+        """
+        start = self.start_s + first * self.length_s
+        return PeriodRun(self.rows, start, self.start_s + last * self.length_s, self.length_s, self._at(start))
+
+    def _at(self, time_s: float) -> float:
+        return self.first + (time_s - self.start_s) / self.length_s
+
     def progress(self, origin_s: float, elapsed: Array) -> Array:
         """Index of the period plus the part of it that is over, (N,); NaN outside the run.
 

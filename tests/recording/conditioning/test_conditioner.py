@@ -1,6 +1,6 @@
 """Whole recordings through the conditioner: closed forms, seams, counts, and whatever users may send."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -115,6 +115,18 @@ def test_long_periodic_recordings_are_averaged_in_groups(monkeypatch: pytest.Mon
     assert rest[-1] > time[-1] - 0.5
     for piece in pieces:
         np.testing.assert_allclose(piece.acceleration, motion.derivative(piece.time, 2), atol=2e-3)
+
+
+def test_a_conditioner_of_the_first_rows_alone_averages_what_lies_in_them() -> None:
+    motion = harmonics(fundamental_hz=0.2)
+    time = np.arange(9000) / 200.0
+    survey = Conditioner.survey(record(motion, time, period=np.floor(time / 5.0 + 1e-9)), robot())
+    beginning = replace(survey, timing=replace(survey.timing, rows=((0, 3500),)))
+    averaged, rest = beginning.motions(6.0)
+    assert (averaged.repetitions, rest.repetitions) == (3, 1)
+    assert rest.time[-1] < 17.5
+    (averaged,) = survey.motions(6.0)
+    assert averaged.repetitions == 9
 
 
 def test_a_period_longer_than_a_window_is_averaged_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -60,7 +60,7 @@ def lagged(velocity: np.ndarray) -> np.ndarray:
 def coloured() -> np.ndarray:
     """Noise below 80 Hz alone: as loud in the band as the positions', all but silent where noise is looked for."""
     sections = signal.butter(4, 80.0, fs=RATE, output="sos")
-    return np.asarray(signal.sosfiltfilt(sections, white(2e-2, seed=9), axis=0))
+    return np.asarray(signal.sosfiltfilt(sections, white(1e-2, seed=9), axis=0))
 
 
 REFUSED: dict[str, Change] = {
