@@ -19,6 +19,9 @@ from service.identification.structure import ModelStructure
 from service.recording.recording import Array
 from service.robot import Robot
 
+TIGHT = 0.1
+"""Standard error of a shape constant's logarithm that leaves no doubt about it, whatever its profile looks like."""
+
 SIGNIFICANT = 5.0
 """Standard errors by which a Stribeck term must differ from zero to stay in the model."""
 
@@ -68,13 +71,25 @@ def _estimated_shapes(motions: Dataset, structure: ModelStructure) -> tuple[Esti
     noise_std, _ = _preliminary_residual(motions, structure, factors)
     proposed = estimate_shapes(motions, structure, factors, noise_std, np.zeros(count), (True,) * count)
     # Judged by what the refined candidates leave: beside constants off their optimum every other one looks open.
-    extended = _with_shapes(structure, _refined(motions, structure, proposed))
-    deviations, unit = _stribeck_deviations(motions, extended, noise_std)
+    refined = _refined(motions, structure, proposed)
+    deviations, unit, tight = _judged(motions, _with_shapes(structure, refined), refined, noise_std)
     supported = [
         shape.delta is not None and not shape.delta_given and bool(deviations[joint] >= SIGNIFICANT)
         for joint, shape in enumerate(proposed)
     ]
-    return estimate_shapes(motions, structure, factors, noise_std, unit, supported)
+    found = estimate_shapes(motions, structure, factors, noise_std, unit, supported)
+    return tuple(
+        _with_tight(shape, best, tight[joint]) for joint, (shape, best) in enumerate(zip(found, refined, strict=True))
+    )
+
+
+def _with_tight(shape: EstimatedShape, refined: EstimatedShape, tight: set[str]) -> EstimatedShape:
+    """The shape with refined constants whose own standard errors leave no doubt, where its profile left one."""
+    if "k_v" in tight and not shape.k_v_identifiable and not shape.k_v_given:
+        shape = replace(shape, k_v=refined.k_v, k_v_identifiable=True)
+    if "delta" in tight and shape.delta is not None and not shape.delta_identifiable:
+        shape = replace(shape, delta=refined.delta, delta_identifiable=True)
+    return shape
 
 
 def _refined(
@@ -92,26 +107,35 @@ def _refined(
     )
 
 
-def _stribeck_deviations(motions: Dataset, structure: ModelStructure, noise_std: Array) -> tuple[Array, Array]:
-    """Per joint, how many standard errors its Stribeck term is from zero, and one noise variance.
+def _judged(
+    motions: Dataset, structure: ModelStructure, shapes: tuple[EstimatedShape, ...], noise_std: Array
+) -> tuple[Array, Array, list[set[str]]]:
+    """What a model with all proposed terms says of them, per joint.
 
-    The noise variance is inflated by autocorrelation and divided by `noise_std`².
+    How many standard errors its Stribeck term is from zero; one noise variance, inflated by autocorrelation and
+    divided by `noise_std`²; and which of its shape constants have a small standard error.
     """
     factors = factorise(motions, structure)
     weights, solution = estimate(factors, structure.size, Estimator.WLS)
     (statistics,) = evaluate(motions, structure, [solution.parameters])
+    given = (motions, structure, solution.parameters, factors, weights, statistics.autoregressions)
     # With δ held: how uncertain δ itself is says nothing about whether the term is there.
-    covariance = parameter_covariance(
-        motions, structure, solution.parameters, factors, weights, statistics.autoregressions
-    )
-    deviations = np.zeros(structure.robot.joint_count)
-    for joint in range(structure.robot.joint_count):
+    held = parameter_covariance(*given)
+    deviations = np.zeros(len(shapes))
+    for joint in range(len(shapes)):
         column = structure.coefficient(joint, "stribeck")
         if column is not None:
-            std = np.sqrt(max(covariance[column, column], np.finfo(float).tiny))
+            std = np.sqrt(max(held[column, column], np.finfo(float).tiny))
             deviations[joint] = abs(solution.parameters[column]) / std
+    estimated = shape_parameters(shapes)
+    errors = np.sqrt(np.diag(parameter_covariance(*given, estimated))[structure.size :])
+    tight: list[set[str]] = [set() for _ in shapes]
+    for (joint, name), error in zip(estimated, errors, strict=True):
+        if 0.0 < error < TIGHT:
+            tight[joint].add(name)
     inflation = np.array([model.long_run_ratio for model in statistics.autoregressions])
-    return deviations, inflation * (np.maximum(statistics.fit.band_rms, FINEST_TORQUE * noise_std) / noise_std) ** 2
+    relative = np.maximum(statistics.fit.band_rms, FINEST_TORQUE * noise_std) / noise_std
+    return deviations, inflation * relative**2, tight
 
 
 def _with_shapes(structure: ModelStructure, shapes: Sequence[EstimatedShape]) -> ModelStructure:

@@ -66,6 +66,21 @@ def test_white_noise_is_called_white() -> None:
     assert np.count_nonzero(orders) < 0.05 * runs
 
 
+def test_an_autoregression_stays_one_where_samples_are_missed() -> None:
+    """AR(1) of 0.9 with 30 % of 3,000 samples missed; a long-run ratio of 19."""
+    orders, ratios = [], []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        noise = signal.lfilter([1.0], [1.0, -0.9], rng.standard_normal(3500))[500:]
+        total = AutocovarianceSum()
+        total.add(LaggedProducts.of(noise, rng.random(len(noise)) > 0.3))
+        orders.append(total.model().order)
+        ratios.append(total.model().long_run_ratio)
+    assert np.median(orders) <= 3
+    assert 15.0 <= np.median(ratios) <= 23.0
+    assert max(ratios) < 60.0
+
+
 def test_pieces_add_up() -> None:
     """Lagged products do not reach from one piece into the next: two pieces that differ by sign are alike."""
     values = autoregressive(AR2, 4000, np.random.default_rng(3))

@@ -87,8 +87,10 @@ class AccelerationSpectrum:
         bearable = noise <= allowed
         last = np.clip(len(bearable) - 1 - np.argmax(bearable[::-1], axis=0), 1, len(bearable) - 2)
         joint = np.arange(noise.shape[1])
-        excess = [np.log(np.maximum(noise, TINY) / np.maximum(allowed, TINY))[last + k, joint] for k in (0, 1)]
-        part = np.clip(-excess[0] / np.maximum(excess[1] - excess[0], TINY), 0.0, 1.0)
+        # Between the last line that is bearable and the first that is not, their ratio grows as a power of frequency.
+        before, beyond = (np.log((noise + TINY) / (allowed + TINY))[last + k, joint] for k in (0, 1))
+        crossing = (before < 0.0) & (beyond > 0.0)
+        part = np.where(crossing, before / np.where(crossing, before - beyond, 1.0), 0.0)
         limit = edge[last, 0] * (edge[last + 1, 0] / edge[last, 0]) ** part
         return np.where(bearable.all(axis=0), np.inf, limit)
 
