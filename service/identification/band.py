@@ -29,7 +29,7 @@ from service.robot import Robot
 KEPT_BEYOND = 2.0
 """Width of the band over the frequency where the unexplained torque outgrows the explained one."""
 
-NOISE_TORQUE_SHARE = 0.3
+NOISE_TORQUE_SHARE = 0.15
 """Largest torque that noise of the positions may make in the regressor, relative to what the fit leaves."""
 
 SMALLEST_OWN_SHARE = 0.01

@@ -383,8 +383,9 @@ def shape_parameters(shapes: Sequence[EstimatedShape]) -> list[tuple[int, str]]:
     """
     estimated: list[tuple[int, str]] = []
     for joint, shape in enumerate(shapes):
-        if shape.k_v_identifiable and not shape.k_v_given:
+        paired = shape.delta is not None and not shape.delta_given
+        if not shape.k_v_given and (shape.k_v_identifiable or paired):
             estimated.append((joint, "k_v"))
-        if shape.delta is not None and not shape.delta_given:
+        if paired:
             estimated.append((joint, "delta"))
     return estimated

@@ -84,11 +84,16 @@ def _estimated_shapes(motions: Dataset, structure: ModelStructure) -> tuple[Esti
 
 
 def _with_tight(shape: EstimatedShape, refined: EstimatedShape, tight: set[str]) -> EstimatedShape:
-    """The shape with refined constants whose own standard errors leave no doubt, where its profile left one."""
-    if "k_v" in tight and not shape.k_v_identifiable and not shape.k_v_given:
-        shape = replace(shape, k_v=refined.k_v, k_v_identifiable=True)
-    if "delta" in tight and shape.delta is not None and not shape.delta_identifiable:
-        shape = replace(shape, delta=refined.delta, delta_identifiable=True)
+    """The shape with what refining all constants together found, where profiles along single ones left a doubt.
+
+    Beside a Stribeck term the two slopes are one pair: neither may be left where only the grid had put it.
+    """
+    paired = shape.delta is not None and not shape.delta_given
+    if paired:
+        shape = replace(shape, delta=refined.delta)
+        shape = replace(shape, delta_identifiable=shape.delta_identifiable or "delta" in tight)
+    if not shape.k_v_given and (paired or "k_v" in tight):
+        shape = replace(shape, k_v=refined.k_v, k_v_identifiable=shape.k_v_identifiable or "k_v" in tight)
     return shape
 
 

@@ -135,9 +135,11 @@ class _Sums:
         motion = prepared.motion
         residual = motion.torque - predicted.T
         self._unfiltered = self._unfiltered and isinstance(motion.band, AllPass)
-        kept = np.where(motion.measured, residual, 0.0)
+        own = (slice(None), motion.own)  # windows of a long recording overlap: each sample counts once
+        measured = motion.measured[own]
+        kept = np.where(measured, residual[own], 0.0)
         self._raw_squares += np.einsum("pij,pij->j", kept, kept)
-        self._raw_count += motion.measured.sum(axis=(0, 1))
+        self._raw_count += measured.sum(axis=(0, 1))
         self._add_periods(prepared, residual)
         band = prepared.reduced_torque - motion.band.reduce(predicted)
         for joint, (row, used) in enumerate(zip(band, prepared.used, strict=True)):
@@ -150,8 +152,8 @@ class _Sums:
                 self._raw_lags[joint].add(lagged)  # nothing was filtered: the same series
                 continue
             for repetition in range(motion.repetitions):
-                series = residual[repetition, :, joint]
-                self._raw_lags[joint].add(LaggedProducts.of(series, motion.measured[repetition, :, joint]))
+                series = residual[own][repetition, :, joint]
+                self._raw_lags[joint].add(LaggedProducts.of(series, measured[repetition, :, joint]))
 
     def statistics(self) -> ResidualStatistics:
         """The sums, turned into what they stand for."""

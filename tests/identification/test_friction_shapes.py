@@ -190,3 +190,22 @@ def test_a_joint_without_friction_has_none() -> None:
         result = identified(arm, PAPER_NOISE, seed)
         assert all(shape.delta is None and not shape.k_v_identifiable for shape in result.shapes)
         assert np.abs(z_scores(result, arm.robot)).max() < 4.5
+
+
+@pytest.mark.parametrize(
+    ("k_v", "delta", "period_s", "seed", "noise"),
+    [
+        (60.0, 6.0, 20.0, 3, 0.1),
+        (100.0, 4.0, 20.0, 3, 0.01),
+        (500.0, 10.0, 10.0, 2, 0.001),
+    ],
+)
+def test_both_slopes_are_right_at_a_high_signal_to_noise_ratio(
+    k_v: float, delta: float, period_s: float, seed: int, noise: float
+) -> None:
+    arm = simulate(with_shapes(paper_robot(), k_v, delta), seed=seed, period_s=period_s)
+    for run in range(3):
+        result = identified(arm, noise * PAPER_NOISE, run)
+        assert [shape.k_v for shape in result.shapes] == pytest.approx([k_v] * 3, rel=0.1)
+        assert [shape.delta for shape in result.shapes] == pytest.approx([delta] * 3, rel=0.2)
+        assert np.abs(z_scores(result, arm.robot)).max() < 4.5

@@ -202,3 +202,21 @@ def test_encoder_noise_does_not_bias_where_torque_noise_is_small(seed: int, runs
         return arm.recording(arm.white(0.1 * PAPER_NOISE, rng), arm.white(2e-5, rng), periods=False)
 
     assert rms(scores(runs_of(arm, runs, draw), arm)) <= 1.2
+
+
+def test_the_residual_tells_the_torque_noise_beside_encoder_noise() -> None:
+    arm = simulate(paper_robot(), seed=4, rate_hz=200.0, periods=5)
+    results = runs_of(
+        arm, 5, lambda rng: arm.recording(arm.white(PAPER_NOISE, rng), arm.white(2e-5, rng), periods=False)
+    )
+    noise = np.array([result.residuals.noise_std for result in results])
+    assert np.abs(noise / PAPER_NOISE - 1.0).max() < 0.1
+
+
+@pytest.mark.slow
+def test_encoder_noise_does_not_bias_one_long_motion() -> None:
+    arm = simulate(paper_robot(), seed=3, rate_hz=200.0, periods=5)
+    results = runs_of(
+        arm, 80, lambda rng: arm.recording(arm.white(PAPER_NOISE, rng), arm.white(2e-5, rng), periods=False)
+    )
+    assert_unbiased(results, arm)

@@ -23,6 +23,9 @@ UNIFORM_TOLERANCE = 0.02
 STAMP_DECIMALS = 5
 """Stamps rounded to so many decimals or fewer are recognised: they may be off the grid by half their last digit."""
 
+BRIDGED_VALUES = 2
+"""Samples in a row that a recorded velocity or acceleration may lack without being given up for the stretch."""
+
 NEARBY = 0.75
 """A grid point further than this, in sample intervals, from every sample was not measured."""
 
@@ -42,7 +45,8 @@ class Stretch:
     resampled : bool
         the stamps were not uniform enough and all signals were interpolated
     velocity, acceleration : (N, n) float64 or None
-        recorded qd, qdd where there are such columns; a joint of which a sample was missed is NaN throughout
+        recorded qd, qdd where there are such columns; a joint of which more than single samples were missed is NaN
+        throughout
     """
 
     start_s: float
@@ -99,7 +103,7 @@ def read_stretch(recording: Recording, robot: Robot, start: int, stop: int, timi
     rows = slice(None) if complete.all() else complete
     time = samples.time[rows]
     elapsed = time - time[0]
-    groups = [None if group is None else group[rows] for group in (samples.velocity, samples.acceleration)]
+    groups = [None if group is None else _bridged(group[rows]) for group in (samples.velocity, samples.acceleration)]
     grid = uniform_grid(elapsed, timing.rate_hz)
     if grid is None:
         rate, begin = timing.rate_hz, 0.0
@@ -179,14 +183,30 @@ def _last_digit(elapsed: Array) -> float:
     return 0.0
 
 
+def _bridged(values: Array) -> Array:
+    """Signals in which single samples were missed, up to `BRIDGED_VALUES` in a row, bridged by straight lines."""
+    missed = np.isnan(values)
+    if not missed.any():
+        return values
+    bridged = values.copy()
+    everywhere = np.arange(len(values))
+    for joint in np.flatnonzero(missed.any(axis=0)):
+        gaps = np.flatnonzero(np.diff(missed[:, joint], prepend=False, append=False)).reshape(-1, 2)
+        inside = (gaps[:, 0] > 0) & (gaps[:, 1] < len(values)) & (gaps[:, 1] - gaps[:, 0] <= BRIDGED_VALUES)
+        if inside.all():
+            known = ~missed[:, joint]
+            bridged[:, joint] = np.interp(everywhere, everywhere[known], values[known, joint])
+    return bridged
+
+
 def _same(values: Array) -> Array:
-    """Samples that already lie on the grid; a joint of which one was missed is NaN throughout."""
+    """Samples that already lie on the grid; a joint of which one is missing is NaN throughout."""
     missed = np.isnan(values).any(axis=0)
     return np.where(missed, np.nan, values) if missed.any() else values
 
 
 def _spline(knots: Array | NDArray[np.int_], at: Array | NDArray[np.int_]) -> Callable[[Array], Array]:
-    """Cubic spline through the samples, evaluated on the grid; a joint of which one was missed is NaN throughout."""
+    """Cubic spline through the samples, evaluated on the grid; a joint of which one is missing is NaN throughout."""
 
     def onto(values: Array) -> Array:
         whole = np.isfinite(values).all(axis=0)

@@ -120,7 +120,8 @@ def test_a_quiet_acceleration_is_used_beside_or_without_a_velocity() -> None:
 
 def test_missed_velocities_fall_back_for_their_stretch_alone() -> None:
     velocity = MOTION.derivative(TIME, 1) + white(1e-4)
-    velocity[9000, 0] = np.nan
+    velocity[9000:9010, 0] = np.nan
+    velocity[[500, 501, 700, 9500], 1] = np.nan  # single samples are bridged
     time = np.where(np.arange(len(TIME)) < 8000, TIME, TIME + 3.0)
     noise = np.random.default_rng(3).normal(0.0, 2e-4, (len(TIME), 2))
     recording = record(MOTION, time, position=MOTION.derivative(TIME, 0) + noise, velocity=velocity)
