@@ -88,7 +88,7 @@ class AccelerationSpectrum:
         last = np.clip(len(bearable) - 1 - np.argmax(bearable[::-1], axis=0), 1, len(bearable) - 2)
         joint = np.arange(noise.shape[1])
         # Between the last line that is bearable and the first that is not, their ratio grows as a power of frequency.
-        before, beyond = (np.log((noise + TINY) / (allowed + TINY))[last + k, joint] for k in (0, 1))
+        before, beyond = ((np.log(noise + TINY) - np.log(allowed + TINY))[last + k, joint] for k in (0, 1))
         crossing = (before < 0.0) & (beyond > 0.0)
         part = np.where(crossing, before / np.where(crossing, before - beyond, 1.0), 0.0)
         limit = edge[last, 0] * (edge[last + 1, 0] / edge[last, 0]) ** part
