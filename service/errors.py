@@ -7,6 +7,9 @@ TauscopeError
 │   └── RecordingMismatchError            recording-mismatch  the recording does not fit the robot
 ├── IdentificationError   (ValueError)    identification      the data cannot answer the question
 ├── ExportError           (ValueError)    export              a model cannot be written in the asked format
+├── ExcitationError       (ValueError)    excitation          no motion within the limits, or a trajectory is not valid
+├── ScenarioError         (ValueError)    scenario            the simulated arm's scenario file is not valid
+├── AcquisitionError      (RuntimeError)  acquisition         a run cannot start, or ended before its time
 ├── NotFoundError         (LookupError)   not-found           nothing of that name is kept here
 └── LimitExceededError    (ValueError)    limit-exceeded      an upload or a request is larger than allowed
 
@@ -58,6 +61,24 @@ class ExportError(TauscopeError, ValueError):
     """A model cannot be written in the format that was asked for."""
 
     code = "export"
+
+
+class ExcitationError(TauscopeError, ValueError):
+    """No motion keeps the limits, or a trajectory file is not valid."""
+
+    code = "excitation"
+
+
+class ScenarioError(TauscopeError, ValueError):
+    """The scenario of the simulated arm cannot be read or is not valid."""
+
+    code = "scenario"
+
+
+class AcquisitionError(TauscopeError, RuntimeError):
+    """A run cannot start, or ended before its time."""
+
+    code = "acquisition"
 
 
 class NotFoundError(TauscopeError, LookupError):

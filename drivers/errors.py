@@ -1,0 +1,59 @@
+"""What a backend raises, and how it describes a fault of a drive."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A fault that a drive or the bus reports, decoded.
+
+    code : str
+        stable name in kebab-case: ``watchdog``, ``overload``, ``over-temperature``, ``lost-bus`` …
+    joint : int or None
+        joint number, counted from 1; None where it concerns the whole arm
+    detail : str
+        what the device said, in one line
+    remedy : str
+        what the user does next, in one line
+    """
+
+    code: str
+    joint: int | None
+    detail: str
+    remedy: str
+
+    def __str__(self) -> str:
+        """One line for a message."""
+        place = "arm" if self.joint is None else f"joint {self.joint}"
+        return f"{place}: {self.detail} ({self.code}); {self.remedy}"
+
+
+class DriverErrorKind(StrEnum):
+    """What went wrong, in the words that callers decide by."""
+
+    NOT_CONNECTED = "not-connected"
+    CANNOT_CONNECT = "cannot-connect"
+    NOT_ENABLED = "not-enabled"
+    REFUSED = "refused"
+    FAULT = "fault"
+    LOST = "lost"
+
+
+class DriverError(RuntimeError):
+    """A backend cannot do what it was asked for; nothing moves because of the request.
+
+    Parameters
+    ----------
+    kind : DriverErrorKind
+        what went wrong
+    message : str
+        one line that names the device or joint and the next step
+    faults : tuple of Fault
+        what the drives report, where they do
+    """
+
+    def __init__(self, kind: DriverErrorKind, message: str, faults: tuple[Fault, ...] = ()) -> None:
+        super().__init__(message)
+        self.kind = kind
+        self.faults = faults
