@@ -1,0 +1,273 @@
+"""One drive: how it is commissioned, what it is told in each cycle and what it answered."""
+
+import math
+from dataclasses import dataclass, field
+
+from drivers.backend import ControlMode, StopPolicy
+from drivers.canopen import objects
+from drivers.canopen.bus import EMERGENCY_ID, HEARTBEAT_ID, MASTER_NODE, CanBus, NodeDictionary
+from drivers.canopen.configuration import NodeConfiguration
+from drivers.canopen.emergency import decode_emergency, describe_error
+from drivers.canopen.objects import DriveObject
+from drivers.canopen.pdo import PdoLayout, decode_pdo, encode_pdo, mapping_entries
+from drivers.canopen.state_machine import STATUS_FOLLOWS, DriveState, Goal, decode_state, next_controlword
+from drivers.canopen.units import DriveUnits
+from drivers.errors import DriverError, DriverErrorKind, Fault
+
+RECEIVED_ID = 0x200
+SENT_IDS = (0x180, 0x280)
+
+STATE_PDO = PdoLayout((objects.STATUSWORD, objects.TORQUE_ACTUAL, objects.POSITION_ACTUAL))
+MOTION_PDO = PdoLayout((objects.VELOCITY_ACTUAL, objects.ERROR_CODE))
+TARGET_PDOS = {
+    ControlMode.POSITION: PdoLayout((objects.CONTROLWORD, objects.TARGET_POSITION)),
+    ControlMode.TORQUE: PdoLayout((objects.CONTROLWORD, objects.TARGET_TORQUE)),
+}
+MODES = {ControlMode.POSITION: objects.CYCLIC_POSITION, ControlMode.TORQUE: objects.CYCLIC_TORQUE}
+
+PRODUCER_HEARTBEAT_MS = 100
+
+_CIA_402 = 402
+_PDO_OFF = 1 << 31
+_EVERY_SYNC = 1
+_QUICK_STOP_AND_HOLD = 6
+_RAMP_AND_LET_GO = 2
+_ABORT_BY_QUICK_STOP = 3
+_ABORT_BY_DISABLING = 2
+_FAULT_BY_QUICK_STOP = 2
+
+
+@dataclass(eq=False)
+class DriveNode:
+    """A drive on the bus.
+
+    configuration : NodeConfiguration
+        as the robot file states it
+    joint : int
+        number of its joint, from 1
+    dictionary : NodeDictionary
+        its object dictionary
+    units : DriveUnits
+        its counts and per mille, known once it is connected
+    values : dict of DriveObject to int
+        what it sent in this cycle; empty where it sent nothing
+    error_code : int
+        of its last emergency
+    acknowledged_code : int
+        error code that the operator has seen: a drive may go on showing it until it is enabled again
+    last_position : float
+        of the joint when it last answered: the place to stay at, never a measurement [rad or m]
+    """
+
+    configuration: NodeConfiguration
+    joint: int
+    dictionary: NodeDictionary
+    units: DriveUnits = field(default=DriveUnits(math.nan, 0, math.nan))
+    values: dict[DriveObject, int] = field(default_factory=dict)
+    error_code: int = 0
+    acknowledged_code: int = 0
+    last_position: float = math.nan
+
+    @staticmethod
+    def on_bus(bus: CanBus, configuration: NodeConfiguration, joint: int) -> "DriveNode":
+        """A drive whose frames are listened to from now on.
+
+        Parameters
+        ----------
+        bus : CanBus
+            where it is
+        configuration : NodeConfiguration
+            which drive
+        joint : int
+            number of its joint, from 1
+        """
+        node_id = configuration.node_id
+        node = DriveNode(configuration, joint, bus.add_node(node_id))
+        for identifier, layout in zip(SENT_IDS, (STATE_PDO, MOTION_PDO), strict=True):
+            bus.subscribe(identifier + node_id, lambda _, data, layout=layout: node._take(layout, data))
+        bus.subscribe(EMERGENCY_ID + node_id, lambda _, data: node._take_emergency(data))
+        bus.subscribe(HEARTBEAT_ID + node_id, lambda _, data: None)
+        return node
+
+    @property
+    def state(self) -> DriveState | None:
+        """Power state as this cycle's statusword tells; None where none came."""
+        word = self.values.get(objects.STATUSWORD)
+        return None if word is None else decode_state(word)
+
+    @property
+    def follows(self) -> bool:
+        """Whether the drive follows its target values."""
+        return bool(self.values.get(objects.STATUSWORD, 0) & STATUS_FOLLOWS)
+
+    @property
+    def has_answered(self) -> bool:
+        """Whether both of its frames came in this cycle."""
+        return objects.STATUSWORD in self.values and objects.VELOCITY_ACTUAL in self.values
+
+    def identify(self) -> frozenset[ControlMode]:
+        """Make sure that it is a drive, learn its units, and return the modes that it has.
+
+        Raises
+        ------
+        DriverError
+            ``cannot-connect``: it does not answer or is no CiA 402 drive; ``refused``: its rated torque is not usable
+        """
+        kind = self.dictionary.read(objects.DEVICE_TYPE) & 0xFFFF
+        if kind != _CIA_402:
+            raise DriverError(
+                DriverErrorKind.CANNOT_CONNECT,
+                f"{self.place}: its device profile is {kind}, not 402 (drives); check drive.node_id",
+            )
+        self.units = self._learn_units()
+        supported = self.dictionary.read(objects.SUPPORTED_MODES)
+        return frozenset(mode for mode, number in MODES.items() if supported >> (number - 1) & 1)
+
+    def commission(
+        self, mode: ControlMode, policy: StopPolicy, torque: float, low: float, high: float, ms: int
+    ) -> None:
+        """Set mode, limits, what it does when the host is gone, and process data; each value is read back.
+
+        Parameters
+        ----------
+        mode : ControlMode
+            who closes the loop
+        policy : StopPolicy
+            ``hold`` or ``torque_off``
+        torque : float
+            largest torque of the joint, infinite where there is no limit [Nm or N]
+        low, high : float
+            range of the joint, infinite where there is no limit [rad or m]
+        ms : int
+            time without the master's heartbeat after which the drive stops [ms]
+        """
+        write = self.dictionary.write
+        holds = policy is StopPolicy.HOLD
+        write(objects.MODE_OF_OPERATION, MODES[mode])
+        write(objects.QUICK_STOP_OPTION, _QUICK_STOP_AND_HOLD if holds else _RAMP_AND_LET_GO)
+        write(objects.ABORT_CONNECTION, _ABORT_BY_QUICK_STOP if holds else _ABORT_BY_DISABLING)
+        write(objects.FAULT_REACTION_OPTION, _FAULT_BY_QUICK_STOP)
+        if math.isfinite(torque):
+            write(
+                objects.LARGEST_TORQUE, min(self.units.torque_cap(torque), self.dictionary.read(objects.LARGEST_TORQUE))
+            )
+        if math.isfinite(low) and math.isfinite(high):
+            counts = sorted((self.units.counts(low), self.units.counts(high)))
+            write(objects.LOWEST_POSITION, counts[0])
+            write(objects.HIGHEST_POSITION, counts[1])
+        write(objects.CONSUMER_HEARTBEAT, MASTER_NODE << 16 | ms)
+        write(objects.PRODUCER_HEARTBEAT, PRODUCER_HEARTBEAT_MS)
+        self._map(0x1400, 0x1600, RECEIVED_ID, TARGET_PDOS[mode])
+        for number, (identifier, layout) in enumerate(zip(SENT_IDS, (STATE_PDO, MOTION_PDO), strict=True)):
+            self._map(0x1800 + number, 0x1A00 + number, identifier, layout)
+
+    def measured(self) -> dict[str, float]:
+        """Position, velocity and effort of the joint in this cycle; NaN where they did not come."""
+        convert = {
+            "position": (objects.POSITION_ACTUAL, self.units.position),
+            "velocity": (objects.VELOCITY_ACTUAL, self.units.velocity),
+            "effort": (objects.TORQUE_ACTUAL, self.units.torque),
+        }
+        values = {
+            name: to_joint(self.values[entry]) if entry in self.values else math.nan
+            for name, (entry, to_joint) in convert.items()
+        }
+        if not math.isnan(values["position"]):
+            self.last_position = values["position"]
+        return values
+
+    def read_now(self) -> None:
+        """Fill `values` by service data: for an arm that is not in its cycle."""
+        self.values = {entry: self.dictionary.read(entry) for entry in (*STATE_PDO.objects, *MOTION_PDO.objects)}
+        if self.values[objects.ERROR_CODE]:
+            self.error_code = self.values[objects.ERROR_CODE]
+
+    def target(self, mode: ControlMode, controlword: int, position: float, torque: float) -> bytes:
+        """Payload of its target frame.
+
+        Parameters
+        ----------
+        mode : ControlMode
+            which of the two targets it takes
+        controlword : int
+            0x6040
+        position : float
+            of the joint, finite [rad or m]
+        torque : float
+            of the joint, finite [Nm or N]
+
+        Raises
+        ------
+        DriverError
+            ``refused``: the target is beyond what the drive can be told
+        """
+        layout = TARGET_PDOS[mode]
+        quantity = self.units.counts(position) if mode is ControlMode.POSITION else self.units.permille(torque)
+        try:
+            return encode_pdo(layout, {objects.CONTROLWORD: controlword, layout.objects[1]: quantity})
+        except OverflowError as error:
+            raise DriverError(DriverErrorKind.REFUSED, f"{self.place}: {error}; check counts_per_turn") from error
+
+    def controlword(self, goal: Goal) -> int:
+        """Next controlword towards a goal.
+
+        Parameters
+        ----------
+        goal : Goal
+            where to take it
+        """
+        return next_controlword(self.state, goal)
+
+    def faults(self) -> tuple[Fault, ...]:
+        """What it reports: a code in its cycle or by emergency, and the state of fault without one."""
+        code = self.values.get(objects.ERROR_CODE, 0) or self.error_code
+        is_in_fault = self.state in (DriveState.FAULT, DriveState.FAULT_REACTION)
+        if code == self.acknowledged_code and not is_in_fault:
+            return ()
+        fault = describe_error(code, self.joint)
+        if fault is None and is_in_fault:
+            fault = Fault("drive", self.joint, "in fault, without an error code", "see the drive's own display")
+        return () if fault is None else (fault,)
+
+    @property
+    def place(self) -> str:
+        """Joint and node, for messages."""
+        return f"joint {self.joint} (node {self.configuration.node_id})"
+
+    def _learn_units(self) -> DriveUnits:
+        configuration = self.configuration
+        rated = configuration.rated_torque_nm or self.dictionary.read(objects.RATED_TORQUE) / 1000.0
+        if rated <= 0.0:
+            raise DriverError(
+                DriverErrorKind.REFUSED,
+                f"{self.place}: its rated torque (0x6076) reads 0; give drive.rated_torque_nm",
+            )
+        turns = configuration.counts_per_turn * configuration.gear_ratio * configuration.direction
+        permille = configuration.direction * rated * abs(configuration.gear_ratio) / 1000.0
+        return DriveUnits(2.0 * math.pi / turns, configuration.zero_count, permille)
+
+    def _map(self, communication: int, mapping: int, identifier: int, layout: PdoLayout) -> None:
+        """Write a PDO's parameters by explicit service data, in the order that CiA 301 asks for."""
+        number = self.configuration.node_id
+        cob_id = DriveObject("PDO COB-ID", communication, 1, 32)
+        kind = DriveObject("PDO transmission type", communication, 2, 8)
+        count = DriveObject("PDO number of entries", mapping, 0, 8)
+        write = self.dictionary.write
+        write(cob_id, _PDO_OFF | identifier + number)
+        write(kind, _EVERY_SYNC)
+        write(count, 0)
+        entries = mapping_entries(layout.objects)
+        for subindex, entry in enumerate(entries, 1):
+            write(DriveObject("PDO entry", mapping, subindex, 32), entry)
+        write(count, len(entries))
+        write(cob_id, identifier + number)
+
+    def _take(self, layout: PdoLayout, data: bytes) -> None:
+        values = decode_pdo(layout, data)
+        if values is not None:
+            self.values.update(values)
+
+    def _take_emergency(self, data: bytes) -> None:
+        code = decode_emergency(data)
+        if code is not None and code & 0xFF00:
+            self.error_code, self.acknowledged_code = code, 0

@@ -1,0 +1,70 @@
+"""Entries of the object dictionary that the driver uses: communication profile CiA 301, drive profile CiA 402."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class DriveObject:
+    """One entry of the object dictionary.
+
+    name : str
+        as CiA calls it
+    index : int
+        0x1000 … 0x6FFF
+    subindex : int
+        0 for a variable
+    bits : int
+        its size
+    signed : bool
+        whether it is an INTEGER (else UNSIGNED)
+    """
+
+    name: str
+    index: int
+    subindex: int
+    bits: int
+    signed: bool = False
+
+    @property
+    def mapping(self) -> int:
+        """The entry as a PDO mapping parameter holds it: index, subindex, length."""
+        return self.index << 16 | self.subindex << 8 | self.bits
+
+    def __str__(self) -> str:
+        """Name and place, for messages."""
+        return f"{self.name} (0x{self.index:04X}:{self.subindex:02X})"
+
+
+DEVICE_TYPE = DriveObject("Device type", 0x1000, 0, 32)
+ERROR_REGISTER = DriveObject("Error register", 0x1001, 0, 8)
+CONSUMER_HEARTBEAT = DriveObject("Consumer heartbeat time", 0x1016, 1, 32)
+PRODUCER_HEARTBEAT = DriveObject("Producer heartbeat time", 0x1017, 0, 16)
+VENDOR = DriveObject("Vendor-ID", 0x1018, 1, 32)
+
+ABORT_CONNECTION = DriveObject("Abort connection option code", 0x6007, 0, 16, signed=True)
+ERROR_CODE = DriveObject("Error code", 0x603F, 0, 16)
+CONTROLWORD = DriveObject("Controlword", 0x6040, 0, 16)
+STATUSWORD = DriveObject("Statusword", 0x6041, 0, 16)
+QUICK_STOP_OPTION = DriveObject("Quick stop option code", 0x605A, 0, 16, signed=True)
+FAULT_REACTION_OPTION = DriveObject("Fault reaction option code", 0x605E, 0, 16, signed=True)
+MODE_OF_OPERATION = DriveObject("Modes of operation", 0x6060, 0, 8, signed=True)
+MODE_DISPLAY = DriveObject("Modes of operation display", 0x6061, 0, 8, signed=True)
+POSITION_ACTUAL = DriveObject("Position actual value", 0x6064, 0, 32, signed=True)
+FOLLOWING_WINDOW = DriveObject("Following error window", 0x6065, 0, 32)
+VELOCITY_ACTUAL = DriveObject("Velocity actual value", 0x606C, 0, 32, signed=True)
+TARGET_TORQUE = DriveObject("Target torque", 0x6071, 0, 16, signed=True)
+LARGEST_TORQUE = DriveObject("Max torque", 0x6072, 0, 16)
+RATED_CURRENT = DriveObject("Motor rated current", 0x6075, 0, 32)
+RATED_TORQUE = DriveObject("Motor rated torque", 0x6076, 0, 32)
+TORQUE_ACTUAL = DriveObject("Torque actual value", 0x6077, 0, 16, signed=True)
+TARGET_POSITION = DriveObject("Target position", 0x607A, 0, 32, signed=True)
+LOWEST_POSITION = DriveObject("Software position limit, lowest", 0x607D, 1, 32, signed=True)
+HIGHEST_POSITION = DriveObject("Software position limit, highest", 0x607D, 2, 32, signed=True)
+LARGEST_SPEED = DriveObject("Max motor speed", 0x6080, 0, 32)
+SUPPORTED_MODES = DriveObject("Supported drive modes", 0x6502, 0, 32)
+
+CYCLIC_POSITION = 8
+"""Mode of operation: cyclic synchronous position."""
+
+CYCLIC_TORQUE = 10
+"""Mode of operation: cyclic synchronous torque."""

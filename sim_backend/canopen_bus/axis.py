@@ -1,0 +1,72 @@
+"""What passes between an emulated drive and the arm that it moves, in joint units."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+class AxisMode(Enum):
+    """What a drive does to its joint."""
+
+    RELEASED = "released"
+    HOLDING = "holding"
+    POSITION = "position"
+    TORQUE = "torque"
+
+
+@dataclass(frozen=True)
+class AxisDemand:
+    """What a drive wants of its joint until the next demand.
+
+    mode : AxisMode
+        what it does
+    position : float
+        target where the mode is position [rad or m]
+    torque : float
+        target where the mode is torque [Nm or N]
+    torque_cap : float
+        most that it exerts [Nm or N]
+    """
+
+    mode: AxisMode
+    position: float = 0.0
+    torque: float = 0.0
+    torque_cap: float = float("inf")
+
+
+@dataclass(frozen=True)
+class AxisMeasurement:
+    """What a drive's sensors tell of its joint.
+
+    position : float
+        [rad or m]
+    velocity : float
+        [rad/s or m/s]
+    torque : float
+        [Nm or N]
+    """
+
+    position: float
+    velocity: float
+    torque: float
+
+
+@dataclass(frozen=True)
+class AxisScale:
+    """Counts and per mille of an emulated drive.
+
+    counts_per_radian : float
+        position counts for one radian (metre) of the joint
+    rated_torque_mnm : int
+        object 0x6076, at the motor shaft [mNm]
+    gear_ratio : float
+        motor turns per joint turn
+    """
+
+    counts_per_radian: float
+    rated_torque_mnm: int
+    gear_ratio: float
+
+    @property
+    def torque_per_permille(self) -> float:
+        """Joint torque of one part in thousand of the rated torque [Nm or N]."""
+        return self.rated_torque_mnm / 1e6 * self.gear_ratio

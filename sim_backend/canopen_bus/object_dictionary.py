@@ -1,0 +1,175 @@
+"""The object dictionary of an emulated drive: entries with a size, a value and who may write them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+
+class Abort(IntEnum):
+    """Abort codes of service data transfers, CiA 301."""
+
+    UNKNOWN_COMMAND = 0x05040001
+    WRITE_ONLY = 0x06010001
+    READ_ONLY = 0x06010002
+    NO_OBJECT = 0x06020000
+    WRONG_LENGTH = 0x06070010
+    NO_SUBINDEX = 0x06090011
+    VALUE_RANGE = 0x06090030
+    DEVICE_STATE = 0x08000022
+
+
+class AbortError(Exception):
+    """A transfer is refused.
+
+    Parameters
+    ----------
+    code : Abort
+        why
+    """
+
+    def __init__(self, code: Abort) -> None:
+        super().__init__(code.name)
+        self.code = code
+
+
+WriteHook = Callable[[int], None]
+"""Called with a new value before it is kept; raises `AbortError` where the drive does not take it."""
+
+
+@dataclass
+class Entry:
+    """One entry.
+
+    bytes : int
+        its size
+    value : int
+        its present value
+    signed : bool
+        whether it is an INTEGER
+    writable : bool
+        whether a master may write it
+    hook : callable or None
+        called before a master's value is kept
+    """
+
+    bytes: int
+    value: int = 0
+    signed: bool = False
+    writable: bool = True
+    hook: WriteHook | None = None
+
+
+@dataclass
+class ObjectDictionary:
+    """All entries, by index and subindex.
+
+    entries : dict
+        of (index, subindex) to Entry
+    """
+
+    entries: dict[tuple[int, int], Entry] = field(default_factory=dict)
+
+    def add(
+        self,
+        index: int,
+        subindex: int,
+        size: int,
+        value: int = 0,
+        *,
+        signed: bool = False,
+        writable: bool = True,
+        hook: WriteHook | None = None,
+    ) -> None:
+        """Add an entry.
+
+        Parameters
+        ----------
+        index, subindex : int
+            its place
+        size : int
+            1, 2 or 4 [bytes]
+        value : int
+            at power-up
+        signed : bool
+            whether it is an INTEGER
+        writable : bool
+            whether a master may write it
+        hook : callable or None
+            called before a master's value is kept
+        """
+        self.entries[index, subindex] = Entry(size, value, signed, writable, hook)
+
+    def get(self, index: int, subindex: int = 0) -> int:
+        """Value of an entry.
+
+        Parameters
+        ----------
+        index, subindex : int
+            its place
+        """
+        return self._entry(index, subindex).value
+
+    def put(self, index: int, value: int, subindex: int = 0) -> None:
+        """Set an entry from within the drive, whoever may write it.
+
+        Parameters
+        ----------
+        index : int
+            its place
+        value : int
+            kept within the entry's size
+        subindex : int
+            its place
+        """
+        entry = self._entry(index, subindex)
+        bits = 8 * entry.bytes
+        low, high = (-(1 << bits - 1), (1 << bits - 1) - 1) if entry.signed else (0, (1 << bits) - 1)
+        entry.value = min(max(value, low), high)
+
+    def read(self, index: int, subindex: int) -> bytes:
+        """Value of an entry as a master gets it, little end first.
+
+        Parameters
+        ----------
+        index, subindex : int
+            its place
+
+        Raises
+        ------
+        AbortError
+            there is no such entry
+        """
+        entry = self._entry(index, subindex)
+        return entry.value.to_bytes(entry.bytes, "little", signed=entry.signed)
+
+    def write(self, index: int, subindex: int, data: bytes) -> None:
+        """A master's write.
+
+        Parameters
+        ----------
+        index, subindex : int
+            its place
+        data : bytes
+            little end first
+
+        Raises
+        ------
+        AbortError
+            there is no such entry, it is not writable, the length is wrong, or the drive refuses the value
+        """
+        entry = self._entry(index, subindex)
+        if not entry.writable:
+            raise AbortError(Abort.READ_ONLY)
+        if len(data) != entry.bytes:
+            raise AbortError(Abort.WRONG_LENGTH)
+        value = int.from_bytes(data, "little", signed=entry.signed)
+        if entry.hook is not None:
+            entry.hook(value)
+        entry.value = value
+
+    def _entry(self, index: int, subindex: int) -> Entry:
+        entry = self.entries.get((index, subindex))
+        if entry is None:
+            known = any(place[0] == index for place in self.entries)
+            raise AbortError(Abort.NO_SUBINDEX if known else Abort.NO_OBJECT)
+        return entry

@@ -1,0 +1,153 @@
+"""The CANopen driver against emulated drives, frame by frame, in this process."""
+
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from drivers import ArmState, ControlMode, DriveLimits, DriverError, Setpoint, StopPolicy
+from drivers.canopen.driver import CanopenArm
+from drivers.errors import DriverErrorKind
+from emulated_can_bus import GEAR, RATED_TORQUE_MNM, START, EmulatedBus
+from sim_backend.canopen_bus.axis import AxisMode
+from sim_backend.canopen_bus.power_state import PowerState
+
+WATCHDOG_S = 0.1
+COUNT = 2.0 * np.pi / 65536 / GEAR
+FREE = np.full(3, np.inf)
+LIMITS = DriveLimits(-FREE, FREE, FREE, np.full(3, 20.0))
+
+
+@pytest.fixture
+def bus() -> Iterator[EmulatedBus]:
+    with EmulatedBus() as emulated:
+        yield emulated
+
+
+@pytest.fixture
+def arm(bus: EmulatedBus) -> Iterator[CanopenArm]:
+    driver = CanopenArm(bus.joints())
+    driver.connect()
+    yield driver
+    driver.disconnect()
+
+
+def enabled(arm: CanopenArm, mode: ControlMode = ControlMode.POSITION) -> ArmState:
+    return arm.enable(mode, LIMITS, StopPolicy.HOLD, WATCHDOG_S)
+
+
+def eventually(is_so: Callable[[], bool], within_s: float = 5.0) -> bool:
+    deadline = time.monotonic() + within_s
+    while not is_so() and time.monotonic() < deadline:
+        time.sleep(0.002)
+    return is_so()
+
+
+def states(bus: EmulatedBus) -> list[PowerState]:
+    return [drive.power.state for drive in bus.drives]
+
+
+def test_connecting_reads_the_arm_and_moves_nothing(bus: EmulatedBus, arm: CanopenArm) -> None:
+    state = arm.connect()
+    np.testing.assert_allclose(state.position, START, atol=COUNT)
+    # 1.5 Nm are 60 per mille of 0.5 Nm behind the gear of 50
+    np.testing.assert_allclose(state.effort, 1.5, atol=0.5 * RATED_TORQUE_MNM / 1e6 * GEAR)
+    assert not state.enabled.any()
+    assert bus.furthest == [0.0, 0.0, 0.0]
+
+
+def test_enabling_never_moves_the_arm_whatever_target_is_left_over(bus: EmulatedBus, arm: CanopenArm) -> None:
+    assert all(drive.dictionary.get(0x607A) == 0x100000 for drive in bus.drives)
+    state = enabled(arm)
+    assert state.enabled.all()
+    assert max(bus.furthest) <= COUNT
+
+
+def test_targets_are_followed_and_read_at_one_instant(bus: EmulatedBus, arm: CanopenArm) -> None:
+    state = enabled(arm)
+    for step in range(50):
+        arm.clock.wait_until_ns(state.time_ns + 5_000_000)
+        wanted = np.array(START) + 0.002 * step
+        state = arm.exchange(Setpoint(wanted, np.zeros(3)))
+        assert state.fresh.all()
+    assert np.abs(state.position - wanted).max() <= 0.002 + COUNT
+
+
+def test_torque_mode_takes_torque_within_the_cap(bus: EmulatedBus, arm: CanopenArm) -> None:
+    enabled(arm, ControlMode.TORQUE)
+    arm.exchange(Setpoint(np.zeros(3), np.array([5.0, -5.0, 30.0])))
+    arm.exchange(Setpoint(np.zeros(3), np.array([5.0, -5.0, 30.0])))
+    demands = [drive.demand() for drive in bus.drives]
+    assert all(demand.mode is AxisMode.TORQUE for demand in demands)
+    np.testing.assert_allclose([demand.torque for demand in demands], [5.0, -5.0, 20.0], atol=0.0126)
+
+
+def test_a_target_that_is_no_number_is_refused_and_nothing_is_sent(bus: EmulatedBus, arm: CanopenArm) -> None:
+    enabled(arm)
+    seen: list[int] = []
+    bus.swallows = lambda message: seen.append(message.arbitration_id) or False
+    with pytest.raises(DriverError, match="nothing was sent") as refusal:
+        arm.exchange(Setpoint(np.array([0.0, np.nan, 0.0]), np.zeros(3)))
+    assert refusal.value.kind is DriverErrorKind.REFUSED
+    assert not any(0x200 <= identifier < 0x300 for identifier in seen)
+
+
+def test_a_silent_host_lets_the_drives_hold_by_themselves(bus: EmulatedBus, arm: CanopenArm) -> None:
+    enabled(arm)
+    assert eventually(lambda: all(state is PowerState.QUICK_STOP_ACTIVE for state in states(bus)))
+    state = arm.exchange(Setpoint(np.zeros(3), np.zeros(3)))
+    assert np.isnan(state.position).all()
+    assert {fault.code for fault in state.faults} == {"watchdog"}
+    with pytest.raises(DriverError, match="acknowledge it first"):
+        enabled(arm)
+    arm.acknowledge_faults()
+    assert all(state is PowerState.QUICK_STOP_ACTIVE for state in states(bus)), "an arm that holds must not be dropped"
+    assert enabled(arm).enabled.all()
+
+
+def test_a_fault_is_told_and_reset_only_on_the_operators_word(bus: EmulatedBus, arm: CanopenArm) -> None:
+    enabled(arm)
+    bus.drives[1].fail(0x4310)
+    assert eventually(lambda: _faults(arm) == [("over-temperature", 2)])
+    arm.stop(StopPolicy.HOLD)
+    assert bus.drives[1].power.state is PowerState.FAULT
+    with pytest.raises(DriverError, match="drive too hot"):
+        enabled(arm)
+    arm.acknowledge_faults()
+    assert enabled(arm).enabled.all()
+
+
+def test_a_drive_that_does_not_answer_leaves_nan_and_nothing_old(bus: EmulatedBus, arm: CanopenArm) -> None:
+    enabled(arm)
+    silent = bus.drives[2].process_data
+    silent.synchronise = list
+    state = arm.exchange(Setpoint(np.array(START), np.zeros(3)))
+    assert state.fresh.tolist() == [True, True, False]
+    assert np.isnan(state.effort[2])
+
+
+def test_a_stop_holds_and_needs_no_cycles_any_more(bus: EmulatedBus, arm: CanopenArm) -> None:
+    enabled(arm)
+    arm.stop(StopPolicy.HOLD)
+    arm.stop(StopPolicy.HOLD)
+    assert all(state is PowerState.QUICK_STOP_ACTIVE for state in states(bus))
+    assert not eventually(lambda: any(drive.dictionary.get(0x603F) for drive in bus.drives), within_s=3 * WATCHDOG_S)
+
+
+def test_letting_go_takes_the_voltage_away(bus: EmulatedBus, arm: CanopenArm) -> None:
+    enabled(arm)
+    arm.stop(StopPolicy.TORQUE_OFF)
+    assert all(state is PowerState.SWITCH_ON_DISABLED for state in states(bus))
+
+
+def test_a_missing_node_is_named(bus: EmulatedBus) -> None:
+    bus.swallows = lambda message: message.arbitration_id == 0x602
+    with pytest.raises(DriverError, match="node 2: Device type") as refusal:
+        CanopenArm(bus.joints()).connect()
+    assert refusal.value.kind is DriverErrorKind.CANNOT_CONNECT
+
+
+def _faults(arm: CanopenArm) -> list[tuple[str, int | None]]:
+    state = arm.exchange(Setpoint(np.array(START), np.zeros(3)))
+    return [(fault.code, fault.joint) for fault in state.faults]

@@ -1,0 +1,66 @@
+"""Emulated drives on python-can's virtual bus, each moving a joint that follows its target at once."""
+
+import math
+import threading
+import time
+from collections.abc import Callable
+from uuid import uuid4
+
+import can
+
+from drivers.canopen.configuration import DriveJoint
+from sim_backend.canopen_bus.axis import AxisMeasurement, AxisMode, AxisScale
+from sim_backend.canopen_bus.drive import EmulatedDrive
+
+GEAR = 50.0
+COUNTS_PER_TURN = 65536
+RATED_TORQUE_MNM = 500
+START = (0.3, -0.2, 0.1)
+
+
+class EmulatedBus:
+    """Drives in a thread of their own, on a bus of this process."""
+
+    def __init__(self) -> None:
+        self.channel = uuid4().hex
+        scale = AxisScale(COUNTS_PER_TURN * GEAR / (2.0 * math.pi), RATED_TORQUE_MNM, GEAR)
+        self.drives = [EmulatedDrive(number, scale) for number in (1, 2, 3)]
+        self.position = list(START)
+        self.furthest = [0.0] * 3
+        self.swallows: Callable[[can.Message], bool] = lambda _: False
+        self._ends = threading.Event()
+        self._bus = can.Bus(interface="virtual", channel=self.channel)
+        self._thread = threading.Thread(target=self._serve)
+
+    def __enter__(self) -> "EmulatedBus":
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ends.set()
+        self._thread.join()
+        self._bus.shutdown()
+
+    def joints(self) -> list[DriveJoint]:
+        bus = {"interface": "virtual", "channel": self.channel}
+        drives = [{"node_id": number, "counts_per_turn": COUNTS_PER_TURN} for number in (1, 2, 3)]
+        return [DriveJoint(f"joint{n}", GEAR, drive | (bus if n == 1 else {})) for n, drive in enumerate(drives, 1)]
+
+    def _serve(self) -> None:
+        while not self._ends.is_set():
+            message = self._bus.recv(0.001)
+            now = time.monotonic()
+            for index, drive in enumerate(self.drives):
+                self._move(index, drive)
+                answers = drive.tick(now)
+                if message is not None and not self.swallows(message):
+                    answers += drive.receive((message.arbitration_id, bytes(message.data)), now)
+                for identifier, data in answers:
+                    self._bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
+
+    def _move(self, index: int, drive: EmulatedDrive) -> None:
+        demand = drive.demand()
+        if demand.mode is AxisMode.POSITION:
+            self.position[index] = demand.position
+        self.furthest[index] = max(self.furthest[index], abs(self.position[index] - START[index]))
+        drive.measure(AxisMeasurement(self.position[index], 0.0, 1.5))
