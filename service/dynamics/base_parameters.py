@@ -90,6 +90,16 @@ class BaseParameters:
         """
         return not np.any(self.combination[index])
 
+    def outward(self, joint: int) -> slice:
+        """Base parameters of the links that a joint moves: from its own link's first one to the last of all.
+
+        Parameters
+        ----------
+        joint : int
+            joint index, from 0
+        """
+        return slice(int(np.searchsorted(self.independent_columns, len(STANDARD_PARAMETERS) * joint)), None)
+
     def project(self, parameters: Array) -> Array:
         """Values of the base parameters, Θ* = Θ_L + B Θ_K, equation (14).
 

@@ -5,6 +5,7 @@ errors that ignore this are too small. An order that is fixed instead of chosen 
 """
 
 from dataclasses import dataclass
+from math import log
 
 import numpy as np
 from numpy.typing import NDArray
@@ -130,7 +131,7 @@ class AutocovarianceSum:
 
     def model(self) -> Autoregression:
         """The autoregressive model of smallest BIC = N log σ_ε² + p log N, by Levinson's recursion."""
-        count = self._sums.counts[0]
+        count = float(self._sums.counts[0])
         if count < 2 or self._sums.products[0] <= 0.0:
             return Autoregression(np.empty(0), 0.0, 0.0)
         # The mean over the pairs at hand, shrunk as if divided by N at every lag: the sequence stays positive definite.
@@ -139,16 +140,18 @@ class AutocovarianceSum:
         present = count / self._sums.spans[0]
         unbroken = LARGEST_ORDER if present == 1.0 else np.log(UNBROKEN_SHARE) / np.log(present)
         largest = int(min(LARGEST_ORDER, len(covariance) - 1, count // 10, unbroken))
-        best = (np.empty(0), covariance[0])
-        best_score = count * np.log(covariance[0])
-        coefficients, variance = np.empty(0), covariance[0]
+        variance = float(covariance[0])
+        best, best_score = (np.empty(0), variance), count * log(variance)
+        coefficients = np.zeros(largest)
         for order in range(1, largest + 1):
-            reflection = (covariance[order] - coefficients @ covariance[order - 1 : 0 : -1]) / variance
-            coefficients = np.append(coefficients - reflection * coefficients[::-1], reflection)
+            before = coefficients[: order - 1]
+            reflection = float(covariance[order] - before @ covariance[order - 1 : 0 : -1]) / variance
+            before -= reflection * before[::-1]
+            coefficients[order - 1] = reflection
             variance *= 1.0 - reflection**2
             if variance <= 0.0:
                 break
-            score = count * np.log(variance) + order * np.log(count)
+            score = count * log(variance) + order * log(count)
             if score < best_score:
-                best, best_score = (coefficients.copy(), variance), score
-        return Autoregression(best[0], float(best[1]), float(covariance[0]))
+                best, best_score = (coefficients[:order].copy(), variance), score
+        return Autoregression(*best, variance=float(covariance[0]))

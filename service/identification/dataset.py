@@ -6,8 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from service.dynamics.base_parameters import BaseParameters
-from service.dynamics.regressor import torque_regressor
-from service.identification.preconditions import moving_joints
+from service.dynamics.regressor import TorqueRegressor
 from service.identification.structure import ModelStructure
 from service.recording.conditioning import Conditioner, Mask, Motion
 from service.recording.recording import Array
@@ -23,9 +22,9 @@ class PreparedMotion:
 
     motion : Motion
         the conditioned motion
-    rigid : (n, m, N) float64
-        base regressor L at the recorded rate
-    reduced_rigid : (n, m, M) float64
+    rigid : tuple of (m_j, N) float64, length n
+        base regressor L at the recorded rate: of each joint's row the columns of the links that it moves
+    reduced_rigid : tuple of (m_j, M) float64, length n
         the same in the common band, decimated
     reduced_torque : (n, M) float64
         measured torque in the common band, mean of the repetitions
@@ -36,8 +35,8 @@ class PreparedMotion:
     """
 
     motion: Motion
-    rigid: Array
-    reduced_rigid: Array
+    rigid: tuple[Array, ...]
+    reduced_rigid: tuple[Array, ...]
     reduced_torque: Array
     used: Mask
     recording: int
@@ -46,6 +45,11 @@ class PreparedMotion:
     def row_weight(self) -> float:
         """√P: a mean of P repetitions has 1/P of the noise variance."""
         return float(np.sqrt(self.motion.repetitions))
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of the columns [bytes]."""
+        return sum(columns.nbytes for columns in (*self.rigid, *self.reduced_rigid))
 
     def joint_columns(self, structure: ModelStructure, joint: int) -> Array:
         """All columns of a joint's equation in the common band, (p_j, M).
@@ -57,10 +61,21 @@ class PreparedMotion:
         joint : int
             joint index, from 0
         """
+        return np.concatenate(self.joint_column_groups(structure, joint))
+
+    def joint_column_groups(self, structure: ModelStructure, joint: int) -> tuple[Array, Array]:
+        """The same columns without a copy: those of the links that the joint moves, and its own terms.
+
+        Parameters
+        ----------
+        structure : ModelStructure
+            the model's columns
+        joint : int
+            joint index, from 0
+        """
         motion = self.motion
         own = structure.joint_term_columns(joint, motion.velocity[:, joint], motion.acceleration[:, joint])
-        outward = self.reduced_rigid[joint, structure.outward_columns(joint)]
-        return np.concatenate([outward, motion.band.reduce(own)])
+        return self.reduced_rigid[joint], motion.band.reduce(own)
 
     def predicted_torque(self, structure: ModelStructure, candidates: Array) -> Array:
         """Model torque at the recorded rate, before any filter, of several parameter sets at once.
@@ -82,10 +97,9 @@ class PreparedMotion:
         torque = np.empty((len(candidates), count, samples))
         for joint in range(count):
             own = structure.joint_term_columns(joint, motion.velocity[:, joint], motion.acceleration[:, joint])
-            outward = structure.outward_columns(joint)
-            columns = structure.joint_columns(joint)
-            rigid = candidates[:, columns[: len(outward)]] @ self.rigid[joint, outward]
-            torque[:, joint] = rigid + candidates[:, columns[len(outward) :]] @ own
+            outward, others = np.split(structure.joint_columns(joint), [len(self.rigid[joint])])
+            torque[:, joint] = candidates[:, outward] @ self.rigid[joint]
+            torque[:, joint] += candidates[:, others] @ own
         return torque
 
 
@@ -118,7 +132,7 @@ class Dataset:
         kept: list[PreparedMotion] = []
         size = 0
         for prepared in self._prepare():
-            size += prepared.rigid.nbytes + prepared.reduced_rigid.nbytes
+            size += prepared.nbytes
             self._too_large = self._too_large or size > MEMORY_LIMIT
             if self._too_large:
                 kept.clear()
@@ -130,20 +144,18 @@ class Dataset:
 
     def _prepare(self) -> Iterator[PreparedMotion]:
         """Condition, evaluate the regressor, and reduce."""
-        columns = np.asarray(self.base.independent_columns)
+        regressor = TorqueRegressor(self.robot, columns=self.base.independent_columns)
         for index, conditioner in enumerate(self.conditioners):
-            moving = moving_joints(conditioner)
             for measured in conditioner.motions(self.cutoff_hz):
-                motion = _without_jitter(measured, moving)
-                regressor = torque_regressor(
-                    self.robot, motion.position, motion.velocity, motion.acceleration, columns=columns
-                )
-                rigid = np.moveaxis(regressor, 0, -1)
+                motion = _without_jitter(measured, conditioner.moving)
+                whole = np.empty((self.robot.joint_count, regressor.column_count, len(motion.position)))
+                regressor.write_shares(motion.position, motion.velocity, motion.acceleration, whole)
+                rigid = tuple(row[self.base.outward(joint)] for joint, row in enumerate(whole))
                 reduce = motion.band.reduce
                 yield PreparedMotion(
                     motion,
                     rigid,
-                    reduce(rigid),
+                    tuple(reduce(columns) for columns in rigid),
                     reduce(np.ascontiguousarray(motion.mean_torque.T)),
                     motion.band.reduce_mask(np.asarray(motion.measured.any(axis=0)).T),
                     index,

@@ -228,7 +228,7 @@ def _steps(grid: _JointGrid, shape: FrictionShape) -> list[int]:
     """Grid indices that K_v may take; the stated one where the robot file states it."""
     if shape.k_v is not None:
         return [GRID_POINTS]
-    least = LEAST_STEP / 10 ** GRID_DECADES[0] * grid.slopes[0]
+    least = (1.0 - 1e-9) * LEAST_STEP / 10 ** GRID_DECADES[0] * grid.slopes[0]  # a grid point: not left to rounding
     return [k for k in range(GRID_POINTS) if grid.slopes[k] >= least]
 
 

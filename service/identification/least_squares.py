@@ -5,11 +5,13 @@ as the normal equations without squaring the condition number. Weights scale R_j
 between them need one pass over the data.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import lapack, solve_triangular
 
 from service.errors import IdentificationError
 from service.identification.dataset import PreparedMotion
@@ -19,9 +21,15 @@ from service.recording.recording import Array
 RANK_TOLERANCE = 1e-9
 """Singular values of the column-scaled factor below this share of the largest are directions without information."""
 
+WELL_CONDITIONED = 1e-6
+"""Reciprocal condition (1-norm) of a factor above which no direction can lack information: the ratio of the singular
+values is at least that over the number of columns."""
+
 ROWS_AT_ONCE = 1 << 10
-"""Rows factorised at once: such a block stays in the processor's cache, which halves the time of one tall
-factorisation."""
+"""Rows factorised at once: such a block stays in the processor's cache."""
+
+PANEL = 8
+"""Columns that are eliminated before the rest is updated by one matrix product."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,10 +48,17 @@ class JointFactor:
     triangle: Array
     rows: int
 
-    @property
+    @cached_property
     def least_squared_residual(self) -> float:
-        """‖A_j Θ_j - y_j‖² where the joint's equations are solved alone: the last entry of R_j, squared."""
-        return float(self.triangle[-1, -1] ** 2)
+        """‖A_j Θ_j - y_j‖² where the joint's equations are solved alone: the last entry of R_j, squared.
+
+        Where columns are zero or combinations but for rounding, rounding would decide over that entry.
+        """
+        columns, target = self.triangle[:, :-1], self.triangle[:, -1]
+        if _is_well_conditioned(columns[:-1]):
+            return float(target[-1] ** 2)
+        solution = np.linalg.lstsq(columns, target, rcond=RANK_TOLERANCE)[0]
+        return float(np.sum((columns @ solution - target) ** 2))
 
     def squared_residual(self, parameters: Array) -> float:
         """‖A_j Θ - y_j‖².
@@ -102,27 +117,22 @@ def factorise(motions: Iterable[PreparedMotion], structure: ModelStructure) -> t
     """
     joints = range(structure.robot.joint_count)
     columns = [structure.joint_columns(joint) for joint in joints]
-    triangles: list[Array | None] = [None] * len(columns)
+    triangles = [np.zeros((len(own) + 1, len(own) + 1), order="F") for own in columns]
     rows = [0] * len(columns)
     for prepared in motions:
         for joint in joints:
-            used = prepared.used[joint]
-            equations = np.vstack([prepared.joint_columns(structure, joint), prepared.reduced_torque[None, joint]])
-            if not used.all():
-                equations = equations[:, used]
-            equations *= prepared.row_weight
-            rows[joint] += equations.shape[1]
-            triangles[joint] = _appended(triangles[joint], equations)
+            equations = *prepared.joint_column_groups(structure, joint), prepared.reduced_torque[None, joint]
+            _append(triangles[joint], equations, prepared.used[joint], prepared.row_weight)
+            rows[joint] += int(prepared.used[joint].sum())
     factors = []
     for joint in joints:
-        triangle = triangles[joint]
-        if triangle is None or rows[joint] <= len(columns[joint]):
+        if rows[joint] <= len(columns[joint]):
             name = structure.robot.joints[joint].name
             raise IdentificationError(
                 f"{name}: {rows[joint]} usable samples for {len(columns[joint])} parameters: record longer, or ask for"
                 " a higher cut-off"
             )
-        factors.append(JointFactor(columns[joint], triangle, rows[joint]))
+        factors.append(JointFactor(columns[joint], triangles[joint], rows[joint]))
     return tuple(factors)
 
 
@@ -206,33 +216,43 @@ def condition_number(factors: tuple[JointFactor, ...], size: int) -> float:
     return float(singular[0] / max(singular[-1], singular[0] * np.finfo(float).eps, np.finfo(float).tiny))
 
 
-def _appended(triangle: Array | None, equations: Array) -> Array:
-    """The factor of the rows so far and of new ones, (p + 1, M) with time last."""
-    pieces = [] if triangle is None else [triangle]
-    for start in range(0, equations.shape[1], ROWS_AT_ONCE):
-        pieces.append(_upper(equations[:, start : start + ROWS_AT_ONCE].T))
-    return _triangle(np.vstack(pieces)) if pieces else np.zeros((len(equations), len(equations)))
+def _append(triangle: Array, equations: Sequence[Array], used: NDArray[np.bool_], weight: float) -> None:
+    """Replace R, in place, by that of the rows so far and of new ones: groups of columns (k, M) with time last."""
+    whole = bool(used.all())
+    for start in range(0, len(used), ROWS_AT_ONCE):
+        rows = slice(start, start + ROWS_AT_ONCE)
+        block = np.concatenate([columns[:, rows] for columns in equations])
+        if not whole:
+            block = block[:, used[rows]]
+        if block.size:
+            block *= weight
+            panel = min(PANEL, len(triangle))
+            triangle[:], *_ = lapack.dtpqrt(0, panel, triangle, block.T, overwrite_a=True, overwrite_b=True)
 
 
 def _triangle(matrix: Array) -> Array:
     """R of the QR factorisation, square, with rows of zeros where there are fewer rows than columns."""
-    upper = _upper(matrix)
+    upper = np.asarray(np.linalg.qr(matrix, mode="r"))
     columns = matrix.shape[1]
     if len(upper) == columns:
         return upper
     return np.vstack([upper, np.zeros((columns - len(upper), columns))])
 
 
-def _upper(matrix: Array) -> Array:
-    """R of the QR factorisation."""
-    return np.asarray(np.linalg.qr(matrix, mode="r"))
+def _is_well_conditioned(triangle: Array) -> bool:
+    """Whether every direction holds information beyond doubt; costs a fraction of singular values."""
+    return bool(lapack.dtrcon(triangle)[0] > WELL_CONDITIONED)
 
 
 def _solved(factor: Array, target: Array) -> Solution:
     """Minimum-norm solution in scaled columns."""
     scale = np.linalg.norm(factor, axis=0)
     scale[scale == 0.0] = 1.0
-    left, singular, right = np.linalg.svd(factor / scale)
+    scaled = factor / scale
+    if _is_well_conditioned(scaled):
+        inverse = solve_triangular(scaled, np.eye(len(scale))) / scale[:, None]
+        return Solution(inverse @ target, factor, target, inverse, np.zeros(len(scale), dtype=bool))
+    left, singular, right = np.linalg.svd(scaled)
     known = singular > RANK_TOLERANCE * max(singular[0], np.finfo(float).tiny)
     spread = right[known].T / singular[known] / scale[:, None]
     undetermined = np.any(np.abs(right[~known]) > 1e-3, axis=0)

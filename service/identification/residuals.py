@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from service.identification.autocorrelation import AutocovarianceSum, Autoregression, LaggedProducts
 from service.identification.dataset import PreparedMotion
@@ -45,7 +46,8 @@ class ResidualStatistics:
     period_noise_std : (n,) float64 or None
         standard deviation of the torque noise from what differs between periods; None without enough periods
     raw_lags, band_lags : tuple of AutocovarianceSum, length n
-        autocovariances of the residual at the recorded rate, and in the common band
+        autocovariances of the residual at the recorded rate, and in the common band; one where nothing was filtered or
+        averaged
     unfiltered : bool
         whether the common band is the whole spectrum
     """
@@ -76,7 +78,7 @@ class ResidualStatistics:
         tell it best; unless the mean has clearly more power at low frequency, which is then what the model lacks.
         """
         means = tuple(lags.model() for lags in self.band_lags)
-        if not self.unfiltered:
+        if not self.unfiltered or self.raw_lags is self.band_lags:
             return means
         singles = (lags.model() for lags in self.raw_lags)
         return tuple(
@@ -126,34 +128,43 @@ class _Sums:
         self._band_squares, self._band_count = zeros.copy(), zeros.copy()
         self._torque_squares = zeros.copy()
         self._period_squares, self._period_count = zeros.copy(), zeros.copy()
-        self._raw_lags = [AutocovarianceSum() for _ in range(joint_count)]
-        self._band_lags = [AutocovarianceSum() for _ in range(joint_count)]
-        self._unfiltered = True
+        self._raw_lags = tuple(AutocovarianceSum() for _ in range(joint_count))
+        self._band_lags = tuple(AutocovarianceSum() for _ in range(joint_count))
+        self._unfiltered, self._unaveraged = True, True
 
     def add(self, prepared: PreparedMotion, predicted: Array) -> None:
         """Add one piece of motion with its predicted torque (n, N)."""
         motion = prepared.motion
-        residual = motion.torque - predicted.T
         self._unfiltered = self._unfiltered and isinstance(motion.band, AllPass)
-        own = (slice(None), motion.own)  # windows of a long recording overlap: each sample counts once
-        measured = motion.measured[own]
-        kept = np.where(measured, residual[own], 0.0)
-        self._raw_squares += np.einsum("pij,pij->j", kept, kept)
-        self._raw_count += measured.sum(axis=(0, 1))
-        self._add_periods(prepared, residual)
+        self._unaveraged = self._unaveraged and motion.repetitions == 1
         band = prepared.reduced_torque - motion.band.reduce(predicted)
-        for joint, (row, used) in enumerate(zip(band, prepared.used, strict=True)):
-            self._band_squares[joint] += motion.repetitions * np.sum(row[used] ** 2)
-            self._torque_squares[joint] += motion.repetitions * np.sum(prepared.reduced_torque[joint, used] ** 2)
-            self._band_count[joint] += motion.repetitions * used.sum()
-            lagged = LaggedProducts.of(row * prepared.row_weight, used)
-            self._band_lags[joint].add(lagged)
-            if isinstance(motion.band, AllPass) and motion.repetitions == 1:
-                self._raw_lags[joint].add(lagged)  # nothing was filtered: the same series
-                continue
-            for repetition in range(motion.repetitions):
-                series = residual[own][repetition, :, joint]
-                self._raw_lags[joint].add(LaggedProducts.of(series, measured[repetition, :, joint]))
+        lagged = [
+            LaggedProducts.of(row * prepared.row_weight, used) for row, used in zip(band, prepared.used, strict=True)
+        ]
+        for total, products in zip(self._band_lags, lagged, strict=True):
+            total.add(products)
+        self._band_squares += motion.repetitions * _squares(band, prepared.used)
+        self._torque_squares += motion.repetitions * _squares(prepared.reduced_torque, prepared.used)
+        self._band_count += motion.repetitions * prepared.used.sum(axis=1)
+        self._add_raw(prepared, predicted, lagged)
+
+    def _add_raw(self, prepared: PreparedMotion, predicted: Array, lagged: Sequence[LaggedProducts]) -> None:
+        """Add the residual at the recorded rate; `lagged` is that of the common band."""
+        motion = prepared.motion
+        torque, measured = (np.ascontiguousarray(values.swapaxes(1, 2)) for values in (motion.torque, motion.measured))
+        residual = torque - predicted
+        self._add_periods(prepared, residual.swapaxes(1, 2))
+        residual, measured = residual[..., motion.own], measured[..., motion.own]  # windows overlap: count samples once
+        for repetition, known in zip(residual, measured, strict=True):
+            self._raw_squares += _squares(repetition, known)
+            self._raw_count += known.sum(axis=1)
+        if isinstance(motion.band, AllPass) and motion.repetitions == 1:  # nothing was filtered: the same series
+            for total, products in zip(self._raw_lags, lagged, strict=True):
+                total.add(products)
+            return
+        for repetition, known in zip(residual, measured, strict=True):
+            for total, row, used in zip(self._raw_lags, repetition, known, strict=True):
+                total.add(LaggedProducts.of(row, used))
 
     def statistics(self) -> ResidualStatistics:
         """The sums, turned into what they stand for."""
@@ -162,7 +173,8 @@ class _Sums:
         fit = Fit(np.sqrt(self._raw_squares / np.maximum(self._raw_count, 1)), band_rms, float(relative))
         by_periods = bool((self._period_count >= FEWEST_PERIOD_SAMPLES).all())
         noise = np.sqrt(self._period_squares / self._period_count) if by_periods else None
-        return ResidualStatistics(fit, noise, tuple(self._raw_lags), tuple(self._band_lags), self._unfiltered)
+        raw_lags = self._band_lags if self._unfiltered and self._unaveraged else self._raw_lags
+        return ResidualStatistics(fit, noise, raw_lags, self._band_lags, self._unfiltered)
 
     def _add_periods(self, prepared: PreparedMotion, residual: Array) -> None:
         """What differs between repetitions of the same motion is noise, whatever the model."""
@@ -180,3 +192,9 @@ class _Sums:
         deviation = np.where(measured, residual - mean, 0.0)
         self._period_squares += np.einsum("pij,pij->j", deviation, deviation)
         self._period_count += np.maximum(count - 1, 0).sum(axis=0)
+
+
+def _squares(residual: Array, used: NDArray[np.bool_]) -> Array:
+    """Σ e² of every joint, (n, M) each, over the samples that count."""
+    kept = residual if used.all() else np.where(used, residual, 0.0)
+    return np.einsum("jt,jt->j", kept, kept)

@@ -27,7 +27,7 @@ shows."""
 SMALLEST_SHARE = 0.02
 """…and explain this share of its joint's residual energy: less is more likely a stand-in for something else."""
 
-PROBE_STATES = 60
+PROBE_STATES = 30
 
 
 def separable_rotors(robot: Robot, base: BaseParameters, seed: int = 0) -> tuple[bool, ...]:

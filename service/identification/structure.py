@@ -15,8 +15,6 @@ from service.dynamics.friction import smooth_sign
 from service.recording.recording import Array
 from service.robot import Robot
 
-PARAMETERS_PER_LINK = 10
-
 
 @dataclass(frozen=True)
 class JointTerms:
@@ -109,7 +107,7 @@ class ModelStructure:
         joint : int
             joint index, from 0
         """
-        return np.flatnonzero(np.asarray(self.base.independent_columns) // PARAMETERS_PER_LINK >= joint)
+        return np.arange(self.base_count)[self.base.outward(joint)]
 
     def joint_term_columns(self, joint: int, velocity: Array, acceleration: Array) -> Array:
         """The joint's own columns along a motion.

@@ -6,6 +6,7 @@ and both round correctly, so they agree on every text that both take; what the q
 """
 
 import re
+import struct
 from collections.abc import Sequence
 
 import numpy as np
@@ -75,8 +76,9 @@ def _parse_numbers(text: bytes) -> Array | None:
     try:
         try:
             json = text.replace(b"nan", b"NaN") if b"n" in text else text
-            values = np.array(from_json(b"[" + json + b"]"), dtype=np.float64)
-        except ValueError:  # a plus sign, a bare point or an empty field is no JSON
+            numbers = from_json(b"[" + json + b"]")
+            values = np.frombuffer(struct.pack(f"{len(numbers)}d", *numbers))  # half the time of np.array
+        except (ValueError, struct.error):  # a plus sign, a bare point or an empty field is no JSON
             values = np.array([float(field) if field else np.nan for field in text.split(b",")])
     except (ValueError, OverflowError):
         return None

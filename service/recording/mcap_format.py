@@ -11,7 +11,7 @@ import zlib
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, Protocol
 
 import zstandard
 from mcap.data_stream import ReadDataStream
@@ -101,7 +101,7 @@ def add_mcap(path: Path, name: str, log: JointStateLog) -> None:
     RecordingError
         the file is truncated or damaged
     """
-    damage = _scan(path, log)
+    damage = scan_mcap(path, log)
     if damage is not None:
         samples = log.samples
         keeps = "`tauscope recording convert --recover` keeps them"
@@ -130,10 +130,51 @@ def recover_mcap(path: Path, choice: Choice) -> Salvage:
         nothing usable comes before the damage
     """
     log = JointStateLog(choice)
-    damage = _scan(path, log)
+    damage = scan_mcap(path, log)
     if damage is not None and log.samples < MINIMUM_ROWS:
         raise RecordingError(f"{choice.file}: {damage}; {_counted(log.samples)} before that point: nothing to keep")
     return Salvage(log.finish(), damage)
+
+
+class MessageSink(Protocol):
+    """Whoever wants the messages of an MCAP file."""
+
+    def handler(self, topic: str, type_name: str, encoding: str) -> MessageHandler | None:
+        """Whoever takes the messages of a topic, None where nobody does.
+
+        Parameters
+        ----------
+        topic : str
+            the topic's name
+        type_name : str
+            the message type, empty where the file names none
+        encoding : str
+            how its messages are encoded
+        """
+        ...
+
+
+def scan_mcap(path: Path, sink: MessageSink) -> str | None:
+    """Hand the messages of an MCAP file over, in the order of the file, up to its end or its first damage.
+
+    Parameters
+    ----------
+    path : Path
+        the file
+    sink : MessageSink
+        takes them
+
+    Returns
+    -------
+    str or None
+        why reading stopped before the file's end, None where it is whole
+    """
+    with path.open("rb") as file:
+        try:
+            _Scan(file, os.fstat(file.fileno()).st_size, sink).run()
+        except _DamageError as damage:
+            return str(damage)
+    return None
 
 
 class _DamageError(Exception):
@@ -145,21 +186,11 @@ def _counted(samples: int) -> str:
     return {0: "no sample", 1: "1 sample"}.get(samples, f"{samples} samples")
 
 
-def _scan(path: Path, log: JointStateLog) -> str | None:
-    """Feed a file's messages to the log; the reason where the file ends before its end."""
-    with path.open("rb") as file:
-        try:
-            _Scan(file, os.fstat(file.fileno()).st_size, log).run()
-        except _DamageError as damage:
-            return str(damage)
-    return None
-
-
 class _Scan:
     """One walk through an MCAP file."""
 
-    def __init__(self, file: BinaryIO, size: int, log: JointStateLog) -> None:
-        self._file, self._size, self._log = file, size, log
+    def __init__(self, file: BinaryIO, size: int, sink: MessageSink) -> None:
+        self._file, self._size, self._sink = file, size, sink
         self._checksum = 0
         self._schemas: dict[int, str] = {}
         self._handlers: dict[int, MessageHandler | None] = {}
@@ -230,7 +261,7 @@ class _Scan:
             channel = Channel.read(ReadDataStream(BytesIO(data[start:stop])))
             if channel.id not in self._handlers:
                 type_name = self._schemas.get(channel.schema_id, "")
-                self._handlers[channel.id] = self._log.handler(channel.topic, type_name, channel.message_encoding)
+                self._handlers[channel.id] = self._sink.handler(channel.topic, type_name, channel.message_encoding)
 
     def _read(self, length: int) -> bytes:
         data = self._file.read(length)

@@ -7,24 +7,10 @@ import numpy as np
 from mcap_ros2.writer import Writer
 
 from service.errors import RecordingError
+from service.recording.joint_state_encoding import JOINT_STATE_DEFINITION
 from service.recording.joint_state_log import JOINT_STATE_TYPES
 from service.recording.recording import Array, EffortKind, Recording
 
-_JOINT_STATE_DEFINITION = """\
-std_msgs/Header header
-string[] name
-float64[] position
-float64[] velocity
-float64[] effort
-================================================================================
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-================================================================================
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-"""
 _ROWS_WRITTEN_AT_ONCE = 8192
 _LATEST_STAMP_S = 2.0**31
 
@@ -61,7 +47,7 @@ def write_mcap(recording: Recording, file: BinaryIO, joint_names: Sequence[str] 
     has_velocity = all(f"qd{joint}" in recording.table.names for joint in range(1, n + 1))
     kept = ("t", "q", "tau", "qd") if has_velocity else ("t", "q", "tau")
     writer = Writer(file)
-    schema = writer.register_msgdef(JOINT_STATE_TYPES[0], _JOINT_STATE_DEFINITION)
+    schema = writer.register_msgdef(JOINT_STATE_TYPES[0], JOINT_STATE_DEFINITION)
     offset = min(float(recording.samples(0, 1).time[0]), 0.0)
     previous = -1
     for start in range(0, len(recording), _ROWS_WRITTEN_AT_ONCE):

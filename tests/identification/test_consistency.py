@@ -1,6 +1,7 @@
 """Physically consistent parameters: the conic program against an independent formulation, truths, and bad input."""
 
 import itertools
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from service.identification.consistency import (
     mass_inequalities,
     nearest_consistent_parameters,
     plausible_prior,
+    program,
     total_mass_inequalities,
 )
 from service.identification.consistency.triangle import UPPER_TRIANGLE, triangle_of_parameters
@@ -257,6 +259,39 @@ def test_contradicting_bounds_are_named():
     bounds = mass_inequalities(0, 3.0, None, 10, "forearm") + total_mass_inequalities(1, None, 2.0, 10)
     with pytest.raises(IdentificationError, match="together: mass of forearm ≥ 3 kg, mass of all links ≤ 2 kg; widen"):
         nearest_consistent_parameters(factor, target, plausible_prior(chain(1), factor, target), bounds)
+
+
+class PanicException(BaseException):
+    """What a panic of the solver looks like from Python."""
+
+
+@pytest.mark.parametrize("panics", [1, 100])
+def test_a_solver_that_breaks_down_is_asked_otherwise(panics: int, monkeypatch: pytest.MonkeyPatch):
+    truth = ellipsoid(np.random.default_rng(4)).to_vector()
+    truth[6] = -1.0
+    factor, target = information(np.random.default_rng(4), truth, rank=10, noise=0.0)
+    prior = plausible_prior(chain(1), factor, target)
+    expected = nearest_consistent_parameters(factor, target, prior)
+    left = iter(range(panics))
+    whole = program.clarabel.DefaultSolver
+
+    class Panicking:
+        def __init__(self, *arguments: Any) -> None:
+            self._solver = whole(*arguments)
+
+        def solve(self) -> object:
+            if next(left, None) is not None:
+                raise PanicException("Eigval error: Eigen(1)")
+            return self._solver.solve()
+
+    monkeypatch.setattr(program.clarabel, "DefaultSolver", Panicking)
+    if panics > 1:
+        with pytest.raises(IdentificationError, match="was not solved"):
+            nearest_consistent_parameters(factor, target, prior)
+        return
+    found = nearest_consistent_parameters(factor, target, prior)
+    assert found.objective == pytest.approx(expected.objective, rel=1e-6)
+    np.testing.assert_allclose(found.parameters, expected.parameters, rtol=1e-4, atol=1e-6)
 
 
 def test_information_that_is_not_finite_is_refused():

@@ -7,6 +7,7 @@ import pytest
 
 from identification.simulated import PAPER_NOISE, Array, SimulatedArm, paper_robot, simulate, standard_errors, z_scores
 from pinocchio_arm import pinocchio_regressor
+from service.dynamics import TorqueRegressor
 from service.errors import IdentificationError, RecordingMismatchError
 from service.identification import Estimator, Identification, Options, dataset, document, identify, least_squares
 from service.identification.dataset import Dataset, PreparedMotion
@@ -126,6 +127,21 @@ def test_restricted_factors_are_those_of_the_smaller_model(arm, recording, resul
     np.testing.assert_allclose(solution.parameters, expected, rtol=0, atol=1e-8)
 
 
+@pytest.mark.parametrize("deficiency", ["none", "combination", "zero but for rounding"])
+def test_a_joint_alone_leaves_what_its_equations_leave(deficiency: str) -> None:
+    """Columns that are none of their own explain nothing, though rounding leaves a direction of them."""
+    rng = np.random.default_rng(8)
+    matrix, target = rng.normal(size=(25, 6)), rng.normal(size=25)
+    expected = np.linalg.lstsq(matrix, target)[1][0]
+    if deficiency == "combination":
+        matrix = np.insert(matrix, 2, matrix[:, :3] @ [0.3, -0.7, 0.2], axis=1)
+    elif deficiency == "zero but for rounding":
+        matrix = np.insert(matrix, 2, 1e-17 * rng.normal(size=25), axis=1)
+    triangle = np.asarray(np.linalg.qr(np.column_stack([matrix, target]), mode="r"))
+    factor = JointFactor(np.arange(matrix.shape[1]), triangle, len(target))
+    assert factor.least_squared_residual == pytest.approx(expected, rel=1e-12)
+
+
 @pytest.mark.parametrize("rows_at_once", [1, 17, 400, 10**6])
 def test_the_size_of_blocks_changes_nothing(
     arm, recording, result, rows_at_once: int, monkeypatch: pytest.MonkeyPatch
@@ -160,13 +176,13 @@ def test_equations_that_do_not_fit_into_memory_are_made_again(
         arm.robot, joints=tuple(replace(joint, friction_shape=FrictionShape()) for joint in arm.robot.joints)
     )
     calls: list[int] = []
-    regressor = dataset.torque_regressor
+    write = TorqueRegressor.write_shares
 
-    def counted(*arguments, **options):
+    def counted(regressor: TorqueRegressor, *arguments) -> None:
         calls.append(1)
-        return regressor(*arguments, **options)
+        write(regressor, *arguments)
 
-    monkeypatch.setattr(dataset, "torque_regressor", counted)
+    monkeypatch.setattr(dataset.TorqueRegressor, "write_shares", counted)
     kept = identify(robot, recordings, recordings[:1], Options(cutoff_hz=cutoff_hz))
     kept_calls = len(calls)
     monkeypatch.setattr(dataset, "MEMORY_LIMIT", 1000)

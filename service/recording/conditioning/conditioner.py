@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -11,11 +12,17 @@ from service.recording.conditioning.motion import Motion, Trim, averaged_motion,
 from service.recording.conditioning.motion_source import MotionSource, choose_sources
 from service.recording.conditioning.period_runs import PeriodRun
 from service.recording.conditioning.periods import Periods, repeats, split_periods, with_turns_removed
-from service.recording.conditioning.position_noise import PositionNoise, encoder_step, lowest_limit, position_noise
+from service.recording.conditioning.position_noise import (
+    STANDING_STILL,
+    PositionNoise,
+    encoder_step,
+    lowest_limit,
+    position_noise,
+)
 from service.recording.conditioning.summary import ConditioningSummary
 from service.recording.conditioning.timing import Timing, find_stretches, row_at
-from service.recording.conditioning.uniform import Stretch, read_stretch, uniform_grid
-from service.recording.recording import Recording
+from service.recording.conditioning.uniform import Mask, Stretch, read_stretch, uniform_grid
+from service.recording.recording import Array, Recording, Samples
 from service.robot.robot import Robot
 
 WINDOW_ROWS = 1 << 15
@@ -29,6 +36,9 @@ LONGEST_PERIOD = 2 * WINDOW_ROWS
 
 AVERAGED_ROWS = 8 * WINDOW_ROWS
 """Rows that are averaged into one period at most, for the same reason."""
+
+SMALLEST_MOTION = 1e-5
+"""A joint moves where its range exceeds `STANDING_STILL` standard deviations of its noise, and this [rad or m]."""
 
 PERIOD_SPARE = 4
 """Rows read beyond the periods on either side, so that interpolation has neighbours."""
@@ -81,6 +91,28 @@ class Conditioner:
         noise = replace(noise, limit_hz=lowest_limit(source.limits_hz), joint_limits_hz=source.limits_hz)
         return Conditioner(recording, robot, timing, noise, source)
 
+    @property
+    def position_noise_std(self) -> Array:
+        """Standard deviation of the noise of each joint's position, (n,) [rad or m]."""
+        return np.sqrt(self.noise.density * self.timing.rate_hz / 2.0)
+
+    @cached_property
+    def moving(self) -> Mask:
+        """Joints that leave the noise of their own encoder at some time of the recording, (n,)."""
+        joints = self.robot.joint_count
+        lowest, highest = np.full(joints, np.inf), np.full(joints, -np.inf)
+        for samples in self.usable_samples():
+            position = np.ascontiguousarray(samples.position.T)
+            lowest = np.fmin(lowest, np.fmin.reduce(position, axis=1))
+            highest = np.fmax(highest, np.fmax.reduce(position, axis=1))
+        return highest - lowest > np.maximum(STANDING_STILL * self.position_noise_std, SMALLEST_MOTION)
+
+    def usable_samples(self) -> Iterator[Samples]:
+        """The rows of all stretches as they were recorded, piece by piece."""
+        for start, stop in self.timing.rows:
+            for first in range(start, stop, WINDOW_ROWS):
+                yield self.recording.samples(first, min(first + WINDOW_ROWS, stop))
+
     def motions(self, cutoff_hz: float | None) -> Iterator[Motion]:
         """The recording's motion, piece by piece, in one band.
 
@@ -120,14 +152,10 @@ class Conditioner:
             the band [Hz]; whether periods are averaged depends on it
         """
         missed, resampled = np.zeros(self.robot.joint_count, int), False
-        for start, stop in self.timing.rows:
-            for first in range(start, stop, WINDOW_ROWS):
-                samples = self.recording.samples(first, min(first + WINDOW_ROWS, stop))
-                missed += np.isnan(samples.effort).sum(axis=0)
-                time = samples.time[np.isfinite(samples.position).all(axis=1)]
-                resampled = resampled or bool(
-                    len(time) > 1 and uniform_grid(time - time[0], self.timing.rate_hz) is None
-                )
+        for samples in self.usable_samples():
+            missed += np.isnan(samples.effort, order="F").sum(axis=0)
+            time = samples.time[samples.complete]
+            resampled = resampled or bool(len(time) > 1 and uniform_grid(time - time[0], self.timing.rate_hz) is None)
         groups = (self._averaged(group, cutoff_hz) for rows in self.timing.rows for group in self._groups(rows))
         return ConditioningSummary(
             recording=self.recording.name,
@@ -139,7 +167,7 @@ class Conditioner:
             rate_hz=self.timing.rate_hz,
             resampled=resampled,
             averaged_periods=max((motion.repetitions for motion in groups if motion is not None), default=0),
-            position_noise_std=tuple(float(v) for v in np.sqrt(self.noise.density * self.timing.rate_hz / 2.0)),
+            position_noise_std=tuple(float(value) for value in self.position_noise_std),
             velocity_source=tuple(str(name) for name in self.source.names),
         )
 

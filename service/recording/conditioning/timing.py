@@ -148,7 +148,7 @@ def _scan(recording: Recording) -> tuple[Array, NDArray[np.int_], PeriodLabels |
     count, previous_time, previous_label = 0, None, None
     for start in range(0, len(recording), SCAN_ROWS):
         samples = recording.samples(start, min(start + SCAN_ROWS, len(recording)))
-        complete = np.isfinite(samples.position).all(axis=1)
+        complete = samples.complete
         incomplete.append(np.flatnonzero(~complete) + start)
         time = samples.time[complete]
         if not len(time):

@@ -99,7 +99,7 @@ def read_stretch(recording: Recording, robot: Robot, start: int, stop: int, timi
     """
     samples = recording.samples(start, stop)
     torque = recording.joint_torque(samples.effort, robot)
-    complete = np.isfinite(samples.position).all(axis=1)
+    complete = samples.complete
     rows = slice(None) if complete.all() else complete
     time = samples.time[rows]
     elapsed = time - time[0]
@@ -201,7 +201,7 @@ def _bridged(values: Array) -> Array:
 
 def _same(values: Array) -> Array:
     """Samples that already lie on the grid; a joint of which one is missing is NaN throughout."""
-    missed = np.isnan(values).any(axis=0)
+    missed = np.isnan(values, order="F").any(axis=0)
     return np.where(missed, np.nan, values) if missed.any() else values
 
 

@@ -2,10 +2,16 @@
 
 import numpy as np
 import pytest
+from scipy import signal
 
 from recording.conditioning.synthetic import Harmonics, harmonics
 from service.recording.conditioning import Stretch
-from service.recording.conditioning.position_noise import NOISE_SHARE, encoder_step, position_noise
+from service.recording.conditioning.position_noise import (
+    NOISE_SHARE,
+    encoder_step,
+    position_noise,
+    segment_spectra,
+)
 
 MOTION = harmonics(joints=2, fundamental_hz=0.2)
 
@@ -27,6 +33,15 @@ def test_the_density_of_white_noise_is_found(rate: float, seconds: float, std: f
         ratios.append(found.density / (std**2 * 2.0 / rate))
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.05)
     assert np.abs(np.array(ratios) - 1.0).max() < (0.2 if seconds > 10.0 else 0.35)
+
+
+@pytest.mark.parametrize("length", [256, 101])
+def test_the_mean_of_segment_spectra_is_welchs(length: int) -> None:
+    values = np.random.default_rng(4).normal(1.0, 2.0, (1500, 3))
+    spectra = segment_spectra(values, 200.0, length)
+    frequency, expected = signal.welch(values, 200.0, nperseg=length, axis=0)
+    assert spectra.shape[1:] == (len(frequency), 3)
+    np.testing.assert_allclose(spectra.mean(axis=0), expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize("counts", [4096, 65536])
