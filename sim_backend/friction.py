@@ -46,19 +46,70 @@ def static_friction_torque(
             f"friction has {len(friction)} and friction_shape {len(friction_shape)} entries; "
             f"the arm has {joint_count} joints: give one entry a joint"
         )
+    constants = shape_constants(friction, friction_shape)
     torque = np.empty_like(velocity)
-    for column, (coefficients, shape) in enumerate(zip(friction, friction_shape, strict=True)):
+    for column, (coefficients, (k_v, delta)) in enumerate(zip(friction, constants, strict=True)):
         speed = velocity[:, column]
-        stiction = _smooth_sign(speed, coefficients.stiction, shape.k_v, f"joint {column + 1}: friction_shape.k_v")
-        stribeck = _smooth_sign(speed, coefficients.stribeck, shape.delta, f"joint {column + 1}: friction_shape.delta")
+        stiction = coefficients.stiction * np.arctan(k_v * speed) / (0.5 * math.pi)
+        stribeck = coefficients.stribeck * np.arctan(delta * speed) / (0.5 * math.pi)
         torque[:, column] = stiction + stribeck + coefficients.viscous * speed
     return torque
 
 
-def _smooth_sign(speed: Array, level: float, slope: float | None, place: str) -> Array:
-    """Level times a sign function that the arctangent makes continuous, shape (N,)."""
-    if level == 0.0:
-        return np.zeros_like(speed)
-    if slope is None:
+def shape_constants(
+    friction: Sequence[FrictionCoefficients], friction_shape: Sequence[FrictionShape]
+) -> list[tuple[float, float]]:
+    """K_v and δ of each joint; zero where the coefficient that they shape is zero and the robot file states none.
+
+    Parameters
+    ----------
+    friction : sequence of FrictionCoefficients
+        τ_s, τ_sc, τ_v, one entry a joint [Nm, Nm, Nm s/rad; N, N, N s/m]
+    friction_shape : sequence of FrictionShape
+        K_v and δ, one entry a joint [s/rad or s/m]
+
+    Raises
+    ------
+    RobotFileError
+        where a shape constant that is needed is None
+    """
+    constants: list[tuple[float, float]] = []
+    for number, (coefficients, shape) in enumerate(zip(friction, friction_shape, strict=True), 1):
+        place = f"joint {number}: friction_shape"
+        k_v = _needed(shape.k_v, coefficients.stiction, f"{place}.k_v")
+        constants.append((k_v, _needed(shape.delta, coefficients.stribeck, f"{place}.delta")))
+    return constants
+
+
+def _needed(slope: float | None, level: float, place: str) -> float:
+    """Return the slope, which may be missing only where the level that it shapes is zero."""
+    if slope is None and level != 0.0:
         raise RobotFileError(f"{place} is missing; a simulation with friction needs it [s/rad or s/m]")
-    return level * np.arctan(slope * speed) / (0.5 * math.pi)
+    return 0.0 if slope is None else slope
+
+
+def smooth_sign(velocity: float, k_v: float) -> float:
+    """A(v) = (2/π) arctan(K_v v), the continuous stand-in for sgn v, equation (8).
+
+    Parameters
+    ----------
+    velocity : float
+        v [rad/s or m/s]
+    k_v : float
+        K_v [s/rad or s/m]
+    """
+    return math.atan(k_v * velocity) / (0.5 * math.pi)
+
+
+def smooth_sign_slope(velocity: float, k_v: float) -> float:
+    """dA/dv = (2/π) K_v / (1 + (K_v v)²) [s/rad or s/m].
+
+    Parameters
+    ----------
+    velocity : float
+        v [rad/s or m/s]
+    k_v : float
+        K_v [s/rad or s/m]
+    """
+    scaled = k_v * velocity
+    return k_v / (1.0 + scaled * scaled) / (0.5 * math.pi)

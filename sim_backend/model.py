@@ -5,6 +5,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -136,7 +137,50 @@ def _place(body: mujoco.MjsBody, joint: Joint, segment: Segment) -> None:
 
 
 def _weigh(body: mujoco.MjsBody, link: LinkInertia, place: str) -> None:
-    """Give the body its inertia: centre of mass, principal axes and principal moments about the centre of mass."""
+    """Give the body its inertia."""
+    inertia = body_inertia(link, place)
+    body.explicitinertial = True
+    body.mass = inertia.mass
+    body.ipos = inertia.centre
+    body.iquat = inertia.quaternion
+    body.inertia = inertia.moments
+
+
+@dataclass(frozen=True, eq=False)
+class BodyInertia:
+    """Inertia of a body in MuJoCo's terms.
+
+    mass : float
+        m, above zero [kg]
+    centre : (3,) float64
+        centre of mass in the link frame [m]
+    quaternion : (4,) float64
+        (w, x, y, z) of the principal axes in the link frame
+    moments : (3,) float64
+        principal moments about the centre of mass, ascending, above zero [kg m²]
+    """
+
+    mass: float
+    centre: Array
+    quaternion: Array
+    moments: Array
+
+
+def body_inertia(link: LinkInertia, place: str) -> BodyInertia:
+    """Centre of mass, principal axes and principal moments of a link.
+
+    Parameters
+    ----------
+    link : LinkInertia
+        about the link frame's origin
+    place : str
+        what a message calls the link
+
+    Raises
+    ------
+    UnphysicalModelError
+        where the link is no rigid body: negative mass, or moments of inertia that no mass distribution has
+    """
     if link.mass < 0.0:
         raise UnphysicalModelError(f"{place}: mass {link.mass:g} kg is negative; give a mass of zero or more")
     if link.mass == 0.0 and np.any(link.first_moment):
@@ -146,11 +190,12 @@ def _weigh(body: mujoco.MjsBody, link: LinkInertia, place: str) -> None:
     moments, axes = np.linalg.eigh(about_centre)
     if np.linalg.det(axes) < 0.0:
         axes[:, 0] = -axes[:, 0]
-    body.explicitinertial = True
-    body.mass = max(link.mass, LEAST_MASS)
-    body.ipos = centre
-    body.iquat = _quaternion(axes)
-    body.inertia = _regularised(moments, float(np.trace(link.inertia)), place)
+    return BodyInertia(
+        mass=max(link.mass, LEAST_MASS),
+        centre=centre,
+        quaternion=_quaternion(axes),
+        moments=_regularised(moments, float(np.trace(link.inertia)), place),
+    )
 
 
 def _regularised(moments: Array, scale: float, place: str) -> Array:
