@@ -1,0 +1,170 @@
+"""From the host's setpoints to a target at every tick of the drive: a cubic B-spline, as smooth as the motion itself.
+
+A chord between setpoints would make the drive's torque ripple in step with the host's cycle, and the host would read
+that ripple at one and the same phase: a bias of every recorded torque by K_p T²/12 of the acceleration. The uniform
+cubic B-spline with the setpoints as control points reproduces every cubic without ripple, and never leaves the convex
+hull of the last four setpoints while they come in time. It is two cycles late.
+"""
+
+from collections import deque
+from statistics import median_low
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_LATEST_PHASE = 5.0
+_CURVED_CYCLES = 2.0
+_MOST_SKIPPED = 10
+_EARLIEST = 0.3
+_LARGEST_ERROR = 0.1
+_MEMORY = 200
+_INTERVALS = 15
+_CHANGE_OF_PACE = 0.1
+_FIRST_PERIOD = 4.0
+
+
+class SetpointSpline:
+    """Target position as a function of the drive's own time, from setpoints that arrive roughly periodically.
+
+    The drive has no clock in common with the host. Its grid of cycles is a straight line through the last arrivals,
+    with a memory long enough to keep their jitter out of the target; it begins anew where the host changes its pace.
+    While a setpoint is overdue the target goes on as it moved; cycles that the host skipped are filled in on a
+    parabola. Time is counted in ticks.
+
+    Parameters
+    ----------
+    position : (n,) float64
+        where the target stands [rad or m]
+    """
+
+    def __init__(self, position: Array) -> None:
+        self._points = np.tile(position, (4, 1))
+        self._intervals: deque[float] = deque(maxlen=_INTERVALS)
+        self._period = _FIRST_PERIOD
+        self._arrival: float | None = None
+        self._grid = 0.0
+        self._arrivals = 0
+        self._weights = np.empty((2, 4))
+
+    def add(self, position: Array, arrival: float) -> None:
+        """Take a setpoint.
+
+        Parameters
+        ----------
+        position : (n,) float64
+            target of the host [rad or m]
+        arrival : float
+            when it arrived [ticks]
+        """
+        cycles = self._place_on_grid(arrival)
+        older, before = self._points[2].copy(), self._points[3].copy()
+        # parabola through the last two setpoints, at -1 and 0, and the new one
+        bend = ((position - before) / max(cycles, 1) - (before - older)) / (cycles + 1.0)
+        slope = (before - older) + bend
+        for cycle in range(1, cycles + 1):
+            self._points[:3] = self._points[1:]
+            self._points[3] = before + cycle * slope + (cycle * cycle) * bend
+        self._points[3] = position
+
+    def starved(self, time: float) -> bool:
+        """Whether setpoints have failed to come for so long that the target should come to rest.
+
+        Parameters
+        ----------
+        time : float
+            instant [ticks]
+        """
+        return time - self._grid > _LATEST_PHASE * self._period
+
+    def restart(self, position: Array) -> None:
+        """Continue with setpoints from another place; the pace of the host is not forgotten.
+
+        Parameters
+        ----------
+        position : (n,) float64
+            where the target stands [rad or m]
+        """
+        self._points[:] = position
+
+    def at(self, time: float) -> tuple[Array, Array]:
+        """Target at an instant.
+
+        Parameters
+        ----------
+        time : float
+            not long before the last setpoint [ticks]
+
+        Returns
+        -------
+        position : (n,) float64
+            target [rad or m]
+        velocity : (n,) float64
+            its rate [rad or m, per tick]
+        """
+        overdue = (time - self._grid) / self._period
+        rate = 1.0 / self._period
+        x = min(max(overdue, -1.0), 1.0)
+        x2 = x * x
+        x3 = x2 * x
+        self._weights[:] = (
+            (
+                (1.0 - 3.0 * x + 3.0 * x2 - x3) / 6.0,
+                (4.0 - 6.0 * x2 + 3.0 * x3) / 6.0,
+                (1.0 + 3.0 * x + 3.0 * x2 - 3.0 * x3) / 6.0,
+                x3 / 6.0,
+            ),
+            (
+                rate * (-0.5 + x - 0.5 * x2),
+                rate * (-2.0 * x + 1.5 * x2),
+                rate * (0.5 + x - 1.5 * x2),
+                rate * (0.5 * x2),
+            ),
+        )
+        position, velocity = self._weights.dot(self._points)
+        return self._overdue(position, velocity, overdue - 1.0) if overdue > 1.0 else (position, velocity)
+
+    def _overdue(self, position: Array, velocity: Array, cycles: float) -> tuple[Array, Array]:
+        """Go on from the end of the spline: with its acceleration at first, then with the velocity reached."""
+        points = self._points
+        change = points[1] - 2.0 * points[2] + points[3]
+        curved = min(cycles, _CURVED_CYCLES)
+        position += (cycles * self._period) * velocity + (curved * (cycles - 0.5 * curved)) * change
+        return position, velocity + (curved / self._period) * change
+
+    def _place_on_grid(self, arrival: float) -> int:
+        """Find the cycle that a setpoint belongs to; returns by how many it follows the one before, zero where none."""
+        before, self._arrival = self._arrival, arrival
+        if before is None:
+            return self._begin_grid(arrival)
+        self._intervals.append(max(arrival - before, 0.0))
+        usual = max(1.0, median_low(self._intervals))
+        learning = len(self._intervals) < _INTERVALS
+        if not learning and abs(usual - self._period) > _CHANGE_OF_PACE * self._period:
+            self._period = usual
+            self._intervals.clear()
+            return self._begin_grid(arrival)
+        unit = usual if learning else self._period
+        cycles = int((arrival - self._grid) / unit + _EARLIEST)
+        if cycles > _MOST_SKIPPED:
+            return self._begin_grid(arrival)
+        self._lock(arrival, max(cycles, 0), learning)
+        return max(cycles, 0)
+
+    def _begin_grid(self, arrival: float) -> int:
+        """Let an arrival be the first of the grid."""
+        self._grid, self._arrivals = arrival, 1
+        return 1
+
+    def _lock(self, arrival: float, cycles: int, learning: bool) -> None:
+        """Fit a straight line to the arrivals, by least squares with a memory of limited length."""
+        self._arrivals = n = min(self._arrivals + 1, _MEMORY)
+        self._grid += cycles * self._period
+        late = arrival - self._grid
+        if not learning:
+            # a stall says nothing of the host's clock
+            largest = _LARGEST_ERROR * self._period
+            late = min(max(late, -largest), largest)
+        self._grid += 2.0 * (2 * n - 1) / (n * (n + 1)) * late
+        self._period = max(1.0, self._period + 6.0 / (n * (n + 1)) * late / max(cycles, 1))

@@ -1,0 +1,135 @@
+"""Where the position loop shall be at each tick: on the host's motion, or coming to rest after a stop."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim_backend.device.setpoint_spline import SetpointSpline
+
+Array = NDArray[np.float64]
+
+STOP_TIME_S = 0.1
+"""A hold brings every joint to rest in this time, all at once and so on the path that the arm is on [s]."""
+
+
+_ROUNDING = 1e-9
+_LEAP = 0.02
+
+
+class Target:
+    """Position and velocity of the target; it stays within the range and below the speed limit, whatever the host asks.
+
+    Setpoints that move within the limits are followed exactly. One that leaps is approached with bounded acceleration.
+
+    Parameters
+    ----------
+    position : (n,) float64
+        where it begins [rad or m]
+    velocity : (n,) float64
+        how it moves there; zero for an arm at rest [rad/s or m/s]
+    acceleration : (n,) float64
+        with which it catches up with setpoints that leapt [rad/s² or m/s²]
+    tick_s : float
+        time between two ticks [s]
+    """
+
+    def __init__(self, position: Array, velocity: Array, acceleration: Array, tick_s: float) -> None:
+        count = len(position)
+        self.position = position.copy()
+        self.velocity = velocity.copy()
+        self._tick_s = tick_s
+        self._low, self._high = np.full(count, -np.inf), np.full(count, np.inf)
+        self._fastest = np.full(count, np.inf)
+        self._acceleration = acceleration
+        self.resume()
+        self.brake()
+
+    def resume(self) -> None:
+        """Be ready for setpoints that begin where the target is."""
+        self._spline = SetpointSpline(self.position)
+        self._asked = self.position
+        self._behind = False
+
+    def limit(self, low: Array, high: Array, fastest: Array) -> None:
+        """Keep the target within limits from now on; a target that is outside the range may stay where it is.
+
+        Parameters
+        ----------
+        low, high : (n,) float64
+            range [rad or m]
+        fastest : (n,) float64
+            speed limit [rad/s or m/s]
+        """
+        self._low, self._high = np.minimum(low, self.position), np.maximum(high, self.position)
+        self._fastest = fastest
+
+    @property
+    def range(self) -> tuple[Array, Array]:
+        """Lower and upper end of the range, each (n,) [rad or m]."""
+        return self._low, self._high
+
+    def follow(self, position: Array, arrival: float) -> None:
+        """Take a setpoint of the host.
+
+        Parameters
+        ----------
+        position : (n,) float64
+            as the host asks [rad or m]
+        arrival : float
+            when it arrived [ticks]
+        """
+        if self._braking:
+            self._spline.restart(self.position)
+            self._asked = self.position
+            self._braking, self._behind = False, True
+        self._spline.add(np.minimum(np.maximum(position, self._low), self._high), arrival)
+
+    def brake(self) -> None:
+        """Come to rest from the present velocity within `STOP_TIME_S`."""
+        self._braking = True
+        self._slowing = self.velocity * (self._tick_s / STOP_TIME_S)
+        self._ticks_left = round(STOP_TIME_S / self._tick_s) if self.velocity.any() else 0
+
+    def advance(self, tick: int) -> None:
+        """Move on by one tick.
+
+        Parameters
+        ----------
+        tick : int
+            the present tick
+        """
+        if not self._braking and self._spline.starved(tick):
+            self.brake()
+        if not self._braking:
+            self._follow_spline(tick)
+        elif self._ticks_left > 0:
+            self._ticks_left -= 1
+            self.velocity = self.velocity - self._slowing if self._ticks_left else np.zeros_like(self.velocity)
+            moved = self.position + self.velocity * self._tick_s
+            self.position = np.minimum(np.maximum(moved, self._low), self._high)
+
+    def _follow_spline(self, tick: int) -> None:
+        """Move with the spline; catch up with it where a limit kept the target behind."""
+        position, rate = self._spline.at(tick)
+        moved = (position - self._asked) / self._tick_s
+        slack = self._acceleration * self._tick_s
+        velocity = rate / self._tick_s
+        if (
+            self._behind
+            or (np.abs(moved) > self._fastest).any()
+            or (np.abs(moved - self.velocity) > slack + _LEAP).any()
+        ):
+            velocity = self._catching_up(moved, slack)
+            self.position = self.position + velocity * self._tick_s
+            self._behind = bool((np.abs(position - self.position) > _ROUNDING).any())
+        else:
+            self.position = position
+        self._asked, self.velocity = position, velocity
+        self.position = np.minimum(np.maximum(self.position, self._low), self._high)
+
+    def _catching_up(self, moved: Array, slack: Array) -> Array:
+        """Velocity that closes the gap to the spline, and can still be taken back in time."""
+        gap = self._asked - self.position
+        closing = np.minimum(np.abs(gap) / self._tick_s, np.sqrt(2.0 * self._acceleration * np.abs(gap)))
+        wanted = moved + np.copysign(closing, gap)
+        wanted = np.minimum(np.maximum(wanted, self.velocity - slack), self.velocity + slack)
+        return np.minimum(np.maximum(wanted, -self._fastest), self._fastest)
