@@ -1,0 +1,79 @@
+"""Arms with limits and models, and motions for them."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from arms import panda_like, paper_arm, paper_parameters, random_arm, random_link, ur5_like
+from service.excitation import FourierSeries
+from service.robot import (
+    FrictionCoefficients,
+    FrictionShape,
+    Joint,
+    JointLimits,
+    LinkInertia,
+    Model,
+    Robot,
+)
+
+Array = NDArray[np.float64]
+
+
+PAPER_SHAPE = FrictionShape(500.0, 10.0)
+
+
+def with_limits(robot: Robot, limits: JointLimits, shape: FrictionShape = PAPER_SHAPE) -> Robot:
+    """The arm, every joint with these limits."""
+    joints = tuple(Joint(j.name, j.type, limits, friction_shape=shape) for j in robot.joints)
+    return replace(robot, joints=joints)
+
+
+def limited_paper_arm(torque: float | None = 40.0) -> Robot:
+    """The paper's arm with the limits and the model of the example robot file."""
+    robot = with_limits(paper_arm(), JointLimits((-2.9, 2.9), 2.0, 5.0, torque))
+    links = tuple(LinkInertia.from_vector(vector) for vector in paper_parameters().reshape(-1, 10))
+    friction = (
+        FrictionCoefficients(2.0, -0.3, 0.5),
+        FrictionCoefficients(1.0, -0.2, 0.277),
+        FrictionCoefficients(2.0, -0.3, 0.03),
+    )
+    return replace(robot, model=Model(links, friction))
+
+
+def modelled_arm(rng: np.random.Generator, joint_count: int) -> Robot:
+    """A random chain, prismatic joints included, with links, friction and limits."""
+    robot = with_limits(random_arm(rng, joint_count), JointLimits((-1.5, 1.2), 1.5, 6.0, 200.0))
+    links = tuple(random_link(rng) for _ in range(joint_count))
+    friction = tuple(FrictionCoefficients(*rng.uniform(0.0, 1.0, 3)) for _ in range(joint_count))
+    return replace(robot, model=Model(links, friction))
+
+
+def gradient_arms() -> list[Robot]:
+    """Arms on which gradients are checked: the paper's, UR5-like, Panda-like, random ones with prismatic joints."""
+    slow = FrictionShape(20.0, 3.0)
+    named = [with_limits(arm(), JointLimits((-2.5, 2.5), 2.0, 6.0, 50.0), slow) for arm in (paper_arm, ur5_like)]
+    panda = with_limits(panda_like(), JointLimits((-2.5, 2.5), 2.0, 6.0, 50.0), FrictionShape(20.0))
+    links = [tuple(random_link(np.random.default_rng(j)) for j in range(r.joint_count)) for r in (*named, panda)]
+    modelled = [replace(r, model=Model(each)) for r, each in zip((*named, panda), links, strict=True)]
+    return [*modelled, modelled_arm(np.random.default_rng(1), 3), modelled_arm(np.random.default_rng(2), 4)]
+
+
+def resting_series(
+    rng: np.random.Generator, joint_count: int, harmonics: int = 5, period_s: float = 10.0
+) -> FourierSeries:
+    """A random series at rest at the ends of its period, speeds of about one."""
+    order = np.arange(1.0, harmonics + 1.0)
+    cosine = rng.normal(scale=0.3, size=(joint_count, harmonics))
+    cosine -= cosine.mean(axis=1, keepdims=True)
+    sine = rng.normal(scale=0.3, size=(joint_count, harmonics))
+    sine -= np.multiply.outer(sine @ order, order) / (order @ order)
+    return FourierSeries(period_s, rng.uniform(-0.5, 0.5, joint_count), cosine, sine)
+
+
+def derivative_along(function: Callable[[Array], float], x: Array, direction: Array, step: float) -> float:
+    """Sixth-order central difference along a direction."""
+    weights = {1: 45.0 / 60.0, 2: -9.0 / 60.0, 3: 1.0 / 60.0}
+    pairs = (w * (function(x + k * step * direction) - function(x - k * step * direction)) for k, w in weights.items())
+    return float(sum(pairs)) / step

@@ -1,0 +1,297 @@
+"""Designs: limits kept on a finer grid, better than random motions, and refused where nothing is possible."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
+
+from arms import random_link, ur5_like
+from excitation.excited_arms import Array, limited_paper_arm, modelled_arm, with_limits
+from service.dynamics import base_parameters, inverse_dynamics
+from service.errors import ExcitationError
+from service.excitation import (
+    Box,
+    ColumnScaling,
+    Criterion,
+    ExcitationDesign,
+    ExcitationOptions,
+    FourierSegment,
+    OptimiserProgress,
+    Workspace,
+    design_excitation,
+    excitation_document,
+    motion_limits,
+    parse_trajectory_json,
+    require_within_limits,
+    trajectory_json,
+)
+from service.excitation.information import ExcitationRegressor
+from service.excitation.workspace import WorkspaceUsage
+from service.robot import JointLimits, Model, Robot
+from service.robot.kinematics import link_placements
+from sim_backend.motion import random_fourier_motion
+
+QUICK = ExcitationOptions(starts=1, slow_postures=1)
+
+
+@pytest.fixture(scope="module")
+def paper_design() -> ExcitationDesign:
+    """The paper's arm with default options."""
+    return design_excitation(limited_paper_arm())
+
+
+def condition_number(robot: Robot, design_series: object, time: Array) -> float:
+    """Of L at these instants, by NumPy."""
+    motion = design_series.evaluate(time)  # type: ignore[attr-defined]
+    return float(np.linalg.cond(ExcitationRegressor(robot, base_parameters(robot), capacity=4096).stacked(motion)))
+
+
+def assert_within_limits(robot: Robot, design: ExcitationDesign, options: ExcitationOptions) -> None:
+    """All limits, ten times finer than anything that the design looked at, torque by a calculation of its own."""
+    samples = design.trajectory.samples(4000.0 / min(options.period_s, 10.0))
+    limits = motion_limits(robot)
+    assert (samples.position >= limits.position_low - 1e-9).all()
+    assert (samples.position <= limits.position_high + 1e-9).all()
+    assert (np.abs(samples.velocity) <= limits.velocity * (1.0 + 1e-9)).all()
+    assert (np.abs(samples.acceleration) <= limits.acceleration * (1.0 + 1e-9)).all()
+    if robot.model.links is not None:
+        parameters = np.concatenate([link.to_vector() for link in robot.model.links])
+        torque = inverse_dynamics(robot, parameters, samples.position, samples.velocity, samples.acceleration)
+        assert (np.abs(torque) <= (1.0 - options.torque_margin) * limits.torque).all()
+
+
+@settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    joints=st.integers(1, 3),
+    low=st.floats(-2.5, -0.2),
+    high=st.floats(0.1, 2.5),
+    speed=st.floats(0.2, 3.0),
+    acceleration=st.floats(0.5, 20.0),
+    torque=st.floats(20.0, 300.0),
+    period=st.floats(4.0, 20.0),
+)
+def test_random_limits_hold_at_every_instant(
+    seed: int, joints: int, low: float, high: float, speed: float, acceleration: float, torque: float, period: float
+) -> None:
+    robot = modelled_arm(np.random.default_rng(seed), joints)
+    robot = with_limits(robot, JointLimits((low, high), speed, acceleration, torque))
+    options = replace(QUICK, period_s=period, periods=1, limit_fraction=1.0)
+    try:
+        design = design_excitation(robot, options)
+    except ExcitationError as error:
+        refused = str(error)  # gravity alone may need more than a torque limit that was drawn
+        assume("torque" not in refused and "motion" not in refused)
+        raise
+    assert_within_limits(robot, design, options)
+    margins = design.margins
+    assert min(part.min() for part in (margins.position, margins.velocity, margins.acceleration)) >= -1e-9
+
+
+def test_the_paper_s_arm(paper_design: ExcitationDesign) -> None:
+    robot = limited_paper_arm()
+    assert_within_limits(robot, paper_design, ExcitationOptions())
+    time = np.arange(500.0) * 0.02
+    found = condition_number(robot, paper_design.series, time)
+    assert paper_design.condition_number == pytest.approx(found, rel=0.02)
+    rng = np.random.default_rng(0)
+    drawn = [random_fourier_motion(robot.joints, rng, limit_fraction=0.95) for _ in range(100)]
+    assert found < min(condition_number(robot, series, time) for series in drawn)
+    assert paper_design.value < paper_design.random_value
+
+
+def test_the_whole_trajectory(paper_design: ExcitationDesign) -> None:
+    trajectory = paper_design.trajectory
+    ends = trajectory.evaluate(np.array([0.0, trajectory.duration_s]))
+    assert np.abs(ends.velocity).max() < 1e-9
+    assert np.abs(ends.acceleration).max() < 1e-9
+    np.testing.assert_allclose(ends.position[0], ends.position[1], atol=1e-9)
+    samples = trajectory.samples(100.0)
+    labels = [np.flatnonzero(samples.period == k) for k in range(6)]
+    assert [len(rows) for rows in labels] == [1000] * 6
+    for rows in labels[1:]:
+        np.testing.assert_allclose(samples.position[rows], samples.position[labels[0]], atol=1e-9)
+    require_within_limits(trajectory, limited_paper_arm(), motion_limits(limited_paper_arm()))
+    jerk = np.abs(np.diff(trajectory.samples(1000.0).acceleration, axis=0)).max() * 1000.0
+    assert jerk < 100.0
+
+
+def test_every_joint_reverses_slowly_at_several_postures(paper_design: ExcitationDesign) -> None:
+    trajectory = paper_design.trajectory
+    slow = [s for s in trajectory.segments if isinstance(s, FourierSegment) and s.first_period is None]
+    assert len(slow) == 3
+    postures, speeds = [], []
+    for segment in slow:
+        motion = segment.evaluate(np.linspace(0.0, segment.duration_s, 4001))
+        for joint in range(3):
+            moving = motion.velocity[np.abs(motion.velocity[:, joint]) > 1e-6, joint]
+            assert np.count_nonzero(np.diff(np.sign(moving))) >= 4
+        postures.append(motion.position[0])
+        speeds.append(np.abs(motion.velocity).max())
+    assert max(speeds) <= 0.1
+    assert max(speeds) > 3.0 * min(speeds)
+    assert min(np.abs(postures[a] - postures[b]).max() for a, b in ((0, 1), (1, 2), (0, 2))) > 0.3
+
+
+def test_the_same_seed_gives_the_same_motion() -> None:
+    options = replace(QUICK, seed=3)
+    first, second = (design_excitation(limited_paper_arm(), options) for _ in range(2))
+    assert trajectory_json(first.trajectory) == trajectory_json(second.trajectory)
+    other = design_excitation(limited_paper_arm(), replace(QUICK, seed=4))
+    assert trajectory_json(first.trajectory) != trajectory_json(other.trajectory)
+
+
+def test_the_document_holds_the_trajectory_and_can_be_played(paper_design: ExcitationDesign) -> None:
+    text = excitation_document(paper_design).model_dump_json(by_alias=True)
+    assert '"schema":"tauscope.excitation/1"' in text
+    played = parse_trajectory_json(text, "design.json", limited_paper_arm())
+    assert trajectory_json(played) == trajectory_json(paper_design.trajectory)
+    document = excitation_document(paper_design)
+    assert document.condition_number == paper_design.condition_number
+    assert set(document.margins) == {"position", "velocity", "acceleration", "torque"}
+    assert document.history
+    assert document.active
+
+
+def test_progress_grows_to_its_end() -> None:
+    told: list[OptimiserProgress] = []
+    design_excitation(limited_paper_arm(), QUICK, progress=told.append)
+    fractions = [each.fraction for each in told]
+    assert fractions == sorted(fractions)
+    assert 0.0 <= fractions[0] <= fractions[-1] <= 1.0
+    bests = [each.best for each in told]
+    assert bests[-1] < bests[1]
+
+
+@pytest.mark.parametrize("criterion", list(Criterion))
+def test_every_criterion_gets_better_where_it_is_asked_for(criterion: Criterion) -> None:
+    design = design_excitation(limited_paper_arm(), replace(QUICK, criterion=criterion))
+    assert design.value < design.random_value
+    robot = limited_paper_arm()
+    matrix = ExcitationRegressor(robot, base_parameters(robot), capacity=2000).stacked(
+        design.series.evaluate(np.arange(2000.0) * 0.005)
+    )
+    gram = matrix.T @ matrix / 2000
+    expected = {
+        Criterion.COND_F: np.linalg.norm(gram) * np.linalg.norm(np.linalg.inv(gram)),
+        Criterion.LOG_DET: -np.linalg.slogdet(gram)[1] / len(gram),
+        Criterion.COND_2: np.linalg.cond(matrix),
+    }
+    assert design.value == pytest.approx(expected[criterion], rel=1e-5)
+
+
+def test_noise_and_scaling_change_the_motion() -> None:
+    robot = limited_paper_arm()
+    plain = design_excitation(robot, QUICK)
+    weighted = design_excitation(robot, replace(QUICK, noise_std=np.array([0.05, 5.0, 0.5])))
+    scaled = design_excitation(robot, replace(QUICK, scaling=ColumnScaling.TYPICAL))
+    assert weighted.value != pytest.approx(plain.value, rel=1e-3)
+    assert scaled.value < 0.1 * plain.value  # columns of one size are far better conditioned
+    with pytest.raises(ExcitationError, match="noise_std needs 3 positive numbers"):
+        design_excitation(robot, replace(QUICK, noise_std=np.array([1.0, 0.0, 1.0])))
+
+
+def test_floor_and_box_are_kept_clear() -> None:
+    robot = limited_paper_arm()
+    workspace = Workspace(0.1, (Box(np.array([0.3, -2.0, 0.0]), np.array([1.5, -0.2, 2.0])),))
+    options = replace(QUICK, workspace=workspace, periods=2)
+    design = design_excitation(robot, options)
+    assert_within_limits(robot, design, options)
+    samples = design.trajectory.samples(1000.0)
+    ends = link_placements(robot, samples.position)[:, 1:, :3, 3]
+    assert ends[..., 2].min() >= 0.1
+    box = workspace.boxes[0]
+    assert not ((ends > box.low) & (ends < box.high)).all(axis=-1).any()
+    assert design.margins.workspace_m is not None
+    assert (
+        0.0 <= design.margins.workspace_m <= WorkspaceUsage(robot, workspace).clearance(samples.position).min() + 1e-3
+    )
+
+
+def test_a_tight_torque_limit_is_kept() -> None:
+    robot = limited_paper_arm(torque=11.0)
+    design = design_excitation(robot, QUICK)
+    assert_within_limits(robot, design, QUICK)
+    assert design.margins.torque is not None
+    assert design.margins.torque.min() >= 0.0
+    free = design_excitation(limited_paper_arm(torque=None), QUICK)
+    with pytest.raises(AssertionError):  # the limit binds: without it the motion asks for more
+        assert_within_limits(robot, free, QUICK)
+
+
+def test_a_robot_without_limits_or_model_says_what_was_assumed() -> None:
+    robot = ur5_like()
+    design = design_excitation(robot, replace(QUICK, periods=1, slow_postures=0, closing_period=False))
+    notes = "\n".join(design.notes)
+    assert "joint1: position assumed within ±3.142 rad" in notes
+    assert "joint6: velocity assumed up to 1 rad/s" in notes
+    assert "acceleration assumed up to 4 rad/s²" in notes
+    assert "torque is not constrained: the robot file has no model" in notes
+    assert design.margins.torque is None
+    modelled = replace(robot, model=Model(tuple(random_link(np.random.default_rng(j)) for j in range(6))))
+    design = design_excitation(modelled, replace(QUICK, periods=1, slow_postures=0, closing_period=False))
+    assert "no limit is stated" in "\n".join(design.notes)
+
+
+def changed(joint: int, **limits: object) -> Robot:
+    """The paper's arm with other limits of one joint."""
+    robot = limited_paper_arm()
+    joints = list(robot.joints)
+    joints[joint] = replace(joints[joint], limits=replace(joints[joint].limits, **limits))
+    return replace(robot, joints=tuple(joints))
+
+
+@pytest.mark.parametrize(
+    ("robot", "options", "message"),
+    [
+        (changed(1, position=(0.5, 0.5001)), {}, "joint2: position limits .* leave no room to move"),
+        (changed(2, velocity=0.0), {}, "joint3: a velocity limit of 0 rad/s allows no motion"),
+        (changed(0, acceleration=0.0), {}, "joint1: an acceleration limit of 0 rad/s² allows no motion"),
+        (changed(1, position=(-0.4, 0.4), torque=0.5), {}, "joint2: torque limit: at rest the prior model needs"),
+        (changed(1, torque=10.0), {"torque_offset": 9.0}, "joint2: torque limit 10 less the margin leaves -1"),
+        (
+            limited_paper_arm(),
+            {"workspace": Workspace(2.0)},
+            "workspace: the end of link 2 and the floor meet in every posture, by 1.2 m",
+        ),
+        (
+            limited_paper_arm(),
+            {"workspace": Workspace(None, (Box(-3.0 * np.ones(3), 3.0 * np.ones(3)),))},
+            "and box 1 meet in every posture",
+        ),
+    ],
+)
+def test_what_cannot_be_is_refused_by_name(robot: Robot, options: dict[str, object], message: str) -> None:
+    with pytest.raises(ExcitationError, match=message) as raised:
+        design_excitation(robot, replace(QUICK, **options))
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"period_s": 0.0},
+        {"period_s": np.nan},
+        {"harmonics": 1},
+        {"periods": 0},
+        {"limit_fraction": 1.5},
+        {"torque_margin": 1.0},
+        {"torque_offset": -1.0},
+        {"starts": 0},
+        {"seed": -1},
+        {"slow_postures": -1},
+        {"information_weight": -0.1},
+    ],
+)
+def test_wishes_that_mean_nothing(options: dict[str, object]) -> None:
+    with pytest.raises(ExcitationError, match=f"{next(iter(options))} is "):
+        replace(QUICK, **options)
+
+
+def test_boxes_that_are_none() -> None:
+    with pytest.raises(ExcitationError, match="the lower one first"):
+        Box(np.ones(3), np.zeros(3))
+    with pytest.raises(ExcitationError, match="give a height"):
+        Workspace(np.nan)
