@@ -8,8 +8,13 @@ from fastapi import FastAPI
 
 from service.api import health, pages
 from service.api.body_limit import BodyLimit
+from service.api.campaigns.models import CampaignRequest
+from service.api.campaigns.router import router as campaigns
+from service.api.excitations.models import ExcitationRequest
+from service.api.excitations.router import router as excitations
 from service.api.identifications.models import IdentificationRequest
 from service.api.identifications.router import router as identifications
+from service.api.jobs.events import EVENT_MODELS
 from service.api.openapi import install_openapi
 from service.api.problem_handlers import install_problem_handlers
 from service.api.problems import Problem
@@ -17,16 +22,19 @@ from service.api.protection import KnownCallers, SafeAnswers
 from service.api.recordings.router import router as recordings
 from service.api.robots.models import RobotCheckRequest
 from service.api.robots.router import router as robots
+from service.api.runs.models import RunRequest
+from service.api.runs.router import router as runs
 from service.api.services import open_services
 from service.api.settings import Settings
+from service.jobs import StartControl
 
-API_VERSION = "1.0.0"
+API_VERSION = "1.1.0"
 """Of the interface, not of the package; a change of tests/api/openapi.json goes with a change here."""
 
 PREFIX = "/api/v1"
 
 
-def create_app(settings: Settings, executor: Executor | None = None) -> FastAPI:
+def create_app(settings: Settings, executor: Executor | None = None, start: StartControl | None = None) -> FastAPI:
     """The application; it takes the data folder when it starts and lets go of it when it stops.
 
     Parameters
@@ -35,13 +43,16 @@ def create_app(settings: Settings, executor: Executor | None = None) -> FastAPI:
         of the operator
     executor : Executor or None
         where the work is done; processes of our own where None
+    start : callable or None
+        starts the control process of a run; one of our own where None
     """
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        with open_services(settings, executor) as services:
+        with open_services(settings, executor, start) as services:
             app.state.services = services
-            yield
+            async with services.pulse.beating():
+                yield
 
     app = FastAPI(
         title="Tauscope",
@@ -52,12 +63,13 @@ def create_app(settings: Settings, executor: Executor | None = None) -> FastAPI:
         docs_url=None,
         redoc_url=None,
     )
-    for router in (identifications, recordings, robots):
+    for router in (campaigns, excitations, runs, recordings, identifications, robots):
         app.include_router(router, prefix=PREFIX)
     app.include_router(health.router)
     app.include_router(pages.router)
     install_problem_handlers(app)
-    install_openapi(app, [IdentificationRequest, RobotCheckRequest, Problem])
+    requests = [IdentificationRequest, ExcitationRequest, RunRequest, CampaignRequest, RobotCheckRequest]
+    install_openapi(app, [*requests, Problem, *EVENT_MODELS])
     # The last one added is the first to see a request.
     app.add_middleware(BodyLimit, limit=settings.max_upload_bytes)
     app.add_middleware(KnownCallers, allowed_hosts=settings.allowed_hosts)

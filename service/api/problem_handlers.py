@@ -11,7 +11,7 @@ from starlette.requests import ClientDisconnect
 
 from service.api.problems import ProblemError, answer_code, field_errors, make_problem, problem_answer, summarised
 from service.errors import TauscopeError
-from service.jobs import QueueFullError
+from service.jobs import BusyError, QueueFullError
 from service.store import NameTakenError
 
 _log = logging.getLogger("tauscope.api")
@@ -38,6 +38,8 @@ async def _tauscope_error(request: Request, error: Exception) -> Response:
     """A failure that Tauscope foresees."""
     if isinstance(error, QueueFullError):
         return problem_answer(make_problem("queue-full", str(error), request.url.path), {"Retry-After": "10"})
+    if isinstance(error, BusyError):
+        return problem_answer(make_problem("busy", str(error), request.url.path), {"Retry-After": "10"})
     if isinstance(error, NameTakenError):
         return answer_code(request, "name-taken", str(error))
     code = error.code if isinstance(error, TauscopeError) else "internal"

@@ -41,6 +41,9 @@ _KINDS = (
     ProblemKind("recording-mismatch", HTTPStatus.UNPROCESSABLE_ENTITY, "A recording does not fit the robot"),
     ProblemKind("identification", HTTPStatus.UNPROCESSABLE_ENTITY, "The data cannot answer the question"),
     ProblemKind("export", HTTPStatus.CONFLICT, "The model cannot be written in this format"),
+    ProblemKind("excitation", HTTPStatus.UNPROCESSABLE_ENTITY, "No motion keeps the limits, or it is not valid"),
+    ProblemKind("scenario", HTTPStatus.UNPROCESSABLE_ENTITY, "The simulated arm's scenario is not valid"),
+    ProblemKind("acquisition", HTTPStatus.CONFLICT, "The run cannot start, or ended before its time"),
     ProblemKind("not-found", HTTPStatus.NOT_FOUND, "Nothing of that name is kept here"),
     ProblemKind("limit-exceeded", HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "The request is larger than accepted"),
     # What only a service can meet.
@@ -51,6 +54,7 @@ _KINDS = (
     ProblemKind("host", HTTPStatus.BAD_REQUEST, "The request is meant for another host"),
     ProblemKind("origin", HTTPStatus.FORBIDDEN, "Pages of other origins have no access"),
     ProblemKind("name-taken", HTTPStatus.CONFLICT, "Another recording of that name is kept"),
+    ProblemKind("busy", HTTPStatus.CONFLICT, "Another run has the arm"),
     ProblemKind("not-finished", HTTPStatus.CONFLICT, "The job has not ended yet"),
     ProblemKind("cancelled", HTTPStatus.CONFLICT, "The job was cancelled"),
     ProblemKind("interrupted", HTTPStatus.CONFLICT, "The service ended before the job did"),

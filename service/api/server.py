@@ -4,9 +4,10 @@ import socket
 from collections.abc import Callable
 
 import uvicorn
+from fastapi import FastAPI
 
 from service.api.app import create_app
-from service.api.services import require_data_folder
+from service.api.services import Services, require_data_folder
 from service.api.settings import Settings
 from service.errors import TauscopeError
 
@@ -32,8 +33,9 @@ def serve(settings: Settings, announce: Callable[[str], None]) -> None:
     settings.require_loopback()
     require_data_folder(settings)
     with _listening(settings) as listener:
+        app = create_app(settings)
         config = uvicorn.Config(
-            create_app(settings),
+            app,
             log_level="warning",
             server_header=False,
             proxy_headers=False,
@@ -41,7 +43,22 @@ def serve(settings: Settings, announce: Callable[[str], None]) -> None:
         )
         host, port = listener.getsockname()[:2]
         announce(f"http://{f'[{host}]' if ':' in host else host}:{port}")
-        uvicorn.Server(config).run(sockets=[listener])
+        _Server(config, app).run(sockets=[listener])
+
+
+class _Server(uvicorn.Server):
+    """Stops the arms as soon as it is asked to end, before it waits for open requests."""
+
+    def __init__(self, config: uvicorn.Config, app: FastAPI) -> None:
+        super().__init__(config)
+        self._app = app
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Stop the arms, then everything else."""
+        services: Services | None = getattr(self._app.state, "services", None)
+        if services is not None:
+            services.begin_to_close()
+        await super().shutdown(sockets)
 
 
 def _listening(settings: Settings) -> socket.socket:

@@ -3,6 +3,7 @@
 import ipaddress
 import os
 from pathlib import Path
+from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -16,14 +17,25 @@ class Settings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    data_folder: Path = Field(description="holds everything that is kept: recordings/ and identifications/")
+    data_folder: Path = Field(description="holds everything that is kept")
     host: str = Field(default="127.0.0.1", description="address to listen at")
     port: int = Field(default=8000, ge=0, le=65535, description="port to listen at; 0 takes any free one")
     max_upload_bytes: int = Field(default=256 * MEBIBYTE, gt=0, description="largest body of a request [bytes]")
     max_document_bytes: int = Field(default=4 * MEBIBYTE, gt=0, description="largest JSON body or part [bytes]")
     max_recordings: int = Field(default=100, gt=0, description="most recordings of one request")
-    max_waiting: int = Field(default=100, gt=0, description="most identifications that wait")
-    workers: int = Field(default=1, gt=0, description="identifications that are worked on at a time, a process each")
+    max_waiting: int = Field(default=100, gt=0, description="most jobs that wait")
+    workers: int = Field(default=1, gt=0, description="jobs that are worked on at a time, a process each")
+    max_arms: int = Field(default=4, gt=0, description="arms that may move at a time, a control process each")
+    backend: Literal["sim", "dynamixel", "canopen"] = Field(
+        default="sim", description="what moves the arm where a request names no backend"
+    )
+    sim_time: Literal["virtual", "real"] = Field(
+        default="virtual", description="of the simulated arm, where a request does not say"
+    )
+    sim_socket: Path | None = Field(
+        default=None,
+        description="where a simulated arm that runs by the clock listens; one is started for each run where None",
+    )
 
     @property
     def recordings_folder(self) -> Path:
@@ -34,6 +46,21 @@ class Settings(BaseModel):
     def identifications_folder(self) -> Path:
         """Identifications, each a folder."""
         return self.data_folder / "identifications"
+
+    @property
+    def excitations_folder(self) -> Path:
+        """Designed motions, each a folder."""
+        return self.data_folder / "excitations"
+
+    @property
+    def runs_folder(self) -> Path:
+        """Runs, each a folder."""
+        return self.data_folder / "runs"
+
+    @property
+    def campaigns_folder(self) -> Path:
+        """Campaigns, each a folder."""
+        return self.data_folder / "campaigns"
 
     @property
     def allowed_hosts(self) -> frozenset[str]:

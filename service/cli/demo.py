@@ -1,49 +1,53 @@
-"""``tauscope demo``: the seed paper's arm, simulated, identified, and compared with the truth.
+"""``tauscope demo``: a whole campaign on the seed paper's arm, simulated, and what it found beside the truth.
 
-The robot file that the identification reads holds no model: what it finds, it finds in the recordings.
+Nothing but the simulated arm knows its model: the motions are designed, and the arm is identified, from a robot file
+without one.
 """
 
 import io
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from rich.console import Console
 from ruamel.yaml import YAML
 
+from service.acquisition import BackendOrder, RunOptions, RunOrder, RunState
 from service.cli.demo_folder import prepare_folder
 from service.cli.identify_run import Outcome, Request, identify_files, write_outcome
 from service.cli.identify_summary import show_identification
 from service.cli.output_files import write_file
-from service.cli.terminal import output, plain, shown_progress, table
+from service.cli.run_session import keep_recording, run_to_end, why_unfinished
+from service.cli.terminal import Told, output, plain, shown_percent, shown_progress, table
+from service.errors import AcquisitionError
+from service.excitation import ExcitationOptions, OptimiserProgress, design_excitation, write_trajectory
 from service.identification import Identification
 from service.report.quantities import given, with_uncertainty
 from service.report.table import Table
 from service.robot import Robot, read_robot
 from sim_backend.examples import example_robot
-from sim_backend.motion import random_fourier_motion
-from sim_backend.recording import simulate_recording
-from sim_backend.recording_csv import write_recording_csv
 
 NOISE_STD_NM = (0.5, 0.3, 0.7)
 """σ_τ of the seed paper's section 5."""
 
 RATE_HZ = 200.0
-PERIOD_S = 10.0
-PERIODS = 5
-TRAIN_SEED = 0
-HELD_OUT_SEED = 1
+TRAIN_MOTION = ExcitationOptions(periods=5, slow_postures=1, seed=0)
+HELD_OUT_MOTION = ExcitationOptions(periods=2, slow_postures=0, closing_period=False, seed=1)
 
 ROBOT, TRAIN, HELD_OUT = "robot.yaml", "train.csv", "held-out.csv"
+SCENARIO, TRAIN_TRAJECTORY, HELD_OUT_TRAJECTORY = "scenario.yaml", "train.json", "held-out.json"
 RESULT, REPORT = "identification.json", "report.html"
 EXPORTS = ("friction.json", "friction.yaml", "friction.h", "friction.py", "model.xml")
-FILES = (ROBOT, TRAIN, HELD_OUT, RESULT, REPORT, *EXPORTS)
+FILES = (ROBOT, SCENARIO, TRAIN_TRAJECTORY, HELD_OUT_TRAJECTORY, TRAIN, HELD_OUT, RESULT, REPORT, *EXPORTS)
 """What the demo writes, and may therefore write again."""
 
+SCENARIO_TEXT = f"torque_noise_std: {list(NOISE_STD_NM)}\n"
+"""What the simulated arm conceals, but for the seed of its noise."""
 
 _HEADING = """\
-The seed paper's arm, Table 1, as `tauscope demo` hands it to the identification: what its links weigh and how its
-joints rub is left out. Of the friction curve only the shape constants are given."""
+The seed paper's arm, Table 1, as `tauscope demo` hands it to the design and to the identification: what its links weigh
+and how its joints rub is left out. Of the friction curve only the shape constants are given."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +72,7 @@ class Comparison:
 
 
 def run_demo(folder: Path) -> None:
-    """Simulate, identify, compare, and say where everything is.
+    """Design, run, identify, compare, and say where everything is.
 
     Parameters
     ----------
@@ -82,46 +86,83 @@ def run_demo(folder: Path) -> None:
     """
     prepare_folder(folder, FILES)
     arm = read_robot(example_robot("paper_arm"))
+    write_file(folder / ROBOT, robot_text_without_model(example_robot("paper_arm")).encode())
+    write_file(folder / SCENARIO, SCENARIO_TEXT.encode())
+    with shown_percent() as told, TemporaryDirectory(prefix=".runs-", dir=folder) as runs:
+        design_motion(folder / ROBOT, folder / TRAIN_TRAJECTORY, TRAIN_MOTION, told)
+        design_motion(folder / ROBOT, folder / HELD_OUT_TRAJECTORY, HELD_OUT_MOTION, told)
+        for seed, (trajectory, out) in enumerate(((TRAIN_TRAJECTORY, TRAIN), (HELD_OUT_TRAJECTORY, HELD_OUT))):
+            run_motion(Path(runs).resolve() / Path(out).stem, folder / trajectory, folder / out, seed, told)
+    request = Request(
+        robot=folder / ROBOT,
+        recordings=(folder / TRAIN,),
+        held_out=(folder / HELD_OUT,),
+        json=folder / RESULT,
+        report=folder / REPORT,
+        exports=tuple(folder / name for name in EXPORTS),
+    )
     with shown_progress() as progress:
-        progress("simulate recordings")
-        write_file(folder / ROBOT, robot_text_without_model(example_robot("paper_arm")).encode())
-        for name, seed in ((TRAIN, TRAIN_SEED), (HELD_OUT, HELD_OUT_SEED)):
-            simulate_file(arm, folder / name, seed)
-        request = Request(
-            robot=folder / ROBOT,
-            recordings=(folder / TRAIN,),
-            held_out=(folder / HELD_OUT,),
-            json=folder / RESULT,
-            report=folder / REPORT,
-            exports=tuple(folder / name for name in EXPORTS),
-        )
         outcome = identify_files(request, progress)
         write_outcome(request, outcome, progress)
     _show(output(), folder, outcome, compare(arm, outcome.identification))
 
 
-def simulate_file(arm: Robot, path: Path, seed: int) -> None:
-    """Write a recording of the arm on a random motion, with sensor noise.
+def design_motion(robot: Path, out: Path, options: ExcitationOptions, told: Told) -> None:
+    """Design a motion and write it as a trajectory file.
 
     Parameters
     ----------
-    arm : Robot
-        with its true model
-    path : Path
+    robot : Path
+        robot file
+    out : Path
         file to make
-    seed : int
-        of the motion and of the noise
+    options : ExcitationOptions
+        what is wished
+    told : callable
+        told the step and the percentage
     """
-    motion_rng, noise_rng = np.random.default_rng(seed).spawn(2)
-    recording = simulate_recording(
-        arm,
-        random_fourier_motion(arm.joints, motion_rng, period_s=PERIOD_S),
-        rate_hz=RATE_HZ,
-        periods=PERIODS,
-        noise_std=NOISE_STD_NM,
-        rng=noise_rng,
+
+    def tell(progress: OptimiserProgress) -> None:
+        told(f"design {out.stem} motion", 100.0 * progress.fraction)
+
+    write_trajectory(design_excitation(read_robot(robot), options, progress=tell).trajectory, out)
+
+
+def run_motion(folder: Path, trajectory: Path, out: Path, seed: int, told: Told) -> None:
+    """Play a motion on the simulated arm, and keep what it recorded.
+
+    Parameters
+    ----------
+    folder : Path
+        takes what the run leaves
+    trajectory : Path
+        the motion
+    out : Path
+        recording to make
+    seed : int
+        of the noise
+    told : callable
+        told the step and the percentage
+
+    Raises
+    ------
+    AcquisitionError
+        if the run does not finish
+    """
+    scenario = folder.with_suffix(".yaml")
+    scenario.write_text(f"{SCENARIO_TEXT}seed: {seed}\n", encoding="utf-8")
+    arm = example_robot("paper_arm")
+    order = RunOrder(
+        robot=str(arm),
+        trajectory=str(trajectory.resolve()),
+        backend=BackendOrder(name="sim", settings={"time": "virtual", "scenario": str(scenario)}),
+        # What the arm weighs is the simulation's secret: nobody may feed it forward.
+        options=RunOptions(rate_hz=RATE_HZ, feed_forward=False),
     )
-    write_recording_csv(path, recording, arm.joints)
+    record = run_to_end(folder, order, read_robot(arm), told)
+    if record.state is not RunState.FINISHED:
+        raise AcquisitionError(why_unfinished(record, None))
+    keep_recording(folder, record, out)
 
 
 def robot_text_without_model(path: Path) -> str:

@@ -11,9 +11,10 @@ def demo(
         "demo-output"
     ),
 ) -> None:
-    """Identify a simulated arm.
+    """Run a whole campaign on a simulated arm.
 
-    Simulates the seed paper's arm, identifies it from noisy recordings, and compares the estimate with the truth.
+    Designs a motion for the seed paper's arm and a second one that the model is judged by, runs both, identifies the
+    arm from the noisy recordings, and compares the estimate with the truth. Takes a minute.
 
     Parameters
     ----------

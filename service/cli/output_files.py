@@ -66,6 +66,52 @@ def require_free(outputs: Sequence[Path], inputs: Iterable[Path]) -> None:
         written.add(real)
 
 
+def require_new(path: Path) -> None:
+    """Refuse, before any work is done, to make a file that is there already or whose folder is not.
+
+    Parameters
+    ----------
+    path : Path
+        file to make
+
+    Raises
+    ------
+    typer.BadParameter
+        where its folder does not exist
+    ExportError
+        where it exists
+    """
+    if not path.resolve().parent.is_dir():
+        raise typer.BadParameter(f"output {str(path)!r}: folder {str(path.parent)!r} does not exist; make it first")
+    if path.exists() or path.is_symlink():
+        raise ExportError(f"{path}: exists, and is not replaced; name another file")
+
+
+def keep_file(source: Path, target: Path) -> None:
+    """Give a finished file its place; a file that is there already stays as it is.
+
+    Parameters
+    ----------
+    source : Path
+        on the same disk
+    target : Path
+        its place
+
+    Raises
+    ------
+    ExportError
+        where there is a file by now, or it cannot be written
+    """
+    try:
+        os.link(source, target)
+    except FileExistsError:
+        raise ExportError(f"{target}: was made meanwhile, and is not replaced; the file is kept as {source}") from None
+    except OSError as error:
+        reason = error.strerror or error
+        raise ExportError(f"{target}: cannot be written ({reason}); the file is kept as {source}") from error
+    source.unlink()
+
+
 def write_file(path: Path, content: bytes) -> None:
     """Write a file that appears under its name only when it is complete.
 

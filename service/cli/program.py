@@ -20,9 +20,11 @@ import typer
 from typer.main import get_command
 
 from service.cli.demo_command import demo
+from service.cli.excite_command import excite
 from service.cli.identify_command import identify
 from service.cli.recording_command import recording
 from service.cli.robot_command import robot
+from service.cli.run_command import run
 from service.cli.serve_command import serve
 from service.cli.values import SeveralValuesCommand
 from service.cli.verbs import add_verb
@@ -51,8 +53,10 @@ app = typer.Typer(
     no_args_is_help=True,
 )
 add_verb(app, identify, SeveralValuesCommand)
+add_verb(app, excite)
 app.add_typer(robot, name="robot")
 app.add_typer(recording, name="recording")
+add_verb(app, run)
 add_verb(app, serve)
 add_verb(app, demo)
 

@@ -1,7 +1,7 @@
 """``tauscope serve``: its arguments."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -17,10 +17,20 @@ def serve(
             metavar="DIR", file_okay=False, help="Folder of everything that is kept; the user's own by default."
         ),
     ] = None,
+    backend: Annotated[
+        Literal["sim", "dynamixel", "canopen"], typer.Option(help="What moves the arm where a request does not say.")
+    ] = "sim",
+    sim_time: Annotated[
+        Literal["virtual", "real"], typer.Option(help="Of the simulated arm, where a request does not say.")
+    ] = "virtual",
+    sim_socket: Annotated[
+        Path | None,
+        typer.Option(metavar="SOCKET", help="Where a simulated arm that runs by the clock listens; else one a run."),
+    ] = None,
 ) -> None:
-    """Offer identification over HTTP.
+    """Offer everything over HTTP.
 
-    REST under /api/v1, its documentation under /docs.
+    REST under /api/v1, its documentation under /docs. When it ends, arms that move are stopped first.
 
     Parameters
     ----------
@@ -30,7 +40,13 @@ def serve(
         port to listen at
     data : Path or None
         folder of everything that is kept
+    backend : str
+        ``sim``, ``dynamixel`` or ``canopen``
+    sim_time : str
+        ``virtual`` or ``real``
+    sim_socket : Path or None
+        where a simulated arm that runs by the clock listens
     """
     from service.cli.serving import run_server
 
-    run_server(host, port, data)
+    run_server(host, port, data, backend=backend, sim_time=sim_time, sim_socket=sim_socket)

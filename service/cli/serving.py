@@ -1,6 +1,7 @@
 """``tauscope serve``: the HTTP service in this process."""
 
 from pathlib import Path
+from typing import Literal
 
 import typer
 from pydantic import ValidationError
@@ -9,7 +10,15 @@ from service.api.server import serve
 from service.api.settings import Settings, default_data_folder
 
 
-def run_server(host: str, port: int, data: Path | None) -> None:
+def run_server(
+    host: str,
+    port: int,
+    data: Path | None,
+    *,
+    backend: Literal["sim", "dynamixel", "canopen"] = "sim",
+    sim_time: Literal["virtual", "real"] = "virtual",
+    sim_socket: Path | None = None,
+) -> None:
     """Serve until interrupted.
 
     Parameters
@@ -20,6 +29,12 @@ def run_server(host: str, port: int, data: Path | None) -> None:
         port to listen at; 0 takes any free one
     data : Path or None
         folder of everything that is kept; the user's own data folder where None
+    backend : str
+        what moves the arm where a request does not say
+    sim_time : str
+        of the simulated arm, where a request does not say
+    sim_socket : Path or None
+        where a simulated arm that runs by the clock listens; one is started for each run where None
 
     Raises
     ------
@@ -29,7 +44,10 @@ def run_server(host: str, port: int, data: Path | None) -> None:
         if the address cannot be listened at, or is one that others could reach
     """
     try:
-        settings = Settings(data_folder=data or default_data_folder(), host=host, port=port)
+        folder = data or default_data_folder()
+        settings = Settings(
+            data_folder=folder, host=host, port=port, backend=backend, sim_time=sim_time, sim_socket=sim_socket
+        )
     except ValidationError as error:
         first = error.errors()[0]
         raise typer.BadParameter(f"{first['loc'][0]}: {first['msg']}") from error

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 
 from rich import box
 from rich.console import Console
-from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, SpinnerColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table as RichTable
 from rich.text import Text
 
@@ -52,6 +52,39 @@ def table(title: str, view: Table) -> RichTable:
     for row in view.rows:
         made.add_row(*(plain(cell) for cell in row))
     return made
+
+
+Told = Callable[[str, float | None], None]
+"""Told the step that goes on, and how much of it is done in percent, or None where that is not known."""
+
+
+@contextmanager
+def shown_percent() -> Iterator[Told]:
+    """A bar on standard error, where that is a terminal.
+
+    Yields
+    ------
+    callable
+        to be told the step and the percentage whenever they change
+    """
+    if not sys.stderr.isatty():
+        yield lambda step, percent: None
+        return
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("", total=None)
+
+        def show(step: str, percent: float | None) -> None:
+            total = None if percent is None else 100.0
+            progress.update(task, description=one_line(step), total=total, completed=percent or 0.0)
+
+        yield show
 
 
 @contextmanager

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from service.identification import Estimator, Options
-from service.jobs.record import StoredModel
+from service.jobs.stored import StoredModel
 
 
 class OrderedRecording(StoredModel):

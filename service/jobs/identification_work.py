@@ -4,23 +4,21 @@ import json
 from collections.abc import Iterable
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 
 from service.errors import ExportError, RecordingError, TauscopeError
 from service.identification import Identification, document, identify
 from service.identification.compensation import RecordingSource
 from service.jobs.exports import EXPORT_FILES, ExportFormat, ExportInput, make_export
+from service.jobs.identification_order import IdentificationOrder, OrderedRecording
+from service.jobs.identification_workspace import IdentificationWorkspace
 from service.jobs.messages import without_folders
-from service.jobs.order import IdentificationOrder, OrderedRecording
 from service.jobs.record import JobProblem
-from service.jobs.workspace import Workspace
+from service.jobs.work import begin_step, do_work
 from service.recording import EffortKind, Recording, read_recording
 from service.robot import Robot, read_robot
 from service.store import hash_file, write_atomically
-
-
-class _StoppedError(Exception):
-    """The job was cancelled; nobody waits for its result."""
 
 
 def run_identification(folder: Path, server_recordings: Path) -> JobProblem | None:
@@ -38,49 +36,34 @@ def run_identification(folder: Path, server_recordings: Path) -> JobProblem | No
     JobProblem or None
         why there is no result; None where there is one
     """
-    work = _Work(Workspace(folder), server_recordings)
-    try:
-        work.run()
-    except _StoppedError:
-        return JobProblem(code="cancelled", detail="the job was cancelled")
-    except TauscopeError as error:
-        return JobProblem(code=error.code, detail=work.in_user_terms(error))
-    return None
+    work = _Work(IdentificationWorkspace(folder), server_recordings)
+    return do_work(work.workspace, work.run, *work.folders)
 
 
 class _Work:
     """One job on its way."""
 
-    def __init__(self, workspace: Workspace, server_recordings: Path) -> None:
+    def __init__(self, workspace: IdentificationWorkspace, server_recordings: Path) -> None:
         self.workspace = workspace
         self.server_recordings = server_recordings
+        uploads = (workspace.uploads(held_out=held_out) for held_out in (False, True))
+        self.folders = (*uploads, workspace.robot, server_recordings)
+        self.begin = partial(begin_step, workspace)
 
     def run(self) -> None:
         """Read, identify, write."""
         order = self.workspace.read_order()
         if order is None:
             raise TauscopeError("the job's order.json is missing or damaged; hand the identification in again")
-        self._begin("read robot and recordings")
+        self.begin("read robot and recordings")
         robot = read_robot(self.workspace.robot / order.robot_file)
         recordings = self._read(order.recordings, robot, held_out=False)
         held_out = self._read(order.held_out, robot, held_out=True)
-        identification = identify(robot, recordings, held_out, order.options.to_options(), self._begin)
-        self._begin("write result and exports")
+        identification = identify(robot, recordings, held_out, order.options.to_options(), self.begin)
+        self.begin("write result and exports")
         content = document(identification).model_dump_json(by_alias=True, indent=1).encode()
         write_atomically(self.workspace.result, content)
         self._write_exports(identification, order, recordings)
-
-    def in_user_terms(self, error: TauscopeError) -> str:
-        """An error's message without the server's folders."""
-        workspace = self.workspace
-        uploads = [workspace.uploads(held_out=held_out) for held_out in (False, True)]
-        return without_folders(str(error), *uploads, workspace.robot, self.server_recordings)
-
-    def _begin(self, step: str) -> None:
-        """Tell a step, unless nobody wants to know any more."""
-        if self.workspace.is_asked_to_stop():
-            raise _StoppedError
-        self.workspace.write_step(step)
 
     def _read(self, ordered: Iterable[OrderedRecording], robot: Robot, *, held_out: bool) -> list[Recording]:
         """The recordings of the order, each with the bytes that were ordered."""
@@ -113,7 +96,7 @@ class _Work:
             try:
                 content = make_export(export_format, given)
             except ExportError as error:
-                refusals[export_format.value] = self.in_user_terms(error)
+                refusals[export_format.value] = without_folders(str(error), *self.folders)
                 continue
             write_atomically(self.workspace.exports / EXPORT_FILES[export_format].name, content)
         write_atomically(self.workspace.refusals, json.dumps(refusals, indent=1).encode())

@@ -1,10 +1,11 @@
-"""The queue of jobs: one after the other into an executor, each in a definite state, also after a restart."""
+"""The queue of jobs: one after the other into an executor; each has a definite state, also after a restart."""
 
 import logging
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
+from dataclasses import dataclass
 from pathlib import Path
 
 from service.errors import LimitExceededError, NotFoundError
@@ -18,9 +19,7 @@ Work = Callable[[Path], JobProblem | None]
 
 _log = logging.getLogger("tauscope.jobs")
 
-INTERRUPTED = JobProblem(
-    code="interrupted", detail="the service ended before this job did; hand the identification in again"
-)
+INTERRUPTED = JobProblem(code="interrupted", detail="the service ended before this job did; hand it in again")
 CANCELLED = JobProblem(code="cancelled", detail="the job was cancelled on request")
 WORKER_LOST = JobProblem(
     code="worker-lost",
@@ -33,21 +32,41 @@ class QueueFullError(LimitExceededError):
     """So many jobs are waiting that no further one is accepted."""
 
 
+@dataclass(frozen=True, eq=False)
+class JobKind:
+    """A kind of job: where its folders lie and what is done with them.
+
+    items : ItemStore
+        folders of the jobs
+    work : callable
+        does the job of a folder
+    """
+
+    items: ItemStore
+    work: Work
+
+
+@dataclass(frozen=True)
+class _Job:
+    """A job that has not ended."""
+
+    kind: JobKind
+    identifier: str
+
+
 class JobQueue:
     """Jobs waiting for an executor, and jobs in it; the only writer of their states.
 
     Every method may be called from any thread.
     """
 
-    def __init__(self, items: ItemStore, work: Work, executor: Executor, *, slots: int, most_waiting: int) -> None:
+    def __init__(self, kinds: Sequence[JobKind], executor: Executor, *, slots: int, most_waiting: int) -> None:
         """Make the queue; jobs that an earlier service left unfinished become `interrupted`.
 
         Parameters
         ----------
-        items : ItemStore
-            folders of the jobs
-        work : callable
-            does the job of a folder
+        kinds : sequence of JobKind
+            every kind of job that will be handed in
         executor : Executor
             where the work is done; shut down by `close`
         slots : int
@@ -55,24 +74,26 @@ class JobQueue:
         most_waiting : int
             jobs that may wait
         """
-        self._items = items
-        self._work = work
         self._executor = executor
         self._slots = slots
         self._most_waiting = most_waiting
         self._lock = threading.RLock()
-        self._waiting: deque[str] = deque()
-        self._running: dict[str, Future[JobProblem | None]] = {}
+        self._waiting: deque[_Job] = deque()
+        self._running: dict[_Job, Future[JobProblem | None]] = {}
         self._is_closed = False
-        items.tidy()
-        for identifier in items.identifiers():
-            self._move(identifier, JobState.INTERRUPTED, INTERRUPTED)
+        for kind in kinds:
+            kind.items.tidy()
+            for identifier in kind.items.identifiers():
+                if not _move(_Job(kind, identifier), JobState.INTERRUPTED, INTERRUPTED):
+                    Workspace(kind.items.folder(identifier)).tell_lost_end()
 
-    def submit(self, staged: Path) -> str:
+    def submit(self, kind: JobKind, staged: Path) -> str:
         """Take a job.
 
         Parameters
         ----------
+        kind : JobKind
+            of the job
         staged : Path
             staged folder that holds the job's input
 
@@ -89,19 +110,21 @@ class JobQueue:
         with self._lock:
             if self._is_closed or len(self._waiting) >= self._most_waiting:
                 raise QueueFullError(f"{len(self._waiting)} jobs are waiting already; try again when one has ended")
-            Workspace(staged).write_record(JobRecord(state=JobState.QUEUED, created=self._items.clock()))
-            identifier = self._items.publish(staged)
-            self._waiting.append(identifier)
+            Workspace(staged).write_record(JobRecord(state=JobState.QUEUED, created=kind.items.clock()))
+            job = _Job(kind, kind.items.publish(staged))
+            self._waiting.append(job)
             self._fill_slots()
-            return identifier
+            return job.identifier
 
-    def cancel_or_remove(self, identifier: str) -> bool:
+    def cancel_or_remove(self, kind: JobKind, identifier: str) -> bool:
         """Cancel a job that has not ended; remove one that has, or whose record is damaged.
 
         Cancelled work stops at its next step; what it still does until then is dropped.
 
         Parameters
         ----------
+        kind : JobKind
+            of the job
         identifier : str
             of the job
 
@@ -116,14 +139,39 @@ class JobQueue:
             if there is no such job
         """
         with self._lock:
-            workspace = Workspace(self._items.folder(identifier))
-            if not self._move(identifier, JobState.CANCELLED, CANCELLED):
-                self._items.remove(identifier)
-                return True
+            if self.cancel(kind, identifier):
+                return False
+            kind.items.remove(identifier)
+            return True
+
+    def cancel(self, kind: JobKind, identifier: str) -> bool:
+        """Cancel a job that has not ended.
+
+        Parameters
+        ----------
+        kind : JobKind
+            of the job
+        identifier : str
+            of the job
+
+        Returns
+        -------
+        bool
+            False where it had ended, or its record is damaged
+
+        Raises
+        ------
+        NotFoundError
+            if there is no such job
+        """
+        with self._lock:
+            job, workspace = _Job(kind, identifier), Workspace(kind.items.folder(identifier))
+            if not _move(job, JobState.CANCELLED, CANCELLED):
+                return False
             workspace.ask_to_stop()
-            if identifier in self._waiting:
-                self._waiting.remove(identifier)
-            return False
+            if job in self._waiting:
+                self._waiting.remove(job)
+            return True
 
     def close(self) -> None:
         """End the work; whatever has not ended by itself becomes `interrupted`."""
@@ -131,47 +179,49 @@ class JobQueue:
             self._is_closed = True
             unfinished = [*self._running, *self._waiting]
             self._waiting.clear()
-            for identifier in unfinished:
-                self._move(identifier, JobState.INTERRUPTED, INTERRUPTED)
+            for job in unfinished:
+                _move(job, JobState.INTERRUPTED, INTERRUPTED)
         self._executor.shutdown(wait=True, cancel_futures=True)
 
     def _fill_slots(self) -> None:
         """Hand waiting jobs to the executor while it has room."""
         while self._waiting and len(self._running) < self._slots and not self._is_closed:
-            identifier = self._waiting.popleft()
-            self._move(identifier, JobState.RUNNING)
+            job = self._waiting.popleft()
+            _move(job, JobState.RUNNING)
             try:
-                future = self._executor.submit(self._work, self._items.folder(identifier))
+                future = self._executor.submit(job.kind.work, job.kind.items.folder(job.identifier))
             except (BrokenExecutor, RuntimeError, OSError):
-                _log.exception("job %s could not be handed to a worker", identifier)
-                self._move(identifier, JobState.FAILED, WORKER_LOST)
+                _log.exception("job %s could not be handed to a worker", job.identifier)
+                _move(job, JobState.FAILED, WORKER_LOST)
                 continue
-            self._running[identifier] = future
-            future.add_done_callback(lambda done, ended=identifier: self._end(ended, done))
+            self._running[job] = future
+            future.add_done_callback(lambda done, ended=job: self._end(ended, done))
 
-    def _end(self, identifier: str, future: "Future[JobProblem | None]") -> None:
+    def _end(self, job: _Job, future: "Future[JobProblem | None]") -> None:
         """Take note that the work of a job has ended, and begin the next."""
-        problem = _problem_of(identifier, future)
+        problem = _problem_of(job.identifier, future)
         with self._lock:
-            self._running.pop(identifier, None)
+            self._running.pop(job, None)
             try:
-                self._move(identifier, JobState.SUCCEEDED if problem is None else JobState.FAILED, problem)
+                _move(job, JobState.SUCCEEDED if problem is None else JobState.FAILED, problem)
             except OSError:
                 # The disk is full or gone: the job becomes `interrupted` with the next start.
-                _log.exception("the state of job %s could not be written", identifier)
+                _log.exception("the state of job %s could not be written", job.identifier)
             self._fill_slots()
 
-    def _move(self, identifier: str, state: JobState, problem: JobProblem | None = None) -> bool:
-        """Write a job's new state, if it may follow the present one; False where it may not or the job is gone."""
-        try:
-            workspace = Workspace(self._items.folder(identifier))
-        except NotFoundError:
-            return False
-        record = workspace.read_record()
-        if record is None or not record.may_become(state):
-            return False
-        workspace.write_record(record.moved(state, self._items.clock(), problem))
-        return True
+
+def _move(job: _Job, state: JobState, problem: JobProblem | None = None) -> bool:
+    """Write a job's new state, if it may follow the present one; False where it may not or the job is gone."""
+    items = job.kind.items
+    try:
+        workspace = Workspace(items.folder(job.identifier))
+    except NotFoundError:
+        return False
+    record = workspace.read_record()
+    if record is None or not record.may_become(state):
+        return False
+    workspace.write_record(record.moved(state, items.clock(), problem))
+    return True
 
 
 def _problem_of(identifier: str, future: "Future[JobProblem | None]") -> JobProblem | None:

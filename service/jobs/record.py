@@ -3,15 +3,10 @@
 from datetime import datetime
 from typing import Literal
 
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
+from pydantic import AwareDatetime, Field
 
 from service.jobs.states import JobState, may_follow
-
-
-class StoredModel(BaseModel):
-    """Base of what jobs keep as JSON: no type is converted, no key is overlooked."""
-
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+from service.jobs.stored import StoredModel
 
 
 class JobProblem(StoredModel):

@@ -1,6 +1,7 @@
 """What is kept: recordings and the folders of finished and waiting work, as plain files that are never half written."""
 
 from service.store.atomic import write_atomically
+from service.store.event_log import EventLog, LogFollower, LoggedEvent
 from service.store.folder_lock import FolderLock
 from service.store.incoming import IncomingFile, KeptFile, hash_file
 from service.store.items import ItemStore
@@ -9,10 +10,13 @@ from service.store.recordings import NameTakenError, RecordingStore, StoredRecor
 
 __all__ = [
     "FILE_NAME_RULE",
+    "EventLog",
     "FolderLock",
     "IncomingFile",
     "ItemStore",
     "KeptFile",
+    "LogFollower",
+    "LoggedEvent",
     "NameTakenError",
     "RecordingStore",
     "StoredRecording",

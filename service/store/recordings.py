@@ -117,6 +117,20 @@ class RecordingStore:
         self._status(name)
         return self.root / name
 
+    def holds(self, name: str) -> bool:
+        """Whether there is a recording of a name.
+
+        Parameters
+        ----------
+        name : str
+            any text
+        """
+        try:
+            self._status(name)
+        except NotFoundError:
+            return False
+        return True
+
     def find(self, name: str) -> StoredRecording:
         """A recording with its sha256, which is computed where it is not known.
 

@@ -2,11 +2,8 @@
 
 import http.client
 import json
-import re
 import signal
 import socket
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -16,16 +13,9 @@ import pytest
 
 from api.conftest import IDENTIFICATIONS, RECORDINGS
 from api.problem_check import assert_problem
+from api.serving import served
 from service.api import Settings, serve
 from service.errors import TauscopeError
-from shared_data import REPOSITORY
-
-PROGRAM = """
-import sys
-from pathlib import Path
-from service.api import Settings, serve
-serve(Settings(data_folder=Path(sys.argv[1]), port=0, max_upload_bytes=8_000_000), lambda url: print(url, flush=True))
-"""
 
 
 @pytest.fixture(scope="module")
@@ -35,21 +25,9 @@ def data_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def server(data_folder: Path) -> Iterator[httpx2.Client]:
-    arguments = [sys.executable, "-c", PROGRAM, str(data_folder)]
-    with subprocess.Popen(
-        arguments, cwd=REPOSITORY, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        try:
-            assert process.stdout is not None
-            url = process.stdout.readline().strip()
-            assert re.fullmatch(r"http://127\.0\.0\.1:[0-9]+", url)
-            with httpx2.Client(base_url=url, timeout=60) as client:
-                yield client
-        finally:
-            process.send_signal(signal.SIGTERM)
-            out, err = process.communicate(timeout=60)
-    assert process.returncode in (0, -signal.SIGTERM)
-    assert (out, err) == ("", "")
+    with served(data_folder) as service:
+        yield service.client
+    assert service.process.returncode in (0, -signal.SIGTERM)
 
 
 def ended(server: httpx2.Client, here: str) -> dict[str, Any]:

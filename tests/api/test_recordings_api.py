@@ -197,3 +197,19 @@ def test_a_full_disk_is_said(client: TestClient, settings: Settings, monkeypatch
     monkeypatch.setattr("os.fsync", full)
     assert_problem(client.post(RECORDINGS, files={"file": ("a.csv", CSV)}), "storage-full", 507)
     assert {file.name for file in settings.recordings_folder.iterdir()} == {".sha256"}
+
+
+@pytest.mark.parametrize(("name", "kind"), [("a b.csv", "text/csv"), ("log.mcap", "application/octet-stream")])
+def test_a_recording_is_fetched_as_it_was_sent(name: str, kind: str, client: TestClient) -> None:
+    content = bytes(range(256)) * 1000
+    client.post(RECORDINGS, files={"file": (name, content)})
+    answer = client.get(f"{RECORDINGS}/{name}/content")
+    assert (answer.status_code, answer.content) == (200, content)
+    assert answer.headers["content-type"].partition(";")[0] == kind
+    assert answer.headers["content-disposition"].startswith("attachment")
+    assert answer.headers["x-content-type-options"] == "nosniff"
+
+
+@pytest.mark.parametrize("name", ["nothing.csv", ".sha256", "..", "%2e%2e%2f.lock"])
+def test_nothing_else_is_fetched(name: str, client: TestClient) -> None:
+    assert_problem(client.get(f"{RECORDINGS}/{name}/content"), "not-found", 404)

@@ -10,9 +10,21 @@ import numpy as np
 import pytest
 
 from cli.conftest import Ended
-from service.cli.demo import FILES, HELD_OUT, NOISE_STD_NM, REPORT, RESULT, ROBOT, TRAIN, robot_text_without_model
+from service.cli.demo import (
+    FILES,
+    HELD_OUT,
+    HELD_OUT_TRAJECTORY,
+    NOISE_STD_NM,
+    REPORT,
+    RESULT,
+    ROBOT,
+    TRAIN,
+    TRAIN_TRAJECTORY,
+    robot_text_without_model,
+)
 from service.cli.demo_folder import MARK, prepare_folder
 from service.errors import ExportError
+from service.excitation import read_trajectory
 from service.recording import read_recording
 from service.robot import read_robot
 from sim_backend.examples import example_robot
@@ -20,16 +32,21 @@ from sim_backend.examples import example_robot
 Run = Callable[..., Ended]
 
 
+def in_whole_demo(test: Callable[..., None]) -> Callable[..., None]:
+    return pytest.mark.slow(pytest.mark.timeout(400)(test))
+
+
 @pytest.fixture(scope="module")
 def demo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """The demo's folder and what it printed, run as a program of its own."""
     folder = tmp_path_factory.mktemp("demo") / "out"
     command = [sys.executable, "-m", "service.cli", "demo", "--out", str(folder)]
-    ended = subprocess.run(command, check=False, capture_output=True, text=True, timeout=100)
+    ended = subprocess.run(command, check=False, capture_output=True, text=True, timeout=300)
     assert (ended.returncode, ended.stderr) == (0, "")
     return folder, ended.stdout
 
 
+@in_whole_demo
 def test_everything_is_there_and_named(demo: tuple[Path, str]) -> None:
     folder, printed = demo
     assert sorted(path.name for path in folder.iterdir()) == sorted([MARK, *FILES])
@@ -37,6 +54,7 @@ def test_everything_is_there_and_named(demo: tuple[Path, str]) -> None:
         assert f"wrote {folder / name}\n" in printed
 
 
+@in_whole_demo
 def test_the_result_holds_the_truth(demo: tuple[Path, str]) -> None:
     folder, _ = demo
     result = json.loads((folder / RESULT).read_text(encoding="utf-8"))
@@ -49,6 +67,7 @@ def test_the_result_holds_the_truth(demo: tuple[Path, str]) -> None:
     assert result["fit"]["held_out"]["rms"] == pytest.approx(NOISE_STD_NM, rel=0.05)
 
 
+@in_whole_demo
 def test_the_identification_is_not_told_the_truth(demo: tuple[Path, str]) -> None:
     folder, _ = demo
     robot = read_robot(folder / ROBOT)
@@ -57,15 +76,23 @@ def test_the_identification_is_not_told_the_truth(demo: tuple[Path, str]) -> Non
     arm = read_robot(example_robot("paper_arm"))
     assert [joint.limits for joint in robot.joints] == [joint.limits for joint in arm.joints]
     assert "model:" not in robot_text_without_model(example_robot("paper_arm"))
+    for name in (TRAIN_TRAJECTORY, HELD_OUT_TRAJECTORY):
+        trajectory = read_trajectory(folder / name, robot)
+        assert trajectory.design is not None
+        assert None in trajectory.design.margins.get("torque", (None,))
 
 
+@in_whole_demo
 def test_recordings_are_of_different_motions(demo: tuple[Path, str]) -> None:
     folder, _ = demo
     train, held_out = (read_recording(folder / name).samples() for name in (TRAIN, HELD_OUT))
-    assert train.position.shape == held_out.position.shape == (10000, 3)
-    assert np.abs(train.position - held_out.position).max() > 0.5
+    assert len(train.position) > 200 * 50
+    assert len(held_out.position) > 200 * 20
+    assert np.abs(train.position[:4000] - held_out.position[:4000]).max() > 0.5
+    assert np.abs(train.effort[:4000] - held_out.effort[:4000]).min(axis=0).max() > 0.0
 
 
+@in_whole_demo
 def test_z_scores_are_printed_and_plausible(demo: tuple[Path, str]) -> None:
     _, printed = demo
     line = next(line for line in printed.splitlines() if line.startswith("z is"))

@@ -106,7 +106,11 @@ def test_no_answer_is_1_and_one_line(run: Run, places: dict[str, str], case: str
 
 @pytest.mark.parametrize(
     "words",
-    [["--help"], ["--version"], *([verb, "--help"] for verb in ("identify", "robot", "recording", "serve", "demo"))],
+    [
+        ["--help"],
+        ["--version"],
+        *([verb, "--help"] for verb in ("identify", "run", "robot", "recording", "serve", "demo")),
+    ],
 )
 def test_help_and_version_are_0(run: Run, words: list[str]) -> None:
     ended = run(*words)

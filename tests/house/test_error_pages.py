@@ -1,10 +1,15 @@
 """The examples of the error pages are what Tauscope says: each is provoked, and its page must hold the message."""
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from service.errors import TauscopeError
+from acquisition.doubles import PointArm, connection, point_robot, short_motion
+from service.acquisition import make_backend, run_trajectory
+from service.errors import AcquisitionError, TauscopeError
+from service.excitation import ExcitationOptions, Workspace, design_excitation, read_trajectory
 from service.identification.compensation.drive_units import drive_units
 from service.recording import EffortKind, read_recording
 from service.robot import Joint, read_robot
@@ -97,6 +102,56 @@ def test_export_example() -> None:
     with pytest.raises(TauscopeError) as raised:
         drive_units(joint, EffortKind.TORQUE)
     assert_on_page(raised.value, "export")
+
+
+@pytest.mark.parametrize(
+    ("robot", "options"),
+    [
+        (ROBOT.replace("- name: joint2", "- name: joint2\n    limits: {position: [0.3, 0.3005]}"), {}),
+        (ROBOT, {"workspace": Workspace(floor_m=1.0)}),
+    ],
+    ids=["no room", "floor too high"],
+)
+def test_design_examples(robot: str, options: dict[str, Workspace], tmp_path: Path) -> None:
+    path = tmp_path / "arm.yaml"
+    path.write_text(robot, encoding="utf-8")
+    with pytest.raises(TauscopeError) as raised:
+        design_excitation(read_robot(path), ExcitationOptions(**options))
+    assert_on_page(raised.value, "excitation")
+
+
+@pytest.mark.parametrize("row", ["0.1,0,x", "0.0,0,0"], ids=["no number", "time stands still"])
+def test_trajectory_examples(row: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("arm.yaml").write_text(ROBOT, encoding="utf-8")
+    rows = ["t,q1,q2", "0.0,0,0", row] if "x" in row else ["t,q1,q2", "-0.1,0,0", "0.0,0,0", row]
+    Path("motion.csv").write_text("\n".join(rows), encoding="utf-8")
+    with pytest.raises(TauscopeError) as raised:
+        read_trajectory("motion.csv", read_robot("arm.yaml"))
+    assert_on_page(raised.value, "excitation")
+
+
+@pytest.mark.parametrize("case", ["outside", "fast", "collision", "silent"])
+def test_run_examples(case: str, tmp_path: Path) -> None:
+    robot, arm = point_robot(), PointArm(position=np.array([0.4, 2.3 if case == "outside" else -0.3]))
+    if case == "collision":
+        arm.tamper = lambda arm, state: replace(
+            state, position=arm.position - (len(arm.sent) > 100) * np.array([0, 0.25])
+        )
+    elif case == "silent":
+        arm.tamper = lambda arm, state: replace(
+            state, position=np.where([len(arm.sent) > 100, False], np.nan, arm.position)
+        )
+    motion = short_motion(robot, amplitude=0.175 * 2 if case == "fast" else 0.05)
+    record = run_trajectory(robot, motion, connection(arm), tmp_path / "run")
+    assert record.problem is not None
+    assert_on_page(AcquisitionError(record.problem.detail), record.problem.code)
+
+
+def test_backend_example() -> None:
+    with pytest.raises(AcquisitionError) as raised:
+        make_backend("simm", point_robot(), {})
+    assert_on_page(raised.value, "acquisition")
 
 
 def assert_on_page(error: TauscopeError, code: str) -> None:

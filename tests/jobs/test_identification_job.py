@@ -12,8 +12,8 @@ from service.jobs import (
     ExportFormat,
     IdentificationOptions,
     IdentificationOrder,
+    IdentificationWorkspace,
     OrderedRecording,
-    Workspace,
     run_identification,
 )
 from service.jobs import identification_work as work_module
@@ -23,10 +23,10 @@ OPTIONS = IdentificationOptions(cutoff_hz=None)
 
 
 @pytest.fixture
-def workspace(tmp_path: Path) -> Workspace:
+def workspace(tmp_path: Path) -> IdentificationWorkspace:
     folder = tmp_path / "job"
     folder.mkdir()
-    workspace = Workspace(folder)
+    workspace = IdentificationWorkspace(folder)
     workspace.prepare()
     (workspace.robot / "arm.yaml").write_bytes(PAPER_ROBOT.read_bytes())
     return workspace
@@ -39,7 +39,9 @@ def server(tmp_path: Path) -> Path:
     return folder
 
 
-def order(workspace: Workspace, *paths: Path, held_out: tuple[Path, ...] = (), robot: str = "arm.yaml") -> None:
+def order(
+    workspace: IdentificationWorkspace, *paths: Path, held_out: tuple[Path, ...] = (), robot: str = "arm.yaml"
+) -> None:
     def ordered(path: Path) -> OrderedRecording:
         origin = "uploaded" if path.is_relative_to(workspace.folder) else "server"
         return OrderedRecording(name=path.name, origin=origin, sha256=hash_file(path))
@@ -55,7 +57,7 @@ def order(workspace: Workspace, *paths: Path, held_out: tuple[Path, ...] = (), r
     )
 
 
-def test_result_exports_and_steps(workspace: Workspace, server: Path) -> None:
+def test_result_exports_and_steps(workspace: IdentificationWorkspace, server: Path) -> None:
     train = write_recording(workspace.uploads(held_out=False) / "train.csv", seed=1)
     test = write_recording(server / "test.csv", seed=2)
     order(workspace, train, held_out=(test,))
@@ -82,7 +84,7 @@ def test_result_exports_and_steps(workspace: Workspace, server: Path) -> None:
     assert compensation["joints"][0]["torque"]["stiction"] == document.friction[0].stiction
 
 
-def test_a_urdf_that_came_with_the_robot_is_patched(workspace: Workspace, server: Path) -> None:
+def test_a_urdf_that_came_with_the_robot_is_patched(workspace: IdentificationWorkspace, server: Path) -> None:
     (workspace.robot / "arm.yaml").write_text(
         "name: slider\nkinematics: {urdf: {file: arm.urdf, base: base, tip: tool}}\n", encoding="utf-8"
     )
@@ -122,7 +124,7 @@ def spoil(path: Path, row: int, text: str) -> Path:
 
 
 def test_a_broken_recording_is_named_with_line_and_column_and_without_the_servers_folders(
-    workspace: Workspace, server: Path, tmp_path: Path
+    workspace: IdentificationWorkspace, server: Path, tmp_path: Path
 ) -> None:
     path = write_recording(workspace.uploads(held_out=False) / "broken.csv", seed=1)
     row = path.read_text(encoding="utf-8").splitlines()[99].split(",")
@@ -136,7 +138,7 @@ def test_a_broken_recording_is_named_with_line_and_column_and_without_the_server
     assert workspace.read_result() is None
 
 
-def test_a_recording_of_another_robot(workspace: Workspace, server: Path) -> None:
+def test_a_recording_of_another_robot(workspace: IdentificationWorkspace, server: Path) -> None:
     order(workspace, _slider_recording(server / "slider.csv"))
     problem = run_identification(workspace.folder, server)
     assert problem is not None
@@ -145,7 +147,9 @@ def test_a_recording_of_another_robot(workspace: Workspace, server: Path) -> Non
 
 
 @pytest.mark.parametrize("change", ["edited", "removed", "replaced by a link"])
-def test_a_recording_on_the_server_that_changed_meanwhile(change: str, workspace: Workspace, server: Path) -> None:
+def test_a_recording_on_the_server_that_changed_meanwhile(
+    change: str, workspace: IdentificationWorkspace, server: Path
+) -> None:
     path = _slider_recording(server / "a.csv")
     order(workspace, path)
     if change == "edited":
@@ -160,26 +164,26 @@ def test_a_recording_on_the_server_that_changed_meanwhile(change: str, workspace
     assert "changed or removed" in problem.detail
 
 
-def test_a_damaged_order(workspace: Workspace, server: Path) -> None:
+def test_a_damaged_order(workspace: IdentificationWorkspace, server: Path) -> None:
     problem = run_identification(workspace.folder, server)
     assert problem is not None
     assert "order.json" in problem.detail
 
 
 def test_cancelled_work_stops_at_its_next_step(
-    workspace: Workspace, server: Path, monkeypatch: pytest.MonkeyPatch
+    workspace: IdentificationWorkspace, server: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     order(workspace, write_recording(server / "a.csv", seed=1))
     steps: list[str] = []
-    write = Workspace.write_step
+    write = IdentificationWorkspace.write_step
 
-    def cancel_at_the_second(self: Workspace, step: str) -> None:
+    def cancel_at_the_second(self: IdentificationWorkspace, step: str) -> None:
         steps.append(step)
         write(self, step)
         if len(steps) == 2:
             self.ask_to_stop()
 
-    monkeypatch.setattr(Workspace, "write_step", cancel_at_the_second)
+    monkeypatch.setattr(IdentificationWorkspace, "write_step", cancel_at_the_second)
     problem = run_identification(workspace.folder, server)
     assert problem is not None
     assert problem.code == "cancelled"
@@ -188,7 +192,7 @@ def test_cancelled_work_stops_at_its_next_step(
 
 
 def test_unforeseen_failures_are_not_swallowed(
-    workspace: Workspace, server: Path, monkeypatch: pytest.MonkeyPatch
+    workspace: IdentificationWorkspace, server: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     order(workspace, _slider_recording(server / "a.csv"))
 
@@ -201,6 +205,6 @@ def test_unforeseen_failures_are_not_swallowed(
 
 
 @pytest.mark.parametrize("damage", [b"", b"[]", b"{}", b'{"schema": "other/1"}', b"\xff", b"[" * 100_000])
-def test_a_damaged_result_is_no_result(damage: bytes, workspace: Workspace) -> None:
+def test_a_damaged_result_is_no_result(damage: bytes, workspace: IdentificationWorkspace) -> None:
     workspace.result.write_bytes(damage)
     assert workspace.read_result() is None

@@ -1,6 +1,5 @@
 """The queue: order, slots, cancelling, failures of every kind, restart."""
 
-from collections.abc import Callable
 from concurrent.futures import BrokenExecutor
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
@@ -9,7 +8,8 @@ import pytest
 
 from jobs.executors import InlineExecutor, ManualExecutor
 from service.errors import NotFoundError
-from service.jobs import JobProblem, JobQueue, JobState, QueueFullError, Workspace
+from service.jobs import JobKind, JobProblem, JobQueue, JobState, QueueFullError, Workspace
+from service.jobs.queue import Work
 from service.store import ItemStore
 
 
@@ -35,10 +35,23 @@ def crash(_: Path) -> None:
     raise ZeroDivisionError("a bug")
 
 
-def make_queue(
-    items: ItemStore, executor: ManualExecutor, work: Callable[[Path], JobProblem | None] = succeed, slots: int = 1
-) -> JobQueue:
-    return JobQueue(items, work, executor, slots=slots, most_waiting=2)
+class OneKind:
+    """A queue of jobs of one kind."""
+
+    def __init__(self, items: ItemStore, executor: ManualExecutor, work: Work, slots: int) -> None:
+        self.kind = JobKind(items, work)
+        self.queue = JobQueue([self.kind], executor, slots=slots, most_waiting=2)
+        self.close = self.queue.close
+
+    def submit(self, staged: Path) -> str:
+        return self.queue.submit(self.kind, staged)
+
+    def cancel_or_remove(self, identifier: str) -> bool:
+        return self.queue.cancel_or_remove(self.kind, identifier)
+
+
+def make_queue(items: ItemStore, executor: ManualExecutor, work: Work = succeed, slots: int = 1) -> OneKind:
+    return OneKind(items, executor, work, slots)
 
 
 def state_of(items: ItemStore, identifier: str) -> JobState:
@@ -72,9 +85,7 @@ def test_jobs_run_in_their_order_and_never_more_than_there_are_slots(
 @pytest.mark.parametrize(
     ("work", "state", "code"), [(fail, JobState.FAILED, "recording"), (crash, JobState.FAILED, "internal")]
 )
-def test_work_that_fails(
-    work: Callable[[Path], JobProblem | None], state: JobState, code: str, items: ItemStore
-) -> None:
+def test_work_that_fails(work: Work, state: JobState, code: str, items: ItemStore) -> None:
     job = make_queue(items, InlineExecutor(), work).submit(items.stage())
     assert (state_of(items, job), problem_of(items, job)) == (state, code)
 
@@ -207,3 +218,58 @@ def test_a_full_disk_when_a_job_ends_does_not_stop_the_queue(
     assert "could not be written" in caplog.text
     make_queue(items, ManualExecutor())
     assert state_of(items, unlucky) == "interrupted"
+
+
+def test_jobs_of_several_kinds_take_their_turns(tmp_path: Path, executor: ManualExecutor) -> None:
+    first, second = (JobKind(ItemStore(tmp_path / noun, noun), succeed) for noun in ("first", "second"))
+    queue = JobQueue([first, second], executor, slots=1, most_waiting=2)
+    jobs = [(kind, queue.submit(kind, kind.items.stage())) for kind in (first, second, first)]
+    for done in range(3):
+        states = [state_of(kind.items, job) for kind, job in jobs]
+        assert states == ["succeeded"] * done + ["running"] + ["queued"] * (2 - done)
+        executor.run()
+    with pytest.raises(NotFoundError, match="no second"):
+        queue.cancel_or_remove(second, jobs[0][1])
+
+
+def events_of(items: ItemStore, identifier: str) -> list[tuple[str, str | None]]:
+    """Kind and state of every event."""
+    log = Workspace(items.folder(identifier)).events.follow().read()
+    assert [event.number for event in log] == list(range(1, len(log) + 1))
+    return [(event.content["kind"], event.content.get("state")) for event in log]
+
+
+def test_every_change_of_state_is_told(items: ItemStore, executor: ManualExecutor) -> None:
+    queue = make_queue(items, executor, fail)
+    done, cancelled = queue.submit(items.stage()), queue.submit(items.stage())
+    queue.cancel_or_remove(cancelled)
+    executor.run()
+    assert events_of(items, done) == [("state", "queued"), ("state", "running"), ("ended", "failed")]
+    assert events_of(items, cancelled) == [("state", "queued"), ("ended", "cancelled")]
+    ended = Workspace(items.folder(done)).events.last()
+    assert ended is not None
+    assert ended["problem"] == {"code": "recording", "detail": "a.csv: row 3"}
+
+
+@pytest.mark.parametrize("loss", ["all", "the end", "none"])
+def test_the_end_is_told_by_the_next_start_where_it_is_missing(loss: str, items: ItemStore) -> None:
+    job = make_queue(items, InlineExecutor()).submit(items.stage())
+    log = Workspace(items.folder(job)).events.path
+    lines = log.read_bytes().splitlines(keepends=True)
+    log.write_bytes(b"".join({"all": [], "the end": lines[:-1], "none": lines}[loss]))
+    make_queue(items, ManualExecutor())
+    make_queue(items, ManualExecutor())
+    kinds = [kind for kind, _ in events_of(items, job)]
+    assert kinds == (["ended"] if loss == "all" else ["state", "state", "ended"])
+
+
+def test_events_that_cannot_be_written_do_not_stop_the_job(
+    items: ItemStore, executor: ManualExecutor, caplog: pytest.LogCaptureFixture
+) -> None:
+    queue = make_queue(items, executor)
+    job = queue.submit(items.stage())
+    Workspace(items.folder(job)).events.path.unlink()
+    Workspace(items.folder(job)).events.path.mkdir()
+    executor.run()
+    assert state_of(items, job) == "succeeded"
+    assert "an event of job" in caplog.text

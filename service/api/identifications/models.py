@@ -1,15 +1,15 @@
 """Requests and answers about identifications."""
 
-from datetime import datetime
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Self
 
 from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from service.api.models import AnswerModel, StrictModel
-from service.api.problems import Problem
+from service.api.jobs.answers import JobAnswer
+from service.api.jobs.submission import RobotRequest
+from service.api.models import AnswerModel
 from service.api.robots.models import EXAMPLE_ROBOT
-from service.jobs import IdentificationOptions, JobState, OrderedRecording
+from service.jobs import IdentificationOptions, OrderedRecording
 from service.store import FILE_NAME_RULE, is_file_name
 from service.store.names import FILE_NAME_PATTERN
 
@@ -25,12 +25,9 @@ FileName = Annotated[str, AfterValidator(_file_name), Field(json_schema_extra={"
 Names = Annotated[list[FileName], Field(max_length=1000)]
 
 
-class IdentificationRequest(StrictModel):
+class IdentificationRequest(RobotRequest):
     """What is to be identified."""
 
-    robot: dict[str, Any] | None = Field(
-        default=None, description="content of a robot file; in a form, the part `robot` may hold the file instead"
-    )
     recordings: Names | None = Field(
         default=None,
         description="names of the recordings that the model is made from: files of this form, or on the server;"
@@ -72,26 +69,18 @@ class LinksAnswer(AnswerModel):
     """Where to go on from an identification."""
 
     self_: str = Field(alias="self", description="its state")
+    events: str = Field(description="what happens to it, as server-sent events")
     result: str | None = Field(default=None, description="its result, once it succeeded")
     exports: dict[str, str] = Field(default={}, description="its exports by format, once it succeeded")
 
 
-class IdentificationAnswer(AnswerModel):
+class IdentificationAnswer(JobAnswer):
     """The state of an identification."""
 
-    id: str = Field(description="identifier", examples=["20261103T101502Z-1f2e3d4c"])
-    state: JobState | Literal["damaged"] = Field(
-        description="where it stands; interrupted: the service ended first; damaged: its files are missing or damaged"
-    )
-    step: str | None = Field(default=None, description="what is being done, while it is running")
-    created: datetime | None = Field(default=None, description="when it was handed in, UTC")
-    started: datetime | None = Field(default=None, description="when its work began, UTC")
-    ended: datetime | None = Field(default=None, description="when it ended, UTC")
     robot: str | None = Field(default=None, description="name of the robot")
     recordings: tuple[OrderedRecording, ...] = Field(default=(), description="what the model is made from")
     held_out: tuple[OrderedRecording, ...] = Field(default=(), description="what it is judged by")
     options: IdentificationOptions | None = Field(default=None, description="how it is identified")
-    problem: Problem | None = Field(default=None, description="why it did not succeed")
     refused_exports: dict[str, str] = Field(
         default={}, description="formats that cannot hold this model, each with the reason"
     )

@@ -2,7 +2,8 @@
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Path, Query, Request, Response
+from fastapi import APIRouter, Path, Request, Response
+from starlette.concurrency import run_in_threadpool
 
 from service.api.identifications.models import (
     EXAMPLES,
@@ -10,10 +11,13 @@ from service.api.identifications.models import (
     IdentificationListAnswer,
     IdentificationRequest,
 )
-from service.api.identifications.status import describe, finished_workspace
+from service.api.identifications.status import describe, find_identification, finished_identification
 from service.api.identifications.submission import submit_identification
-from service.api.openapi import binary_part, form_body, json_body, model_reference
-from service.api.problems import ProblemError, problem_responses
+from service.api.jobs.answers import require_document
+from service.api.jobs.events import add_events_route
+from service.api.jobs.routes import ENDINGS, Identifier, Limit, collection
+from service.api.jobs.submission import request_body
+from service.api.problems import problem_responses
 from service.api.services import Offered
 from service.errors import ExportError, NotFoundError
 from service.identification import IdentificationDocument
@@ -22,27 +26,14 @@ from service.robot.messages import nearest, one_line, shown
 
 router = APIRouter(prefix="/identifications", tags=["identifications"], responses=problem_responses("invalid-request"))
 
-Identifier = Annotated[str, Path(description="identifier", examples=["20261103T101502Z-1f2e3d4c"])]
-Limit = Annotated[int, Query(ge=1, le=1000, description="most entries of the list")]
 Format = Annotated[
     str, Path(alias="format", description="what to write", json_schema_extra={"enum": [*ExportFormat]}, examples=["c"])
 ]
 
-_ENDINGS = ("not-finished", "cancelled", "interrupted", "damaged")
 _FILES = {"type": "array", "items": {"type": "string", "contentMediaType": "application/octet-stream"}}
-_BODY = {
-    **json_body(IdentificationRequest, EXAMPLES),
-    **form_body(
-        {
-            "request": model_reference(IdentificationRequest),
-            "robot": binary_part("the robot file (YAML)"),
-            "urdf": binary_part("the URDF that the robot file names, by its bare name"),
-            "recordings": {**_FILES, "description": "recordings that the model is made from"},
-            "held_out": {**_FILES, "description": "recordings that it is judged by"},
-        },
-        required=[],
-        encoding={"request": {"contentType": "application/json"}},
-    ),
+_UPLOADS = {
+    "recordings": {**_FILES, "description": "recordings that the model is made from"},
+    "held_out": {**_FILES, "description": "recordings that it is judged by"},
 }
 _EXPORT_CONTENT: dict[str, Any] = {
     media_type: {"schema": {"type": "string"}}
@@ -66,12 +57,12 @@ _EXPORT_CONTENT: dict[str, Any] = {
         "queue-full",
         "storage-full",
     ),
-    openapi_extra={"requestBody": {"required": True, "content": _BODY}},
+    openapi_extra=request_body(IdentificationRequest, EXAMPLES, _UPLOADS),
 )
 async def hand_in(request: Request, response: Response, services: Offered) -> IdentificationAnswer:
     """The robot is checked at once, recordings are read by the job: follow `Location` until it has ended."""
     identifier = await submit_identification(request, services)
-    answer = describe(services, identifier, request.url.path)
+    answer = await run_in_threadpool(describe, services, identifier, request.url.path)
     response.headers["Location"] = answer.links.self_
     return answer
 
@@ -79,7 +70,7 @@ async def hand_in(request: Request, response: Response, services: Offered) -> Id
 @router.get("", summary="List identifications")
 def list_identifications(request: Request, services: Offered, limit: Limit = 100) -> IdentificationListAnswer:
     """The newest first."""
-    identifiers = services.identifications.identifiers()[:limit]
+    identifiers = services.identifications.items.identifiers()[:limit]
     return IdentificationListAnswer(
         identifications=[describe(services, identifier, request.url.path) for identifier in identifiers]
     )
@@ -88,7 +79,7 @@ def list_identifications(request: Request, services: Offered, limit: Limit = 100
 @router.get("/{identifier}", summary="Follow an identification", responses=problem_responses("not-found"))
 def get_identification(request: Request, identifier: Identifier, services: Offered) -> IdentificationAnswer:
     """Its state, and where to go on from there."""
-    return describe(services, identifier, _collection(request, 1))
+    return describe(services, identifier, collection(request, 1))
 
 
 @router.get(
@@ -99,7 +90,7 @@ def get_identification(request: Request, identifier: Identifier, services: Offer
         200: {"model": IdentificationDocument, "description": "the same document as `tauscope identify --json`"},
         **problem_responses(
             "not-found",
-            *_ENDINGS,
+            *ENDINGS,
             "robot-file",
             "recording",
             "recording-mismatch",
@@ -112,10 +103,8 @@ def get_identification(request: Request, identifier: Identifier, services: Offer
 )
 def get_result(identifier: Identifier, services: Offered) -> Response:
     """The result of an identification that succeeded; else the problem that it ended in."""
-    content = finished_workspace(services, identifier).read_result()
-    if content is None:
-        raise ProblemError("damaged", f"the result of {identifier} is missing or damaged; hand it in again")
-    return Response(content, media_type="application/json")
+    content = finished_identification(services, identifier).read_result()
+    return Response(require_document(content, identifier), media_type="application/json")
 
 
 @router.get(
@@ -124,14 +113,14 @@ def get_result(identifier: Identifier, services: Offered) -> Response:
     response_class=Response,
     responses={
         200: {"content": _EXPORT_CONTENT, "description": "the file"},
-        **problem_responses("not-found", *_ENDINGS, "export", "recording", "identification", "worker-lost", "internal"),
+        **problem_responses("not-found", *ENDINGS, "export", "recording", "identification", "worker-lost", "internal"),
     },
 )
 def get_export(identifier: Identifier, format_: Format, services: Offered) -> Response:
     """The identified model for a controller (json, yaml, c, python) or a simulator (urdf, mjcf)."""
     if format_ not in set(ExportFormat):
         raise NotFoundError(one_line(f"there is no export {shown(format_)}; {nearest(format_, set(ExportFormat))}"))
-    workspace = finished_workspace(services, identifier)
+    workspace = finished_identification(services, identifier)
     reason = workspace.refused_exports().get(format_)
     if reason is not None:
         raise ExportError(reason)
@@ -148,11 +137,9 @@ def get_export(identifier: Identifier, format_: Format, services: Offered) -> Re
 )
 def cancel_or_remove(request: Request, identifier: Identifier, services: Offered) -> IdentificationAnswer | Response:
     """One that waits or runs is cancelled; one that has ended is removed with all its files."""
-    if services.jobs.cancel_or_remove(identifier):
+    if services.jobs.cancel_or_remove(services.identifications, identifier):
         return Response(status_code=204)
-    return describe(services, identifier, _collection(request, 1))
+    return describe(services, identifier, collection(request, 1))
 
 
-def _collection(request: Request, steps_below: int) -> str:
-    """Path of the collection, seen from a request below it."""
-    return request.url.path.rsplit("/", steps_below)[0]
+add_events_route(router, "an identification", find_identification)

@@ -1,24 +1,24 @@
 """From a request to a job: what was sent is written into the job's folder and checked as far as that is quick."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 
 from fastapi import Request
 from starlette.concurrency import run_in_threadpool
 
-from service.api.documents import JSON, media_type, parse_document, read_document, refuse_media_type
-from service.api.form import FORM, PartRule, ReceivedForm, receive_form
+from service.api.form import PartRule
 from service.api.identifications.models import IdentificationRequest
+from service.api.jobs.submission import Received, keep_robot, receive_request
 from service.api.problems import ProblemError
-from service.api.robots.files import keep_inline_robot, read_received_robot, robot_part_rules
+from service.api.robots.files import read_received_robot
 from service.api.services import Services
 from service.errors import LimitExceededError
-from service.jobs import IdentificationOrder, OrderedRecording, Workspace
+from service.jobs import IdentificationOrder, IdentificationWorkspace, OrderedRecording
 from service.store import KeptFile, RecordingStore
 
 Role = Literal["recordings", "held_out"]
+
+_Received = Received[IdentificationRequest]
 
 
 async def submit_identification(request: Request, services: Services) -> str:
@@ -43,48 +43,25 @@ async def submit_identification(request: Request, services: Services) -> str:
     TauscopeError
         if the robot is not valid, a recording is not there, or something is too large
     """
-    staged = await run_in_threadpool(services.identifications.stage)
+    staged = await run_in_threadpool(services.identifications.items.stage)
     try:
-        workspace = Workspace(staged)
+        workspace = IdentificationWorkspace(staged)
         await run_in_threadpool(workspace.prepare)
-        received = await _receive(request, services, workspace)
+        settings = services.settings
+        most = settings.max_recordings
+        uploads = {
+            "recordings": PartRule(settings.max_upload_bytes, workspace.uploads(held_out=False), most),
+            "held_out": PartRule(settings.max_upload_bytes, workspace.uploads(held_out=True), most),
+        }
+        received = await receive_request(request, IdentificationRequest, settings, workspace.robot, uploads)
         return await run_in_threadpool(_hand_in, received, services, workspace)
     finally:
-        await run_in_threadpool(services.identifications.discard, staged)
+        await run_in_threadpool(services.identifications.items.discard, staged)
 
 
-@dataclass(frozen=True)
-class _Received:
-    """A request as it arrived: its document, and the files that came with it."""
-
-    document: IdentificationRequest
-    form: ReceivedForm
-
-
-async def _receive(request: Request, services: Services, workspace: Workspace) -> _Received:
-    """Read the body, whichever of the two media types it is."""
-    settings = services.settings
-    if media_type(request) == JSON:
-        return _Received(
-            await read_document(request, IdentificationRequest, settings.max_document_bytes), ReceivedForm()
-        )
-    if media_type(request) != FORM:
-        raise refuse_media_type(request, JSON, FORM)
-    most = settings.max_recordings
-    rules = {
-        "request": PartRule(settings.max_document_bytes),
-        **robot_part_rules(workspace.robot),
-        "recordings": PartRule(settings.max_upload_bytes, workspace.uploads(held_out=False), most),
-        "held_out": PartRule(settings.max_upload_bytes, workspace.uploads(held_out=True), most),
-    }
-    form = await receive_form(request, rules)
-    text = form.texts.get("request", b"{}")
-    return _Received(parse_document(text, IdentificationRequest, within="part request"), form)
-
-
-def _hand_in(received: _Received, services: Services, workspace: Workspace) -> str:
+def _hand_in(received: _Received, services: Services, workspace: IdentificationWorkspace) -> str:
     """Check what was received, and queue it."""
-    robot_file = _robot_file(received, workspace.robot)
+    robot_file = keep_robot(received, workspace.robot)
     robot = read_received_robot(workspace.robot, robot_file)
     recordings = _ordered("recordings", received, services.recordings)
     held_out = _ordered("held_out", received, services.recordings)
@@ -97,19 +74,7 @@ def _hand_in(received: _Received, services: Services, workspace: Workspace) -> s
         options=received.document.options,
     )
     workspace.write_order(order)
-    return services.jobs.submit(workspace.folder)
-
-
-def _robot_file(received: _Received, folder: Path) -> str:
-    """Name of the robot file in the job's folder, written there if it came as JSON."""
-    file, inline = received.form.file("robot"), received.document.robot
-    if file is not None and inline is not None:
-        raise ProblemError("invalid-request", "the robot came twice, as part robot and in part request; send it once")
-    if file is not None:
-        return file.name
-    if inline is None:
-        raise ProblemError("invalid-request", "no robot was sent; send part robot, or the field robot in the JSON")
-    return keep_inline_robot(folder, inline)
+    return services.jobs.submit(services.identifications, workspace.folder)
 
 
 def _ordered(role: Role, received: _Received, store: RecordingStore) -> tuple[OrderedRecording, ...]:

@@ -6,9 +6,11 @@ from typing import Annotated
 from urllib.parse import quote
 
 from fastapi import APIRouter, Path, Query, Request, Response
+from fastapi.responses import FileResponse
 from starlette.concurrency import run_in_threadpool
 
 from service.api.documents import media_type, refuse_media_type
+from service.api.downloads import file_answer
 from service.api.form import FORM, PartRule, receive_form
 from service.api.openapi import binary_part, form_body
 from service.api.problems import ProblemError, problem_responses
@@ -80,6 +82,20 @@ async def report_on_recording(name: Name, services: Offered, joint_count: JointC
         text = f"{name}: the process that looked into it ended unexpectedly; is the file damaged, or far too large?"
         raise ProblemError("worker-lost", text) from None
     return RecordingReportAnswer.model_validate(report)
+
+
+@router.get(
+    "/{name}/content",
+    summary="Fetch a recording",
+    response_class=FileResponse,
+    responses={
+        200: {"content": {"application/octet-stream": {}, "text/csv": {}}, "description": "the file"},
+        **problem_responses("not-found"),
+    },
+)
+def get_content(name: Name, services: Offered) -> FileResponse:
+    """The very bytes that are kept."""
+    return file_answer(services.recordings.path(name), name)
 
 
 @router.delete("/{name}", status_code=204, summary="Remove a recording", responses=problem_responses("not-found"))

@@ -1,0 +1,1 @@
+"""Campaigns: from a robot to an identified model in one request."""

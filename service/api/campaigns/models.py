@@ -1,0 +1,98 @@
+"""Requests and answers about campaigns."""
+
+from typing import Any, Literal
+
+from pydantic import Field
+
+from service.acquisition.options import RunOptions
+from service.api.backends import BackendRequest
+from service.api.jobs.answers import JobAnswer
+from service.api.jobs.submission import RobotRequest
+from service.api.models import AnswerModel
+from service.api.robots.models import EXAMPLE_ROBOT
+from service.identification import IdentificationDocument
+from service.jobs import BackendChoice, ExcitationDesignOptions, HeldOutMotion, IdentificationOptions, JobState
+
+
+class CampaignRequest(RobotRequest):
+    """Which campaign is wanted."""
+
+    backend: BackendRequest = Field(default=BackendRequest(), description="which arm is moved")
+    excitation: ExcitationDesignOptions = Field(
+        default=ExcitationDesignOptions(), description="how the training motion is designed"
+    )
+    held_out: HeldOutMotion | None = Field(
+        default=HeldOutMotion(), description="a second motion, by which the model is judged; null: none"
+    )
+    run: RunOptions = Field(default=RunOptions(), description="how the motions are run")
+    identification: IdentificationOptions = Field(
+        default=IdentificationOptions(), description="how the arm is identified"
+    )
+
+
+EXAMPLES: dict[str, tuple[str, Any]] = {
+    "default": ("Everything as it comes, on the simulated arm", {"robot": EXAMPLE_ROBOT, "backend": {"name": "sim"}}),
+    "options": (
+        "Ordinary least squares from eight periods, without a held-out motion",
+        {
+            "robot": EXAMPLE_ROBOT,
+            "backend": {"name": "sim", "time": "virtual"},
+            "excitation": {"periods": 8, "seed": 3},
+            "held_out": None,
+            "identification": {"estimator": "ls"},
+        },
+    ),
+}
+
+
+class CampaignStepAnswer(AnswerModel):
+    """One step of a campaign."""
+
+    name: Literal["design", "run", "held-out design", "held-out run", "identify"] = Field(description="of the step")
+    state: str = Field(description="waiting, or the state of its excitation, run or identification")
+    link: str | None = Field(default=None, description="its excitation, run or identification")
+
+
+class CampaignLinksAnswer(AnswerModel):
+    """Where to go on from a campaign."""
+
+    self_: str = Field(alias="self", description="its state")
+    events: str = Field(description="what happens to it, as server-sent events")
+    stop: str = Field(description="where a POST stops it")
+    recordings: tuple[str, ...] = Field(default=(), description="recordings that the model is made from")
+    held_out: tuple[str, ...] = Field(default=(), description="recordings that it is judged by")
+    identification: str | None = Field(default=None, description="its identification, exports included")
+    result: str | None = Field(default=None, description="its result, once it succeeded")
+
+
+class CampaignAnswer(JobAnswer):
+    """The state of a campaign."""
+
+    robot: str | None = Field(default=None, description="name of the robot")
+    backend: BackendChoice | None = Field(default=None, description="which arm is moved")
+    steps: tuple[CampaignStepAnswer, ...] = Field(default=(), description="in their order")
+    links: CampaignLinksAnswer = Field(description="where to go on")
+
+
+class CampaignListAnswer(AnswerModel):
+    """Campaigns that are kept."""
+
+    campaigns: list[CampaignAnswer] = Field(description="the newest first")
+
+
+class CampaignResult(AnswerModel):
+    """What came of a campaign."""
+
+    schema_: Literal["tauscope.campaign/1"] = Field(
+        default="tauscope.campaign/1", alias="schema", description="name and version of this form"
+    )
+    identification: IdentificationDocument = Field(description="the same document as `tauscope identify --json`")
+    steps: tuple[CampaignStepAnswer, ...] = Field(description="how it came about")
+    links: CampaignLinksAnswer = Field(description="everything that was made on the way")
+
+
+class CampaignStopAnswer(AnswerModel):
+    """What became of the wish to stop a campaign."""
+
+    id: str = Field(description="identifier of the campaign")
+    state: JobState = Field(description="where it stood; it stops unless that is an end state")

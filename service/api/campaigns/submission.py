@@ -1,0 +1,62 @@
+"""From a request to a campaign."""
+
+from fastapi import Request
+from starlette.concurrency import run_in_threadpool
+
+from service.api.backends import chosen_backend
+from service.api.campaigns.models import CampaignRequest
+from service.api.jobs.submission import Received, keep_robot, receive_request
+from service.api.robots.files import read_received_robot
+from service.api.services import Services
+from service.jobs import CampaignOrder, CampaignWorkspace
+
+
+async def submit_campaign(request: Request, services: Services) -> str:
+    """Take a request for a campaign.
+
+    Parameters
+    ----------
+    request : Request
+        JSON, or a form with the parts request, robot and urdf
+    services : Services
+        where it goes
+
+    Returns
+    -------
+    str
+        the campaign's identifier
+
+    Raises
+    ------
+    ProblemError
+        if the request is not as documented
+    TauscopeError
+        if the robot is not valid, or somebody else has the arm
+    """
+    items = services.campaigns.items
+    staged = await run_in_threadpool(items.stage)
+    try:
+        workspace = CampaignWorkspace(staged)
+        await run_in_threadpool(workspace.prepare)
+        received = await receive_request(request, CampaignRequest, services.settings, workspace.robot)
+        return await run_in_threadpool(_hand_in, received, services, workspace)
+    finally:
+        await run_in_threadpool(items.discard, staged)
+
+
+def _hand_in(received: Received[CampaignRequest], services: Services, workspace: CampaignWorkspace) -> str:
+    """Check what was received, and begin."""
+    document, robot_file = received.document, keep_robot(received, workspace.robot)
+    robot = read_received_robot(workspace.robot, robot_file)
+    workspace.write_order(
+        CampaignOrder(
+            robot_file=robot_file,
+            robot_name=robot.name,
+            backend=chosen_backend(services.settings, document.backend),
+            excitation=document.excitation,
+            held_out=document.held_out,
+            run=document.run,
+            identification=document.identification,
+        )
+    )
+    return services.campaigns.submit(workspace.folder)

@@ -1,0 +1,116 @@
+"""Routes about excitations."""
+
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Query, Request, Response
+from starlette.concurrency import run_in_threadpool
+
+from service.api.excitations.models import EXAMPLES, ExcitationAnswer, ExcitationListAnswer, ExcitationRequest
+from service.api.excitations.status import describe, find_excitation, finished_excitation
+from service.api.excitations.submission import submit_excitation
+from service.api.jobs.answers import require_document
+from service.api.jobs.events import add_events_route
+from service.api.jobs.routes import ENDINGS, Identifier, Limit, collection
+from service.api.jobs.submission import request_body
+from service.api.problems import problem_responses
+from service.api.services import Offered
+from service.jobs import read_designed_trajectory
+
+router = APIRouter(prefix="/excitations", tags=["excitations"], responses=problem_responses("invalid-request"))
+
+TrajectoryFormat = Annotated[
+    Literal["json", "csv"],
+    Query(alias="format", description="json: exact coefficients; csv: samples that any controller can play"),
+]
+Rate = Annotated[float, Query(gt=0.0, le=10_000.0, description="samples a second of the CSV [Hz]")]
+
+
+@router.post(
+    "",
+    status_code=202,
+    summary="Have a motion designed",
+    response_model=ExcitationAnswer,
+    responses=problem_responses(
+        "bad-request",
+        "limit-exceeded",
+        "media-type",
+        "robot-file",
+        "robot-unphysical",
+        "invalid-request",
+        "queue-full",
+        "storage-full",
+    ),
+    openapi_extra=request_body(ExcitationRequest, EXAMPLES),
+)
+async def hand_in(request: Request, response: Response, services: Offered) -> ExcitationAnswer:
+    """The robot is checked at once, the motion is designed by the job: follow `Location` until it has ended."""
+    identifier = await submit_excitation(request, services)
+    answer = await run_in_threadpool(describe, services, identifier, request.url.path)
+    response.headers["Location"] = answer.links.self_
+    return answer
+
+
+@router.get("", summary="List excitations")
+def list_excitations(request: Request, services: Offered, limit: Limit = 100) -> ExcitationListAnswer:
+    """The newest first."""
+    identifiers = services.excitations.items.identifiers()[:limit]
+    return ExcitationListAnswer(
+        excitations=[describe(services, identifier, request.url.path) for identifier in identifiers]
+    )
+
+
+@router.get("/{identifier}", summary="Follow an excitation", responses=problem_responses("not-found"))
+def get_excitation(request: Request, identifier: Identifier, services: Offered) -> ExcitationAnswer:
+    """Its state, and where to go on from there."""
+    return describe(services, identifier, collection(request, 1))
+
+
+@router.get(
+    "/{identifier}/result",
+    summary="Fetch the design",
+    response_class=Response,
+    responses={
+        200: {"content": {"application/json": {}}, "description": "the same document as `tauscope excite --json`"},
+        **problem_responses("not-found", *ENDINGS, "excitation", "robot-file", "worker-lost", "internal"),
+    },
+)
+def get_result(identifier: Identifier, services: Offered) -> Response:
+    """Criterion, its history, and what is left to every limit; else the problem that the job ended in."""
+    content = finished_excitation(services, identifier).read_result()
+    return Response(require_document(content, identifier), media_type="application/json")
+
+
+@router.get(
+    "/{identifier}/trajectory",
+    summary="Fetch the trajectory",
+    response_class=Response,
+    responses={
+        200: {"content": {"application/json": {}, "text/csv": {}}, "description": "the file"},
+        **problem_responses("not-found", *ENDINGS, "excitation", "limit-exceeded", "worker-lost", "internal"),
+    },
+)
+def get_trajectory(
+    identifier: Identifier, services: Offered, format_: TrajectoryFormat = "json", rate_hz: Rate = 500.0
+) -> Response:
+    """The motion for Tauscope itself (json) or for another controller (csv)."""
+    workspace = finished_excitation(services, identifier)
+    content = read_designed_trajectory(workspace, None if format_ == "json" else rate_hz)
+    media_type = "application/json" if format_ == "json" else "text/csv"
+    disposition = {"Content-Disposition": f'attachment; filename="trajectory.{format_}"'}
+    return Response(require_document(content, identifier), headers=disposition, media_type=media_type)
+
+
+@router.delete(
+    "/{identifier}",
+    summary="Cancel or remove an excitation",
+    response_model=ExcitationAnswer,
+    responses={204: {"description": "it had ended, and was removed"}, **problem_responses("not-found")},
+)
+def cancel_or_remove(request: Request, identifier: Identifier, services: Offered) -> ExcitationAnswer | Response:
+    """One that waits or runs is cancelled; one that has ended is removed with all its files."""
+    if services.jobs.cancel_or_remove(services.excitations, identifier):
+        return Response(status_code=204)
+    return describe(services, identifier, collection(request, 1))
+
+
+add_events_route(router, "an excitation", find_excitation)

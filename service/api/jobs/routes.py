@@ -1,0 +1,24 @@
+"""Arguments and paths that routes about jobs share."""
+
+from typing import Annotated
+
+from fastapi import Path, Query, Request
+
+Identifier = Annotated[str, Path(description="identifier", examples=["20261103T101502Z-1f2e3d4c"])]
+Limit = Annotated[int, Query(ge=1, le=1000, description="most entries of the list")]
+
+ENDINGS = ("not-finished", "cancelled", "interrupted", "damaged")
+"""Problems of a job without result, beside those of its work."""
+
+
+def collection(request: Request, steps_below: int) -> str:
+    """Path of the collection, seen from a request below it.
+
+    Parameters
+    ----------
+    request : Request
+        what is answered
+    steps_below : int
+        path components below the collection
+    """
+    return request.url.path.rsplit("/", steps_below)[0]

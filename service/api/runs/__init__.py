@@ -1,0 +1,1 @@
+"""Runs: begun, followed, stopped at any time, their recordings fetched."""

@@ -1,0 +1,121 @@
+"""Routes about runs."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request, Response
+from fastapi.responses import FileResponse
+from starlette.concurrency import run_in_threadpool
+
+from service.api.downloads import file_answer
+from service.api.jobs.events import add_events_route
+from service.api.jobs.routes import Identifier, Limit, collection
+from service.api.jobs.submission import request_body
+from service.api.openapi import binary_part
+from service.api.problems import ProblemError, problem_responses
+from service.api.runs.models import EXAMPLES, RecordingFormat, RunAnswer, RunListAnswer, RunRequest, StopAnswer
+from service.api.runs.status import describe, find_run, followed_run, require_recording
+from service.api.runs.submission import submit_run
+from service.api.services import Offered
+
+router = APIRouter(prefix="/runs", tags=["runs"], responses=problem_responses("invalid-request"))
+
+Format = Annotated[RecordingFormat, Query(alias="format", description="mcap: the journal, ramp included; else columns")]
+
+_PARTS = {"trajectory": binary_part("the motion: a trajectory document (.json), or samples (.csv)")}
+
+
+@router.post(
+    "",
+    status_code=202,
+    summary="Begin a run",
+    response_model=RunAnswer,
+    responses=problem_responses(
+        "bad-request",
+        "not-found",
+        "busy",
+        "not-finished",
+        "limit-exceeded",
+        "media-type",
+        "robot-file",
+        "robot-unphysical",
+        "excitation",
+        "invalid-request",
+        "queue-full",
+        "storage-full",
+    ),
+    openapi_extra=request_body(RunRequest, EXAMPLES, _PARTS),
+)
+async def hand_in(request: Request, response: Response, services: Offered) -> RunAnswer:
+    """The arm moves as soon as there is a motion: follow `Location` until it has ended, or stop it at any time.
+
+    One run at a time has an arm. Every command passes a guard that keeps the robot file's limits.
+    """
+    identifier = await submit_run(request, services)
+    answer = await run_in_threadpool(describe, services, identifier, collection(request, 1))
+    response.headers["Location"] = answer.links.self_
+    return answer
+
+
+@router.get("", summary="List runs")
+def list_runs(request: Request, services: Offered, limit: Limit = 100) -> RunListAnswer:
+    """The newest first."""
+    identifiers = services.runs.items.identifiers()[:limit]
+    return RunListAnswer(runs=[describe(services, identifier, collection(request, 1)) for identifier in identifiers])
+
+
+@router.get("/{identifier}", summary="Follow a run", responses=problem_responses("not-found"))
+def get_run(request: Request, identifier: Identifier, services: Offered) -> RunAnswer:
+    """Its state, how far it is, what was measured, and where to go on from there."""
+    return describe(services, identifier, collection(request, 2))
+
+
+@router.post(
+    "/{identifier}/stop",
+    status_code=202,
+    summary="Stop a run",
+    responses={**problem_responses("not-found"), 202: {"description": "it stops, or had ended already"}},
+    openapi_extra={"requestBody": {"required": False, "content": {}}},
+)
+async def stop_run(identifier: Identifier, services: Offered) -> StopAnswer:
+    """Stops the arm by the run's stop policy; legal in every state, any number of times; needs no body.
+
+    It waits for nothing: neither for other requests nor for jobs. The recording up to the stop is kept.
+    """
+    # Neither a thread of the pool nor a lock is needed for a run that goes on: whatever is stuck, this is not.
+    live = services.runs.stop(identifier)
+    if live is not None:
+        return StopAnswer(id=identifier, state=live.state)
+    record = find_run(services, identifier).read_run()
+    if record is None:
+        raise ProblemError("damaged", f"files of {identifier} are missing or damaged; it does not go on")
+    return StopAnswer(id=identifier, state=record.state)
+
+
+@router.get(
+    "/{identifier}/recording",
+    summary="Fetch the recording of a run",
+    response_class=FileResponse,
+    responses={
+        200: {"content": {"application/octet-stream": {}, "text/csv": {}}, "description": "the file"},
+        **problem_responses("not-found", "not-finished"),
+    },
+)
+def get_recording(identifier: Identifier, services: Offered, format_: Format = "csv") -> FileResponse:
+    """What was measured; also of a run that was stopped or interrupted, as far as it came."""
+    workspace = require_recording(services, identifier, format_)
+    return file_answer(workspace.recording(format_), f"run-{identifier}.{format_}")
+
+
+@router.delete(
+    "/{identifier}",
+    status_code=204,
+    summary="Remove a run",
+    responses=problem_responses("not-found", "not-finished"),
+)
+def remove_run(identifier: Identifier, services: Offered) -> None:
+    """One that has ended is removed with all its files; its recording stays among the recordings."""
+    if not services.runs.remove(identifier):
+        raise ProblemError("not-finished", f"{identifier} goes on; stop it, and remove it when it has ended")
+
+
+add_events_route(router, "a run", followed_run)

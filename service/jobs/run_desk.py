@@ -1,0 +1,210 @@
+"""All runs: taken, led in threads of their own, stopped at once, and found interrupted after a restart."""
+
+import logging
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+from service.errors import TauscopeError
+from service.jobs.device_claims import BusyError, DeviceClaims
+from service.jobs.led_work import LedWork
+from service.jobs.motions import Motion
+from service.jobs.run_leader import Live, RunLeader, StartControl
+from service.jobs.run_workspace import RunWorkspace
+from service.store import ItemStore, KeptFile, RecordingStore, hash_file
+from service.store.items import staged_identifier
+
+_log = logging.getLogger("tauscope.jobs")
+
+PATIENCE_S = 15.0
+"""How long a run may take to stop when the service ends; its control process outlasts it where need be [s]."""
+
+
+class RunDesk:
+    """Runs that go on, and the folders of all runs. Every method may be called from any thread."""
+
+    def __init__(
+        self,
+        items: ItemStore,
+        recordings: RecordingStore,
+        start: StartControl,
+        claims: DeviceClaims,
+        is_alive: Callable[[], bool],
+    ) -> None:
+        """Open the desk; runs that an earlier service left unfinished become `interrupted`.
+
+        Parameters
+        ----------
+        items : ItemStore
+            folders of the runs
+        recordings : RecordingStore
+            where the recordings of runs are kept for identifications
+        start : callable
+            starts the control process of a run
+        claims : DeviceClaims
+            who has which arm
+        is_alive : callable
+            whether the service can still be reached; while it cannot, no control process hears of its owner
+        """
+        self.items = items
+        self.claims = claims
+        self._recordings = recordings
+        self._start = start
+        self._is_alive = is_alive
+        self._lock = threading.Lock()
+        self._led: LedWork[RunLeader] = LedWork()
+        self._is_closed = False
+        items.tidy()
+        for identifier in items.identifiers():
+            self._end(RunWorkspace(items.folder(identifier)), None)
+
+    def submit(self, staged: Path, motion: Motion, holder: str | None = None) -> str:
+        """Take a run; it begins at once.
+
+        Parameters
+        ----------
+        staged : Path
+            staged folder that holds the run's input
+        motion : callable
+            sees to it that the run has its trajectory
+        holder : str or None
+            who has the arm already, to whom the run belongs; None where the run takes the arm itself
+
+        Returns
+        -------
+        str
+            the run's identifier
+
+        Raises
+        ------
+        BusyError
+            if somebody else has the arm; the folder stays staged
+        """
+        workspace = RunWorkspace(staged)
+        request = workspace.read_request()
+        if request is None:
+            raise TauscopeError("the run's request.json is missing or damaged; hand the run in again")
+        workspace.create(request)
+        claim = None if holder is not None else (request.device, f"run {staged_identifier(staged)}")
+        with self._lock:
+            if self._is_closed:
+                raise BusyError("the service is ending; hand the run in when it is up again")
+            if claim is not None:
+                self.claims.take(*claim)
+            try:
+                identifier = self.items.publish(staged)
+            except BaseException:
+                self._release(claim)
+                raise
+            workspace = RunWorkspace(self.items.folder(identifier))
+            leader = RunLeader(workspace, self._start, motion, self._is_alive)
+            self._led.begin(identifier, leader, lambda: self._end(workspace, claim))
+        return identifier
+
+    def stop(self, identifier: str) -> Live | None:
+        """Stop a run, in whatever state it is: takes no lock, waits for nothing, may be called any number of times.
+
+        Parameters
+        ----------
+        identifier : str
+            of the run
+
+        Returns
+        -------
+        Live or None
+            where the run stood; None where it does not go on
+        """
+        leader = self._led.find(identifier)
+        if leader is None:
+            return None
+        leader.stop()
+        return leader.live
+
+    def live(self, identifier: str) -> Live | None:
+        """What is known of a run that goes on; None of any other.
+
+        Parameters
+        ----------
+        identifier : str
+            of the run
+        """
+        leader = self._led.find(identifier)
+        return None if leader is None else leader.live
+
+    def remove(self, identifier: str) -> bool:
+        """Remove a run that has ended, with all its files; what is kept among the recordings stays.
+
+        Parameters
+        ----------
+        identifier : str
+            of the run
+
+        Returns
+        -------
+        bool
+            False where the run goes on
+
+        Raises
+        ------
+        NotFoundError
+            if there is no such run
+        """
+        if self._led.find(identifier) is not None:
+            return False
+        self.items.remove(identifier)
+        return True
+
+    def stop_all(self) -> None:
+        """Stop every run and take no further ones; returns at once."""
+        self._is_closed = True
+        for leader in self._led.leaders():
+            leader.stop()
+
+    def close(self) -> None:
+        """Stop every run, and wait until all have ended or patience has."""
+        with self._lock:
+            self.stop_all()
+        self._led.join(PATIENCE_S)
+
+    def _end(self, workspace: RunWorkspace, claim: tuple[str, str] | None) -> None:
+        """Put everything in its place after a run."""
+        try:
+            workspace.recover()
+            self._conclude(workspace)
+        except Exception:
+            _log.exception("run %s could not be put in order", workspace.folder.name)
+        finally:
+            self._release(claim)
+
+    def _release(self, claim: tuple[str, str] | None) -> None:
+        """Let go of the arm, where the run took it itself."""
+        if claim is not None:
+            self.claims.release(*claim)
+
+    def _conclude(self, workspace: RunWorkspace) -> None:
+        """Keep the recording of a run that has ended among the recordings, and tell the end; done once."""
+        if workspace.has_told_end():
+            return
+        try:
+            self._keep_recording(workspace)
+        except (TauscopeError, OSError):
+            _log.exception("the recording of run %s could not be kept", workspace.folder.name)
+        workspace.tell_end()
+
+    def _keep_recording(self, workspace: RunWorkspace) -> None:
+        """Give the CSV of a run a name among the recordings; both names share the bytes on the disk."""
+        path, record = workspace.recording("csv"), workspace.read_run()
+        if record is not None and record.state.is_end and path.is_file():
+            name = run_recording_name(workspace.folder.name)
+            self._recordings.keep(KeptFile(path, name, path.stat().st_size, hash_file(path)))
+
+
+def run_recording_name(identifier: str) -> str:
+    """What the recording of a run is called among the recordings.
+
+    Parameters
+    ----------
+    identifier : str
+        of the run
+    """
+    return f"run-{identifier}.csv"

@@ -1,0 +1,131 @@
+"""What happened, line by line: appended by several processes, read by any number of followers, kept over restarts."""
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+_TAIL = 2**16
+
+
+@dataclass(frozen=True)
+class LoggedEvent:
+    """One line of a log.
+
+    number : int
+        of the line, from 1: who has read it goes on with the next
+    content : dict
+        what was appended
+    """
+
+    number: int
+    content: dict[str, Any]
+
+
+class EventLog:
+    """A file of JSON objects, one a line, that only ever grows.
+
+    A line is written by one call, so that lines of several processes never mix. A line that a full disk cut off keeps
+    its number and is passed over.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Look at a log; nothing is opened yet, and a file that is not there is an empty log.
+
+        Parameters
+        ----------
+        path : Path
+            of the file
+        """
+        self.path = path
+
+    def append(self, content: Mapping[str, Any]) -> None:
+        """Add a line; a crash of the machine may lose the last ones.
+
+        Parameters
+        ----------
+        content : mapping
+            plain data without NaN
+
+        Raises
+        ------
+        OSError
+            if it cannot be written
+        """
+        line = json.dumps(content, ensure_ascii=False, allow_nan=False).encode() + b"\n"
+        descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o640)
+        try:
+            size = os.fstat(descriptor).st_size
+            is_torn = size > 0 and os.pread(descriptor, 1, size - 1) != b"\n"
+            os.write(descriptor, b"\n" + line if is_torn else line)
+        finally:
+            os.close(descriptor)
+
+    def last(self) -> dict[str, Any] | None:
+        """The content of the last whole line; None where there is none or it is damaged."""
+        try:
+            with self.path.open("rb") as file:
+                size = file.seek(0, os.SEEK_END)
+                file.seek(max(0, size - _TAIL))
+                lines = file.read().split(b"\n")
+        except OSError:
+            return None
+        return _parsed(lines[-2]) if len(lines) > 1 else None
+
+    def follow(self, after: int = 0) -> "LogFollower":
+        """A reader of what comes after a line.
+
+        Parameters
+        ----------
+        after : int
+            number of the last line that is known already; 0 for all lines
+        """
+        return LogFollower(self.path, after)
+
+
+class LogFollower:
+    """Reads a log from where it last ended; holds no file open between two readings."""
+
+    def __init__(self, path: Path, after: int) -> None:
+        """Begin behind a line.
+
+        Parameters
+        ----------
+        path : Path
+            of the log
+        after : int
+            lines that are passed over
+        """
+        self._path = path
+        self._after = after
+        self._number = 0
+        self._offset = 0
+
+    def read(self) -> list[LoggedEvent]:
+        """Every whole line that was added since the last call."""
+        try:
+            with self._path.open("rb") as file:
+                file.seek(self._offset)
+                content = file.read()
+        except FileNotFoundError:
+            return []
+        whole = content[: content.rfind(b"\n") + 1]
+        self._offset += len(whole)
+        events = []
+        for line in whole.split(b"\n")[:-1]:
+            self._number += 1
+            parsed = _parsed(line) if self._number > self._after else None
+            if parsed is not None:
+                events.append(LoggedEvent(self._number, parsed))
+        return events
+
+
+def _parsed(line: bytes) -> dict[str, Any] | None:
+    """The object of a line; None where the line is damaged."""
+    try:
+        content = json.loads(line)
+    except (ValueError, RecursionError):
+        return None
+    return content if isinstance(content, dict) else None

@@ -1,0 +1,139 @@
+"""``tauscope run``: a recording, or one line that says why there is none; nothing is ever replaced."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cli.conftest import Ended
+from jobs.paper_files import PAPER_ROBOT
+from jobs.waiting import wait_until
+from service.excitation import MoveSegment, Trajectory, write_trajectory
+from service.recording import read_recording
+from shared_data import REPOSITORY
+
+Run = Callable[..., Ended]
+
+
+def motion(path: Path, duration_s: float) -> Path:
+    """A slow move of the paper's arm."""
+    move = MoveSegment(np.array([0.0, 0.6, 0.6]), np.array([0.5, 1.0, 0.0]), duration_s)
+    write_trajectory(Trajectory("paper-arm", ("joint1", "joint2", "joint3"), (move,)), path)
+    return path
+
+
+START = "--start=0,0.6,0.6"
+
+
+@pytest.fixture
+def short(tmp_path: Path) -> Path:
+    return motion(tmp_path / "short.json", 1.0)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet", ".mcap"])
+def test_a_recording_in_every_format(suffix: str, run: Run, short: Path, tmp_path: Path) -> None:
+    out = tmp_path / f"out{suffix}"
+    ended = run("run", PAPER_ROBOT, "--trajectory", short, "--out", out, "--rate", "200", START)
+    assert (ended.status, ended.err) == (0, "")
+    assert f"wrote {out}\n" in ended.out
+    recording = read_recording(out)
+    assert recording.joint_count == 3
+    assert len(recording) >= 195
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(["short.json", out.name])
+
+
+def test_the_scenario_and_the_posture_count(run: Run, short: Path, tmp_path: Path) -> None:
+    (tmp_path / "scenario.yaml").write_text("torque_noise_std: 2.0\n", encoding="utf-8")
+    noise = []
+    for options in ([START], ["--scenario", tmp_path / "scenario.yaml", "--start", "0.2,0.6,0.6"]):
+        out = tmp_path / f"{len(options)}.csv"
+        assert run("run", PAPER_ROBOT, "--trajectory", short, "--out", out, "--rate", "200", *options).status == 0
+        noise.append(np.diff(read_recording(out).samples().effort, axis=0).std())
+    assert noise[1] > noise[0] + 2.0
+
+
+def test_a_recording_is_named_after_the_moment(
+    run: Run, short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    ended = run("run", PAPER_ROBOT, "--trajectory", short, "--rate", "200", START)
+    assert ended.status == 0
+    (made,) = tmp_path.glob("run-*Z.csv")
+    assert f"wrote {made.name}\n" in ended.out
+
+
+def test_a_file_that_is_there_stays(run: Run, short: Path, tmp_path: Path) -> None:
+    (tmp_path / "mine.csv").write_text("mine")
+    ended = run("run", PAPER_ROBOT, "--trajectory", short, "--out", tmp_path / "mine.csv")
+    assert (ended.status, len(ended.err.splitlines())) == (1, 1)
+    assert "is not replaced" in ended.err
+    assert (tmp_path / "mine.csv").read_text() == "mine"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.csv", "short.json"]
+
+
+@pytest.mark.parametrize(
+    ("options", "status", "words"),
+    [
+        (["--out", "out.txt"], 2, "the suffix names no format"),
+        (["--out", "gone/out.csv"], 2, "does not exist"),
+        (["--start", "a,b"], 2, "is no list of numbers"),
+        (["--start", "nan,0,0"], 2, "is no list of numbers"),
+        (["--backend", "real"], 2, "--backend"),
+        (["--mode", "speed"], 2, "--mode"),
+        (["--rate", "0"], 2, "--rate"),
+        (["--backend", "canopen", "--time", "real"], 2, "--time belongs to --backend sim"),
+        (["--start", "0,0"], 1, "start has to be 3 numbers"),
+        (["--backend", "dynamixel"], 1, "dynamixel"),
+        (["--trajectory", PAPER_ROBOT], 1, "paper_arm.yaml"),
+        (["--scenario", PAPER_ROBOT], 1, "paper_arm.yaml"),
+    ],
+)
+def test_what_is_refused(
+    options: list[str | Path], status: int, words: str, run: Run, short: Path, tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    trajectory = [] if "--trajectory" in options else ["--trajectory", short]
+    ended = run("run", PAPER_ROBOT, *trajectory, *options)
+    assert ended.status == status, ended
+    assert words in ended.err
+    assert "Traceback" not in ended.err
+    if status == 1:
+        assert len(ended.err.splitlines()) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["short.json"]
+
+
+def test_ctrl_c_stops_the_arm_and_keeps_what_was_recorded(tmp_path: Path) -> None:
+    long = motion(tmp_path / "long.json", 600.0)
+    out = tmp_path / "out.csv"
+    command = [sys.executable, "-m", "service.cli", "run", PAPER_ROBOT, "--trajectory", long, "--out", out]
+    with subprocess.Popen(
+        [str(word) for word in [*command, "--rate", "200", START]],
+        cwd=REPOSITORY,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+
+        def is_running() -> bool:
+            records = list(tmp_path.glob(".tauscope-run-*/run/run.json"))
+            if not records or json.loads(records[0].read_bytes())["state"] != "running":
+                return False
+            return records[0].with_name("journal.mcap").stat().st_size > 200_000
+
+        wait_until(is_running)
+        os.kill(process.pid, signal.SIGINT)
+        printed, err = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert len(err.splitlines()) == 1
+    assert "the run stopped" in err
+    assert str(out) in err
+    assert f"wrote {out}\n" in printed
+    assert len(read_recording(out)) > 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["long.json", "out.csv"]
