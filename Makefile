@@ -26,7 +26,7 @@ $(INSTALLED): constraints-dev.txt pyproject.toml
 	$(BIN)/python -m pip install -qq --disable-pip-version-check --no-deps --no-build-isolation -e .
 	@touch $@
 
-demo: $(INSTALLED) ## identify the paper's arm from a simulated recording; look into demo-output/
+demo: $(INSTALLED) ## a whole campaign on the paper's arm, simulated; look into demo-output/
 	$(BIN)/tauscope demo --out demo-output
 
 test: $(INSTALLED) ## the quick tests
