@@ -124,7 +124,19 @@ class CanopenArm:
         return state
 
     def enable(self, mode: ControlMode, limits: DriveLimits, stop_policy: StopPolicy, watchdog_s: float) -> ArmState:
-        """Commission every drive, arm its heartbeat consumer, and take all to *operation enabled* together."""
+        """Commission every drive, arm its heartbeat consumer, and take all to *operation enabled* together.
+
+        Parameters
+        ----------
+        mode : ControlMode
+            cyclic synchronous position or torque
+        limits : DriveLimits
+            of torque and position, which the drives enforce
+        stop_policy : StopPolicy
+            ``hold`` or ``torque_off``
+        watchdog_s : float
+            time without the master's heartbeat after which the drives stop [s]
+        """
         bus = self._require_bus()
         self._refuse_impossible(mode, stop_policy, watchdog_s)
         state = self._read_by_service_data()
@@ -145,7 +157,13 @@ class CanopenArm:
         return state
 
     def exchange(self, setpoint: Setpoint) -> ArmState:
-        """Targets out, SYNC, answers in; a node that does not answer in time leaves NaN."""
+        """Targets out, SYNC, answers in; a node that does not answer in time leaves NaN.
+
+        Parameters
+        ----------
+        setpoint : Setpoint
+            finite targets
+        """
         if self._mode is None:
             raise DriverError(DriverErrorKind.NOT_ENABLED, "the drives are not enabled; enable the arm first")
         target = setpoint.position if self._mode is ControlMode.POSITION else setpoint.torque
@@ -156,7 +174,13 @@ class CanopenArm:
         return self._cycle(self._mode, Goal.OPERATION_ENABLED, setpoint, self._answer_ns)
 
     def stop(self, policy: StopPolicy) -> ArmState:
-        """Quick stop and hold, or ramp and let go; drives that are in no such state already stay as they are."""
+        """Quick stop and hold, or ramp and let go; drives that are in such a state already stay as they are.
+
+        Parameters
+        ----------
+        policy : StopPolicy
+            ``hold`` or ``torque_off``
+        """
         if self._bus is None:
             return self._unknown()
         goal = _POLICY_GOALS.get(policy, Goal.QUICK_STOP)

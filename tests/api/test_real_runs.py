@@ -93,14 +93,16 @@ def test_followers_that_are_gone_leave_nothing_behind(service: Served) -> None:
     client = service.client
     run = begin(client, LONG_S, rate_hz=200.0)
     wait_until(lambda: is_running(client, run))
-    before = open_files()
     with ExitStack() as streams:
+        readers = []
         for _ in range(20):
             other = streams.enter_context(httpx2.Client(base_url=client.base_url, timeout=60))
             answer = streams.enter_context(other.stream("GET", run["links"]["events"]))
-            assert next(answer.iter_lines())
-        assert open_files() >= before + 20
-    wait_until(lambda: open_files() < before + 5)
+            readers.append(answer.iter_lines())
+            assert next(readers[-1])
+        during = open_files()
+        assert during > 20
+    wait_until(lambda: open_files() <= during - 20)
     assert client.post(run["links"]["stop"]).json()["state"] == "running"
     (*_, last) = follow(client, run)
     assert last.data["state"] == "stopped"

@@ -55,9 +55,10 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=3, help="designs of ours, of different seeds")
     parser.add_argument("--json", type=Path, help="write the figures here")
     options = parser.parse_args()
-    figures = {name: compare(name, options) for name in options.arms}
-    for name, found in figures.items():
-        print(table(name, found))
+    figures = {}
+    for name in options.arms:
+        figures[name] = compare(name, options)
+        print(table(name, figures[name]), flush=True)
     if options.json:
         options.json.write_text(json.dumps(figures, indent=1))
 

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arms import panda_like, paper_arm, paper_parameters, random_arm, random_link, ur5_like
-from service.excitation import FourierSeries
+from service.dynamics import inverse_dynamics
+from service.excitation import ExcitationDesign, ExcitationOptions, FourierSeries, motion_limits
 from service.robot import (
     FrictionCoefficients,
     FrictionShape,
@@ -77,3 +78,17 @@ def derivative_along(function: Callable[[Array], float], x: Array, direction: Ar
     weights = {1: 45.0 / 60.0, 2: -9.0 / 60.0, 3: 1.0 / 60.0}
     pairs = (w * (function(x + k * step * direction) - function(x - k * step * direction)) for k, w in weights.items())
     return float(sum(pairs)) / step
+
+
+def assert_within_limits(robot: Robot, design: ExcitationDesign, options: ExcitationOptions) -> None:
+    """All limits, ten times finer than anything that the design looked at, torque by a calculation of its own."""
+    samples = design.trajectory.samples(4000.0 / min(options.period_s, 10.0))
+    limits = motion_limits(robot)
+    assert (samples.position >= limits.position_low - 1e-9).all()
+    assert (samples.position <= limits.position_high + 1e-9).all()
+    assert (np.abs(samples.velocity) <= limits.velocity * (1.0 + 1e-9)).all()
+    assert (np.abs(samples.acceleration) <= limits.acceleration * (1.0 + 1e-9)).all()
+    if robot.model.links is not None:
+        parameters = np.concatenate([link.to_vector() for link in robot.model.links])
+        torque = inverse_dynamics(robot, parameters, samples.position, samples.velocity, samples.acceleration)
+        assert (np.abs(torque) <= (1.0 - options.torque_margin) * limits.torque).all()

@@ -107,16 +107,16 @@ def test_export_example() -> None:
 @pytest.mark.parametrize(
     ("robot", "options"),
     [
-        (ROBOT.replace("- name: joint2", "- name: joint2\n    limits: {position: [0.3, 0.3005]}"), {}),
-        (ROBOT, {"workspace": Workspace(floor_m=1.0)}),
+        (ROBOT.replace("- name: joint2", "- name: joint2\n    limits: {position: [0.3, 0.3005]}"), ExcitationOptions()),
+        (ROBOT, ExcitationOptions(workspace=Workspace(floor_m=1.0))),
     ],
     ids=["no room", "floor too high"],
 )
-def test_design_examples(robot: str, options: dict[str, Workspace], tmp_path: Path) -> None:
+def test_design_examples(robot: str, options: ExcitationOptions, tmp_path: Path) -> None:
     path = tmp_path / "arm.yaml"
     path.write_text(robot, encoding="utf-8")
     with pytest.raises(TauscopeError) as raised:
-        design_excitation(read_robot(path), ExcitationOptions(**options))
+        design_excitation(read_robot(path), options)
     assert_on_page(raised.value, "excitation")
 
 

@@ -216,13 +216,14 @@ def test_stop_while_the_motion_is_designed(tmp_path: Path) -> None:
     executor = ManualExecutor()
     bench = Bench(tmp_path, executor=executor)
     campaign = bench.submit()
-    wait_until(lambda: len(executor.tasks) == 1)
+    wait_until(lambda: bench.workspace(campaign).read_made().held_out_excitation is not None)
     assert bench.desk.stop(campaign)
     assert bench.ended(campaign).state is JobState.CANCELLED
     made = bench.workspace(campaign).read_made()
-    record = Workspace(bench.excitations.items.folder(made.excitation or "")).read_record()
-    assert record is not None
-    assert record.state is JobState.CANCELLED
+    for identifier in (made.excitation, made.held_out_excitation):
+        record = Workspace(bench.excitations.items.folder(identifier or "")).read_record()
+        assert record is not None
+        assert record.state is JobState.CANCELLED
     assert not bench.desk.stop(campaign)
 
 
@@ -272,7 +273,7 @@ def test_what_was_not_measured_before_a_restart_never_moves_by_itself(is_closed:
     executor, controls = ManualExecutor(), HandControls()
     earlier = Bench(tmp_path, controls, executor)
     campaign = earlier.submit()
-    wait_until(lambda: bool(executor.tasks))
+    wait_until(lambda: earlier.workspace(campaign).read_made().held_out_excitation is not None)
     if is_closed:
         earlier.desk.close()
     later = Bench(tmp_path, controls)
