@@ -81,7 +81,7 @@ class CampaignDesk:
             self._led.begin(identifier, leader, lambda: None)
         return identifier
 
-    def stop(self, identifier: str) -> bool:
+    def stop(self, identifier: str) -> JobState | None:
         """Stop a campaign: takes no lock, waits for nothing, may be called any number of times.
 
         Parameters
@@ -91,14 +91,15 @@ class CampaignDesk:
 
         Returns
         -------
-        bool
-            False where it does not go on
+        JobState or None
+            where the campaign stood; None where nothing of it goes on
         """
         leader = self._led.find(identifier)
         if leader is None:
-            return False
+            return None
+        state = leader.state
         leader.stop()
-        return True
+        return state
 
     def remove(self, identifier: str) -> bool:
         """Remove a campaign that has ended; what it made stays.

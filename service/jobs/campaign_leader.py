@@ -3,12 +3,13 @@
 import logging
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from service.acquisition.record import RunRecord
 from service.acquisition.states import RunState
-from service.errors import TauscopeError
+from service.errors import NotFoundError, TauscopeError
 from service.jobs.campaign_order import CampaignOrder
 from service.jobs.campaign_workspace import CampaignWorkspace
 from service.jobs.excitation_order import ExcitationDesignOptions
@@ -76,6 +77,7 @@ class CampaignLeader:
         release_arm : callable
             lets go of the arm; called when nothing more will move
         """
+        self.state = JobState.QUEUED
         self._workspace = workspace
         self._order = order
         self._shop = shop
@@ -109,6 +111,7 @@ class CampaignLeader:
             self._move(JobState.RUNNING)
             self._go()
         except StoppedError:
+            self._cancel_jobs()
             if self._is_closing:
                 self._leave_for_later()
             else:
@@ -167,7 +170,6 @@ class CampaignLeader:
         """Wait for a job to succeed."""
         record = wait_for_end(workspace(kind.items.folder(identifier)), self._stop_asked)
         if record is None:
-            self._shop.jobs.cancel(kind, identifier)
             raise StoppedError
         require_succeeded(record, f"{noun} {identifier}")
 
@@ -234,6 +236,15 @@ class CampaignLeader:
         """Keep what was made."""
         self._workspace.write_made(self._workspace.read_made().model_copy(update=made))
 
+    def _cancel_jobs(self) -> None:
+        """Nobody waits for what is still designed or identified."""
+        made, shop = self._workspace.read_made(), self._shop
+        jobs = [(shop.excitations, made.excitation), (shop.excitations, made.held_out_excitation)]
+        for kind, identifier in [*jobs, (shop.identifications, made.identification)]:
+            with suppress(NotFoundError):
+                if identifier is not None:
+                    shop.jobs.cancel(kind, identifier)
+
     def _leave_for_later(self) -> None:
         """The service ends: what can be gone on with stays running, everything else is interrupted."""
         if not self._workspace.read_made().recordings:
@@ -244,6 +255,7 @@ class CampaignLeader:
         record = self._workspace.read_record()
         if record is None or not record.may_become(state):
             return
+        self.state = state
         try:
             self._workspace.write_record(record.moved(state, datetime.now(UTC), problem))
         except OSError:

@@ -163,6 +163,7 @@ class RunLeader:
         problem = None if code is None else RunProblem(code=code, detail=detail)
         try:
             self._workspace.end_before_start(state, problem)
+            self.live = Live(state, None, {})
         except OSError:
             # The disk is full or gone: the run becomes `interrupted` with the next start.
             _log.exception("the state of run %s could not be written", self._workspace.folder.name)

@@ -18,7 +18,6 @@ from service.api.jobs.routes import ENDINGS, Identifier, Limit, collection
 from service.api.jobs.submission import request_body
 from service.api.problems import ProblemError, problem_responses
 from service.api.services import Offered
-from service.jobs import JobState
 
 router = APIRouter(prefix="/campaigns", tags=["campaigns"], responses=problem_responses("invalid-request"))
 
@@ -95,8 +94,9 @@ def get_result(request: Request, identifier: Identifier, services: Offered) -> C
 async def stop_campaign(identifier: Identifier, services: Offered) -> CampaignStopAnswer:
     """Stops the arm first, then everything else of it; legal in every state, any number of times; needs no body."""
     # As for a run: no thread of the pool and no lock is needed for one that goes on.
-    if services.campaigns.stop(identifier):
-        return CampaignStopAnswer(id=identifier, state=JobState.RUNNING)
+    state = services.campaigns.stop(identifier)
+    if state is not None:
+        return CampaignStopAnswer(id=identifier, state=state)
     record = find_campaign(services, identifier).read_record()
     if record is None:
         raise ProblemError("damaged", f"files of {identifier} are missing or damaged; it does not go on")
