@@ -10,6 +10,7 @@ from drivers import ControlMode, DriverError, Setpoint, StopPolicy
 from sim_backend.device import HOTTEST, Activity, Disturbance, FaultCode, Injection, SimulatedDevice
 from sim_backend.device.activity import COMMANDED, POWERED, TRANSITIONS, commanded_by, stopped_by
 from sim_backend.device.faults import REMEDIES, FaultLatch, device_fault
+from sim_backend.device.posture import resting_posture
 from sim_backend.driver import SimulatedArm
 from sim_backend.scenario import Scenario
 
@@ -152,5 +153,6 @@ def test_a_torque_that_no_arm_survives_ends_in_a_fault_and_not_in_a_traceback() 
     assert np.isfinite(state.position).all()
 
 
-def test_the_default_place_is_zero_or_the_nearest_end_of_the_range() -> None:
-    np.testing.assert_array_equal(SimulatedDevice(bench_robot(), Scenario()).read().position, 0.0)
+def test_the_default_place_is_the_resting_posture() -> None:
+    position = SimulatedDevice(bench_robot(), Scenario()).read().position
+    np.testing.assert_array_equal(position, resting_posture(bench_robot()))

@@ -122,7 +122,7 @@ def test_command_latency_delays_the_motion() -> None:
 
 def test_the_upright_arm_whose_first_joint_has_no_inertia_is_held_and_driven() -> None:
     robot = bench_robot()
-    arm = SimulatedArm(robot)
+    arm = SimulatedArm(robot, start_position=np.zeros(3))
     arm.connect()
     arm.enable(ControlMode.POSITION, wide_limits(robot), StopPolicy.HOLD, 0.1)
     model, still, push = build_model(robot), np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0]])
