@@ -20,6 +20,7 @@ import typer
 from typer.main import get_command
 
 from service.cli.demo_command import demo
+from service.cli.diagnose_command import diagnose
 from service.cli.excite_command import excite
 from service.cli.identify_command import identify
 from service.cli.recording_command import recording
@@ -53,6 +54,7 @@ app = typer.Typer(
     no_args_is_help=True,
 )
 add_verb(app, identify, SeveralValuesCommand)
+add_verb(app, diagnose, SeveralValuesCommand)
 add_verb(app, excite)
 app.add_typer(robot, name="robot")
 app.add_typer(recording, name="recording")

@@ -1,0 +1,258 @@
+"""What an effect of the catalogue is: torque that the nominal model lacks, linear in coefficients for a given shape.
+
+One object is one *form* of an effect at one place: a joint, or the whole arm. Its columns are made at the recorded
+rate, before any filter, so that torque and columns pass the same one. Adding an effect is one file: a class with its
+equation, its columns and the forms that it can take on a given arm.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+
+from service.diagnosis.catalogue.setting import Setting
+from service.diagnosis.catalogue.signals import Signals
+from service.recording.recording import Array
+from service.robot import JointType
+
+_POSITION = {JointType.REVOLUTE: "rad", JointType.PRISMATIC: "m"}
+_TORQUE = {JointType.REVOLUTE: "Nm", JointType.PRISMATIC: "N"}
+
+
+@dataclass(frozen=True)
+class Coefficient:
+    """A linear coefficient of an effect.
+
+    name : str
+        in the equation
+    unit : str
+        with ``{tau}`` and ``{q}`` in place of the joint's units of torque and position
+    positive : bool
+        whether physics allows no negative value
+    largest : float
+        magnitude beyond which nothing real has it
+    """
+
+    name: str
+    unit: str
+    positive: bool = False
+    largest: float = np.inf
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A quantity that shapes an effect's columns and is searched over a grid, then refined between bounds.
+
+    name : str
+        in the equation
+    unit : str
+        as in `Coefficient`
+    logarithmic : bool
+        whether steps are relative ones
+    fixed : bool
+        whether only the grid's own values make sense
+    reported : bool
+        whether it belongs to the effect and not merely to how its column is made
+    """
+
+    name: str
+    unit: str
+    logarithmic: bool = False
+    fixed: bool = False
+    reported: bool = True
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A parameter as a finding reports it.
+
+    name : str
+        in the equation
+    value : float
+        estimate
+    std : float
+        its standard error
+    unit : str
+        SI
+    """
+
+    name: str
+    value: float
+    std: float
+    unit: str
+
+
+NO_SHAPE = np.zeros((1, 0))
+"""The grid of an effect without shape parameters."""
+
+
+@dataclass(frozen=True, eq=False)
+class Effect(ABC):
+    """One form of an effect at one place.
+
+    joint : int or None
+        joint index, from 0; None for the whole arm
+    grid : (g, k) float64
+        values of the shape parameters at which the effect is looked for
+    lower, upper : (k,) float64
+        bounds of the shape parameters
+    """
+
+    id: ClassVar[str]
+    equation: ClassVar[str]
+    meaning: ClassVar[str]
+    remedy: ClassVar[str]
+    revealing_motion: ClassVar[str]
+    coefficients: ClassVar[tuple[Coefficient, ...]]
+    shapes: ClassVar[tuple[Shape, ...]] = ()
+    repeats: ClassVar[bool] = False
+
+    joint: int | None
+    grid: Array = field(default_factory=lambda: NO_SHAPE)
+    lower: Array = field(default_factory=lambda: np.zeros(0))
+    upper: Array = field(default_factory=lambda: np.zeros(0))
+
+    @classmethod
+    @abstractmethod
+    def forms(cls, setting: Setting) -> "Sequence[Effect]":
+        """All forms and places worth looking at on this arm and motion.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm and the ranges of its motion
+        """
+
+    @abstractmethod
+    def columns(self, signals: Signals, shapes: Array) -> Array:
+        """Torque per unit of each coefficient, for several shapes at once.
+
+        Parameters
+        ----------
+        signals : Signals
+            one piece of motion
+        shapes : (g, k) float64
+            values of the shape parameters
+
+        Returns
+        -------
+        (g, c, m, N) or (g, c, m, P, N) float64
+            for the m joints of `touched`; with P where repetitions of the same motion differ
+        """
+
+    def touched(self, joint_count: int) -> tuple[int, ...]:
+        """Joints whose torque the effect changes: its own one, or all.
+
+        Parameters
+        ----------
+        joint_count : int
+            n
+        """
+        return tuple(range(joint_count)) if self.joint is None else (self.joint,)
+
+    def is_free(self, place: int) -> bool:
+        """Whether a shape parameter is estimated between the grid's points.
+
+        Parameters
+        ----------
+        place : int
+            which of the shape parameters
+        """
+        return not self.shapes[place].fixed
+
+    def name(self, joint_names: Sequence[str]) -> str:
+        """``effect@joint``, or the effect alone where it belongs to the whole arm.
+
+        Parameters
+        ----------
+        joint_names : sequence of str
+            names of the arm's joints
+        """
+        return self.id if self.joint is None else f"{self.id}@{joint_names[self.joint]}"
+
+    def where(self, joint_names: Sequence[str]) -> str:
+        """The place in words.
+
+        Parameters
+        ----------
+        joint_names : sequence of str
+            names of the arm's joints
+        """
+        return "the whole arm" if self.joint is None else joint_names[self.joint]
+
+    def unit(self, template: str, setting: Setting) -> str:
+        """A unit with the joint's own units of torque and position.
+
+        Parameters
+        ----------
+        template : str
+            with ``{tau}`` and ``{q}``
+        setting : Setting
+            the arm
+        """
+        return self.unit_at(template, setting, self.joint)
+
+    @staticmethod
+    def unit_at(template: str, setting: Setting, joint: int | None) -> str:
+        """The same for any joint.
+
+        Parameters
+        ----------
+        template : str
+            with ``{tau}`` and ``{q}``
+        setting : Setting
+            the arm
+        joint : int or None
+            joint index, from 0; None for the whole arm
+        """
+        kind = setting.robot.joints[joint or 0].type
+        return template.format(tau=_TORQUE[kind], q=_POSITION[kind])
+
+    def quantities(
+        self, setting: Setting, coefficients: Array, shape: Array, covariance: Array
+    ) -> tuple[Quantity, ...]:
+        """The parameters of a finding: coefficients, then shapes.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        coefficients : (c,) float64
+            estimates
+        shape : (k,) float64
+            estimates
+        covariance : (c + k, c + k) float64
+            of both
+        """
+        std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        names = (*self.coefficients, *self.shapes)
+        values = (*coefficients, *shape)
+        return tuple(
+            Quantity(each.name, float(value), float(error), self.unit(each.unit, setting))
+            for each, value, error in zip(names, values, std, strict=True)
+            if isinstance(each, Coefficient) or each.reported
+        )
+
+
+def per_joint_columns(rows: Array) -> Array:
+    """Columns (g, c, N) of a single joint in the form that `Effect.columns` returns, (g, c, 1, N).
+
+    Parameters
+    ----------
+    rows : (g, c, N) float64
+        columns
+    """
+    return rows[:, :, None, :]
+
+
+def mesh(*axes: Array) -> Array:
+    """All combinations of the shape parameters' values, (g, k).
+
+    Parameters
+    ----------
+    *axes : (g_i,) float64
+        values of each shape parameter
+    """
+    return np.stack([part.ravel() for part in np.meshgrid(*axes, indexing="ij")], axis=1)

@@ -1,0 +1,102 @@
+"""Elastic torque that depends on the joint's own angle: springs, counterbalances, hoses and end stops."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from service.diagnosis.catalogue.effect import Coefficient, Effect, Shape, mesh, per_joint_columns
+from service.diagnosis.catalogue.setting import Setting
+from service.diagnosis.catalogue.signals import Signals
+from service.recording.recording import Array
+
+ONSETS = np.linspace(0.2, 0.9, 8)
+"""Angles at which a cable begins to pull, relative to the range of motion: one that always pulls is a spring."""
+
+EXPONENTS = np.array([1.0, 1.5, 2.0])
+
+
+class JointSpring(Effect):
+    """τ = k (q - q_0); the constant part is in the nominal model's offset."""
+
+    id: ClassVar[str] = "joint_spring"
+    equation: ClassVar[str] = "tau = k (q - q_0)"
+    meaning: ClassVar[str] = "an elastic torque grows linearly with the angle"
+    remedy: ClassVar[str] = "add a spring to the joint"
+    revealing_motion: ClassVar[str] = "the joint's whole range, in several poses of the other joints"
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("k", "{tau}/{q}", positive=True),)
+
+    @classmethod
+    def forms(cls, setting: Setting) -> Sequence[Effect]:
+        """One a joint that moves.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        """
+        return [cls(joint) for joint in setting.joints if setting.moves(joint)]
+
+    def columns(self, signals: Signals, shapes: Array) -> Array:
+        """The angle.
+
+        Parameters
+        ----------
+        signals : Signals
+            one piece of motion
+        shapes : (1, 0) float64
+            none
+        """
+        return per_joint_columns(signals.position[self.joint][None, None])
+
+
+@dataclass(frozen=True, eq=False)
+class CableForce(Effect):
+    """τ = ±k max(±(q - q_t), 0)^p.
+
+    side : int
+        +1 where it pulls beyond q_t, -1 where below
+    """
+
+    id: ClassVar[str] = "cable_force"
+    equation: ClassVar[str] = "tau = +-k max(+-(q - q_t), 0)^p"
+    meaning: ClassVar[str] = "a one-sided elastic torque sets in past an angle"
+    remedy: ClassVar[str] = "re-route the hose or cable, or model its pull past the angle"
+    revealing_motion: ClassVar[str] = "motion well past the angle on both sides"
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("k", "{tau}/{q}^p", positive=True),)
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("q_t", "{q}"), Shape("p", "1", fixed=True))
+
+    side: int = 1
+
+    @classmethod
+    def forms(cls, setting: Setting) -> Sequence[Effect]:
+        """Both sides of every joint that moves.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        """
+        made = []
+        for joint in setting.joints:
+            if setting.moves(joint):
+                low, high = float(setting.lowest[joint]), float(setting.highest[joint])
+                for side in (1, -1):
+                    onsets = np.sort((low if side > 0 else high) + side * ONSETS * (high - low))
+                    bounds = np.array([onsets[0], 1.0]), np.array([onsets[-1], 2.0])
+                    made.append(cls(joint, mesh(onsets, EXPONENTS), *bounds, side=side))
+        return made
+
+    def columns(self, signals: Signals, shapes: Array) -> Array:
+        """±max(±(q - q_t), 0)^p.
+
+        Parameters
+        ----------
+        signals : Signals
+            one piece of motion
+        shapes : (g, 2) float64
+            q_t [rad or m], p
+        """
+        beyond = np.maximum(self.side * (signals.position[self.joint] - shapes[:, :1]), 0.0)
+        return per_joint_columns((self.side * beyond ** shapes[:, 1:])[:, None])

@@ -1,0 +1,203 @@
+"""Torque that repeats with the angle of the motor or the joint: cogging, and ripple in proportion to the load.
+
+Orders are counted per unit of joint position. Where the robot file states a gear ratio, only whole multiples of the
+motor's revolution can occur; otherwise the angle-periodogram is scanned as finely as the range of motion resolves.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from service.diagnosis.catalogue.effect import Coefficient, Effect, Quantity, Shape, per_joint_columns
+from service.diagnosis.catalogue.setting import Setting
+from service.diagnosis.catalogue.signals import Signals
+from service.recording.recording import Array
+from service.robot import JointType
+
+FEWEST_CYCLES = 3.0
+"""Cycles over the range of motion below which a periodic torque is a spring or a bump by another name."""
+
+CYCLES_A_STEP = 0.35
+"""Step of the scan in cycles over the range of motion: a peak is two wide."""
+
+BAND_SHARE = 0.8
+"""Share of the band up to which the frequency at typical speed may reach."""
+
+MOST_ORDERS = 220
+
+
+def possible_orders(setting: Setting, joint: int) -> Array:
+    """Orders of a periodic torque that this motion can show, (g,), ascending; empty where there are none.
+
+    Parameters
+    ----------
+    setting : Setting
+        the arm and its motion
+    joint : int
+        joint index, from 0
+    """
+    reach = float(setting.highest[joint] - setting.lowest[joint])
+    if not setting.moves(joint):
+        return np.zeros(0)
+    lowest = FEWEST_CYCLES * 2.0 * np.pi / reach
+    highest = BAND_SHARE * 2.0 * np.pi * setting.cutoff_hz / float(setting.speed[joint])
+    if _is_geared(setting, joint):
+        unit = abs(setting.robot.joints[joint].gear_ratio or 1.0) * _pole_pairs(setting, joint)
+        lowest = min(lowest, unit) if reach >= 2.0 * np.pi / unit * FEWEST_CYCLES else lowest
+        multiples = np.arange(max(1, int(np.ceil(lowest / unit - 1e-9))), int(highest / unit) + 1)
+        return np.asarray(unit * multiples[:MOST_ORDERS], dtype=np.float64)
+    step = CYCLES_A_STEP * 2.0 * np.pi / reach
+    return np.asarray(np.arange(lowest, highest, step)[:MOST_ORDERS], dtype=np.float64)
+
+
+def _pole_pairs(setting: Setting, joint: int) -> int:
+    drive = setting.robot.joints[joint].drive or {}
+    pairs = drive.get("pole_pairs", 1)
+    return int(pairs) if isinstance(pairs, int | float) and pairs >= 1 else 1
+
+
+def _is_geared(setting: Setting, joint: int) -> bool:
+    described = setting.robot.joints[joint]
+    return described.gear_ratio is not None and described.type is JointType.REVOLUTE
+
+
+@dataclass(frozen=True, eq=False)
+class _Periodic(Effect):
+    """Sine and cosine of an order, with a weight of its own.
+
+    geared : bool
+        whether only whole multiples of the motor's revolution can occur
+    """
+
+    geared: bool = False
+
+    repeats: ClassVar[bool] = True
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("order", "1/{q}"),)
+
+    @classmethod
+    def forms(cls, setting: Setting) -> Sequence[Effect]:
+        """One a joint whose motion covers enough cycles.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        """
+        made = []
+        for joint in setting.joints:
+            orders = possible_orders(setting, joint)
+            if len(orders):
+                bounds = 0.9 * orders[:1], 1.1 * orders[-1:]
+                made.append(cls(joint, orders[:, None], *bounds, geared=_is_geared(setting, joint)))
+        return made
+
+    def is_free(self, place: int) -> bool:
+        """Whether the order lies between the grid's points.
+
+        Parameters
+        ----------
+        place : int
+            the order is the only shape
+        """
+        return not self.geared
+
+    def quantities(
+        self, setting: Setting, coefficients: Array, shape: Array, covariance: Array
+    ) -> tuple[Quantity, ...]:
+        """Amplitude, phase and order instead of sine and cosine.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        coefficients : (2,) float64
+            of sine and cosine
+        shape : (1,) float64
+            order
+        covariance : (3, 3) float64
+            of both and the order
+        """
+        sine, cosine = (float(value) for value in coefficients)
+        amplitude = float(np.hypot(sine, cosine)) or 1e-300
+        of_amplitude = np.array([sine, cosine]) / amplitude
+        of_phase = np.array([-cosine, sine]) / amplitude**2
+        own = covariance[:2, :2]
+        return (
+            Quantity("order", float(shape[0]), float(np.sqrt(max(covariance[2, 2], 0.0))), self.unit("1/{q}", setting)),
+            Quantity(
+                "amplitude",
+                amplitude,
+                float(np.sqrt(of_amplitude @ own @ of_amplitude)),
+                self.unit(self.coefficients[0].unit, setting),
+            ),
+            Quantity("phase", float(np.arctan2(cosine, sine)), float(np.sqrt(of_phase @ own @ of_phase)), "rad"),
+        )
+
+    def _waves(self, signals: Signals, shapes: Array) -> Array:
+        """Sin kq, cos kq, (g, 2, N)."""
+        angle = shapes * signals.position[self.joint]
+        return np.stack([np.sin(angle), np.cos(angle)], axis=1)
+
+
+class Cogging(_Periodic):
+    """τ = Σ a sin(k q + φ)."""
+
+    id: ClassVar[str] = "cogging"
+    equation: ClassVar[str] = "tau = sum a sin(k q + phi)"
+    meaning: ClassVar[str] = "torque repeats with the angle, whatever the load"
+    remedy: ClassVar[str] = "compensate the torque over the motor's angle"
+    revealing_motion: ClassVar[str] = (
+        "slow constant speed over the whole range, the load changed by other joints' poses"
+    )
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("sine", "{tau}"), Coefficient("cosine", "{tau}"))
+
+    def columns(self, signals: Signals, shapes: Array) -> Array:
+        """Sin kq, cos kq.
+
+        Parameters
+        ----------
+        signals : Signals
+            one piece of motion
+        shapes : (g, 1) float64
+            k [1/rad or 1/m]
+        """
+        return per_joint_columns(self._waves(signals, shapes))
+
+
+class TorqueRipple(_Periodic):
+    """τ = τ_rb Σ a sin(k q + φ)."""
+
+    id: ClassVar[str] = "torque_ripple"
+    equation: ClassVar[str] = "tau = tau_rb sum a sin(k q + phi)"
+    meaning: ClassVar[str] = "torque repeats with the angle, in proportion to the load"
+    remedy: ClassVar[str] = "correct the torque constant over the motor's angle"
+    revealing_motion: ClassVar[str] = "the same angles under other loads: other poses of the other joints"
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (
+        Coefficient("sine", "1", largest=0.5),
+        Coefficient("cosine", "1", largest=0.5),
+    )
+
+    @classmethod
+    def forms(cls, setting: Setting) -> Sequence[Effect]:
+        """One a joint that is loaded and covers enough cycles.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        """
+        return [form for form in super().forms(setting) if form.joint is not None and setting.is_loaded(form.joint)]
+
+    def columns(self, signals: Signals, shapes: Array) -> Array:
+        """τ_rb sin kq, τ_rb cos kq.
+
+        Parameters
+        ----------
+        signals : Signals
+            one piece of motion
+        shapes : (g, 1) float64
+            k [1/rad or 1/m]
+        """
+        return per_joint_columns(signals.load[self.joint] * self._waves(signals, shapes))

@@ -1,0 +1,82 @@
+"""On which arm and in which ranges of motion effects are looked for."""
+
+from dataclasses import dataclass
+
+from service.recording.recording import Array
+from service.robot import Robot
+
+LEAST_LOAD = 0.02
+"""Rms of a joint's rigid-body torque relative to its largest torque below which nothing presses its transmission."""
+
+ONE_WAY = 0.1
+"""Speed the other way, relative to the rms, below which a joint does not reverse."""
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """The arm and the ranges of its recorded motion.
+
+    robot : Robot
+        the arm
+    slowest, fastest : (n,) float64
+        range of every joint's velocity, the rarest percents left out [rad/s or m/s]
+    lowest, highest : (n,) float64
+        range of every joint's position [rad or m]
+    speed, top_speed : (n,) float64
+        rms and largest magnitude of every joint's velocity [rad/s or m/s]
+    load, top_torque : (n,) float64
+        rms of the fitted rigid-body torque, largest magnitude of the model's torque [Nm or N]
+    durations : tuple of float
+        length of every training recording [s]
+    cutoff_hz : float
+        highest frequency that torque and columns share [Hz]
+    """
+
+    robot: Robot
+    slowest: Array
+    fastest: Array
+    lowest: Array
+    highest: Array
+    speed: Array
+    top_speed: Array
+    load: Array
+    top_torque: Array
+    durations: tuple[float, ...]
+    cutoff_hz: float
+
+    @property
+    def joints(self) -> range:
+        """Indices of the joints that move."""
+        return range(self.robot.joint_count)
+
+    def moves(self, joint: int) -> bool:
+        """Whether a joint moves at all.
+
+        Parameters
+        ----------
+        joint : int
+            joint index, from 0
+        """
+        return bool(self.highest[joint] > self.lowest[joint] and self.speed[joint] > 0.0)
+
+    def reverses(self, joint: int) -> bool:
+        """Whether a joint moves both ways.
+
+        Parameters
+        ----------
+        joint : int
+            joint index, from 0
+        """
+        return bool(
+            self.slowest[joint] < -ONE_WAY * self.speed[joint] and self.fastest[joint] > ONE_WAY * self.speed[joint]
+        )
+
+    def is_loaded(self, joint: int) -> bool:
+        """Whether the rigid body loads a joint's transmission at all.
+
+        Parameters
+        ----------
+        joint : int
+            joint index, from 0
+        """
+        return bool(self.load[joint] > LEAST_LOAD * self.top_torque[joint])

@@ -1,0 +1,59 @@
+"""Extra friction near zero velocity that decays with speed, beyond what the nominal curve has."""
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from service.diagnosis.catalogue.effect import Coefficient, Effect, Shape, mesh, per_joint_columns
+from service.diagnosis.catalogue.setting import Setting
+from service.diagnosis.catalogue.signals import Signals
+from service.recording.recording import Array
+
+SPEEDS = np.array([0.04, 0.08, 0.15, 0.25, 0.4, 0.65, 1.0])
+"""Decay speeds looked at, relative to the joint's top speed."""
+
+EXPONENTS = np.array([1.0, 2.0])
+
+
+class StribeckFriction(Effect):
+    """τ = s A(q̇) exp(-(|q̇|/v_s)^α)."""
+
+    id: ClassVar[str] = "stribeck_friction"
+    equation: ClassVar[str] = "tau = s sgn(qd) exp(-(|qd|/v_s)^alpha)"
+    meaning: ClassVar[str] = "friction rises towards zero velocity more than the model's curve"
+    remedy: ClassVar[str] = "add a Stribeck term"
+    revealing_motion: ClassVar[str] = "slow sweeps between rest and a few v_s, beside motion at top speed"
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("s", "{tau}", positive=True),)
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("v_s", "{q}/s", logarithmic=True), Shape("alpha", "1", fixed=True))
+
+    @classmethod
+    def forms(cls, setting: Setting) -> Sequence[Effect]:
+        """One a joint that moves.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        """
+        made = []
+        for joint in setting.joints:
+            if setting.moves(joint):
+                speeds = SPEEDS * setting.top_speed[joint]
+                bounds = np.array([0.5 * speeds[0], 1.0]), np.array([1.5 * speeds[-1], 2.0])
+                made.append(cls(joint, mesh(speeds, EXPONENTS), *bounds))
+        return made
+
+    def columns(self, signals: Signals, shapes: Array) -> Array:
+        """A(q̇) exp(-(|q̇|/v_s)^α).
+
+        Parameters
+        ----------
+        signals : Signals
+            one piece of motion
+        shapes : (g, 2) float64
+            v_s [rad/s or m/s], α
+        """
+        speed = np.abs(signals.velocity[self.joint])
+        decay = np.exp(-((speed / shapes[:, :1]) ** shapes[:, 1:]))
+        return per_joint_columns((signals.step[self.joint] * decay)[:, None])

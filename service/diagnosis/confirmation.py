@@ -1,0 +1,120 @@
+"""Whether a finding holds on motion that was not used: what it predicts there, and what it would be there."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from service.diagnosis.blocks import add_block_sums
+from service.diagnosis.fit import Fitter
+from service.diagnosis.model import ExtendedModel, Term
+from service.diagnosis.observations import Observations
+from service.diagnosis.projection import moments
+from service.diagnosis.screening import Screen, model_signals
+from service.recording.recording import Array
+
+CLEARLY_WORSE = -3.0
+"""Standard errors of the gain below which a finding has spoilt the prediction."""
+
+CLEARLY_BETTER = 1.0
+"""…and above which it must lie where the noise is not known from repetitions, so that significance is less certain."""
+
+SEEN_AGAIN = 1.64
+"""Standard errors that a finding estimated on the held-out recordings alone must differ from zero, its sign kept."""
+
+PLAINLY_SEEN = 6.0
+"""Standard errors at which it is there beyond doubt, so that a prediction that is no better speaks of its size only."""
+
+SAME_SIZE = 0.4
+"""…as long as it is at least this part of what training says."""
+
+SHOULD_BE_SEEN = 3.0
+"""Standard errors at which the finding, if true, is expected there: below, its absence says nothing."""
+
+
+@dataclass(frozen=True)
+class Confirmation:
+    """What held-out recordings say of a finding.
+
+    gain : float
+        what the finding takes off the predicted residual's energy there [noise variances]
+    gain_z : float
+        the same in its own standard errors, from blocks of one second
+    expected_z : float
+        standard errors from zero at which the finding would be seen there if it is what training says
+    seen_z : float
+        the same as estimated there, beside nominal parameters of these recordings' own
+    """
+
+    gain: float
+    gain_z: float
+    expected_z: float
+    seen_z: float
+
+    def confirmed(self, *, cautious: bool) -> bool:
+        """Whether the finding is there on motion that it was not made from, and does not spoil the prediction.
+
+        Parameters
+        ----------
+        cautious : bool
+            whether the noise is not known from repetitions
+        """
+        seen = self.expected_z < SHOULD_BE_SEEN or self.seen_z > SEEN_AGAIN
+        if cautious and self.gain_z <= CLEARLY_BETTER:
+            return self.gain_z > CLEARLY_WORSE and self.seen_z > max(PLAINLY_SEEN, SAME_SIZE * self.expected_z)
+        return seen and self.gain_z > CLEARLY_WORSE
+
+
+class HeldOut:
+    """Held-out recordings, with the noise of the training ones.
+
+    Parameters
+    ----------
+    observations : Observations
+        held-out rows, noise known
+    """
+
+    def __init__(self, observations: Observations) -> None:
+        self.observations = observations
+        self.fitter = Fitter(observations)
+        self.screen = Screen(observations, ())
+
+    def confirm(self, before: ExtendedModel, after: ExtendedModel, term: Term) -> Confirmation:
+        """Compare predictions without and with a term.
+
+        Parameters
+        ----------
+        before, after : ExtendedModel
+            fitted to the training recordings
+        term : Term
+            what `after` has more, as fitted there
+        """
+        gains = self.block_gains(before, after)
+        spread = float(gains.std(ddof=1) * np.sqrt(len(gains))) if len(gains) > 1 else np.inf
+        total = float(gains.sum())
+        expected, seen = self._seen_again(before, after, term)
+        return Confirmation(total, total / max(spread, np.finfo(float).tiny), expected, seen)
+
+    def block_gains(self, before: ExtendedModel, after: ExtendedModel) -> Array:
+        """Decrease of the whitened residual's energy in blocks of `BLOCK_S`, (b,).
+
+        Parameters
+        ----------
+        before, after : ExtendedModel
+            models to compare
+        """
+        gains: dict[tuple[int, int], float] = {}
+        rows = zip(self.fitter.white_residual(before), self.fitter.white_residual(after), strict=True)
+        for joint, (old, new) in enumerate(rows):
+            add_block_sums(gains, *self.observations.row_labels(joint), old**2 - new**2)
+        return np.array(list(gains.values()))
+
+    def _seen_again(self, before: ExtendedModel, after: ExtendedModel, term: Term) -> tuple[float, float]:
+        """The term along its training coefficients: expected and found, in standard errors of these recordings."""
+        nominal = replace(before, structure=after.structure, parameters=after.parameters)
+        fit = self.fitter.projected(nominal)
+        white = self.screen.white_columns(term.effect, term.shape[None], model_signals(nominal, self.observations))
+        found = moments(fit.projection, white)
+        strength = float(np.sqrt(term.coefficients @ found.gram[0] @ term.coefficients))
+        noise = float(np.sqrt(fit.inflation()))
+        along = float(term.coefficients @ found.target[0]) / max(strength, np.finfo(float).tiny)
+        return strength / noise, along / noise

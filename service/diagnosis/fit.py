@@ -1,0 +1,231 @@
+"""The extended model fitted to whitened rows by Gauss–Newton steps: Θ, K_v, δ, effects and their shapes together."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from service.diagnosis.model import ExtendedModel, Term, residual_rows, with_terms
+from service.diagnosis.observations import Observations
+from service.diagnosis.projection import JointColumns, Projection, project
+from service.recording.recording import Array
+
+STEPS = 8
+SETTLED = 1e-4
+"""Change of the residual's energy, in noise variances a step, relative to all rows, that is the end."""
+
+LARGEST_LOG_STEP = 0.4
+"""Change of a constant's logarithm in one step."""
+
+SHAPE_STEP = 0.15
+"""Change of a linear shape parameter in one step, relative to its bounds."""
+
+HALVINGS = 4
+
+FARTHEST = 3.0
+"""Factor beyond which a constant of the friction curve does not move from where the identification found it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """An extended model at its optimum.
+
+    model : ExtendedModel
+        with fitted parameters
+    projection : Projection
+        of its columns at the optimum; the residual is what is left after the last linear step
+    """
+
+    model: ExtendedModel
+    projection: Projection
+
+    @property
+    def energy(self) -> float:
+        """Whitened residual's Σ r²."""
+        return self.projection.energy
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance of all parameters for white noise of the modelled size, (p, p)."""
+        return self.projection.spread @ self.projection.spread.T
+
+    def inflation(self) -> float:
+        """Residual energy per degree of freedom, at least 1: what is left is more than noise by this factor."""
+        return max(1.0, self.energy / max(self.projection.freedom, 1))
+
+
+class Fitter:
+    """Fits extended models to the same observations; columns that never change are whitened once.
+
+    Parameters
+    ----------
+    observations : Observations
+        the data, noise known
+    """
+
+    def __init__(self, observations: Observations) -> None:
+        self.observations = observations
+        self._rigid: dict[int, Array] = {}
+
+    def fit(self, model: ExtendedModel, *, steps: int = STEPS) -> Fit:
+        """Fit all parameters.
+
+        Parameters
+        ----------
+        model : ExtendedModel
+            where to start
+        steps : int
+            most Gauss–Newton steps
+        """
+        start = [model.constant(place) for place in range(len(model.constants))]
+        residual, columns = self._linearised(model)
+        rows = sum(len(row) for row in residual)
+        energy = _energy(model, residual)
+        projection = project(columns, residual, model.size, model.prior())
+        for _ in range(steps):
+            moved, found, lower = model, residual, np.inf
+            for halving in range(HALVINGS):
+                moved = _stepped(model, projection.step, 0.5**halving, start)
+                found = self._residual(moved)
+                lower = _energy(moved, found)
+                if lower <= energy * (1.0 + 1e-12):
+                    break
+            if lower > energy * (1.0 + 1e-12):
+                break
+            gained, energy, model = energy - lower, lower, moved
+            residual, columns = found, self._columns(model)
+            projection = project(columns, residual, model.size, model.prior())
+            if gained < SETTLED * rows and not _moves(model, projection.step):
+                break
+        return Fit(model, projection)
+
+    def projected(self, model: ExtendedModel) -> Fit:
+        """The linear step at a model as it is, without moving it.
+
+        Parameters
+        ----------
+        model : ExtendedModel
+            the model
+        """
+        residual, columns = self._linearised(model)
+        return Fit(model, project(columns, residual, model.size, model.prior()))
+
+    def white_residual(self, model: ExtendedModel) -> list[Array]:
+        """Whitened residual of a model as it is, (R_j,) a joint.
+
+        Parameters
+        ----------
+        model : ExtendedModel
+            the model
+        """
+        return self._residual(model)
+
+    def columns(self, model: ExtendedModel) -> list[JointColumns]:
+        """Whitened columns of all parameters of a model, one entry a joint.
+
+        Parameters
+        ----------
+        model : ExtendedModel
+            the model
+        """
+        return self._columns(model)
+
+    def _linearised(self, model: ExtendedModel) -> tuple[list[Array], list[JointColumns]]:
+        return self._residual(model), self._columns(model)
+
+    def _residual(self, model: ExtendedModel) -> list[Array]:
+        rows = residual_rows(model, self.observations)
+        return [self.observations.white(joint, pieces)[0] for joint, pieces in enumerate(rows)]
+
+    def _columns(self, model: ExtendedModel) -> list[JointColumns]:
+        observations, structure = self.observations, model.structure
+        joints = range(observations.robot.joint_count)
+        own: list[list[Array]] = [[] for _ in joints]
+        index: list[list[int]] = [[] for _ in joints]
+        for number, piece in enumerate(observations):
+            motion = piece.prepared.motion
+            parts: list[list[Array]] = [[] for _ in joints]
+            places: list[list[int]] = [[] for _ in joints]
+            for joint in joints:
+                terms = structure.joint_term_columns(joint, motion.velocity[:, joint], motion.acceleration[:, joint])
+                parts[joint].append(piece.repeated(motion.band.reduce(terms)))
+                places[joint] += list(structure.joint_columns(joint)[-len(terms) :])
+                of_constants, rows = model.sensitivity_columns(piece, joint)
+                parts[joint].append(piece.repeated(rows))
+                places[joint] += of_constants
+            signals = model.signals(piece)
+            for term, place in zip(model.terms, model.term_places(), strict=True):
+                derivatives = model.term_derivatives(term, signals)
+                for slot, joint in enumerate(term.effect.touched(len(joints))):
+                    parts[joint].append(piece.reduced(derivatives[:, slot]))
+                    places[joint] += list(range(place.start, place.stop))
+            for joint in joints:
+                own[joint].append(np.concatenate(parts[joint]))
+                if number == 0:
+                    index[joint] = places[joint]
+        result = []
+        for joint in joints:
+            rigid = self._white_rigid(model, joint)
+            all_places = np.concatenate([structure.joint_columns(joint)[: len(rigid)], index[joint]]).astype(np.intp)
+            result.append(JointColumns(all_places, np.concatenate([rigid, observations.white(joint, own[joint])])))
+        return result
+
+    def _white_rigid(self, model: ExtendedModel, joint: int) -> Array:
+        """Columns of the links, which no fit changes."""
+        if joint not in self._rigid:
+            own = len(model.structure.terms[joint].names)
+            columns = [piece.prepared.joint_columns(model.structure, joint)[:-own] for piece in self.observations]
+            rows = [piece.repeated(each) for piece, each in zip(self.observations, columns, strict=True)]
+            self._rigid[joint] = self.observations.white(joint, rows)
+        return self._rigid[joint]
+
+
+def _energy(model: ExtendedModel, residual: list[Array]) -> float:
+    """Σ r² of the data's rows and of the prior's."""
+    _, left = model.prior()
+    return sum(float(row @ row) for row in residual) + float(left @ left)
+
+
+def _moves(model: ExtendedModel, step: Array) -> bool:
+    """Whether the next step would still move a shape."""
+    first = model.structure.size
+    constants = step[first : first + len(model.constants)]
+    if len(constants) and np.abs(constants).max() > 0.02:
+        return True
+    for term, place in zip(model.terms, model.term_places(), strict=True):
+        of_shapes = step[place][len(term.coefficients) :]
+        span = (term.effect.upper - term.effect.lower)[term.free_shapes]
+        if len(of_shapes) and (np.abs(of_shapes) > 2e-3 * span).any():
+            return True
+    return False
+
+
+def _stepped(model: ExtendedModel, step: Array, share: float, start: list[float]) -> ExtendedModel:
+    """The model moved by part of a Gauss–Newton step, shapes within their bounds."""
+    size = model.structure.size
+    terms = list(model.structure.terms)
+    for place, (joint, name) in enumerate(model.constants):
+        change = float(np.clip(share * step[size + place], -LARGEST_LOG_STEP, LARGEST_LOG_STEP))
+        value = float(np.clip(model.constant(place) * np.exp(change), start[place] / FARTHEST, start[place] * FARTHEST))
+        terms[joint] = replace(terms[joint], **{name: value})
+    moved = []
+    for term, place in zip(model.terms, model.term_places(), strict=True):
+        own = share * step[place]
+        count = len(term.coefficients)
+        shape = term.shape.copy()
+        for free, change in zip(term.free_shapes, own[count:], strict=True):
+            shape[free] = _moved_shape(term, free, float(change))
+        moved.append(Term(term.effect, shape, term.coefficients + own[:count]))
+    stepped = replace(
+        model, structure=model.structure.with_terms(tuple(terms)), parameters=model.parameters + share * step[:size]
+    )
+    return with_terms(stepped, moved)
+
+
+def _moved_shape(term: Term, place: int, change: float) -> float:
+    """A shape parameter after a step that is neither too long nor leaves its bounds."""
+    effect, value = term.effect, float(term.shape[place])
+    if effect.shapes[place].logarithmic:
+        bound = LARGEST_LOG_STEP * abs(value)
+    else:
+        bound = SHAPE_STEP * float(effect.upper[place] - effect.lower[place])
+    return float(np.clip(value + np.clip(change, -bound, bound), effect.lower[place], effect.upper[place]))

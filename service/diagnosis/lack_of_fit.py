@@ -1,0 +1,142 @@
+"""Whether anything but noise is left at a joint, without asking what.
+
+Two tests. *Omnibus*: a basis of smooth functions of the joint's state and of time, projected off the model, holds no
+more of the residual's energy per direction than the rest does (F test: an error of the noise's size does not matter).
+*Pure error*: the mean over repetitions differs from the model by no more than repetitions differ among themselves.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from service.diagnosis.fit import Fit
+from service.diagnosis.observations import Observations, Piece
+from service.recording.recording import Array
+
+FEATURES = 60
+HATS = 12
+"""Hat functions of time in every recording."""
+
+LEVEL = 1e-3
+"""Chance, over all joints and both tests, at which a mismatch is called significant."""
+
+
+@dataclass(frozen=True, eq=False)
+class LackOfFit:
+    """What is left.
+
+    omnibus, pure_error : (n,) float64
+        p-values; 1 where the test could not be made
+    excess : (n,) float64
+        Σ r² beyond the noise's, in noise variances, never negative
+    """
+
+    omnibus: Array
+    pure_error: Array
+    excess: Array
+
+    @property
+    def significant(self) -> list[bool]:
+        """Per joint, whether more than noise is left."""
+        level = LEVEL / (2 * len(self.omnibus))
+        return [bool(min(a, b) < level) for a, b in zip(self.omnibus, self.pure_error, strict=True)]
+
+
+def lack_of_fit(fit: Fit, observations: Observations, *, pure_error: bool, seed: int = 0) -> LackOfFit:
+    """Test what a model leaves.
+
+    Parameters
+    ----------
+    fit : Fit
+        the model at its optimum
+    observations : Observations
+        the rows that it was fitted to
+    pure_error : bool
+        whether their noise is known from repetitions
+    seed : int
+        of the random features
+    """
+    joints = observations.robot.joint_count
+    omnibus, pure, excess = np.ones(joints), np.ones(joints), np.zeros(joints)
+    share = fit.projection.spread.shape[1] / max(sum(len(row) for row in fit.projection.residual), 1)
+    repeated = pure_error_rows(observations)
+    for joint, residual in enumerate(fit.projection.residual):
+        rows = [piece.reduced(_features(piece, joint, observations, seed)) for piece in observations]
+        white = observations.white(joint, rows)
+        basis = fit.projection.basis[joint]
+        outside = white - (white @ basis.T) @ basis
+        omnibus[joint] = _f_test(outside, residual, share)
+        freedom = len(residual) * (1.0 - share)
+        energy = float(residual @ residual)
+        excess[joint] = max(energy - freedom, 0.0)
+        means = freedom - repeated[joint]
+        if pure_error and repeated[joint] > 0 and means > 1.0:
+            ratio = max(energy - repeated[joint], 0.0) / means
+            pure[joint] = float(stats.f.sf(ratio, means, repeated[joint]))
+    return LackOfFit(omnibus, pure, excess)
+
+
+def pure_error_rows(observations: Observations) -> Array:
+    """Degrees of freedom of what differs between repetitions, (n,).
+
+    Parameters
+    ----------
+    observations : Observations
+        the data
+    """
+    joints = observations.robot.joint_count
+    return np.array(
+        [
+            sum((piece.repetitions - 1) * piece.used[j].all(axis=0).sum() for piece in observations)
+            for j in range(joints)
+        ],
+        dtype=float,
+    )
+
+
+def _f_test(columns: Array, residual: Array, share: float) -> float:
+    """p-value of the residual's energy in the columns' span against the rest."""
+    scale = np.linalg.norm(columns, axis=1)
+    columns = columns[scale > 1e-9 * max(float(scale.max(initial=0.0)), 1e-300)]
+    if not len(columns):
+        return 1.0
+    _, singular, right = np.linalg.svd(columns / np.linalg.norm(columns, axis=1)[:, None], full_matrices=False)
+    span = right[singular > 1e-3 * singular[0]]
+    inside = float(np.sum((span @ residual) ** 2))
+    rest = float(residual @ residual) - inside
+    freedom = len(residual) * (1.0 - share) - len(span)
+    if freedom < len(span) or rest <= 0.0:
+        return 1.0
+    return float(stats.f.sf((inside / len(span)) / (rest / freedom), len(span), freedom))
+
+
+def _features(piece: Piece, joint: int, observations: Observations, seed: int) -> Array:
+    """Smooth functions of state and time at the recorded rate, (k, P, N)."""
+    motion = piece.prepared.motion
+    rng = np.random.default_rng([seed, joint])
+    states = np.concatenate([motion.position, motion.velocity], axis=1)
+    reach = np.maximum(_reach(observations), 1e-12)
+    count = observations.robot.joint_count
+    weight = 0.5 * rng.standard_normal((FEATURES, 2 * count)) * (rng.random((FEATURES, 2 * count)) < 1.5 / count)
+    own = (joint, count + joint)
+    weight[:, own] = 1.5 * rng.standard_normal((FEATURES, 2))
+    phase = rng.uniform(0.0, 2.0 * np.pi, FEATURES)
+    waves = np.cos((weight / reach) @ states.T + phase[:, None])
+    of_state = np.repeat(waves[:, None], piece.repetitions, axis=1)
+    ends = [float(each.time.max()) for each in observations if each.prepared.recording == piece.prepared.recording]
+    recordings = sorted({each.prepared.recording for each in observations})
+    hats = np.zeros((HATS * len(recordings), *piece.time.shape))
+    place = recordings.index(piece.prepared.recording) * HATS
+    at = piece.time / max(1e-9, *ends) * (HATS - 1)
+    for number in range(HATS):
+        hats[place + number] = np.maximum(1.0 - np.abs(at - number), 0.0)
+    return np.concatenate([of_state, hats])
+
+
+def _reach(observations: Observations) -> Array:
+    """Standard deviation of every joint's position and velocity, (2 n,)."""
+    motions = [piece.prepared.motion for piece in observations]
+    position = np.concatenate([motion.position for motion in motions]).std(axis=0)
+    velocity = np.concatenate([motion.velocity for motion in motions]).std(axis=0)
+    return np.concatenate([position, velocity])

@@ -1,0 +1,150 @@
+"""The diagnosis as a document: what ``diagnose --json`` writes and the REST API returns (CONTRACT.md)."""
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class Document(BaseModel):
+    """Base of all result documents: strict, and closed to unknown keys."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, ser_json_inf_nan="null")
+
+
+class WhereEntry(Document):
+    """The range of a variable in which the excess residual concentrates."""
+
+    variable: str = Field(description="velocity, position, load, acceleration, time, temperature or motor_position")
+    range: list[float] = Field(description="lowest and highest value [SI]")
+    share: float = Field(description="part of the excess that lies within it")
+    recording: str | None = Field(default=None, description="for time: in which recording")
+
+
+class MismatchEntry(Document):
+    """Excess residual of one joint, before anything is named."""
+
+    joint: str = Field(description="name of the joint")
+    excess_rms: float = Field(description="what the residual exceeds the noise by, in the common band [Nm or N]")
+    significant: bool = Field(description="whether more than noise is left there")
+    where: WhereEntry | None = Field(description="in which part of the motion; null where it is everywhere")
+    time: WhereEntry | None = Field(description="when; null where always")
+
+
+class QuantityEntry(Document):
+    """One parameter of a finding."""
+
+    name: str = Field(description="in the equation")
+    value: float = Field(description="estimate")
+    std: float = Field(description="standard error, from the joint covariance of all parameters")
+    unit: str = Field(description="SI")
+
+
+class FindingEntry(Document):
+    """An effect that the nominal model leaves out."""
+
+    effect: str = Field(description="id of the effect")
+    joint: str | None = Field(description="name of the joint; null where it belongs to the whole arm")
+    probability: float = Field(description="that it is this effect and not one of its equivalents")
+    equivalent: list[str] = Field(description="other effect@joint that these data cannot tell from it")
+    equation: str = Field(description="its torque")
+    parameters: list[QuantityEntry] = Field(description="estimates")
+    statement: str = Field(description="one plain sentence to act on")
+    gain: float = Field(description="what it takes off the residual's energy, in noise variances")
+    confirmed: bool | None = Field(description="by held-out recordings; null without any")
+    rms_before: list[float] = Field(description="per joint, residual of the model without it [Nm or N]")
+    rms_after: list[float] = Field(description="per joint, residual of the model with all findings [Nm or N]")
+    held_out_rms_before: list[float] | None = Field(description="the same on held-out recordings")
+    held_out_rms_after: list[float] | None = Field(description="the same on held-out recordings")
+
+
+class FitChangeEntry(Document):
+    """Residuals without and with all findings."""
+
+    rms_before: list[float] = Field(description="per joint, at the recorded rate, no filter [Nm or N]")
+    rms_after: list[float] = Field(description="per joint, at the recorded rate, no filter [Nm or N]")
+
+
+class FitChangesEntry(Document):
+    """Fits on training and held-out recordings."""
+
+    train: FitChangeEntry = Field(description="on the recordings that were explained")
+    held_out: FitChangeEntry | None = Field(default=None, description="on recordings that were not used")
+
+
+class MovedEntry(Document):
+    """A parameter that is not the same in two recordings."""
+
+    parameter: str = Field(description="name")
+    between: list[str] = Field(description="the two recordings")
+    shift_in_std: float = Field(description="second less first, in standard errors of the difference")
+
+
+class ConstancyEntry(Document):
+    """Whether the parameters hold from one recording to the next."""
+
+    p_value: float = Field(description="chance of such differences if they do")
+    moved: list[MovedEntry] = Field(description="the most clearly moved parameters")
+
+
+class DetectableEntry(Document):
+    """The smallest size of an effect that these data would have shown."""
+
+    effect: str = Field(description="id of the effect")
+    joint: str | None = Field(description="name of the joint")
+    minimum: float | None = Field(description="seen in nine of ten such data sets; null where nothing shows it")
+    unit: str = Field(description="SI")
+    visible: bool = Field(description="false where no torque and position along this motion can show it")
+
+
+class DifferenceEntry(Document):
+    """A parameter that the simulation has wrong."""
+
+    parameter: str = Field(description="name")
+    simulation: float = Field(description="value in the simulation")
+    real: float = Field(description="value on the arm")
+    std: float = Field(description="standard error of the difference")
+    difference_in_std: float = Field(description="real less simulation, in standard errors")
+
+
+class ShiftEntry(Document):
+    """What the left-out effects had been doing to a parameter."""
+
+    parameter: str = Field(description="name")
+    before: float = Field(description="estimate without the findings")
+    after: float = Field(description="estimate with them")
+    shift_in_std: float = Field(description="in standard errors of the estimate without them")
+
+
+class NextExperimentEntry(Document):
+    """What motion would decide what is open."""
+
+    separates: list[str] = Field(description="effects that it tells apart")
+    trajectory: str | None = Field(description="path of a trajectory; null where none was designed")
+    why: str = Field(description="the motion in words, and what it decides")
+
+
+class DiagnosisDocument(Document):
+    """Result of a diagnosis, schema tauscope.diagnosis/1."""
+
+    schema_id: Literal["tauscope.diagnosis/1"] = Field(
+        default="tauscope.diagnosis/1", alias="schema", description="name and version of this document's form"
+    )
+    robot: str = Field(description="name of the robot")
+    joints: list[str] = Field(description="names of its joints, in chain order")
+    against: Literal["identified", "model", "simulation"] = Field(description="what the recordings were compared with")
+    verdict: Literal["consistent", "explained", "partly_explained", "unexplained", "inconclusive"] = Field(
+        description="as a whole"
+    )
+    noise_std: list[float] = Field(description="per joint, torque noise a sample [Nm or N]")
+    noise_method: Literal["periods", "residual"] = Field(
+        description="from differences between repeated periods, or from what a saturated fit leaves"
+    )
+    cutoff_hz: float = Field(description="band in which torque and effects were compared [Hz]")
+    mismatch: list[MismatchEntry] = Field(description="one a joint")
+    findings: list[FindingEntry] = Field(description="most explained residual energy first")
+    fit: FitChangesEntry = Field(description="without and with all findings")
+    constancy: ConstancyEntry = Field(description="whether the parameters hold from one recording to the next")
+    detectable: list[DetectableEntry] = Field(description="what would have been seen, and from which size")
+    parameter_differences: list[DifferenceEntry] = Field(description="what the simulation has wrong")
+    parameter_shifts: list[ShiftEntry] = Field(description="what the left-out effects had been doing to the parameters")
+    next_experiment: NextExperimentEntry | None = Field(description="what would decide what is open")

@@ -1,0 +1,187 @@
+"""Every form of every effect beside the fitted model: how much each would explain, and how likely noise does that."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from service.diagnosis.catalogue import Effect, Signals
+from service.diagnosis.effective_number import effective_number
+from service.diagnosis.fit import Fit
+from service.diagnosis.model import ExtendedModel
+from service.diagnosis.observations import Observations
+from service.diagnosis.projection import INVISIBLE, Moments, moments, statistics
+from service.recording.recording import Array
+
+SHAPES_AT_ONCE = 48
+"""Shapes whose columns are made together: bounds memory."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One form of an effect beside a fitted model, at its best shape.
+
+    effect : Effect
+        form and place
+    shape : (k,) float64
+        the best shape
+    coefficients : (c,) float64
+        with which it explains most
+    gain : float
+        T, what it takes off the residual's energy [noise variances]
+    gram : (c, c) float64
+        of its projected columns at that shape
+    visible : bool
+        whether any data of this kind could show it
+    shapes_tried : float
+        effective number of independent shapes, at least 1
+    information : float
+        energy of the first coefficient's projected column per unit, the median over the visible shapes: the inverse of
+        its variance
+    """
+
+    effect: Effect
+    shape: Array
+    coefficients: Array
+    gain: float
+    gram: Array
+    visible: bool
+    shapes_tried: float
+    information: float
+
+    @property
+    def count(self) -> int:
+        """Number of coefficients c."""
+        return len(self.coefficients)
+
+    @property
+    def score(self) -> float:
+        """T less what as many coefficients and shapes would explain of noise."""
+        return self.gain - self.count - 2.0 * float(np.log(self.shapes_tried))
+
+    def p_value(self, inflation: float = 1.0) -> float:
+        """Chance that noise alone explains as much somewhere on this form's grid.
+
+        Parameters
+        ----------
+        inflation : float
+            factor by which the residual exceeds the modelled noise
+        """
+        tail = float(stats.chi2.sf(self.gain / inflation, self.count))
+        return min(1.0, self.shapes_tried * tail * self._one_sided)
+
+    @property
+    def _one_sided(self) -> float:
+        return 0.5 if self.count == 1 and self.effect.coefficients[0].positive else 1.0
+
+
+class Screen:
+    """Screens effects on the same observations; effective numbers of shapes are worked out once.
+
+    Parameters
+    ----------
+    observations : Observations
+        the data, noise known
+    effects : sequence of Effect
+        all forms to look at
+    seed : int
+        of the draws for the effective numbers
+    """
+
+    def __init__(self, observations: Observations, effects: Sequence[Effect], seed: int = 0) -> None:
+        self.observations = observations
+        self.effects = tuple(effects)
+        self._rng = np.random.default_rng(seed)
+        self._numbers: dict[int, float] = {}
+        self._white: dict[int, dict[int, Array]] = {}
+
+    def candidates(self, fit: Fit) -> list[Candidate]:
+        """Every form at its best shape on the grid.
+
+        Parameters
+        ----------
+        fit : Fit
+            the model so far
+        """
+        signals = [fit.model.signals(piece) for piece in self.observations]
+        return [self._candidate(place, effect, fit, signals) for place, effect in enumerate(self.effects)]
+
+    def at_shapes(self, effect: Effect, shapes: Array, fit: Fit, signals: Sequence[Signals]) -> Moments:
+        """Moments of an effect at any shapes.
+
+        Parameters
+        ----------
+        effect : Effect
+            the form
+        shapes : (g, k) float64
+            shapes
+        fit : Fit
+            the model so far
+        signals : sequence of Signals
+            of every piece
+        """
+        return moments(fit.projection, self.white_columns(effect, shapes, signals))
+
+    def white_columns(self, effect: Effect, shapes: Array, signals: Sequence[Signals]) -> dict[int, Array]:
+        """Whitened columns (g, c, R_j) of an effect at every joint that it touches.
+
+        Parameters
+        ----------
+        effect : Effect
+            the form
+        shapes : (g, k) float64
+            shapes
+        signals : sequence of Signals
+            of every piece
+        """
+        touched = effect.touched(self.observations.robot.joint_count)
+        rows: dict[int, list[Array]] = {joint: [] for joint in touched}
+        count = 1
+        for piece, own in zip(self.observations, signals, strict=True):
+            columns = effect.columns(own, shapes)
+            count = columns.shape[1]
+            for slot, joint in enumerate(touched):
+                values = columns[:, :, slot]
+                flat = values.reshape(len(shapes) * count, *values.shape[2:])
+                rows[joint].append(piece.reduced(np.ascontiguousarray(flat)))
+        white = {joint: self.observations.white(joint, parts) for joint, parts in rows.items()}
+        return {joint: each.reshape(len(shapes), count, -1) for joint, each in white.items()}
+
+    def _candidate(self, place: int, effect: Effect, fit: Fit, signals: Sequence[Signals]) -> Candidate:
+        parts, whitened = [], []
+        known = place in self._numbers
+        for first in range(0, len(effect.grid), SHAPES_AT_ONCE):
+            columns = self.white_columns(effect, effect.grid[first : first + SHAPES_AT_ONCE], signals)
+            parts.append(moments(fit.projection, columns))
+            if not known and len(effect.grid) > 1:
+                whitened.append(columns)
+        found = Moments(*(np.concatenate([getattr(part, name) for part in parts]) for name in Moments.__annotations__))
+        if not known:
+            self._numbers[place] = effective_number(found, whitened, self._rng) if whitened else 1.0
+        gains, coefficients = statistics(found, [each.positive for each in effect.coefficients])
+        best = int(np.argmax(gains))
+        visible = (found.shares > INVISIBLE).all(axis=1)
+        return Candidate(
+            effect=effect,
+            shape=effect.grid[best],
+            coefficients=coefficients[best],
+            gain=float(gains[best]),
+            gram=found.gram[best],
+            visible=bool(visible.any()),
+            shapes_tried=self._numbers[place],
+            information=float(np.median(found.gram[visible, 0, 0])) if visible.any() else 0.0,
+        )
+
+
+def model_signals(model: ExtendedModel, observations: Observations) -> list[Signals]:
+    """Signals of every piece under a model.
+
+    Parameters
+    ----------
+    model : ExtendedModel
+        the model
+    observations : Observations
+        the data
+    """
+    return [model.signals(piece) for piece in observations]

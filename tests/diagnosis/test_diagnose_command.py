@@ -1,0 +1,89 @@
+"""``tauscope diagnose`` from the files to its document; the parser is the program's own."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from diagnosis.diagnosed_arm import recordings
+from diagnosis.test_diagnosis_of_simulated_arms import spring
+from service.cli.diagnose_command import diagnose
+from service.cli.values import SeveralValuesCommand
+from service.cli.verbs import add_verb
+from service.diagnosis import DiagnosisDocument
+from service.recording import Recording
+from sim_backend.examples import example_robot
+
+app = typer.Typer()
+add_verb(app, diagnose, SeveralValuesCommand)
+
+
+def written(folder: Path, name: str, recording: Recording) -> Path:
+    samples = recording.samples()
+    assert samples.period is not None
+    columns = [samples.time[:, None], samples.position, samples.effort, samples.period[:, None]]
+    header = "t,q1,q2,q3,tau1,tau2,tau3,period"
+    path = folder / f"{name}.csv"
+    np.savetxt(path, np.hstack(columns), delimiter=",", header=header, comments="", fmt="%.9g")
+    return path
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    folder = tmp_path_factory.mktemp("recordings")
+    made = recordings((1, 2, 3), spring, np.random.default_rng(5))
+    return [str(written(folder, f"motion-{place}", each)) for place, each in enumerate(made)]
+
+
+def run(*words: str) -> tuple[int, str]:
+    result = CliRunner().invoke(app, [str(example_robot("paper_arm")), *words])
+    return result.exit_code, result.output
+
+
+def test_the_document_is_written(files: list[str], tmp_path: Path) -> None:
+    out = tmp_path / "out.json"
+    status, _ = run(*files[:2], "--held-out", files[2], "--json", str(out))
+    assert status == 0
+    found = DiagnosisDocument.model_validate_json(out.read_text())
+    assert [(finding.effect, finding.joint) for finding in found.findings] == [("joint_spring", "joint1")]
+    assert json.loads(out.read_text())["schema"] == "tauscope.diagnosis/1"
+
+
+def test_a_terminal_shows_verdict_and_statement(files: list[str]) -> None:
+    status, shown = run(*files)
+    assert status == 0
+    assert "explained" in shown
+    assert "joint1: an elastic torque grows linearly with the angle" in shown
+
+
+def test_against_the_model_wrong_values_and_missing_structure_are_told_apart(files: list[str], tmp_path: Path) -> None:
+    robot = tmp_path / "wrong.yaml"
+    text = example_robot("paper_arm").read_text()
+    robot.write_text(
+        text.replace("{stiction: 1.0, stribeck: -0.2, viscous: 0.277}", "{stiction: 1.0, stribeck: -0.2, viscous: 0.1}")
+    )
+    out = tmp_path / "out.json"
+    result = CliRunner().invoke(app, [str(robot), *files, "--against", "model", "--json", str(out)])
+    assert result.exit_code == 0
+    found = DiagnosisDocument.model_validate_json(out.read_text())
+    assert found.against == "model"
+    assert "joint_spring" in [finding.effect for finding in found.findings]
+    wrong = {entry.parameter: entry for entry in found.parameter_differences}
+    assert wrong["viscous joint2"].simulation == 0.1
+    assert wrong["viscous joint2"].real == pytest.approx(0.277, abs=0.05)
+
+
+def test_against_something_that_is_no_file_is_wrong_usage(files: list[str]) -> None:
+    status, shown = run(*files, "--against", "nothing-of-this-name.csv")
+    assert status == 2
+    assert "nothing-of-this-name.csv" in shown
+
+
+def test_an_input_is_never_overwritten(files: list[str]) -> None:
+    before = Path(files[0]).read_bytes()
+    status, _ = run(*files, "--json", files[0])
+    assert status == 2
+    assert Path(files[0]).read_bytes() == before

@@ -1,0 +1,244 @@
+"""Columns of the effects against references written out again, sample by sample where there is a state."""
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin  # pyright: ignore[reportMissingImports]
+import pytest
+from numpy.typing import NDArray
+
+from arms import random_parameters, ur5_like
+from pinocchio_arm import pinocchio_model
+from service.diagnosis.catalogue import Effect, Setting, Signals, catalogue, possible_effects
+from service.robot import Robot
+
+Array = NDArray[np.float64]
+
+RATE = 1000.0
+K_V = 80.0
+
+
+def motion(robot: Robot, rng: np.random.Generator, samples: int = 4000) -> tuple[Array, Array, Array]:
+    """A smooth motion that closes after its samples, with exact derivatives, (n, N) each."""
+    time = np.arange(samples) / RATE
+    omega = 2.0 * np.pi / (samples / RATE) * np.arange(1, 4)
+    amplitude = rng.uniform(-0.5, 0.5, (2, robot.joint_count, 3))
+    sine, cosine = np.sin(np.outer(omega, time)), np.cos(np.outer(omega, time))
+    q = amplitude[0] @ sine + amplitude[1] @ cosine
+    qd = (amplitude[0] * omega) @ cosine - (amplitude[1] * omega) @ sine
+    qdd = -(amplitude[0] * omega**2) @ sine - (amplitude[1] * omega**2) @ cosine
+    return q, qd, qdd
+
+
+def signals(seed: int = 0) -> Signals:
+    """Motion of a six-joint arm with Pinocchio's torque as the load."""
+    rng = np.random.default_rng(seed)
+    robot = ur5_like()
+    links = random_parameters(rng, robot.joint_count)
+    q, qd, qdd = motion(robot, rng)
+    load = torque(robot, links, q, qd, qdd)
+    step = 2.0 / np.pi * np.arctan(K_V * qd)
+    return Signals(
+        robot=robot,
+        rate_hz=RATE,
+        time=np.arange(8000).reshape(2, 4000) / RATE,
+        recording=0,
+        position=q,
+        velocity=qd,
+        acceleration=qdd,
+        load=load,
+        torque=load + 2.0 * step + 0.5 * qd,
+        step=step,
+        steepness=np.full(robot.joint_count, K_V),
+        bodies=links,
+        links=links,
+        periodic=True,
+    )
+
+
+def torque(robot: Robot, links: Array, q: Array, qd: Array, qdd: Array) -> Array:
+    """Inverse dynamics by Pinocchio, (n, N)."""
+    model = pinocchio_model(robot, links)
+    data = model.createData()
+    rows = [pin.rnea(model, data, *state) for state in zip(q.T, qd.T, qdd.T, strict=True)]
+    return np.array(rows).T
+
+
+SIGNALS = signals()
+
+
+def setting(gear_ratio: float | None = None) -> Setting:
+    s = SIGNALS
+    robot = replace(s.robot, joints=tuple(replace(joint, gear_ratio=gear_ratio) for joint in s.robot.joints))
+    return Setting(
+        robot=robot,
+        slowest=s.velocity.min(axis=1),
+        fastest=s.velocity.max(axis=1),
+        lowest=s.position.min(axis=1),
+        highest=s.position.max(axis=1),
+        speed=s.velocity.std(axis=1),
+        top_speed=np.abs(s.velocity).max(axis=1),
+        load=s.load.std(axis=1),
+        top_torque=np.abs(s.torque).max(axis=1),
+        durations=(8.0,),
+        cutoff_hz=30.0,
+    )
+
+
+def form(effect: str, joint: int | None, number: int = 0) -> Effect:
+    found = [each for each in possible_effects(setting()) if each.id == effect and each.joint == joint]
+    return found[number]
+
+
+def columns(effect: str, joint: int | None, shape: tuple[float, ...] = (), number: int = 0) -> Array:
+    """Columns of one shape, (c, m, N) or (c, m, P, N)."""
+    return form(effect, joint, number).columns(SIGNALS, np.array([shape]).reshape(1, -1))[0]
+
+
+V, Q, A, L, T = (getattr(SIGNALS, name)[2] for name in ("velocity", "position", "acceleration", "load", "torque"))
+S = SIGNALS.step[2]
+
+
+@pytest.mark.parametrize(
+    ("effect", "shape", "expected"),
+    [
+        ("asymmetric_coulomb", (), [np.where(V > 0, S, -S)]),
+        ("asymmetric_viscous", (), [np.where(V > 0, V, -V)]),
+        ("nonlinear_viscous", (2.2,), [np.where(V > 0, 1, -1) * np.exp(2.2 * np.log(np.abs(V)))]),
+        ("load_dependent_friction", (), [S * np.sqrt(L**2)]),
+        ("position_dependent_friction", (), [S * np.cos(Q), S * np.sin(Q)]),
+        ("stribeck_friction", (0.2, 2.0), [S / np.exp((V / 0.2) ** 2)]),
+        ("stribeck_friction", (0.2, 1.0), [S / np.exp(np.abs(V) / 0.2)]),
+        ("cogging", (21.0,), [np.imag(np.exp(21j * Q)), np.real(np.exp(21j * Q))]),
+        ("torque_ripple", (21.0,), [L * np.imag(np.exp(21j * Q)), L * np.real(np.exp(21j * Q))]),
+        ("joint_spring", (), [Q]),
+        ("rotor_inertia", (), [A]),
+        ("torque_gain_error", (), [T]),
+        ("torque_saturation", (5.0,), [-(T - np.clip(T, -5.0, 5.0))]),
+    ],
+)
+def test_columns_that_need_no_state(effect: str, shape: tuple[float, ...], expected: list[Array]) -> None:
+    found = columns(effect, 2, shape)
+    assert found.shape == (len(expected), 1, len(V))
+    assert found[:, 0] == pytest.approx(np.array(expected), abs=1e-12)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_cable_pulls_back_on_one_side_only(side: int) -> None:
+    found = columns("cable_force", 2, (0.1, 1.5), number=0 if side > 0 else 1)[0, 0]
+    for q, value in zip(Q[::50], found[::50], strict=True):
+        reach = side * (q - 0.1)
+        assert value == pytest.approx(side * reach**1.5 if reach > 0 else 0.0)
+
+
+def test_bristles_follow_dahls_equation() -> None:
+    length = 0.02
+    deflection = 0.0
+    expected = np.empty(len(Q))
+    for _ in range(3):  # until a period repeats the one before
+        for k in range(len(Q)):
+            step = Q[k] - Q[k - 1]  # the motion closes: the last sample comes before the first
+            for _ in range(20):
+                part = step / 20
+                deflection += (part - abs(part) * deflection) / length
+            expected[k] = deflection
+    found = columns("presliding_hysteresis", 2, (length,))[0, 0] + S
+    assert found == pytest.approx(expected, abs=5e-3)
+    assert np.abs(found).max() <= 1.0
+
+
+def test_coupled_friction_acts_on_both_joints_with_the_power_of_the_common_speed() -> None:
+    for number, sign in enumerate((1, -1)):
+        found = columns("friction_coupling", 2, (K_V,), number=number)
+        common = SIGNALS.velocity[2] + sign * SIGNALS.velocity[1]
+        effort = 0.7 * found[0] + 0.3 * found[1]
+        power = effort[0] * SIGNALS.velocity[1] + effort[1] * SIGNALS.velocity[2]
+        friction = 0.7 * 2 / np.pi * np.arctan(K_V * common) + 0.3 * common
+        assert power == pytest.approx(friction * common)
+
+
+def test_drift_decays_from_repetition_to_repetition() -> None:
+    found = columns("friction_drift", 2, (5.0,))
+    assert found.shape == (2, 1, 2, len(V))
+    assert found[1, 0, 0] == pytest.approx(V * np.exp(-np.arange(4000) / RATE / 5.0))
+    assert found[0, 0, 1] == pytest.approx(S * np.exp(-(4.0 + np.arange(4000) / RATE) / 5.0))
+
+
+def test_a_late_torque_is_the_shifted_torque_to_first_order() -> None:
+    delay = 4  # samples
+    late = np.roll(SIGNALS.torque, delay, axis=1)
+    found = columns("time_delay", None)[0] * delay / RATE
+    assert found.shape == SIGNALS.torque.shape
+    smooth = np.abs(SIGNALS.velocity).min(axis=0) > 0.1  # the friction's steps are no first-order matter
+    error = (late - SIGNALS.torque - found)[:, smooth]
+    assert np.abs(error).max() < 0.1 * np.abs(found[:, smooth]).max()
+
+
+def test_a_tilted_base_is_gravity_in_another_direction() -> None:
+    found = columns("base_tilt", None)
+    tilt = 1e-4
+    for column, axis in zip(found, (0, 1), strict=True):
+        gravity = SIGNALS.robot.gravity.copy()
+        gravity[axis] += 9.81 * tilt
+        tilted = replace(SIGNALS.robot, gravity=gravity)
+        picked = slice(None, None, 40)
+        state = [each[:, picked] for each in (SIGNALS.position, SIGNALS.velocity, SIGNALS.acceleration)]
+        change = torque(tilted, SIGNALS.links, *state) - SIGNALS.load[:, picked]
+        assert tilt * column[:, picked] == pytest.approx(change, abs=1e-9)
+
+
+def test_a_compliant_joint_leaves_the_torque_of_the_link_that_lags() -> None:
+    compliance = 1e-5
+    lag = compliance * SIGNALS.load[2]
+    rate = 2j * np.pi * np.fft.rfftfreq(len(lag), 1 / RATE)
+    spectrum = np.fft.rfft(lag)
+    state = [SIGNALS.position.copy(), SIGNALS.velocity.copy(), SIGNALS.acceleration.copy()]
+    for order, values in enumerate(state):
+        values[2] -= np.fft.irfft(rate**order * spectrum, n=len(lag))
+    picked = slice(None, None, 40)
+    moved = torque(SIGNALS.robot, SIGNALS.links, *(each[:, picked] for each in state))
+    found = compliance * columns("joint_elasticity", 2, (400.0,))[0][:, picked]
+    assert found == pytest.approx(moved - SIGNALS.load[:, picked], abs=2e-3 * np.abs(found).max())
+
+
+def test_play_changes_sides_with_the_load() -> None:
+    width = 0.25 * float(SIGNALS.load[2].std())
+    lag = 0.5e-5 * np.tanh(SIGNALS.load[2] / width)
+    rate = 2j * np.pi * np.fft.rfftfreq(len(lag), 1 / RATE)
+    state = [SIGNALS.position.copy(), SIGNALS.velocity.copy(), SIGNALS.acceleration.copy()]
+    for order, values in enumerate(state):
+        values[2] -= np.fft.irfft(rate**order * np.fft.rfft(lag), n=len(lag))
+    picked = slice(None, None, 40)
+    moved = torque(SIGNALS.robot, SIGNALS.links, *(each[:, picked] for each in state))
+    found = 1e-5 * columns("backlash", 2, (width, 400.0))[0][:, picked]
+    assert found == pytest.approx(moved - SIGNALS.load[:, picked], abs=5e-3 * np.abs(found).max())
+
+
+def test_a_stated_gear_ratio_leaves_whole_turns_of_the_motor_only() -> None:
+    geared = [each for each in possible_effects(setting(gear_ratio=20.0)) if each.id == "cogging"]
+    assert geared
+    for effect in geared:
+        assert effect.grid[:, 0] / 20.0 == pytest.approx(np.rint(effect.grid[:, 0] / 20.0))
+        assert not effect.is_free(0)
+    free = [each for each in possible_effects(setting()) if each.id == "cogging"]
+    assert all(effect.is_free(0) for effect in free)
+
+
+def test_every_form_makes_columns_of_the_promised_shape() -> None:
+    for effect in possible_effects(setting()):
+        touched = effect.touched(6)
+        found = effect.columns(SIGNALS, effect.grid[:2])
+        count = min(2, len(effect.grid))
+        assert found.shape[:3] == (count, len(effect.coefficients), len(touched)), effect.id
+        assert found.shape[-1] == SIGNALS.position.shape[1]
+        assert np.isfinite(found).all()
+        assert effect.grid.shape[1] == len(effect.shapes) == len(effect.lower) == len(effect.upper)
+        assert (effect.grid >= effect.lower - 1e-12).all()
+        assert (effect.grid <= effect.upper + 1e-12).all()
+
+
+def test_ids_are_those_of_the_contract_and_each_is_described() -> None:
+    ids = [effect.id for effect in catalogue()]
+    assert len(set(ids)) == len(ids)
+    for effect in catalogue():
+        assert all([effect.equation, effect.meaning, effect.remedy, effect.revealing_motion, effect.coefficients])

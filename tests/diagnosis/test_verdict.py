@@ -1,0 +1,55 @@
+"""The verdict from its evidence, and the smallest visible sizes from theirs."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from service.diagnosis.catalogue.elastic_forces import JointSpring
+from service.diagnosis.detectability import detectable, needed_strength
+from service.diagnosis.screening import Candidate
+from service.diagnosis.verdict import Evidence, Verdict, verdict
+
+
+@pytest.mark.parametrize(
+    ("findings", "before", "after", "holds", "expected"),
+    [
+        (0, False, False, True, Verdict.CONSISTENT),
+        (0, False, False, False, Verdict.INCONCLUSIVE),
+        (0, True, True, True, Verdict.UNEXPLAINED),
+        (0, True, True, False, Verdict.UNEXPLAINED),
+        (1, True, False, True, Verdict.EXPLAINED),
+        (1, False, False, False, Verdict.EXPLAINED),
+        (2, True, True, False, Verdict.PARTLY_EXPLAINED),
+    ],
+)
+def test_each_verdict_follows_from_tests(
+    findings: int, before: bool, after: bool, holds: bool, expected: Verdict
+) -> None:
+    assert verdict(Evidence(findings, before, after, holds)) is expected
+
+
+def candidate(information: float, visible: bool = True) -> Candidate:
+    return Candidate(JointSpring(0), np.zeros(0), np.zeros(1), 0.0, np.eye(1), visible, 3.0, information)
+
+
+def test_a_spring_of_the_smallest_visible_size_is_found_nine_times_in_ten() -> None:
+    level = 1e-4
+    (size,) = detectable([candidate(400.0)], level, 1.0)
+    assert size.minimum is not None
+    rng = np.random.default_rng(1)
+    scores = (size.minimum * 20.0 + rng.standard_normal(20_000)) ** 2
+    threshold = stats.chi2.isf(level / 3.0, 1)
+    assert np.mean(scores > threshold) == pytest.approx(0.9, abs=0.01)
+
+
+def test_more_misfit_and_more_shapes_need_a_larger_effect() -> None:
+    (plain,), (inflated,) = (detectable([candidate(400.0)], 1e-4, factor) for factor in (1.0, 4.0))
+    assert plain.minimum is not None
+    assert inflated.minimum == pytest.approx(2.0 * plain.minimum)
+    assert needed_strength(candidate(1.0), 1e-6) > needed_strength(candidate(1.0), 1e-3)
+
+
+def test_what_lies_within_the_nominal_columns_is_not_visible() -> None:
+    (size,) = detectable([candidate(0.0, visible=False)], 1e-4, 1.0)
+    assert not size.visible
+    assert size.minimum is None

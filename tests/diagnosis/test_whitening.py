@@ -1,0 +1,50 @@
+"""The filter that makes a joint's noise white."""
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from service.diagnosis.whitening import fitted_noise
+
+
+def coloured(rng: np.random.Generator, rows: int) -> np.ndarray:
+    return signal.lfilter([1.0], [1.0, -0.5, 0.3], rng.standard_normal(rows + 200))[200:]
+
+
+def test_autoregressive_noise_becomes_white_with_unit_variance() -> None:
+    rng = np.random.default_rng(1)
+    rows = coloured(rng, 20_000)
+    noise = fitted_noise([(rows, np.ones(len(rows), bool), 1.0)])
+    white = noise.whitened(rows)
+    assert noise.order >= 2
+    assert white.var() == pytest.approx(1.0, abs=0.05)
+    lagged = [float(white[:-k] @ white[k:]) / len(white) for k in (1, 2, 3)]
+    assert np.abs(lagged).max() < 0.04
+
+
+def test_white_noise_is_only_scaled() -> None:
+    rng = np.random.default_rng(2)
+    rows = 3.0 * rng.standard_normal(5000)
+    noise = fitted_noise([(rows, np.ones(len(rows), bool), 1.0)])
+    assert noise.order == 0
+    assert noise.std == pytest.approx(3.0, rel=0.05)
+
+
+def test_whitened_rows_whose_past_was_not_measured_are_left_out() -> None:
+    rng = np.random.default_rng(3)
+    rows = coloured(rng, 5000)
+    noise = fitted_noise([(rows, np.ones(len(rows), bool), 1.0)])
+    used = np.ones(5000, bool)
+    used[1000] = False
+    kept = noise.kept(used)
+    assert len(kept) == 5000 - noise.order
+    missing = np.flatnonzero(~kept) + noise.order
+    assert list(missing) == list(range(1000, 1001 + noise.order))
+
+
+def test_the_scale_of_differences_between_repetitions_is_taken_out() -> None:
+    rng = np.random.default_rng(4)
+    repetitions = 0.7 * rng.standard_normal((3, 4000))
+    deviation = repetitions - repetitions.mean(axis=0)
+    noise = fitted_noise([(row, np.ones(4000, bool), 3 / 2) for row in deviation])
+    assert noise.std == pytest.approx(0.7, rel=0.03)
