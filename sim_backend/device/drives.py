@@ -98,8 +98,9 @@ class Drives:
             when it arrived [ticks]
         """
         if activity is Activity.TRACKING:
-            self._target.follow(setpoint.position, arrival)
-        self._commanded_torque = setpoint.torque
+            self._target.follow(setpoint.position, setpoint.torque, arrival)
+        else:
+            self._commanded_torque = setpoint.torque
 
     def hold(self, before: Activity, motion: Motion) -> None:
         """Bring the joints to rest and hold them.
@@ -112,8 +113,7 @@ class Drives:
             of the motors
         """
         if before is Activity.TRACKING or self._waits_for_torque(before):
-            if self._commanded_torque is not None:
-                self._servo.absorb(self._commanded_torque)
+            self._servo.absorb(self._target.feed_forward)
             self._target.brake()
             return
         low, high = self._target.range
@@ -141,7 +141,7 @@ class Drives:
             return self._servo.capped(self._commanded_torque)
         target = self._target
         target.advance(tick)
-        forward = self._commanded_torque if activity is Activity.TRACKING else None
+        forward = target.feed_forward if activity is Activity.TRACKING else None
         error, error_rate = target.position - motion.position, target.velocity - motion.velocity
         return self._servo.track(error, error_rate, forward, motion.position)
 

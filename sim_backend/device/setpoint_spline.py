@@ -26,7 +26,9 @@ _FIRST_PERIOD = 4.0
 
 
 class SetpointSpline:
-    """Target position as a function of the drive's own time, from setpoints that arrive roughly periodically.
+    """Target as a function of the drive's own time, from setpoints that arrive roughly periodically.
+
+    A setpoint is a point of any kind: joint positions, and what else belongs to the same instant of the motion.
 
     The drive has no clock in common with the host. Its grid of cycles is a straight line through the last arrivals,
     with a memory long enough to keep their jitter out of the target; it begins anew where the host changes its pace.

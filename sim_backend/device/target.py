@@ -1,4 +1,8 @@
-"""Where the position loop shall be at each tick: on the host's motion, or coming to rest after a stop."""
+"""Where the position loop shall be at each tick: on the host's motion, or coming to rest after a stop.
+
+The host's feed-forward torque goes through the same spline as its positions. As steps, or at another delay than the
+positions that it belongs to, it would make the drive's torque ripple in step with the host's cycle.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +20,9 @@ _LEAP = 0.02
 
 
 class Target:
-    """Position and velocity of the target; it stays within the range and below the speed limit, whatever the host asks.
+    """Position, velocity and feed-forward torque of the target.
+
+    It stays within the range and below the speed limit, whatever the host asks.
 
     Setpoints that move within the limits are followed exactly. One that leaps is approached with bounded acceleration.
 
@@ -36,6 +42,7 @@ class Target:
         count = len(position)
         self.position = position.copy()
         self.velocity = velocity.copy()
+        self.feed_forward = np.zeros(count)
         self._tick_s = tick_s
         self._low, self._high = np.full(count, -np.inf), np.full(count, np.inf)
         self._fastest = np.full(count, np.inf)
@@ -45,7 +52,8 @@ class Target:
 
     def resume(self) -> None:
         """Be ready for setpoints that begin where the target is."""
-        self._spline = SetpointSpline(self.position)
+        self.feed_forward = np.zeros_like(self.position)
+        self._spline = SetpointSpline(self._resting_point())
         self._asked = self.position
         self._behind = False
 
@@ -67,21 +75,25 @@ class Target:
         """Lower and upper end of the range, each (n,) [rad or m]."""
         return self._low, self._high
 
-    def follow(self, position: Array, arrival: float) -> None:
+    def follow(self, position: Array, feed_forward: Array | None, arrival: float) -> None:
         """Take a setpoint of the host.
 
         Parameters
         ----------
         position : (n,) float64
             as the host asks [rad or m]
+        feed_forward : (n,) float64 or None
+            torque that belongs to it; None for none [Nm or N]
         arrival : float
             when it arrived [ticks]
         """
         if self._braking:
-            self._spline.restart(self.position)
+            self._spline.restart(self._resting_point())
             self._asked = self.position
             self._braking, self._behind = False, True
-        self._spline.add(np.minimum(np.maximum(position, self._low), self._high), arrival)
+        within = np.minimum(np.maximum(position, self._low), self._high)
+        torque = np.zeros_like(within) if feed_forward is None else feed_forward
+        self._spline.add(np.concatenate([within, torque]), arrival)
 
     def brake(self) -> None:
         """Come to rest from the present velocity within `STOP_TIME_S`."""
@@ -109,7 +121,9 @@ class Target:
 
     def _follow_spline(self, tick: int) -> None:
         """Move with the spline; catch up with it where a limit kept the target behind."""
-        position, rate = self._spline.at(tick)
+        point, point_rate = self._spline.at(tick)
+        count = len(self.position)
+        position, rate, self.feed_forward = point[:count], point_rate[:count], point[count:]
         moved = (position - self._asked) / self._tick_s
         slack = self._acceleration * self._tick_s
         velocity = rate / self._tick_s
@@ -133,3 +147,7 @@ class Target:
         wanted = moved + np.copysign(closing, gap)
         wanted = np.minimum(np.maximum(wanted, self.velocity - slack), self.velocity + slack)
         return np.minimum(np.maximum(wanted, -self._fastest), self._fastest)
+
+    def _resting_point(self) -> Array:
+        """Control point of the spline where the target is now, (2 n,)."""
+        return np.concatenate([self.position, self.feed_forward])
