@@ -131,7 +131,13 @@ class Owner:
     def has_said(self, *lines: str) -> bool:
         return any(line in self.said for line in lines)
 
+    @property
+    def has_ended(self) -> bool:
+        return any(line.startswith("ended") for line in self.said)
+
     def bury(self) -> None:
+        if self.process.returncode is not None:
+            return
         self.process.kill()
         self.process.wait()
         self._reader.join(10)
@@ -163,12 +169,27 @@ def kill_once(site: Site, victim: str, how: signal.Signals, rng: np.random.Gener
     site.forget_trace()
     run = site.root / f"{site.runs:03d}-{victim}-{how.name}"
     owner = Owner(run)
+    try:
+        return _kill_run(site, run, owner, victim, how, rng)
+    finally:
+        owner.bury()
+
+
+def _kill_run(
+    site: Site, run: Path, owner: Owner, victim: str, how: signal.Signals, rng: np.random.Generator
+) -> str | None:
+    """The same with the owner's process at hand."""
     wait_for(lambda: owner.control is not None, "the control process")
     if rng.random() < 0.8:
-        wait_for(lambda: owner.has_said("state running", "state stopping"), "the motion")
+        wait_for(lambda: owner.has_said("state running", "state stopping") or owner.has_ended, "the motion")
         time.sleep(rng.uniform(0.0, 0.6))
     else:
         time.sleep(rng.uniform(0.0, 2.5))
+    if owner.has_ended:
+        problem = read_record(run).problem
+        assert problem is not None
+        assert problem.rule in STARVED, problem
+        return None
     control = owner.control
     assert control is not None
     state = next((line for line in reversed(owner.said) if line.startswith("state")), "state created")
