@@ -6,6 +6,7 @@ is armed: where no ``exchange`` reaches the device within its time, the device s
 ``watchdog`` until it is acknowledged.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
@@ -66,7 +67,7 @@ class Capabilities:
     modes : frozenset of ControlMode
         ways of control
     stop_policies : frozenset of StopPolicy
-        ways to stop that the device carries out itself, also when the host is gone
+        ways to stop that the device carries out itself, also when the host is gone, in one mode at least
     largest_rate_hz : float
         cycles a second that the bus allows [Hz]
     watchdog_range_s : tuple of two float
@@ -76,6 +77,10 @@ class Capabilities:
     effort_unit : str
         unit of `ArmState.effort`: ``Nm`` is joint torque (N on prismatic joints), anything else a drive unit (``mA``,
         ``permille``) that the robot file's torque constant turns into torque
+    policies_by_mode : mapping of ControlMode to frozenset of StopPolicy, or None
+        ways to stop that the device carries out itself in each mode, where they differ; None where every mode has all
+    holds_before_torque : bool
+        whether an arm that was enabled in torque mode is held until the first torque; else it is given none
     """
 
     joint_count: int
@@ -85,6 +90,18 @@ class Capabilities:
     watchdog_range_s: tuple[float, float]
     takes_feed_forward: bool
     effort_unit: str = "Nm"
+    policies_by_mode: Mapping[ControlMode, frozenset[StopPolicy]] | None = None
+    holds_before_torque: bool = True
+
+    def policies_in(self, mode: ControlMode) -> frozenset[StopPolicy]:
+        """Ways to stop that the device carries out itself when its host is gone.
+
+        Parameters
+        ----------
+        mode : ControlMode
+            who closes the loop
+        """
+        return self.stop_policies if self.policies_by_mode is None else self.policies_by_mode.get(mode, frozenset())
 
 
 class Backend(Protocol):

@@ -1,6 +1,6 @@
 """Backends on the test bench: each with an onlooker who sees the arm itself, not what its drives say of it.
 
-A new backend joins the conformance suite by a rig of its own in `RIGS`.
+A new backend joins the conformance suite by a rig of its own, in `RIGS` or in ``tests/drivers/conftest.py``.
 """
 
 import time
@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
+import pytest
 from numpy.typing import ArrayLike, NDArray
 
 from arms import paper_arm, paper_parameters
@@ -51,9 +52,18 @@ class Watched:
 
 
 class Rig(Protocol):
-    """One backend, and what the tests need beside it."""
+    """One backend, and what the tests need beside it.
+
+    `position_resolution` [rad] and `torque_resolution` [Nm] are the smallest steps that the drives know; 0 where there
+    is none. `swing` is how far position loops that the backend does not tune carry a joint past a place, or leave it
+    short of it [rad]. `is_real_time` says whether its clock is the machine's.
+    """
 
     robot: Robot
+    position_resolution: float
+    torque_resolution: float
+    swing: float
+    is_real_time: bool
 
     @property
     def backend(self) -> Backend:
@@ -70,6 +80,10 @@ class Rig(Protocol):
 
     def inject(self, injection: Injection) -> None:
         """Disturb a joint."""
+        ...
+
+    def torque(self, effort: Array) -> Array:
+        """Joint torque of an effort as the backend reports it [Nm]."""
         ...
 
     def another_host(self) -> Backend | None:
@@ -94,8 +108,21 @@ def bench_robot() -> Robot:
     )
 
 
-class VirtualRig:
+class ExactRig:
+    """What holds of drives that measure in SI units without steps."""
+
+    position_resolution = 0.0
+    torque_resolution = 0.0
+    swing = 0.0
+
+    def torque(self, effort: Array) -> Array:
+        return effort
+
+
+class VirtualRig(ExactRig):
     """`SimulatedArm`: the onlooker is the device itself."""
+
+    is_real_time = False
 
     def __init__(self, arm: SimulatedArm | None = None) -> None:
         self.robot = bench_robot()
@@ -122,8 +149,10 @@ class VirtualRig:
         return None
 
 
-class RemoteRig:
+class RemoteRig(ExactRig):
     """`RemoteSimulatedArm`: the onlooker reads the trace of the device process."""
+
+    is_real_time = True
 
     def __init__(self, socket: Path, trace: Path) -> None:
         self.robot = bench_robot()
@@ -181,7 +210,7 @@ def remote_rigs(folder: Path) -> Iterator[Callable[[], Rig]]:
 
 
 RIGS = {"virtual": virtual_rigs, "real-time": remote_rigs}
-"""Makers of rigs by name; the emulated buses join here."""
+"""Makers of rigs of the simulated arm by name."""
 
 
 def wide_limits(robot: Robot, **changes: ArrayLike) -> DriveLimits:
@@ -201,7 +230,19 @@ def enable(
 ) -> ArmState:
     """Connect and take the arm under power."""
     rig.backend.connect()
-    return rig.backend.enable(mode, wide_limits(rig.robot, **limits), policy, watchdog_s)
+    return rig.backend.enable(mode, wide_limits(rig.robot, **limits), allowed(rig, mode, policy), watchdog_s)
+
+
+def allowed(rig: Rig, mode: ControlMode, policy: StopPolicy) -> StopPolicy:
+    """A stop policy, or one that the drives can carry out by themselves where they cannot do that in this mode."""
+    able = rig.backend.capabilities.policies_in(mode)
+    return policy if policy in able else min(able)
+
+
+def require_policy(rig: Rig, policy: StopPolicy, mode: ControlMode = ControlMode.POSITION) -> None:
+    """Skip the test where the drives cannot carry out a policy by themselves."""
+    if policy not in rig.backend.capabilities.policies_in(mode):
+        pytest.skip(f"the drives cannot {policy} by themselves in mode {mode}")
 
 
 def setpoint(position: Array, torque: Array | None = None) -> Setpoint:

@@ -27,6 +27,8 @@ class EmulatedBus:
         self.drives = [EmulatedDrive(number, scale) for number in (1, 2, 3)]
         self.position = list(START)
         self.furthest = [0.0] * 3
+        self.deaf = False
+        """whether the master misses the process data"""
         self.swallows: Callable[[can.Message], bool] = lambda _: False
         self._ends = threading.Event()
         self._bus = can.Bus(interface="virtual", channel=self.channel)
@@ -56,6 +58,8 @@ class EmulatedBus:
                 if message is not None and not self.swallows(message):
                     answers += drive.receive((message.arbitration_id, bytes(message.data)), now)
                 for identifier, data in answers:
+                    if self.deaf and 0x180 <= identifier < 0x500:
+                        continue
                     self._bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
 
     def _move(self, index: int, drive: EmulatedDrive) -> None:

@@ -15,6 +15,7 @@ from canopen.sdo.exceptions import SdoCommunicationError, SdoError
 
 from drivers.canopen.configuration import BusConfiguration
 from drivers.canopen.objects import DriveObject
+from drivers.canopen.serial_adapter import SerialAdapterBus
 from drivers.errors import DriverError, DriverErrorKind
 
 SYNC_ID = 0x080
@@ -28,6 +29,11 @@ NMT_PRE_OPERATIONAL = 0x80
 _NMT_OPERATIONAL_STATE = 0x05
 
 SDO_TIMEOUT_S = 0.5
+
+SEND_TIMEOUT_S = 0.5
+"""Time in which the bus has to take a frame; the drives' own watchdog is what stops the arm meanwhile."""
+
+_MOST_DRAINED = 1000
 
 FrameHandler = Callable[[int, bytes], None]
 """Takes the identifier and the payload of a frame."""
@@ -57,9 +63,7 @@ class CanBus:
         self._heartbeat_period_ns = 0
         self._next_heartbeat_ns = 0
         try:
-            self._bus = bus or can.Bus(
-                interface=configuration.interface, channel=configuration.channel, bitrate=configuration.bit_rate
-            )
+            self._bus = bus or _open(configuration)
         except (can.CanError, OSError, ValueError, NotImplementedError, ImportError) as error:
             text = " ".join(str(error).split())
             raise DriverError(
@@ -109,7 +113,9 @@ class CanBus:
             ``lost``: the bus does not take it
         """
         try:
-            self._bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False), timeout=0.05)
+            self._bus.send(
+                can.Message(arbitration_id=identifier, data=data, is_extended_id=False), timeout=SEND_TIMEOUT_S
+            )
         except (can.CanError, OSError, ValueError) as error:
             raise self._lost(error) from error
 
@@ -147,6 +153,13 @@ class CanBus:
         if handler is not None:
             handler(message.arbitration_id, bytes(message.data))
         return True
+
+    def drain(self) -> None:
+        """Hand all frames that have come to their handlers: an answer that is late is not taken for the next."""
+        now = time.monotonic_ns()
+        for _ in range(_MOST_DRAINED):
+            if not self.receive(now):
+                return
 
     def start_heartbeat(self, period_s: float) -> None:
         """Be alive to the drives from now on, as long as `receive` or `beat` is called.
@@ -189,6 +202,13 @@ class CanBus:
         return DriverError(
             DriverErrorKind.LOST, f"CAN bus {self._name} is gone ({text}); check the adapter and the cable"
         )
+
+
+def _open(configuration: BusConfiguration) -> can.BusABC:
+    """The bus that python-can knows by this name."""
+    if configuration.interface == "slcan":
+        return SerialAdapterBus(configuration.channel, configuration.bit_rate)
+    return can.Bus(interface=configuration.interface, channel=configuration.channel, bitrate=configuration.bit_rate)
 
 
 class NodeDictionary:
@@ -240,6 +260,19 @@ class NodeDictionary:
             if isinstance(error.__cause__, SdoCommunicationError):
                 raise
             return None
+
+    def read_text(self, entry: DriveObject) -> str:
+        """A text; empty where the node has none.
+
+        Parameters
+        ----------
+        entry : DriveObject
+            what to read
+        """
+        try:
+            return self._client.upload(entry.index, entry.subindex).decode("ascii", "replace").strip("\0 ")
+        except (SdoError, can.CanError, OSError):
+            return ""
 
     def write(self, entry: DriveObject, value: int) -> None:
         """Write an entry and read it back.

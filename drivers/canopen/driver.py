@@ -3,6 +3,7 @@
 import math
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import can
 import numpy as np
@@ -12,27 +13,35 @@ from drivers.canopen import objects
 from drivers.canopen.bus import NMT_PRE_OPERATIONAL, NMT_START, SYNC_ID, CanBus
 from drivers.canopen.bus_budget import CycleFrames, largest_rate_hz
 from drivers.canopen.configuration import BusConfiguration, DriveJoint, read_configuration
+from drivers.canopen.emergency import HEARTBEAT_LOST, WATCHDOG_CODE
 from drivers.canopen.node import MOTION_PDO, RECEIVED_ID, STATE_PDO, TARGET_PDOS, DriveNode
 from drivers.canopen.state_machine import DISABLE_VOLTAGE, FAULT_RESET, DriveState, Goal, next_controlword
 from drivers.clock import MonotonicClock
 from drivers.errors import DriverError, DriverErrorKind, Fault
+from drivers.limits import RunawayWatch, TargetLimiter, require_finite, require_sensible
 from drivers.state import ArmState, Array, Setpoint
 
 CYCLE_FRAMES = CycleFrames((TARGET_PDOS[ControlMode.POSITION].size,), (STATE_PDO.size, MOTION_PDO.size))
-WATCHDOG_RANGE_S = (0.05, 2.0)
-HEARTBEATS_A_WATCHDOG = 4
+WATCHDOG_RANGE_S = (0.02, 5.0)
+HEARTBEATS_A_WATCHDOG = 10
 """The master beats so often within a drive's watchdog time: one lost frame stops nothing."""
 
 TRANSITION_S = 2.0
 """Time for all drives together to reach a power state."""
 
+RESET_S = 0.1
+"""Time in which a drive leaves its fault, or is back in it because the cause persists."""
+
 STOP_S = 0.5
 """Time for a stop by process data; drives that are not there by then are told one by one."""
+
+STILL_CYCLES = 4
+"""Cycles at one place before anything moves: drives interpolate between the last few targets."""
 
 SETTLING_CYCLE_S = 0.01
 """Cycle while drives change state, before and after the control loop's own."""
 
-ANSWER_SPARE_S = 0.002
+PATIENCE_S = 0.002
 """Time that drives and adapter may take to answer SYNC, beyond twice that of the frames on the wire."""
 
 _SETTLING_NS = round(SETTLING_CYCLE_S * 1e9)
@@ -47,7 +56,9 @@ class CanopenArm:
     are taken over and TPDOs sampled at SYNC, so that all joints are read at one instant.
     """
 
-    def __init__(self, joints: Sequence[DriveJoint], bus: can.BusABC | None = None) -> None:
+    def __init__(
+        self, joints: Sequence[DriveJoint], bus: can.BusABC | None = None, *, patience_s: float = PATIENCE_S
+    ) -> None:
         """Check the configuration; nothing is opened yet.
 
         Parameters
@@ -56,6 +67,8 @@ class CanopenArm:
             base first
         bus : can.BusABC or None
             a bus that is open already, in place of the configured one
+        patience_s : float
+            how much longer than the bus takes an answer is waited for [s]
 
         Raises
         ------
@@ -64,12 +77,16 @@ class CanopenArm:
         """
         self._configuration = read_configuration(joints)
         self._given_bus = bus
+        self._patience_s = patience_s
         self._bus: CanBus | None = None
         self._nodes: list[DriveNode] = []
         self._modes = frozenset(ControlMode)
         self._mode: ControlMode | None = None
         self._policy = StopPolicy.HOLD
         self._answer_ns = 0
+        self._limiter: TargetLimiter | None = None
+        self._runaway: RunawayWatch | None = None
+        self._caught: Fault | None = None
         self.clock = MonotonicClock()
 
     @property
@@ -89,28 +106,28 @@ class CanopenArm:
             largest_rate_hz=rate,
             watchdog_range_s=WATCHDOG_RANGE_S,
             takes_feed_forward=False,
+            holds_before_torque=False,
         )
 
     def connect(self) -> ArmState:
         """Open the bus, make sure that every node is a drive, and read it by service data."""
-        if self._bus is None:
-            bus = CanBus(self._configuration, self._given_bus)
-            self._bus = bus
-            self._nodes = [
-                DriveNode.on_bus(bus, node, joint) for joint, node in enumerate(self._configuration.nodes, 1)
-            ]
-            try:
-                bus.command_nodes(NMT_PRE_OPERATIONAL)
-                self._modes = frozenset.intersection(*(node.identify() for node in self._nodes))
-            except DriverError:
-                self.disconnect()
-                raise
+        if self._bus is not None:
+            raise DriverError(DriverErrorKind.CANNOT_CONNECT, "the arm is connected already; disconnect it first")
+        bus = CanBus(self._configuration, self._given_bus)
+        self._bus = bus
+        self._nodes = [DriveNode.on_bus(bus, node, joint) for joint, node in enumerate(self._configuration.nodes, 1)]
+        try:
+            bus.command_nodes(NMT_PRE_OPERATIONAL)
+            self._modes = frozenset.intersection(*(node.identify() for node in self._nodes))
+        except DriverError:
+            self.disconnect()
+            raise
         return self._read_by_service_data()
 
     def acknowledge_faults(self) -> ArmState:
         """Reset drives in fault, once, and forget emergencies; a drive that holds goes on holding."""
         self._require_bus()
-        self._mode = None
+        self._mode, self._caught = None, None
         for node in self._nodes:
             node.read_now()
             if node.state is DriveState.FAULT:
@@ -118,7 +135,7 @@ class CanopenArm:
                 node.dictionary.write(objects.CONTROLWORD, FAULT_RESET)
                 node.dictionary.write(objects.CONTROLWORD, DISABLE_VOLTAGE)
             node.error_code, node.acknowledged_code = 0, node.values[objects.ERROR_CODE]
-        state = self._await(lambda: not any(node.faults() for node in self._nodes), self._read_by_service_data)
+        state = self._await(self._is_sound, self._read_by_service_data, RESET_S)
         if state.faults:
             raise DriverError(DriverErrorKind.FAULT, f"still in fault: {_listed(state.faults)}", state.faults)
         return state
@@ -138,8 +155,11 @@ class CanopenArm:
             time without the master's heartbeat after which the drives stop [s]
         """
         bus = self._require_bus()
+        if self._mode is not None:
+            raise DriverError(DriverErrorKind.REFUSED, "the arm is enabled already; stop it first")
         self._refuse_impossible(mode, stop_policy, watchdog_s)
         state = self._read_by_service_data()
+        require_sensible(limits, state.position)
         if state.faults:
             raise DriverError(DriverErrorKind.FAULT, f"{_listed(state.faults)}; acknowledge it first", state.faults)
         bus.start_heartbeat(watchdog_s / HEARTBEATS_A_WATCHDOG)
@@ -150,10 +170,11 @@ class CanopenArm:
                 node.commission(mode, stop_policy, torque, low, high, round(watchdog_s * 1e3))
             bus.command_nodes(NMT_START)
             self._mode, self._policy = mode, stop_policy
-            state = self._power_up(mode)
+            state = self._power_up(mode, limits)
         except DriverError:
             self.stop(stop_policy)
             raise
+        self._runaway = RunawayWatch(limits) if mode is ControlMode.TORQUE else None
         return state
 
     def exchange(self, setpoint: Setpoint) -> ArmState:
@@ -164,14 +185,21 @@ class CanopenArm:
         setpoint : Setpoint
             finite targets
         """
-        if self._mode is None:
+        bus = self._require_bus()
+        mode, limiter = self._mode, self._limiter
+        if mode is None or limiter is None:
             raise DriverError(DriverErrorKind.NOT_ENABLED, "the drives are not enabled; enable the arm first")
-        target = setpoint.position if self._mode is ControlMode.POSITION else setpoint.torque
-        if len(target) != len(self._nodes) or not np.isfinite(target).all():
-            raise DriverError(
-                DriverErrorKind.REFUSED, "a target is missing or not a finite number; nothing was sent to the drives"
-            )
-        return self._cycle(self._mode, Goal.OPERATION_ENABLED, setpoint, self._answer_ns)
+        require_finite(setpoint, len(self._nodes))
+        bus.drain()
+        if any(node.error_code == HEARTBEAT_LOST for node in self._nodes):
+            return self._read_by_service_data()  # such a drive takes no process data any more
+        goal = Goal.OPERATION_ENABLED if self._caught is None else Goal.QUICK_STOP
+        state = self._cycle(mode, goal, limiter.limited(setpoint), self._answer_ns)
+        if self._runaway is not None and self._caught is None:
+            self._caught = self._runaway.look(state.position, state.velocity)
+        if goal is Goal.OPERATION_ENABLED and (self._caught is not None or state.faults):
+            return self._halted(mode)
+        return state
 
     def stop(self, policy: StopPolicy) -> ArmState:
         """Quick stop and hold, or ramp and let go; drives that are in such a state already stay as they are.
@@ -185,7 +213,7 @@ class CanopenArm:
             return self._unknown()
         goal = _POLICY_GOALS.get(policy, Goal.QUICK_STOP)
         mode = self._mode
-        self._mode = None
+        self._mode, self._limiter, self._runaway = None, None, None
         if mode is not None and not self._stop_in_cycle(mode, goal):
             mode = None
         if mode is None:
@@ -204,6 +232,11 @@ class CanopenArm:
             self._bus.close()
             self._bus, self._nodes, self._mode = None, [], None
 
+    def _halted(self, mode: ControlMode) -> ArmState:
+        """The arm after one drive's trouble became that of all: they stop together."""
+        still = Setpoint(self._present(), np.zeros(len(self._nodes)))
+        return self._cycle(mode, _POLICY_GOALS[self._policy], still, self._answer_ns)
+
     def _refuse_impossible(self, mode: ControlMode, policy: StopPolicy, watchdog_s: float) -> None:
         """Refuse what these drives cannot do, before anything is switched on."""
         reason = None
@@ -216,27 +249,49 @@ class CanopenArm:
         if reason is not None:
             raise DriverError(DriverErrorKind.REFUSED, reason)
 
-    def _power_up(self, mode: ControlMode) -> ArmState:
-        """Take all drives to *operation enabled*, targets at the present place in every cycle."""
+    def _power_up(self, mode: ControlMode, limits: DriveLimits) -> ArmState:
+        """Take all drives to *operation enabled*; targets are where the joints are when their drives get there."""
         settings = self._configuration
         wire_s = 1.0 / largest_rate_hz(len(self._nodes), CYCLE_FRAMES, settings.bit_rate, settings.serial_baud)
-        self._answer_ns = round((2.0 * wire_s + ANSWER_SPARE_S) * 1e9)
+        self._answer_ns = round((2.0 * wire_s + self._patience_s) * 1e9)
+
+        place = self._settled_place(mode)
 
         def cycle() -> ArmState:
-            still = Setpoint(self._present(), np.zeros(len(self._nodes)))
+            for index, node in enumerate(self._nodes):
+                if node.last_state is not DriveState.OPERATION_ENABLED:
+                    place[index] = node.last_position
+            still = Setpoint(place, np.zeros(len(self._nodes)))
             return self._cycle(mode, Goal.OPERATION_ENABLED, still, _SETTLING_NS)
 
         def is_up() -> bool:
-            return all(node.state is DriveState.OPERATION_ENABLED and node.follows for node in self._nodes)
+            return all(node.last_state is DriveState.OPERATION_ENABLED for node in self._nodes)
 
         state = self._await(is_up, cycle)
+        self._limiter = TargetLimiter(limits, place)
+        for _ in range(STILL_CYCLES):
+            self.clock.wait_until_ns(state.time_ns + _SETTLING_NS)
+            state = cycle()
         if not is_up():
-            waiting = next(node for node in self._nodes if node.state is not DriveState.OPERATION_ENABLED)
+            waiting = next(node for node in self._nodes if node.last_state is not DriveState.OPERATION_ENABLED)
             faults = state.faults
-            text = _listed(faults) if faults else f"{waiting.place} stays in {waiting.state or 'an unknown state'}"
+            text = _listed(faults) if faults else f"{waiting.place} stays in {waiting.last_state or 'an unknown state'}"
             kind = DriverErrorKind.FAULT if faults else DriverErrorKind.REFUSED
             raise DriverError(kind, f"the drives cannot be enabled: {text}", faults)
         return state
+
+    def _settled_place(self, mode: ControlMode) -> Array:
+        """Where the joints are now, by process data, read before any drive changes its state.
+
+        One that holds may be back under power with its first target: that must not be where it was when commissioning
+        began.
+        """
+        stay = Setpoint(self._present(), np.zeros(len(self._nodes)))
+        self._await(
+            lambda: all(node.has_answered for node in self._nodes),
+            lambda: self._cycle(mode, Goal.QUICK_STOP, stay, _SETTLING_NS),
+        )
+        return self._present()
 
     def _stop_in_cycle(self, mode: ControlMode, goal: Goal) -> bool:
         """Stop by process data, all drives together; False where not all got there."""
@@ -261,6 +316,7 @@ class CanopenArm:
         bus = self._require_bus()
         pairs = zip(self._nodes, setpoint.position, setpoint.torque, strict=True)
         frames = [node.target(mode, node.controlword(goal), float(q), float(tau)) for node, q, tau in pairs]
+        bus.drain()
         for node, frame in zip(self._nodes, frames, strict=True):
             node.values = {}
             bus.send(RECEIVED_ID + node.configuration.node_id, frame)
@@ -293,8 +349,19 @@ class CanopenArm:
             effort=np.array(columns["effort"]),
             temperature=np.full(len(self._nodes), math.nan),
             enabled=np.array([node.state in _UNDER_POWER for node in self._nodes]),
-            faults=tuple(fault for node in self._nodes for fault in node.faults()),
+            faults=self._faults(),
         )
+
+    def _faults(self) -> tuple[Fault, ...]:
+        """What drives report and what the driver itself has caught; a host that fell silent is one fault of the arm."""
+        reported = [fault for node in self._nodes for fault in node.faults()]
+        silence = [replace(fault, joint=None) for fault in reported if fault.code == WATCHDOG_CODE]
+        caught = [] if self._caught is None else [self._caught]
+        return (*caught, *silence[:1], *(fault for fault in reported if fault.code != WATCHDOG_CODE))
+
+    def _is_sound(self) -> bool:
+        """Whether nothing is in fault."""
+        return not self._faults()
 
     def _present(self) -> Array:
         """Where the joints are, by the last answer of each."""

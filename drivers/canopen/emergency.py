@@ -4,7 +4,11 @@ from drivers.errors import Fault
 
 _LENGTH = 8
 
-_HEARTBEAT_LOST = 0x8130
+HEARTBEAT_LOST = 0x8130
+"""Error code of a drive that misses the master."""
+
+WATCHDOG_CODE = "watchdog"
+"""`Fault.code` of a host that fell silent."""
 
 # The most specific code comes first: a drive's own code falls back to its group's.
 _MEANINGS: tuple[tuple[int, int, str, str, str], ...] = (
@@ -29,13 +33,14 @@ _MEANINGS: tuple[tuple[int, int, str, str, str], ...] = (
     (0xF000, 0x7000, "module", "fault of a further module of the drive", "see the drive's manual for the code"),
     (
         0xFFFF,
-        _HEARTBEAT_LOST,
-        "watchdog",
+        HEARTBEAT_LOST,
+        WATCHDOG_CODE,
         "the master's heartbeat stayed away",
         "make sure the host runs, then acknowledge",
     ),
     (0xFFFF, 0x8140, "bus", "the drive came back from bus-off", "check the cable and both terminators"),
     (0xFF00, 0x8100, "bus", "communication fault", "check the cable, the terminators and the bit rate"),
+    (0xFF00, 0x8400, "over-speed", "faster than allowed", "move slower, then acknowledge"),
     (0xFFFF, 0x8611, "following-error", "following error too large", "move slower or enlarge the window (0x6065)"),
     (0xFFFF, 0x8612, "position-limit", "a position limit was reached", "move the joint back by hand"),
     (0xF000, 0x8000, "monitoring", "a monitored value is outside its range", "see the drive's manual for the code"),

@@ -10,8 +10,8 @@ from drivers.canopen.configuration import NodeConfiguration
 from drivers.canopen.emergency import decode_emergency, describe_error
 from drivers.canopen.objects import DriveObject
 from drivers.canopen.pdo import PdoLayout, decode_pdo, encode_pdo, mapping_entries
-from drivers.canopen.state_machine import STATUS_FOLLOWS, DriveState, Goal, decode_state, next_controlword
-from drivers.canopen.units import DriveUnits
+from drivers.canopen.state_machine import DriveState, Goal, decode_state, next_controlword
+from drivers.canopen.units import DriveUnits, drive_units
 from drivers.errors import DriverError, DriverErrorKind, Fault
 
 RECEIVED_ID = 0x200
@@ -55,6 +55,8 @@ class DriveNode:
         of its last emergency
     acknowledged_code : int
         error code that the operator has seen: a drive may go on showing it until it is enabled again
+    last_state : DriveState or None
+        power state as it told when it last answered: what it is told next when an answer is lost
     last_position : float
         of the joint when it last answered: the place to stay at, never a measurement [rad or m]
     """
@@ -66,6 +68,7 @@ class DriveNode:
     values: dict[DriveObject, int] = field(default_factory=dict)
     error_code: int = 0
     acknowledged_code: int = 0
+    last_state: DriveState | None = None
     last_position: float = math.nan
 
     @staticmethod
@@ -94,11 +97,6 @@ class DriveNode:
         """Power state as this cycle's statusword tells; None where none came."""
         word = self.values.get(objects.STATUSWORD)
         return None if word is None else decode_state(word)
-
-    @property
-    def follows(self) -> bool:
-        """Whether the drive follows its target values."""
-        return bool(self.values.get(objects.STATUSWORD, 0) & STATUS_FOLLOWS)
 
     @property
     def has_answered(self) -> bool:
@@ -174,6 +172,7 @@ class DriveNode:
         }
         if not math.isnan(values["position"]):
             self.last_position = values["position"]
+        self.last_state = self.state or self.last_state
         return values
 
     def read_now(self) -> None:
@@ -209,14 +208,14 @@ class DriveNode:
             raise DriverError(DriverErrorKind.REFUSED, f"{self.place}: {error}; check counts_per_turn") from error
 
     def controlword(self, goal: Goal) -> int:
-        """Next controlword towards a goal.
+        """Next controlword towards a goal; a lost answer changes nothing, or it would drop an arm under power.
 
         Parameters
         ----------
         goal : Goal
             where to take it
         """
-        return next_controlword(self.state, goal)
+        return next_controlword(self.last_state, goal)
 
     def faults(self) -> tuple[Fault, ...]:
         """What it reports: a code in its cycle or by emergency, and the state of fault without one."""
@@ -242,9 +241,7 @@ class DriveNode:
                 DriverErrorKind.REFUSED,
                 f"{self.place}: its rated torque (0x6076) reads 0; give drive.rated_torque_nm",
             )
-        turns = configuration.counts_per_turn * configuration.gear_ratio * configuration.direction
-        permille = configuration.direction * rated * abs(configuration.gear_ratio) / 1000.0
-        return DriveUnits(2.0 * math.pi / turns, configuration.zero_count, permille)
+        return drive_units(configuration, rated)
 
     def _map(self, communication: int, mapping: int, identifier: int, layout: PdoLayout) -> None:
         """Write a PDO's parameters by explicit service data, in the order that CiA 301 asks for."""

@@ -14,7 +14,7 @@ class DriveObject:
     subindex : int
         0 for a variable
     bits : int
-        its size
+        its size; 0 for a text
     signed : bool
         whether it is an INTEGER (else UNSIGNED)
     """
@@ -37,6 +37,8 @@ class DriveObject:
 
 DEVICE_TYPE = DriveObject("Device type", 0x1000, 0, 32)
 ERROR_REGISTER = DriveObject("Error register", 0x1001, 0, 8)
+DEVICE_NAME = DriveObject("Device name", 0x1008, 0, 0)
+SOFTWARE_VERSION = DriveObject("Software version", 0x100A, 0, 0)
 CONSUMER_HEARTBEAT = DriveObject("Consumer heartbeat time", 0x1016, 1, 32)
 PRODUCER_HEARTBEAT = DriveObject("Producer heartbeat time", 0x1017, 0, 16)
 VENDOR = DriveObject("Vendor-ID", 0x1018, 1, 32)

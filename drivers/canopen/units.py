@@ -3,6 +3,8 @@
 import math
 from dataclasses import dataclass
 
+from drivers.canopen.configuration import NodeConfiguration
+
 
 @dataclass(frozen=True)
 class DriveUnits:
@@ -81,3 +83,18 @@ class DriveUnits:
         """
         most = abs(torque / self.torque_per_permille)
         return 0xFFFF if most >= 0xFFFF else math.floor(most)
+
+
+def drive_units(configuration: NodeConfiguration, rated_torque_nm: float) -> DriveUnits:
+    """The units of a drive and its gear.
+
+    Parameters
+    ----------
+    configuration : NodeConfiguration
+        of the drive
+    rated_torque_nm : float
+        at the motor shaft [Nm]
+    """
+    turns = configuration.counts_per_turn * configuration.gear_ratio * configuration.direction
+    permille = configuration.direction * rated_torque_nm * abs(configuration.gear_ratio) / 1000.0
+    return DriveUnits(2.0 * math.pi / turns, configuration.zero_count, permille)

@@ -76,12 +76,15 @@ def make_backend(
     return known[name](robot, settings, folder)
 
 
-def _not_yet(name: str) -> BackendFactory:
-    def refuse(robot: Robot, settings: Mapping[str, Any], folder: Path | None) -> Connection:
-        del robot, settings, folder
-        raise AcquisitionError(f"the backend {name} is not part of this version of Tauscope yet; use sim")
+def _on_field_bus(name: str) -> BackendFactory:
+    """An arm on a field bus; its clock is the machine's."""
 
-    return refuse
+    def connection(robot: Robot, settings: Mapping[str, Any], folder: Path | None) -> Connection:
+        from service.acquisition.field_buses import find_bus
+
+        return Connection(find_bus(name).backend(robot, settings, folder), is_real_time=True)
+
+    return connection
 
 
 def _simulation(robot: Robot, settings: Mapping[str, Any], folder: Path | None) -> Connection:
@@ -149,7 +152,7 @@ def _posture(start: Any, robot: Robot) -> list[float] | None:
 
 BACKENDS: Mapping[str, BackendFactory] = {
     "sim": _simulation,
-    "dynamixel": _not_yet("dynamixel"),
-    "canopen": _not_yet("canopen"),
+    "dynamixel": _on_field_bus("dynamixel"),
+    "canopen": _on_field_bus("canopen"),
 }
 """Every backend by its name."""

@@ -98,9 +98,11 @@ def chosen_stop_policy(
         the robot file states no policy, or several; or the device cannot do it by itself
     """
     policy = options.stop_policy or _stated_policy(joints)
-    if capabilities is not None and policy not in capabilities.stop_policies:
-        can = ", ".join(sorted(capabilities.stop_policies))
-        raise AcquisitionError(f"stop policy {policy}: this arm's drives cannot do that by themselves; choose {can}")
+    if capabilities is not None and policy not in (able := capabilities.policies_in(options.mode)):
+        raise AcquisitionError(
+            f"stop policy {policy}: this arm's drives cannot do that by themselves in mode {options.mode}; "
+            f"choose {', '.join(sorted(able))}"
+        )
     return policy
 
 

@@ -19,8 +19,10 @@ from typing import Annotated
 import typer
 from typer.main import get_command
 
+from service.cli.bus_command import bus
 from service.cli.demo_command import demo
 from service.cli.diagnose_command import diagnose
+from service.cli.doctor_command import doctor
 from service.cli.excite_command import excite
 from service.cli.identify_command import identify
 from service.cli.recording_command import recording
@@ -59,6 +61,8 @@ add_verb(app, excite)
 app.add_typer(robot, name="robot")
 app.add_typer(recording, name="recording")
 add_verb(app, run)
+add_verb(app, doctor)
+app.add_typer(bus, name="bus")
 add_verb(app, serve)
 add_verb(app, demo)
 

@@ -60,6 +60,9 @@ def run(
     acknowledge_faults: Annotated[
         bool, typer.Option("--acknowledge-faults", help="Clear the faults that the drives have latched.")
     ] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Show the frames that would be sent to the bus, and send none.")
+    ] = False,
 ) -> None:
     """Move an arm and record it.
 
@@ -91,6 +94,8 @@ def run(
         of the default excitation
     acknowledge_faults : bool
         whether latched faults are cleared first
+    dry_run : bool
+        whether the frames are shown and nothing is sent
     """
     posture = parse_posture(start)
     from service.acquisition import RunOptions
@@ -99,6 +104,11 @@ def run(
     options = RunOptions.model_validate(
         {"mode": mode, "rate_hz": rate, "stop_policy": stop_policy, "acknowledge_faults": acknowledge_faults}
     )
+    if dry_run:
+        from service.cli.bus_summary import show_frames
+
+        show_frames(robot, backend, trajectory, options)
+        return
     run_arm(
         Request(
             robot=robot,

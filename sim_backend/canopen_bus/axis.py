@@ -24,13 +24,13 @@ class AxisDemand:
     torque : float
         target where the mode is torque [Nm or N]
     torque_cap : float
-        most that it exerts [Nm or N]
+        most that it exerts; nothing where it is released [Nm or N]
     """
 
     mode: AxisMode
     position: float = 0.0
     torque: float = 0.0
-    torque_cap: float = float("inf")
+    torque_cap: float = 0.0
 
 
 @dataclass(frozen=True)

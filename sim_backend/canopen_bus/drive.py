@@ -106,8 +106,9 @@ class EmulatedDrive:
         if self.power.state is not PowerState.OPERATION_ENABLED:
             return AxisDemand(AxisMode.RELEASED)
         if self._mode_taken == CYCLIC_POSITION:
-            target = self.dictionary.get(0x607A) / self.scale.counts_per_radian
-            return AxisDemand(AxisMode.POSITION, position=target, torque_cap=cap)
+            low, high = (self.dictionary.get(0x607D, end) for end in (1, 2))
+            target = min(max(self.dictionary.get(0x607A), low), high)
+            return AxisDemand(AxisMode.POSITION, position=target / self.scale.counts_per_radian, torque_cap=cap)
         if self._mode_taken == CYCLIC_TORQUE:
             torque = self.dictionary.get(0x6071) * self.scale.torque_per_permille
             return AxisDemand(AxisMode.TORQUE, torque=min(max(torque, -cap), cap), torque_cap=cap)

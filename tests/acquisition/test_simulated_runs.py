@@ -85,8 +85,8 @@ def test_a_scenario_is_carried_out(tmp_path: Path, robot: Robot) -> None:
 @pytest.mark.parametrize(
     ("name", "settings", "words"),
     [
-        ("dynamixel", {}, "the backend dynamixel is not part of this version"),
-        ("canopen", {}, "the backend canopen is not part of this version"),
+        ("dynamixel", {}, "joint1 has no drive block"),
+        ("canopen", {}, "joint1 has no drive block"),
         ("simu", {}, "there is no backend 'simu'; did you mean 'sim'?"),
         ("sim", {"tmie": "real"}, "unknown setting 'tmie'; did you mean 'time'"),
         ("sim", {"time": "fast"}, "time is 'fast'; choose virtual or real"),

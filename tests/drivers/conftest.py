@@ -1,22 +1,30 @@
 """The rigs of the conformance suite."""
 
 from collections.abc import Callable, Iterator
+from contextlib import nullcontext
 
 import pytest
 
 from arm_rigs import RIGS, Rig
 from drivers import StopPolicy
+from hardware_emulated.canopen_rig import canopen_rigs
+from hardware_emulated.dynamixel_rig import dynamixel_rigs
+from prompt_process import prompt_process
+
+ALL_RIGS = {**RIGS, "dynamixel": dynamixel_rigs, "canopen": canopen_rigs}
+"""Makers of rigs by name; the emulated buses join here."""
 
 
-@pytest.fixture(scope="session", params=list(RIGS))
+@pytest.fixture(scope="session", params=list(ALL_RIGS))
 def make_rig(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[], Rig]]:
-    with RIGS[request.param](tmp_path_factory.mktemp("rig")) as maker:
+    with ALL_RIGS[request.param](tmp_path_factory.mktemp("rig")) as maker:
         yield maker
 
 
 @pytest.fixture
 def rig(make_rig: Callable[[], Rig]) -> Iterator[Rig]:
     one = make_rig()
-    yield one
-    one.backend.stop(StopPolicy.TORQUE_OFF)
-    one.backend.disconnect()
+    with prompt_process() if one.is_real_time else nullcontext():
+        yield one
+        one.backend.stop(StopPolicy.TORQUE_OFF)
+        one.backend.disconnect()

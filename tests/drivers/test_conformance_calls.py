@@ -128,17 +128,19 @@ def test_limits_that_make_no_sense_are_refused(rig: Rig, changes: dict[str, Any]
 def test_capabilities_are_honest(rig: Rig) -> None:
     capabilities = rig.backend.capabilities
     assert capabilities.joint_count == rig.robot.joint_count
-    assert capabilities.effort_unit == "Nm"
+    assert capabilities.effort_unit in ("Nm", "mA", "permille")
     shortest, longest = capabilities.watchdog_range_s
     rig.backend.connect()
     for watchdog_s in (0.9 * shortest, 1.1 * longest, 0.0, -1.0, np.nan):
         error = refusal(rig.backend.enable, ControlMode.POSITION, wide_limits(rig.robot), StopPolicy.HOLD, watchdog_s)
         assert error.kind is DriverErrorKind.REFUSED
     for mode in capabilities.modes:
-        for policy in capabilities.stop_policies:
+        for policy in capabilities.policies_in(mode):
             for watchdog_s in (shortest, longest):
-                assert rig.backend.enable(mode, wide_limits(rig.robot), policy, watchdog_s).enabled.all()
-                rig.backend.stop(StopPolicy.HOLD)
+                # between two of them the arm falls
+                limits = wide_limits(rig.robot, position_low=-30.0, position_high=30.0)
+                assert rig.backend.enable(mode, limits, policy, watchdog_s).enabled.all()
+                rig.backend.stop(StopPolicy.TORQUE_OFF)
                 rig.backend.acknowledge_faults()
 
 
@@ -149,7 +151,7 @@ def test_feed_forward_counts_where_the_backend_says_so(rig: Rig) -> None:
     before = drive(rig, lambda _: setpoint(START), 0.02)[-1].effort
     push = np.array([0.0, 1.5, 0.0])
     after = [state.effort for state in drive(rig, lambda _: setpoint(START, push), 0.02)]
-    assert max((effort - before)[1] for effort in after) > 0.5 * push[1]
+    assert max(rig.torque(effort - before)[1] for effort in after) > 0.5 * push[1]
 
 
 def test_the_state_has_the_joints_shape_and_si_units(rig: Rig) -> None:
@@ -161,17 +163,18 @@ def test_the_state_has_the_joints_shape_and_si_units(rig: Rig) -> None:
     assert state.enabled.shape == (n,)
     assert state.enabled.dtype == np.bool_
     assert state.fresh.all()
-    assert np.all((state.temperature > 0.0) & (state.temperature < 100.0))
+    known = ~np.isnan(state.temperature)
+    assert np.all((state.temperature[known] > 0.0) & (state.temperature[known] < 100.0))
     np.testing.assert_allclose(state.position, rig.look(), atol=1e-3)
     states = drive(rig, slide(START, 0.4), 0.4)
     time = np.array([state.time_ns for state in states]) * 1e-9
     position = np.array([state.position for state in states])
     velocity = np.array([state.velocity for state in states])
-    fresh = np.diff(time) > 0.0
-    slope = np.diff(position, axis=0)[fresh] / np.diff(time)[fresh, None]
-    mean = 0.5 * (velocity[1:] + velocity[:-1])[fresh]
-    assert np.all(np.median(np.abs(slope - mean), axis=0) < 0.02)
-    assert np.all(position[-1] - START > 0.05)
+    # over ten cycles each, so that an instant that is known to a fraction of a millisecond does not count
+    slope = (position[10:] - position[:-10]) / (time[10:] - time[:-10])[:, None]
+    mean = np.array([velocity[k : k + 11].mean(axis=0) for k in range(len(slope))])
+    assert np.all(np.nanmedian(np.abs(slope - mean), axis=0) < 0.02)
+    assert np.all(np.nanmax(position, axis=0) - START > 0.05)
 
 
 def test_time_never_runs_backwards(rig: Rig) -> None:
@@ -202,11 +205,13 @@ def test_a_second_host_is_refused_by_the_name_of_the_first(rig: Rig) -> None:
 
 def test_a_lost_sample_is_not_a_number_and_concerns_its_joint_alone(rig: Rig) -> None:
     enable(rig)
-    rig.inject(Injection(Disturbance.LOST_SAMPLE, joint=2, duration_ns=50_000_000))
-    state = rig.backend.exchange(setpoint(START))
+    rig.inject(Injection(Disturbance.LOST_SAMPLE, joint=2, duration_ns=300_000_000))
+    # an answer that all drives share breaks off at the silent one: from the next cycle on each answers for itself
+    first, state = (rig.backend.exchange(setpoint(START)) for _ in range(2))
+    assert not first.fresh[1]
     assert state.fresh.tolist() == [True, False, True]
     assert np.isnan([state.velocity[1], state.effort[1]]).all()
-    states = drive(rig, lambda _: setpoint(START), 0.2)
+    states = drive(rig, lambda _: setpoint(START), 0.6)
     assert states[-1].fresh.all()
     assert not states[-1].faults
 

@@ -5,16 +5,33 @@ from typing import Any
 import numpy as np
 import pytest
 
-from arm_rigs import AT_REST, START, Rig, drive, enable, setpoint, slide, wide_limits
+from arm_rigs import (
+    AT_REST,
+    START,
+    Rig,
+    allowed,
+    drive,
+    enable,
+    require_policy,
+    setpoint,
+    slide,
+    wide_limits,
+)
 from drivers import ControlMode, StopPolicy
 
 
 @pytest.mark.parametrize("mode", list(ControlMode))
 def test_enabling_never_moves_the_arm(rig: Rig, mode: ControlMode) -> None:
-    enable(rig, mode, watchdog_s=5.0)
-    np.testing.assert_allclose(rig.look(), START, rtol=0.0, atol=1e-9)
-    seen = rig.watch(0.2)
-    assert np.abs(seen.position - START).max() < 1e-6, "also while the host has not said anything yet"
+    enable(rig, mode, watchdog_s=2.5)
+    # where the drives see the joint, which is where they hold it
+    step = 0.6 * rig.position_resolution
+    if mode is ControlMode.POSITION or rig.backend.capabilities.holds_before_torque:
+        np.testing.assert_allclose(rig.look(), START, rtol=0.0, atol=1e-9 + step)
+        seen = rig.watch(0.2)
+        assert np.abs(seen.position - START).max() < 1e-6 + step, "also while the host has not said anything yet"
+    else:
+        carried = rig.torque(rig.backend.exchange(setpoint(rig.look())).effort)
+        assert np.abs(carried).max() <= 2.0 * rig.torque_resolution, "it exerts nothing that nobody has asked for"
 
 
 @pytest.mark.parametrize("mode", list(ControlMode))
@@ -24,20 +41,27 @@ def test_a_target_from_before_is_forgotten(rig: Rig, mode: ControlMode) -> None:
     rig.backend.exchange(setpoint(START + 2.0, np.array([5.0, 5.0, 5.0])))
     rig.backend.stop(StopPolicy.HOLD)
     place = rig.watch(0.4).position[-1]
-    rig.backend.enable(mode, wide_limits(rig.robot), StopPolicy.HOLD, 5.0)
-    # what is left of the stop settles; the target of old is 2 rad away
-    assert np.abs(rig.watch(0.2).position - place).max() < 5e-3
+    if mode is ControlMode.POSITION or rig.backend.capabilities.holds_before_torque:
+        rig.backend.enable(mode, wide_limits(rig.robot), allowed(rig, mode, StopPolicy.HOLD), 2.5)
+        # what is left of the stop settles; the target of old is 2 rad away
+        assert np.abs(rig.watch(0.2).position - place).max() < 5e-3
+    else:
+        rig.backend.stop(StopPolicy.TORQUE_OFF)
+        rig.backend.enable(mode, wide_limits(rig.robot), allowed(rig, mode, StopPolicy.HOLD), 2.5)
+        state = rig.backend.exchange(setpoint(place))
+        assert np.abs(rig.torque(state.effort)).max() <= 2.0 * rig.torque_resolution
 
 
 def test_it_keeps_its_place_under_gravity(rig: Rig) -> None:
     enable(rig)
     states = drive(rig, lambda _: setpoint(START), 0.3)
-    assert np.abs(states[-1].effort[1:]).min() > 1.0, "gravity is carried"
+    assert np.abs(rig.torque(states[-1].effort)[1:]).min() > 1.0, "gravity is carried"
     rig.backend.stop(StopPolicy.HOLD)
     assert np.abs(rig.watch(0.4).position - START).max() < 1e-4
 
 
 def test_a_damped_arm_sinks_slowly_and_a_free_one_falls(rig: Rig) -> None:
+    require_policy(rig, StopPolicy.DAMP)
     sunk: dict[StopPolicy, np.ndarray] = {}
     enable(rig)
     rig.backend.stop(StopPolicy.DAMP)
@@ -55,20 +79,21 @@ def test_an_arm_that_falls_is_caught_by_enabling_it(rig: Rig) -> None:
     enable(rig)
     rig.backend.stop(StopPolicy.TORQUE_OFF)
     rig.watch(0.15)
-    rig.backend.enable(ControlMode.POSITION, wide_limits(rig.robot), StopPolicy.HOLD, 5.0)
+    rig.backend.enable(ControlMode.POSITION, wide_limits(rig.robot), StopPolicy.HOLD, 2.5)
     caught = rig.look()
-    seen = rig.watch(0.5)
+    seen = rig.watch(1.2)
     assert np.abs(seen.velocity[-1]).max() < AT_REST
-    assert np.abs(seen.position[-1] - caught).max() < 0.3
+    # it fell on while its drives were commissioned
+    assert np.abs(seen.position[-1] - caught).max() < 0.3 + 0.1 * np.abs(seen.velocity[0]).max()
 
 
 def test_a_moving_arm_that_is_stopped_comes_to_rest_where_it_was_going(rig: Rig) -> None:
     enable(rig)
     drive(rig, slide(START, 0.6), 0.3)
     before = rig.backend.stop(StopPolicy.HOLD).position
-    seen = rig.watch(0.4)
+    seen = rig.watch(0.8)
     assert np.abs(seen.velocity[-1]).max() < AT_REST
-    assert np.all(seen.position[-1] - before > -1e-3), "no joint springs back"
+    assert np.all(seen.position[-1] - before > -1e-3 - rig.swing), "no joint springs back"
     assert np.abs(seen.position[-1] - before).max() < 0.6 * 0.1
 
 
@@ -80,24 +105,26 @@ def test_positions_beyond_the_range_are_not_reached(rig: Rig) -> None:
     assert rig.backend.clock.now_ns() > begin
     place = rig.look()
     assert np.all(place <= high + 2e-3)
-    np.testing.assert_allclose(place, high, atol=5e-3)
+    np.testing.assert_allclose(place, high, atol=5e-3 + rig.swing)
 
 
 def test_a_far_target_is_approached_at_the_speed_limit(rig: Rig) -> None:
     enable(rig, velocity=0.5)
     states = drive(rig, lambda _: setpoint(START + 0.4), 0.6)
-    speed = np.abs([state.velocity for state in states])
-    assert speed.max() < 1.3 * 0.5
-    assert speed.max() > 0.8 * 0.5
+    # once the drives' loops have answered the step with which it begins
+    speed = np.abs([state.velocity for state in states[len(states) // 4 :]])
+    assert np.nanmax(speed) < 1.3 * 0.5
+    assert np.nanmax(speed) > 0.8 * 0.5
 
 
 def test_torque_stays_below_the_cap(rig: Rig) -> None:
     cap = np.array([1.0, 6.0, 4.0])
     enable(rig, torque=cap)
     states = drive(rig, lambda _: setpoint(START + 0.8, np.array([30.0, 30.0, 30.0])), 0.4)
-    effort = np.abs([state.effort for state in states])
-    assert np.all(effort <= cap + 1e-9)
-    assert np.all(effort.max(axis=0) > 0.99 * cap), "the cap was reached"
+    torque = np.abs([rig.torque(state.effort) for state in states])
+    noise = 4.0 * rig.torque_resolution
+    assert np.all(torque <= cap + 1e-9 + noise)
+    assert np.all(np.nanmax(torque, axis=0) > 0.99 * cap - noise), "the cap was reached"
 
 
 def test_torque_control_gives_the_torque_that_is_asked_for(rig: Rig) -> None:
@@ -105,27 +132,29 @@ def test_torque_control_gives_the_torque_that_is_asked_for(rig: Rig) -> None:
     # joint 2 leans: what carries it within its friction
     asked = np.array([0.3, -6.0, -1.5])
     states = drive(rig, lambda _: setpoint(START, asked), 0.05)
-    np.testing.assert_allclose(states[-1].effort, asked, atol=1e-9)
+    noise = 4.0 * rig.torque_resolution
+    np.testing.assert_allclose(rig.torque(states[-1].effort), asked, atol=1e-9 + noise)
     states = drive(rig, lambda _: setpoint(START, np.array([0.0, -30.0, 0.0])), 0.02)
-    assert states[-1].effort[1] == pytest.approx(-10.0)
+    assert rig.torque(states[-1].effort)[1] == pytest.approx(-10.0, abs=1e-5 + noise)
 
 
 @pytest.mark.parametrize(
     ("torque", "limits", "code"),
     [
-        ([6.0, -6.0, -1.5], {"position_high": START + 0.3, "velocity": 10.0}, "position-limit"),
-        ([6.0, -6.0, -1.5], {"velocity": 0.8}, "over-speed"),
+        ([6.0, 10.7, 2.0], {"position_high": START + 0.3, "velocity": 10.0}, "position-limit"),
+        ([6.0, 10.7, 2.0], {"velocity": 0.8}, "over-speed"),
     ],
 )
 def test_torque_control_is_stopped_before_it_leaves_the_limits(
     rig: Rig, torque: list[float], limits: dict[str, Any], code: str
 ) -> None:
+    # joints 2 and 3 are carried, joint 1 is pushed
     enable(rig, ControlMode.TORQUE, **limits)
     states = drive(rig, lambda _: setpoint(START, np.array(torque)), 0.6)
     (fault,) = states[-1].faults
     assert fault.code == code
-    seen = rig.watch(0.3)
+    seen = rig.watch(0.8)
     assert np.abs(seen.velocity[-1]).max() < AT_REST
     if code == "position-limit":
         assert fault.joint == 1
-        assert max(state.position[0] for state in states) < START[0] + 0.3 + 0.02
+        assert np.nanmax([state.position[0] for state in states]) < START[0] + 0.3 + 0.02

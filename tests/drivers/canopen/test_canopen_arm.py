@@ -49,6 +49,7 @@ def states(bus: EmulatedBus) -> list[PowerState]:
 
 
 def test_connecting_reads_the_arm_and_moves_nothing(bus: EmulatedBus, arm: CanopenArm) -> None:
+    arm.disconnect()
     state = arm.connect()
     np.testing.assert_allclose(state.position, START, atol=COUNT)
     # 1.5 Nm are 60 per mille of 0.5 Nm behind the gear of 50
@@ -97,8 +98,9 @@ def test_a_silent_host_lets_the_drives_hold_by_themselves(bus: EmulatedBus, arm:
     enabled(arm)
     assert eventually(lambda: all(state is PowerState.QUICK_STOP_ACTIVE for state in states(bus)))
     state = arm.exchange(Setpoint(np.zeros(3), np.zeros(3)))
-    assert np.isnan(state.position).all()
-    assert {fault.code for fault in state.faults} == {"watchdog"}
+    np.testing.assert_allclose(state.position, START, atol=COUNT)
+    assert [(fault.code, fault.joint) for fault in state.faults] == [("watchdog", None)]
+    arm.stop(StopPolicy.HOLD)
     with pytest.raises(DriverError, match="acknowledge it first"):
         enabled(arm)
     arm.acknowledge_faults()
@@ -151,3 +153,17 @@ def test_a_missing_node_is_named(bus: EmulatedBus) -> None:
 def _faults(arm: CanopenArm) -> list[tuple[str, int | None]]:
     state = arm.exchange(Setpoint(np.array(START), np.zeros(3)))
     return [(fault.code, fault.joint) for fault in state.faults]
+
+
+def test_a_lost_answer_neither_drops_the_arm_nor_is_replaced_by_an_old_one(bus: EmulatedBus, arm: CanopenArm) -> None:
+    enabled(arm)
+    for cycle in range(40):
+        bus.deaf = cycle % 3 == 1
+        state = arm.exchange(Setpoint(np.array(START), np.zeros(3)))
+        assert state.fresh.all() == (not bus.deaf)
+        assert all(power is PowerState.OPERATION_ENABLED for power in states(bus))
+    bus.deaf = True
+    arm.exchange(Setpoint(np.array(START), np.zeros(3)))
+    bus.deaf = False
+    arm.stop(StopPolicy.HOLD)
+    assert all(power is PowerState.QUICK_STOP_ACTIVE for power in states(bus))

@@ -1,0 +1,137 @@
+"""The frames that a run would send, without a bus: ``identifier#payload``, as can-utils write them."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.backend import ControlMode, DriveLimits, StopPolicy
+from drivers.canopen import objects
+from drivers.canopen.bus import HEARTBEAT_ID, MASTER_NODE, NMT_ID, NMT_PRE_OPERATIONAL, NMT_START, SYNC_ID
+from drivers.canopen.configuration import DriveJoint, NodeConfiguration, read_configuration
+from drivers.canopen.node import RECEIVED_ID, DriveNode
+from drivers.canopen.objects import DriveObject
+from drivers.canopen.state_machine import DriveState, Goal, next_controlword
+from drivers.canopen.units import drive_units
+from drivers.errors import DriverError, DriverErrorKind
+from drivers.inspection import PlannedFrame
+from drivers.limits import require_sensible
+
+_TO_POWER = (DriveState.SWITCH_ON_DISABLED, DriveState.READY, DriveState.SWITCHED_ON)
+_DOWNLOAD, _UPLOAD = 0x23, 0x40
+_LARGEST_TORQUE_AS_DELIVERED = 0xFFFF
+
+
+class _PlannedDictionary:
+    """Stands in for a node's object dictionary: keeps what is written and turns it into frames."""
+
+    def __init__(self, configuration: NodeConfiguration, label: str) -> None:
+        self.frames: list[PlannedFrame] = []
+        self.node_id = configuration.node_id
+        self._label = label
+        self._values = {objects.LARGEST_TORQUE: _LARGEST_TORQUE_AS_DELIVERED}
+
+    def read(self, entry: DriveObject) -> int:
+        """What was written, or what drives have as delivered."""
+        request = bytes([_UPLOAD]) + _place(entry) + bytes(4)
+        self._add(f"{entry}?", request)
+        return self._values.get(entry, 0)
+
+    def write(self, entry: DriveObject, value: int) -> None:
+        """Keep a value, and read it back as the driver does."""
+        size = entry.bits // 8
+        data = value.to_bytes(size, "little", signed=entry.signed)
+        command = _DOWNLOAD | (4 - size) << 2
+        self._values[entry] = value
+        self._add(f"{entry} := {value}", bytes([command]) + _place(entry) + data.ljust(4, b"\0"))
+        self.read(entry)
+
+    def _add(self, meaning: str, payload: bytes) -> None:
+        self.frames.append(_frame("enable", f"{self._label}: {meaning}", 0x600 + self.node_id, payload))
+
+
+def plan_frames(
+    joints: Sequence[DriveJoint],
+    mode: ControlMode,
+    limits: DriveLimits,
+    watchdog_s: float,
+    targets: NDArray[np.float64],
+) -> Iterator[PlannedFrame]:
+    """Frames of a connection, of enabling, of some cycles and of a stop, for drives that answer as they should.
+
+    Service data is shown as expedited transfers; heartbeats, which are sent as time passes, are shown once.
+
+    Parameters
+    ----------
+    joints : sequence of DriveJoint
+        base first; each ``drive`` block has to state ``rated_torque_nm``
+    mode : ControlMode
+        who closes the loop; in torque mode the torque is the host's loop's to say, and 0 is shown
+    limits : DriveLimits
+        of the joints
+    watchdog_s : float
+        time of silence after which the drives stop [s]
+    targets : (K, n) float64
+        positions of the first K cycles; the arm is supposed to stand at the first of them [rad or m]
+
+    Yields
+    ------
+    PlannedFrame
+        in the order of sending
+
+    Raises
+    ------
+    DriverError
+        ``refused``: a ``drive`` block or a limit is not possible
+    """
+    require_sensible(limits, targets[0])
+    nodes = [_planned_node(number, wanted) for number, wanted in enumerate(read_configuration(joints).nodes, 1)]
+    yield _frame("connect", "all nodes: pre-operational", NMT_ID, bytes([NMT_PRE_OPERATIONAL, 0]))
+    for joint, (node, dictionary) in enumerate(nodes):
+        low, high = float(limits.position_low[joint]), float(limits.position_high[joint])
+        node.commission(mode, StopPolicy.HOLD, float(limits.torque[joint]), low, high, round(watchdog_s * 1e3))
+        yield from dictionary.frames
+    yield _frame("enable", "master: alive", HEARTBEAT_ID + MASTER_NODE, bytes([0x05]))
+    yield _frame("enable", "all nodes: operational", NMT_ID, bytes([NMT_START, 0]))
+    for state in _TO_POWER:
+        word = next_controlword(state, Goal.OPERATION_ENABLED)
+        yield from _cycle([node for node, _ in nodes], mode, "enable", word, targets[0])
+    word = next_controlword(DriveState.OPERATION_ENABLED, Goal.OPERATION_ENABLED)
+    for position in targets:
+        yield from _cycle([node for node, _ in nodes], mode, "cycle", word, position)
+    word = next_controlword(DriveState.OPERATION_ENABLED, Goal.QUICK_STOP)
+    yield from _cycle([node for node, _ in nodes], mode, "stop", word, targets[-1])
+
+
+def _planned_node(joint: int, configuration: NodeConfiguration) -> tuple[DriveNode, _PlannedDictionary]:
+    """A drive that nobody has asked, in the units that the robot file states."""
+    label = f"joint {joint} (node {configuration.node_id})"
+    if configuration.rated_torque_nm is None:
+        raise DriverError(
+            DriverErrorKind.REFUSED,
+            f"{label}: only the drive knows its rated torque (0x6076); state drive.rated_torque_nm for a dry run",
+        )
+    dictionary = _PlannedDictionary(configuration, label)
+    node = DriveNode(configuration, joint, dictionary)  # pyright: ignore[reportArgumentType]
+    node.units = drive_units(configuration, configuration.rated_torque_nm)
+    return node, dictionary
+
+
+def _cycle(
+    nodes: Sequence[DriveNode], mode: ControlMode, phase: str, word: int, position: NDArray[np.float64]
+) -> Iterator[PlannedFrame]:
+    """Targets of all nodes, then SYNC."""
+    for node, place in zip(nodes, position, strict=True):
+        payload = node.target(mode, word, float(place), 0.0)
+        what = f"{place:.4f}" if mode is ControlMode.POSITION else "0"
+        identifier = RECEIVED_ID + node.configuration.node_id
+        yield _frame(phase, f"{node.place}: controlword 0x{word:04X}, target {mode} {what}", identifier, payload)
+    yield _frame(phase, "all nodes: SYNC", SYNC_ID, b"")
+
+
+def _place(entry: DriveObject) -> bytes:
+    return entry.index.to_bytes(2, "little") + bytes([entry.subindex])
+
+
+def _frame(phase: str, meaning: str, identifier: int, payload: bytes) -> PlannedFrame:
+    return PlannedFrame(phase, meaning, f"{identifier:03X}#{payload.hex().upper()}")

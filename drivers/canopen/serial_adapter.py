@@ -1,0 +1,81 @@
+"""A serial CAN adapter (slcan), read as its text comes: python-can's own reader asks the system for byte after byte.
+
+At a byte a call the answers of six drives take longer than a control cycle; read at once they take none of it.
+"""
+
+import contextlib
+import time
+
+from can import CanInitializationError
+from can.interfaces.slcan import slcanBus
+
+from drivers.dynamixel.port_holder import find_holder
+
+RESTART_S = 2.0
+"""Time that an adapter takes to restart after its port was opened, as python-can has it."""
+
+_VERSION_S = 0.1
+_ACKNOWLEDGEMENTS = ("\r", "z\r", "Z\r")
+
+
+class SerialAdapterBus(slcanBus):
+    """`can.interfaces.slcan.slcanBus` that takes all bytes that came with one call and shares its port with nobody."""
+
+    def __init__(self, path: str, bit_rate: int) -> None:
+        """Open the adapter, and the channel on it.
+
+        Parameters
+        ----------
+        path : str
+            serial device
+        bit_rate : int
+            of the bus [bit/s]
+
+        Raises
+        ------
+        CanInitializationError
+            the port is missing, not permitted or taken; names the holder
+        """
+        holder = find_holder(path)
+        if holder is not None:
+            raise CanInitializationError(f"{holder} has it")
+        super().__init__(path, bitrate=bit_rate, sleep_after_open=0.0)
+        try:
+            self.serialPortOrig.exclusive = True
+        except OSError as error:
+            self.shutdown()
+            raise CanInitializationError(f"{find_holder(path) or 'another program'} has it") from error
+        self._await_adapter()
+        self.set_bitrate(bit_rate)
+
+    def _await_adapter(self) -> None:
+        """Until it tells its version: some restart when they are opened, and some never tell."""
+        deadline = time.monotonic() + RESTART_S
+        while time.monotonic() < deadline:
+            with contextlib.suppress(ValueError):
+                if self.get_version(_VERSION_S)[0] is not None:
+                    return
+
+    def _read(self, timeout: float | None) -> str | None:
+        """One line of the adapter, without waiting where one is there already."""
+        line = self._next_line()
+        if line is None:
+            port = self.serialPortOrig
+            waiting = port.in_waiting
+            if not waiting:
+                port.timeout = timeout
+                self._buffer.extend(port.read(1))
+                waiting = port.in_waiting
+            self._buffer.extend(port.read(waiting))
+            line = self._next_line()
+        return line
+
+    def _next_line(self) -> str | None:
+        """The first whole line that says something, taken out of the buffer; not what only acknowledges a command."""
+        while ends := [place for mark in (self._OK, self._ERROR) if (place := self._buffer.find(mark)) >= 0]:
+            end = min(ends) + 1
+            line = self._buffer[:end].decode("ascii", "replace")
+            del self._buffer[:end]
+            if line not in _ACKNOWLEDGEMENTS:
+                return line
+        return None

@@ -1,0 +1,284 @@
+"""Instructions and their answers on one bus, each with its error byte."""
+
+import struct
+import time
+from collections.abc import Mapping, Sequence
+
+from drivers.dynamixel import packets
+from drivers.dynamixel.control_table import Block, Item
+from drivers.dynamixel.packets import FrameParser, Status
+from drivers.dynamixel.port import BITS_PER_BYTE, SerialPort
+from drivers.dynamixel.turns import Turns
+from drivers.errors import DriverError, DriverErrorKind
+
+FACTORY_RETURN_DELAY_S = 500e-6
+"""Return Delay Time of a servo as delivered [s]."""
+
+ATTEMPTS = 3
+"""How often a single servo is asked outside the control loop."""
+
+PATIENCE_S = 0.02
+"""How much longer a single servo is waited for there [s]."""
+
+_LATEST_ANSWER_NS = 100_000_000
+_AFTERTHOUGHT_NS = 2_000_000
+_STATUS_BYTES = 11
+_PING_ANSWER_BYTES = 14
+_BROADCAST_PING_SLOT_S = 0.003
+_FAST_BYTES = 8
+_FAST_SERVO_BYTES = 4
+
+
+class ServoBus:
+    """Speaks to the servos of one port; one thread's own."""
+
+    def __init__(self, port: SerialPort) -> None:
+        """Use a port, open or not yet.
+
+        Parameters
+        ----------
+        port : SerialPort
+            that this process owns
+        """
+        self.port = port
+        self.return_delay_s = FACTORY_RETURN_DELAY_S
+        self.discarded_bytes = 0
+        self._missed_ns: dict[int, int] = {}
+
+    def ping(self, servo: int) -> tuple[int, int] | None:
+        """Model number and firmware of a servo; None where it does not answer.
+
+        Parameters
+        ----------
+        servo : int
+            ID
+        """
+        for _ in range(ATTEMPTS):
+            answer = self._ask(servo, packets.encode_ping(servo), 3, PATIENCE_S)
+            if answer is not None and len(answer.data) == 3:
+                return struct.unpack("<HB", answer.data)
+        return None
+
+    def ping_all(self) -> dict[int, tuple[int, int]]:
+        """Model number and firmware of every servo that answers a ping to all, by ID."""
+        slots = packets.HIGHEST_ID + 1
+        self.port.send(packets.encode_ping())
+        deadline = self.port.reply_deadline_ns(_PING_ANSWER_BYTES * slots, slots * _BROADCAST_PING_SLOT_S)
+        parser = FrameParser()
+        found: dict[int, tuple[int, int]] = {}
+        while received := self.port.receive(deadline):
+            for frame in parser.feed(received):
+                status = packets.decode_status(frame)
+                if status is not None and len(status.data) == 3:
+                    found[status.servo] = struct.unpack("<HB", status.data)
+        return dict(sorted(found.items()))
+
+    def read_once(self, servo: int, address: int, length: int, patience_s: float = 0.0) -> Status | None:
+        """A stretch of a control table, asked for once; None where no whole answer came.
+
+        Parameters
+        ----------
+        servo : int
+            ID
+        address : int
+            of the first byte
+        length : int
+            number of bytes
+        patience_s : float
+            how much longer to wait than in the control loop [s]
+        """
+        return self._ask(servo, packets.encode_read(servo, address, length), length, patience_s)
+
+    def read_block(self, servo: int, block: Block) -> dict[str, int]:
+        """Values of a block by their names.
+
+        Parameters
+        ----------
+        servo : int
+            ID
+        block : Block
+            what to read
+
+        Raises
+        ------
+        DriverError
+            ``cannot-connect``: the servo does not answer; ``refused``: it has no such block
+        """
+        answer = None
+        for _ in range(ATTEMPTS):
+            answer = self.read_once(servo, block.address, block.length, PATIENCE_S)
+            if answer is not None and not answer.refusal and len(answer.data) == block.length:
+                return block.decode(answer.data)
+        raise _failure(servo, f"{block.items[0].name} cannot be read", answer)
+
+    def read(self, servo: int, item: Item) -> int:
+        """Value of an item.
+
+        Parameters
+        ----------
+        servo : int
+            ID
+        item : Item
+            what to read
+
+        Raises
+        ------
+        DriverError
+            ``cannot-connect``: the servo does not answer; ``refused``: it has no such item
+        """
+        return self.read_block(servo, Block(item.address, item.size, (item,)))[item.name]
+
+    def write(self, servo: int, item: Item, value: int) -> None:
+        """Write an item and read it back.
+
+        Parameters
+        ----------
+        servo : int
+            ID
+        item : Item
+            what to write
+        value : int
+            that fits it
+
+        Raises
+        ------
+        DriverError
+            ``cannot-connect``: the servo does not answer; ``refused``: it does not take the value
+        """
+        answer = None
+        for _ in range(ATTEMPTS):
+            request = packets.encode_write(servo, item.address, item.encode(value))
+            answer = self._ask(servo, request, 0, PATIENCE_S)
+            if answer is not None and answer.refusal:
+                raise _failure(servo, f"{item.name} = {value} is refused", answer)
+            # A write whose answer was lost may have arrived: what counts is what the servo holds now.
+            if self.read(servo, item) == value:
+                return
+        raise DriverError(
+            DriverErrorKind.REFUSED, f"servo {servo}: {item.name} was written as {value} and reads otherwise; check it"
+        )
+
+    def sync_write(self, item: Item, values: Mapping[int, int]) -> None:
+        """Write an item of many servos at once; no servo answers.
+
+        Parameters
+        ----------
+        item : Item
+            what to write
+        values : mapping of int to int
+            value for each ID
+        """
+        self.port.send(
+            packets.encode_sync_write({servo: item.encode(value) for servo, value in values.items()}, item.address)
+        )
+
+    def sync_read(
+        self, servos: Sequence[int], block: Block, *, fast: bool = False, patience_s: float = 0.0
+    ) -> tuple[int, dict[int, Status]]:
+        """Read the same block of many servos.
+
+        Parameters
+        ----------
+        servos : sequence of int
+            IDs
+        block : Block
+            what to read
+        fast : bool
+            ask for one packet for all
+        patience_s : float
+            how much longer to wait than in the control loop [s]
+
+        Returns
+        -------
+        int
+            instant at which the instruction had left [ns, monotonic]
+        dict of int to Status
+            whole answers by ID; a servo that did not answer is not in it
+        """
+        owed = self._owed(servos)
+        if owed:
+            self.port.drain()
+        request = packets.encode_sync_read(servos, block.address, block.length, fast=fast)
+        # Taken before: who is woken by the bytes may run before this process does again.
+        asked_ns = time.monotonic_ns() + round(len(request) * BITS_PER_BYTE * 1e9 / self.port.baudrate)
+        self.port.send(request)
+        receive = self._receive_fast if fast else self._receive_each
+        waits_s = len(servos) * self.return_delay_s + patience_s
+        found = receive(servos, block.length, len(request), waits_s, owed)
+        now_ns = time.monotonic_ns()
+        self._missed_ns |= {servo: now_ns for servo in servos if servo not in found}
+        return asked_ns, found
+
+    def _owed(self, servos: Sequence[int]) -> set[int]:
+        """Servos whose answer to an earlier question may still be under way."""
+        since_ns = time.monotonic_ns() - _LATEST_ANSWER_NS
+        return {servo for servo in servos if self._missed_ns.get(servo, 0) > since_ns}
+
+    def _receive_each(
+        self, servos: Sequence[int], length: int, sent: int, waits_s: float, owed: set[int]
+    ) -> dict[int, Status]:
+        """One status packet of each servo, in their order; where answers are owed, also what comes after the last."""
+        answer_bytes = _STATUS_BYTES + length
+        deadline = self.port.reply_deadline_ns(sent + len(servos) * answer_bytes, waits_s)
+        # Stuffing lengthens an answer by a third at most.
+        parser = FrameParser(longest=answer_bytes + length // 3 + 1)
+        turns = Turns(servos, owed)
+        while received := self.port.receive(deadline):
+            for frame in parser.feed(received):
+                status = packets.decode_status(frame)
+                if status is not None and len(status.data) == length and not status.refusal:
+                    turns.take(status)
+            if turns.complete:
+                if not owed:
+                    break
+                deadline = min(deadline, time.monotonic_ns() + _AFTERTHOUGHT_NS)
+        self.discarded_bytes += parser.discarded
+        return turns.answers
+
+    def _receive_fast(
+        self, servos: Sequence[int], length: int, sent: int, waits_s: float, owed: set[int]
+    ) -> dict[int, Status]:
+        """One packet of all servos, or what is whole of one that breaks off; none where there are two that differ."""
+        answer_bytes = _FAST_BYTES + len(servos) * (length + _FAST_SERVO_BYTES)
+        deadline = self.port.reply_deadline_ns(sent + answer_bytes, waits_s)
+        parser = FrameParser(longest=answer_bytes)
+        packets_found: list[list[Status]] = []
+        while received := self.port.receive(deadline):
+            decoded = [packets.decode_fast(frame, servos, length) for frame in parser.feed(received)]
+            packets_found += [statuses for statuses in decoded if statuses and statuses not in packets_found]
+            if packets_found:
+                if not owed:
+                    break
+                deadline = min(deadline, time.monotonic_ns() + _AFTERTHOUGHT_NS)
+        self.discarded_bytes += parser.discarded
+        if not packets_found:
+            packets_found = [packets.decode_fast(parser.pending, servos, length)]
+        return {status.servo: status for status in packets_found[0]} if len(packets_found) == 1 else {}
+
+    def _ask(self, servo: int, request: bytes, length: int, patience_s: float) -> Status | None:
+        """Send an instruction to one servo and wait for its answer."""
+        if self._owed([servo]):
+            self.port.drain()
+        self.port.send(request)
+        delay_s = self.return_delay_s + patience_s
+        deadline = self.port.reply_deadline_ns(len(request) + _STATUS_BYTES + length, delay_s)
+        parser = FrameParser()
+        while received := self.port.receive(deadline):
+            for frame in parser.feed(received):
+                status = packets.decode_status(frame)
+                if status is not None and status.servo == servo and (len(status.data) == length or status.refusal):
+                    return status
+        self.discarded_bytes += parser.discarded
+        self._missed_ns[servo] = time.monotonic_ns()
+        return None
+
+
+def _failure(servo: int, what: str, answer: Status | None) -> DriverError:
+    """Error of an instruction that was not carried out."""
+    if answer is None:
+        return DriverError(
+            DriverErrorKind.CANNOT_CONNECT,
+            f"servo {servo} does not answer ({what}); check its power, cable, ID and baud rate",
+        )
+    reason = packets.describe_refusal(answer.refusal)
+    return DriverError(DriverErrorKind.REFUSED, f"servo {servo}: {what}: {reason}; check the servo with its wizard")

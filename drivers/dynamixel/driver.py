@@ -1,0 +1,344 @@
+"""An arm of Dynamixel servos as a backend: the order of calls, and what a cycle is made of."""
+
+import contextlib
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.backend import Capabilities, ControlMode, DriveLimits, StopPolicy
+from drivers.clock import MonotonicClock
+from drivers.dynamixel.bounds import Bounds, goals_of
+from drivers.dynamixel.bus import ServoBus
+from drivers.dynamixel.bus_budget import BusTiming, CycleTraffic, largest_rate_hz, require_rate
+from drivers.dynamixel.configuration import DynamixelJoint, read_configuration
+from drivers.dynamixel.enabling import enable_servos
+from drivers.dynamixel.faults import lost_bus_fault, silent_servo_fault
+from drivers.dynamixel.group import GroupReading
+from drivers.dynamixel.models import WATCHDOG_MOST, WATCHDOG_STEP_S
+from drivers.dynamixel.port import LEAST_LATENCY_S, SerialPort, read_latency_timer_ms
+from drivers.dynamixel.preparation import commissioning_writes
+from drivers.dynamixel.runaway import RunawayWatch
+from drivers.dynamixel.session import SHORTEST_RETURN_DELAY_S, Session, open_session
+from drivers.dynamixel.stopping import clear_watchdogs, stop_servos
+from drivers.errors import DriverError, DriverErrorKind, Fault
+from drivers.state import ArmState, Setpoint
+
+Array = NDArray[np.float64]
+
+_POLICIES = {
+    ControlMode.POSITION: frozenset([StopPolicy.HOLD]),
+    ControlMode.TORQUE: frozenset([StopPolicy.TORQUE_OFF]),
+}
+"""What the servos do by themselves when their watchdog fires."""
+
+_SUSPECT_SILENCE = 0.8
+"""Part of the watchdog's time after which a cycle asks all servos whether theirs has fired."""
+
+
+class DynamixelArm:
+    """Implements `drivers.Backend` for servos of the X, MX(2.0), P, PRO(A) and Y series.
+
+    Positions are tracked under a cap of current (mode 5; mode 3 on P and Y); torque is commanded as current (mode 0).
+    When a servo's watchdog fires it holds its place in the first and exerts no torque in the second, which is why
+    `StopPolicy.HOLD` goes with positions and `StopPolicy.TORQUE_OFF` with torque. Servos that are given current keep no
+    limit of position or speed: the driver does, and catches the arm by holding it. Effort is motor current.
+    """
+
+    def __init__(self, joints: Sequence[DynamixelJoint], *, slack_s: float = 0.002) -> None:
+        """Nothing is opened yet.
+
+        Parameters
+        ----------
+        joints : sequence of DynamixelJoint
+            base first
+        slack_s : float
+            how much longer than the bus takes an answer is waited for [s]
+
+        Raises
+        ------
+        DriverError
+            ``refused``: a ``drive`` block is not valid
+        """
+        self._configuration = read_configuration(joints)
+        self._clock = MonotonicClock()
+        self._port = SerialPort(self._configuration.port, self._configuration.baud, slack_s)
+        self._session: Session | None = None
+        self._mode: ControlMode | None = None
+        self._policy = StopPolicy.HOLD
+        self._bounds: Bounds | None = None
+        self._watch: RunawayWatch | None = None
+        self._watchdog_s = 0.0
+        self._last_exchange_ns = 0
+        self._last_goals: list[int | None] | None = None
+        self._lost: tuple[Fault, ...] = ()
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """What these servos can do; the rate is exact once they are reached."""
+        knows_torque = all(servo.torque_per_milliampere is not None for servo in self._configuration.servos)
+        traffic, timing = self._budget()
+        return Capabilities(
+            joint_count=len(self._configuration.servos),
+            modes=frozenset(ControlMode) if knows_torque else frozenset([ControlMode.POSITION]),
+            stop_policies=frozenset().union(*_POLICIES.values()),
+            largest_rate_hz=largest_rate_hz(traffic, timing),
+            watchdog_range_s=(WATCHDOG_STEP_S, WATCHDOG_MOST * WATCHDOG_STEP_S),
+            takes_feed_forward=False,
+            effort_unit="mA",
+            policies_by_mode=_POLICIES,
+            holds_before_torque=False,
+        )
+
+    @property
+    def clock(self) -> MonotonicClock:
+        """The machine's monotonic clock."""
+        return self._clock
+
+    def require_rate(self, rate_hz: float) -> None:
+        """Refuse a rate that the bus does not carry.
+
+        Parameters
+        ----------
+        rate_hz : float
+            wanted cycles a second [Hz]
+
+        Raises
+        ------
+        DriverError
+            ``refused``: names what limits it
+        """
+        require_rate(rate_hz, *self._budget())
+
+    def connect(self) -> ArmState:
+        """Lock the port and reach every servo; moves nothing and switches no torque on.
+
+        Raises
+        ------
+        DriverError
+            ``cannot-connect``: connected already, the port is taken or missing, a servo is missing or of the wrong kind
+        """
+        if self._session is not None:
+            raise DriverError(DriverErrorKind.CANNOT_CONNECT, "the arm is connected already; disconnect it first")
+        self._lost = ()
+        self._port.open()
+        try:
+            self._session = open_session(ServoBus(self._port), self._configuration.servos)
+        except DriverError as error:
+            self._port.close()
+            raise DriverError(DriverErrorKind.CANNOT_CONNECT, str(error), error.faults) from error
+        return self._observe(self._session)
+
+    def acknowledge_faults(self) -> ArmState:
+        """Clear watchdogs that have fired; an arm that is still enabled is stopped by its policy first.
+
+        A hardware error (overload, heat …) stays until the servo was switched off and on: it is never restarted from
+        here, for a restart lets go of the joint.
+
+        Raises
+        ------
+        DriverError
+            ``not-connected``, or ``fault`` where a fault stays
+        """
+        session = self._reached()
+        with self._watching_the_port():
+            if self._mode is not None:
+                self.stop(self._policy)
+            session.health.forget()
+            session.read_health()
+            clear_watchdogs(session)
+            for joint, servo in enumerate(session.servos):
+                session.settings[joint] |= session.read(joint, ["Status Return Level"])
+                holds = bool(session.health.has_torque[joint])
+                session.carry_out(joint, commissioning_writes(servo, session.settings[joint], holds=holds))
+            session.read_health()
+        faults = session.health.faults
+        if faults:
+            raise DriverError(DriverErrorKind.FAULT, f"{faults[0]}", faults)
+        return self._observe(session, session.health.temperature.copy())
+
+    def enable(self, mode: ControlMode, limits: DriveLimits, stop_policy: StopPolicy, watchdog_s: float) -> ArmState:
+        """Take the arm under power where it stands.
+
+        Parameters
+        ----------
+        mode : ControlMode
+            who closes the loop
+        limits : DriveLimits
+            position and current are kept to by the driver and, as cap of current and largest speed, by the servos
+        stop_policy : StopPolicy
+            what the servos do when their watchdog fires: `HOLD` in position mode, `TORQUE_OFF` in torque mode
+        watchdog_s : float
+            time without `exchange` after which they do; rounded down to 20 ms [s]
+
+        Raises
+        ------
+        DriverError
+            ``not-connected``, ``refused`` or ``fault``
+        """
+        session = self._reached()
+        self._require_possible(mode, stop_policy)
+        with self._watching_the_port():
+            session.read_health()
+            if faults := session.health.faults:
+                raise DriverError(DriverErrorKind.FAULT, f"{faults[0]}", faults)
+            self._bounds = enable_servos(session, mode, limits, watchdog_s)
+        session.health.expect_torque(True)
+        self._mode, self._policy, self._watchdog_s = mode, stop_policy, watchdog_s
+        self._watch = RunawayWatch(session.servos, limits) if mode is ControlMode.TORQUE else None
+        self._last_goals = None
+        self._last_exchange_ns = self._clock.now_ns()
+        return self._observe(session, session.health.temperature.copy())
+
+    def exchange(self, setpoint: Setpoint) -> ArmState:
+        """One cycle: Sync Write of the goals, Sync Read of all servos, health of one servo.
+
+        Parameters
+        ----------
+        setpoint : Setpoint
+            finite targets for every joint
+
+        Raises
+        ------
+        DriverError
+            ``not-enabled``, ``refused`` (nothing is sent), or ``lost``
+        """
+        session = self._reached()
+        if self._mode is None or self._bounds is None:
+            raise DriverError(DriverErrorKind.NOT_ENABLED, "the arm is not enabled; enable it first")
+        name, goals = goals_of(session.servos, self._mode, self._bounds, setpoint)
+        silence_s = (self._clock.now_ns() - self._last_exchange_ns) * 1e-9
+        with self._watching_the_port():
+            if session.health.runaway is None:
+                session.group.write(name, goals)
+            self._last_goals = goals if self._mode is ControlMode.POSITION else None
+            reading = session.group.read()
+            joint, values = session.group.read_health()
+            suspects = session.group.read_watchdogs() if silence_s > _SUSPECT_SILENCE * self._watchdog_s else {}
+            self._catch(session, reading)
+        self._last_exchange_ns = self._clock.now_ns()
+        for suspect, found in suspects.items():
+            session.health.take(suspect, found)
+        session.health.take(joint, values)
+        temperature = np.full(len(session.servos), np.nan)
+        temperature[joint] = values.get(session.servos[joint].model.temperature_item.name, np.nan)
+        return self._state(session, reading, temperature)
+
+    def stop(self, policy: StopPolicy) -> ArmState:
+        """Stop the arm; legal at any time. `DAMP` is carried out as `HOLD`: these servos cannot damp.
+
+        Parameters
+        ----------
+        policy : StopPolicy
+            how
+        """
+        self._mode = None
+        session = self._session
+        if session is None:
+            return self._blind()
+        caps = [values["Current Limit"] for values in session.settings]
+        if self._bounds is not None:
+            caps = list(self._bounds.current)
+        try:
+            with self._watching_the_port():
+                stop_servos(session, policy, caps, self._last_goals)
+                return self._observe(session)
+        except DriverError as error:
+            if self._session is None:
+                return self._blind()
+            return self._observe(session, None, silent_servo_fault(str(error)))
+
+    def disconnect(self) -> None:
+        """Let go of the port; an arm that is still enabled is stopped by its policy first."""
+        if self._mode is not None:
+            self.stop(self._policy)
+        self._session = None
+        self._port.close()
+
+    def _require_possible(self, mode: ControlMode, policy: StopPolicy) -> None:
+        """Refuse what servos cannot do by themselves when the host is gone."""
+        refused = DriverErrorKind.REFUSED
+        if self._mode is not None:
+            raise DriverError(refused, "the arm is enabled already; stop it first")
+        if mode not in self.capabilities.modes:
+            raise DriverError(
+                refused, "torque cannot be commanded as current without joints[].torque_constant; state it"
+            )
+        if policy not in _POLICIES[mode]:
+            (wanted,) = _POLICIES[mode]
+            raise DriverError(
+                refused,
+                f"in {mode} mode the servos' watchdog ends in {wanted}, not in {policy}; ask for {wanted}"
+                + ("" if mode is ControlMode.POSITION else ", or track positions"),
+            )
+
+    def _catch(self, session: Session, reading: GroupReading) -> None:
+        """Hold an arm that leaves its limits while it is given current: its servos would let it."""
+        if self._watch is None or self._bounds is None or session.health.runaway is not None:
+            return
+        session.health.runaway = self._watch.look(reading.position, reading.velocity)
+        if session.health.runaway is not None:
+            stop_servos(session, StopPolicy.HOLD, self._bounds.current, None)
+
+    def _observe(self, session: Session, temperature: Array | None = None, *failures: Fault) -> ArmState:
+        """State without moving anything, and what failed before; temperatures where they were just read."""
+        with self._watching_the_port():
+            reading = session.group.read_patiently()
+        unknown = np.full(len(session.servos), np.nan)
+        state = self._state(session, reading, unknown if temperature is None else temperature)
+        return replace(state, faults=state.faults + failures)
+
+    def _state(self, session: Session, reading: GroupReading, temperature: Array) -> ArmState:
+        """State of a cycle."""
+        for joint, alert in enumerate(reading.alerts):
+            if alert is not None:
+                session.health.take_alert(joint, alert)
+        return ArmState(
+            time_ns=reading.time_ns,
+            position=reading.position,
+            velocity=reading.velocity,
+            effort=reading.current,
+            temperature=temperature,
+            enabled=session.enabled,
+            faults=session.health.faults,
+        )
+
+    def _blind(self) -> ArmState:
+        """State of an arm that cannot be seen."""
+        unknown = np.full(len(self._configuration.servos), np.nan)
+        enabled = np.zeros(unknown.size, dtype=np.bool_)
+        return ArmState(self._clock.now_ns(), unknown, unknown, unknown, unknown, enabled, self._lost)
+
+    def _reached(self) -> Session:
+        if self._session is None:
+            raise DriverError(DriverErrorKind.NOT_CONNECTED, "the servos are not reached; connect first")
+        return self._session
+
+    @contextlib.contextmanager
+    def _watching_the_port(self) -> Iterator[None]:
+        """Give the session up where the port is gone: what the arm does now is its servos' watchdogs' doing."""
+        try:
+            yield
+        except DriverError as error:
+            if error.kind is DriverErrorKind.LOST:
+                self._lost = (lost_bus_fault(str(error)),)
+                self._session, self._mode = None, None
+                self._port.close()
+                raise DriverError(error.kind, str(error), self._lost) from error
+            raise
+
+    def _budget(self) -> tuple[CycleTraffic, BusTiming]:
+        """Traffic and timing of a cycle; before the servos are reached, with what they will be set to."""
+        session = self._session
+        count = len(self._configuration.servos)
+        if session is None:
+            latency_ms = read_latency_timer_ms(self._configuration.port)
+            exists = os.path.exists(self._configuration.port)
+            latency_s = LEAST_LATENCY_S if latency_ms is None and exists else (latency_ms or 1) * 1e-3
+            return CycleTraffic(count), BusTiming(self._configuration.baud, SHORTEST_RETURN_DELAY_S, latency_s)
+        longest = max(block.length for servo in session.servos for block in servo.model.watched_blocks)
+        families = session.group.family_count
+        traffic = CycleTraffic(count, health_bytes=longest, fast=session.group.fast, families=families)
+        return traffic, BusTiming(self._port.baudrate, session.bus.return_delay_s, self._port.latency_s)

@@ -1,0 +1,137 @@
+"""The frames that a run would send, without a port."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.backend import ControlMode, DriveLimits
+from drivers.dynamixel import packets
+from drivers.dynamixel.bounds import Bounds, goals_of, require_sensible
+from drivers.dynamixel.configuration import DynamixelJoint, read_configuration
+from drivers.dynamixel.control_table import Block
+from drivers.dynamixel.group import health_turns, servo_families
+from drivers.dynamixel.preparation import (
+    SETTINGS,
+    ServoTask,
+    commissioning_writes,
+    current_cap,
+    enabling_writes,
+    watchdog_steps,
+)
+from drivers.dynamixel.servo import JointServo, make_servo
+from drivers.inspection import PlannedFrame
+from drivers.state import Setpoint
+
+_DELIVERED = {
+    **dict.fromkeys(SETTINGS, 0),
+    "Return Delay Time": 250,
+    "Operating Mode": 3,
+    "Status Return Level": 2,
+    "PWM Limit": 885,
+    "Current Limit": 0x7FFF,
+}
+"""Settings of a servo of the X series as delivered, but for a Current Limit that limits nothing."""
+
+
+def plan_frames(
+    joints: Sequence[DynamixelJoint],
+    mode: ControlMode,
+    limits: DriveLimits,
+    watchdog_s: float,
+    targets: NDArray[np.float64],
+) -> Iterator[PlannedFrame]:
+    """Frames of a connection, of enabling, of some cycles and of a stop, for servos as delivered.
+
+    What only the servos themselves know is missing or assumed: their own current and PWM limits are those of an X
+    series servo, a status packet is never lost, and every servo knows Fast Sync Read.
+
+    Parameters
+    ----------
+    joints : sequence of DynamixelJoint
+        base first; each ``drive`` block has to name its model
+    mode : ControlMode
+        who closes the loop; in torque mode the current is the host's loop's to say, and 0 is shown
+    limits : DriveLimits
+        of the joints
+    watchdog_s : float
+        time of silence after which the servos stop [s]
+    targets : (K, n) float64
+        positions of the first K cycles; the arm is supposed to stand at the first of them [rad or m]
+
+    Yields
+    ------
+    PlannedFrame
+        in the order of sending
+
+    Raises
+    ------
+    DriverError
+        ``refused``: a ``drive`` block, a limit or the watchdog's time is not possible
+    """
+    servos = [make_servo(number, servo, None) for number, servo in enumerate(read_configuration(joints).servos, 1)]
+    require_sensible(servos, limits)
+    tasks = [
+        ServoTask(
+            mode,
+            current_cap(servo, _DELIVERED, float(limits.torque[joint])),
+            servo.units.velocity_cap(float(limits.velocity[joint])),
+            servo.units.counts(float(targets[0, joint])),
+            watchdog_steps(watchdog_s),
+        )
+        for joint, servo in enumerate(servos)
+    ]
+    for servo in servos:
+        yield _frame("connect", f"{servo.label}: who are you?", packets.encode_ping(servo.servo))
+        for write in commissioning_writes(servo, _DELIVERED, holds=False):
+            yield _write(servo, "connect", write.item.name, write.value, write.reason)
+    for servo, task in zip(servos, tasks, strict=True):
+        for write in enabling_writes(servo, _DELIVERED, task, holds=False):
+            yield _write(servo, "enable", write.item.name, write.value, write.reason)
+    ends = [
+        servo.units.counts_within(float(limits.position_low[joint]), float(limits.position_high[joint]))
+        for joint, servo in enumerate(servos)
+    ]
+    lows, highs = zip(*ends, strict=True)
+    bounds = Bounds(lows, highs, tuple(task.current_cap for task in tasks))
+    turns = health_turns(servos)
+    for cycle, position in enumerate(targets):
+        name, goals = goals_of(servos, mode, bounds, Setpoint(position, np.zeros(len(servos))))
+        yield from _goals(servos, name, goals)
+        yield from _questions(servos, *turns[cycle % len(turns)])
+    for servo in servos:
+        if mode is ControlMode.TORQUE:
+            yield _write(servo, "stop", "Torque Enable", 0, "torque off")
+        yield _write(servo, "stop", "Bus Watchdog", 0, "stays so without cycles")
+
+
+def _goals(servos: Sequence[JointServo], name: str, goals: Sequence[int | None]) -> Iterator[PlannedFrame]:
+    """Goals of a cycle, one frame a family."""
+    for _, members in servo_families(servos):
+        item = servos[members[0]].model.items[name]
+        values = {servos[index].servo: value for index in members if (value := goals[index]) is not None}
+        told = ", ".join(f"{servo} := {value}" for servo, value in values.items())
+        encoded = {servo: item.encode(value) for servo, value in values.items()}
+        yield _frame("cycle", f"{name}: servo {told}", packets.encode_sync_write(encoded, item.address))
+
+
+def _questions(servos: Sequence[JointServo], turn: int, health: Block) -> Iterator[PlannedFrame]:
+    """Reads of a cycle: the state of all, then a piece of one servo's health."""
+    for block, members in servo_families(servos):
+        identifiers = [servos[index].servo for index in members]
+        asked = ", ".join(map(str, identifiers))
+        frame = packets.encode_sync_read(identifiers, block.address, block.length, fast=True)
+        yield _frame("cycle", f"servos {asked}: current, velocity, position?", frame)
+    names = ", ".join(item.name for item in health.items)
+    frame = packets.encode_read(servos[turn].servo, health.address, health.length)
+    yield _frame("cycle", f"{servos[turn].label}: {names}?", frame)
+
+
+def _write(servo: JointServo, phase: str, name: str, value: int, reason: str) -> PlannedFrame:
+    item = servo.model.items[name]
+    frame = packets.encode_write(servo.servo, item.address, item.encode(value))
+    return _frame(phase, f"{servo.label}: {name} := {value}, {reason}", frame)
+
+
+def _frame(phase: str, meaning: str, frame: bytes) -> PlannedFrame:
+    return PlannedFrame(phase, meaning, frame.hex(" ").upper())

@@ -1,0 +1,308 @@
+"""Frames of Dynamixel Protocol 2.0 as bytes: pure functions and one parser, no port.
+
+The library's own packet handler drops the error byte of group reads and stops at the first silent servo; here every
+status packet is kept with its error byte, and no input is refused with anything but silence.
+Source: ROBOTIS e-Manual, "Protocol 2.0".
+"""
+
+import struct
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+HEADER = b"\xff\xff\xfd\x00"
+BROADCAST_ID = 0xFE
+HIGHEST_ID = 252
+
+ALERT = 0x80
+"""Bit of the error byte: the servo has a hardware error."""
+
+LONGEST_FRAME = 1024
+"""Frames that say to be longer are noise [bytes]."""
+
+_PING, _READ, _WRITE, _STATUS = 0x01, 0x02, 0x03, 0x55
+_SYNC_READ, _SYNC_WRITE, _FAST_SYNC_READ = 0x82, 0x83, 0x8A
+_FIXED_BYTES = 7
+_SHORTEST_FRAME = 10
+_STUFFED, _PLAIN = b"\xff\xff\xfd\xfd", b"\xff\xff\xfd"
+
+
+@dataclass(frozen=True)
+class Status:
+    """A status packet.
+
+    servo : int
+        ID of the servo that sent it
+    error : int
+        error byte: `ALERT` and, below it, the number of an error of the instruction
+    data : bytes
+        its parameters
+    """
+
+    servo: int
+    error: int
+    data: bytes
+
+    @property
+    def alert(self) -> bool:
+        """Whether the servo has a hardware error."""
+        return bool(self.error & ALERT)
+
+    @property
+    def refusal(self) -> int:
+        """Number of the error that the instruction met; 0 for none."""
+        return self.error & ~ALERT & 0xFF
+
+
+def _crc_table() -> tuple[int, ...]:
+    """CRC-16 of the polynomial x¹⁶ + x¹⁵ + x² + 1, most significant bit first, for each byte."""
+    table = []
+    for byte in range(256):
+        crc = byte << 8
+        for _ in range(8):
+            crc = (crc << 1 ^ 0x8005 if crc & 0x8000 else crc << 1) & 0xFFFF
+        table.append(crc)
+    return tuple(table)
+
+
+_CRC = _crc_table()
+
+
+def checksum(data: bytes | bytearray | memoryview, crc: int = 0) -> int:
+    """CRC-16 (polynomial 0x8005, initial value 0) of a frame without its last two bytes.
+
+    Parameters
+    ----------
+    data : bytes
+        header to last parameter, stuffing included
+    crc : int
+        of what came before
+    """
+    for byte in data:
+        crc = (crc << 8 & 0xFFFF) ^ _CRC[crc >> 8 ^ byte]
+    return crc
+
+
+def encode_instruction(servo: int, instruction: int, parameters: bytes = b"") -> bytes:
+    """A frame: header, ID, length, instruction and parameters with stuffing, CRC.
+
+    Parameters
+    ----------
+    servo : int
+        ID that it is for
+    instruction : int
+        what to do
+    parameters : bytes
+        with what
+    """
+    body = (bytes([instruction]) + parameters).replace(_PLAIN, _STUFFED)
+    frame = HEADER + struct.pack("<BH", servo, len(body) + 2) + body
+    return frame + struct.pack("<H", checksum(frame))
+
+
+def encode_ping(servo: int = BROADCAST_ID) -> bytes:
+    """Ask who is there.
+
+    Parameters
+    ----------
+    servo : int
+        ID, or `BROADCAST_ID` for all
+    """
+    return encode_instruction(servo, _PING)
+
+
+def encode_read(servo: int, address: int, length: int) -> bytes:
+    """Read a stretch of a control table.
+
+    Parameters
+    ----------
+    servo : int
+        ID
+    address : int
+        of the first byte
+    length : int
+        number of bytes
+    """
+    return encode_instruction(servo, _READ, struct.pack("<HH", address, length))
+
+
+def encode_write(servo: int, address: int, data: bytes) -> bytes:
+    """Write a stretch of a control table.
+
+    Parameters
+    ----------
+    servo : int
+        ID
+    address : int
+        of the first byte
+    data : bytes
+        what to write
+    """
+    return encode_instruction(servo, _WRITE, struct.pack("<H", address) + data)
+
+
+def encode_sync_read(servos: Sequence[int], address: int, length: int, *, fast: bool = False) -> bytes:
+    """Read the same stretch of many servos.
+
+    Parameters
+    ----------
+    servos : sequence of int
+        IDs in the order in which they shall answer
+    address : int
+        of the first byte
+    length : int
+        bytes of each
+    fast : bool
+        one status packet for all, in place of one each
+    """
+    parameters = struct.pack("<HH", address, length) + bytes(servos)
+    return encode_instruction(BROADCAST_ID, _FAST_SYNC_READ if fast else _SYNC_READ, parameters)
+
+
+def encode_sync_write(values: Mapping[int, bytes], address: int) -> bytes:
+    """Write the same stretch of many servos at once; none of them answers.
+
+    Parameters
+    ----------
+    values : mapping of int to bytes
+        what to write to each ID, all of one length
+    address : int
+        of the first byte
+    """
+    length = len(next(iter(values.values())))
+    if any(len(data) != length for data in values.values()):
+        raise ValueError("a Sync Write carries the same number of bytes to every servo")
+    parameters = struct.pack("<HH", address, length)
+    return encode_instruction(
+        BROADCAST_ID, _SYNC_WRITE, parameters + b"".join(bytes([servo]) + data for servo, data in values.items())
+    )
+
+
+class FrameParser:
+    """Finds whole frames in what comes from a port, whatever it is.
+
+    Noise and damaged frames are passed over and counted in `discarded`.
+    """
+
+    def __init__(self, longest: int = LONGEST_FRAME) -> None:
+        """Begin with nothing.
+
+        Parameters
+        ----------
+        longest : int
+            longest frame that can be meant, so that a damaged length does not swallow what follows [bytes]
+        """
+        self.discarded = 0
+        self._longest = longest
+        self._buffer = bytearray()
+
+    def feed(self, received: bytes) -> Iterator[bytes]:
+        """Frames that are complete now and whose checksum is right, header included.
+
+        Parameters
+        ----------
+        received : bytes
+            what has come since
+        """
+        self._buffer += received
+        while (frame := self._next_frame()) is not None:
+            yield frame
+
+    @property
+    def pending(self) -> bytes:
+        """The frame that has begun and is not complete."""
+        return bytes(self._buffer)
+
+    def _next_frame(self) -> bytes | None:
+        """The next whole frame whose checksum is right."""
+        buffer = self._buffer
+        while True:
+            start = buffer.find(HEADER)
+            if start < 0:
+                self._discard(max(0, len(buffer) - len(HEADER) + 1))
+                return None
+            self._discard(start)
+            if len(buffer) < _FIXED_BYTES:
+                return None
+            end = _FIXED_BYTES + (buffer[5] | buffer[6] << 8)
+            if not _SHORTEST_FRAME <= end <= self._longest:
+                self._discard(1)
+            elif len(buffer) < end:
+                return None
+            elif checksum(buffer[: end - 2]) != buffer[end - 2] | buffer[end - 1] << 8:
+                self._discard(1)
+            else:
+                frame = bytes(buffer[:end])
+                del buffer[:end]
+                return frame
+
+    def _discard(self, count: int) -> None:
+        del self._buffer[:count]
+        self.discarded += count
+
+
+def decode_status(frame: bytes) -> Status | None:
+    """A frame as a status packet of one servo; None where it is something else, such as the echo of an instruction.
+
+    Parameters
+    ----------
+    frame : bytes
+        as `FrameParser` finds it
+    """
+    if len(frame) <= _SHORTEST_FRAME or frame[_FIXED_BYTES] != _STATUS or frame[4] > HIGHEST_ID:
+        return None
+    body = frame[_FIXED_BYTES:-2].replace(_STUFFED, _PLAIN)
+    return Status(frame[4], body[1], body[2:])
+
+
+def decode_fast(frame: bytes, servos: Sequence[int], length: int) -> list[Status]:
+    """Answers in a Fast Sync Read's packet, also in the beginning of one: those whose running checksum is right.
+
+    Each servo appends error, ID, data and the checksum of everything before it; there is no stuffing. A servo that
+    stays silent cuts the packet short, and those before it are still good.
+
+    Parameters
+    ----------
+    frame : bytes
+        from the header on
+    servos : sequence of int
+        IDs in the order in which they were asked
+    length : int
+        bytes of data of each
+    """
+    found: list[Status] = []
+    if not frame.startswith(HEADER + bytes([BROADCAST_ID])) or frame[_FIXED_BYTES : _FIXED_BYTES + 1] != b"\x55":
+        return found
+    crc, done = 0, 0
+    start = _FIXED_BYTES + 1
+    for servo in servos:
+        end = start + 2 + length
+        if len(frame) < end + 2:
+            break
+        crc = checksum(frame[done:end], crc)
+        if crc != frame[end] | frame[end + 1] << 8 or frame[start + 1] != servo:
+            break
+        found.append(Status(servo, frame[start], frame[start + 2 : end]))
+        crc, done, start = checksum(frame[end : end + 2], crc), end + 2, end + 2
+    return found
+
+
+def describe_refusal(number: int) -> str:
+    """What an error number of a status packet means.
+
+    Parameters
+    ----------
+    number : int
+        error byte without `ALERT`
+    """
+    return _REFUSALS.get(number, f"error {number}")
+
+
+_REFUSALS = {
+    0x01: "the instruction failed",
+    0x02: "the instruction is not known to the servo",
+    0x03: "the instruction arrived damaged",
+    0x04: "the value is outside its range",
+    0x05: "the data are shorter than the item",
+    0x06: "the value is beyond a limit that the servo is set to",
+    0x07: "the item cannot be written now (read-only, or torque is on)",
+}

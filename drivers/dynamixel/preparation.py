@@ -1,0 +1,238 @@
+"""Which registers are written before a servo is given torque, in which order, and why: plain data, no port."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from drivers.backend import ControlMode
+from drivers.dynamixel.control_table import Item
+from drivers.dynamixel.models import CURRENT_MODE, WATCHDOG_MOST, WATCHDOG_STEP_S
+from drivers.dynamixel.servo import JointServo
+from drivers.errors import DriverError, DriverErrorKind
+
+SETTINGS = (
+    "Return Delay Time",
+    "Drive Mode",
+    "Operating Mode",
+    "PWM Limit",
+    "Current Limit",
+    "Max Position Limit",
+    "Min Position Limit",
+    "Status Return Level",
+)
+"""Items that are read of each servo when it is reached."""
+
+_TIME_BASED_PROFILE = 0x04
+_TORQUE_ON_BY_GOAL = 0x08
+_ROUNDING = 1e-6
+
+
+@dataclass(frozen=True)
+class RegisterWrite:
+    """A value for an item of a servo.
+
+    item : Item
+        what is written
+    value : int
+        what it becomes
+    reason : str
+        why, in a few words
+    """
+
+    item: Item
+    value: int
+    reason: str
+
+
+@dataclass(frozen=True)
+class ServoTask:
+    """What a servo shall do once it has torque.
+
+    mode : ControlMode
+        who closes the loop
+    current_cap : int
+        most current [units]
+    velocity_cap : int
+        largest speed of its target while it tracks positions, 0 for none [units]
+    present : int
+        Present Position [counts]
+    watchdog_steps : int
+        Bus Watchdog
+    """
+
+    mode: ControlMode
+    current_cap: int
+    velocity_cap: int
+    present: int
+    watchdog_steps: int
+
+
+def operating_mode(servo: JointServo, mode: ControlMode) -> int:
+    """Operating Mode of a servo for a way of control.
+
+    Parameters
+    ----------
+    servo : JointServo
+        of which
+    mode : ControlMode
+        who closes the loop
+    """
+    return CURRENT_MODE if mode is ControlMode.TORQUE else servo.model.family.position_mode
+
+
+def drive_mode(servo: JointServo, present: int) -> int:
+    """Drive Mode without time-based profiles, and without torque that a goal switches on.
+
+    Parameters
+    ----------
+    servo : JointServo
+        of which
+    present : int
+        Drive Mode now
+    """
+    unwanted = _TIME_BASED_PROFILE | (_TORQUE_ON_BY_GOAL if servo.model.family.torque_on_by_goal else 0)
+    return present & ~unwanted
+
+
+def commissioning_writes(servo: JointServo, settings: Mapping[str, int], *, holds: bool) -> list[RegisterWrite]:
+    """What is written when a servo is reached; nothing that moves it, and EEPROM only where it differs.
+
+    Parameters
+    ----------
+    servo : JointServo
+        of which
+    settings : mapping of str to int
+        values of `SETTINGS`
+    holds : bool
+        whether it has torque: then its EEPROM is locked
+    """
+    wanted = [("Status Return Level", 2, "every instruction is answered")]
+    if not holds:
+        wanted.append(("Return Delay Time", 0, "no wait before an answer"))
+        wanted.append(
+            ("Drive Mode", drive_mode(servo, settings["Drive Mode"]), "no profiles by time, no torque by goals")
+        )
+    items = servo.model.items
+    return [RegisterWrite(items[name], value, why) for name, value, why in wanted if settings[name] != value]
+
+
+def enabling_writes(
+    servo: JointServo, settings: Mapping[str, int], task: ServoTask, *, holds: bool
+) -> list[RegisterWrite]:
+    """What is written to take a servo under power where it stands, in order.
+
+    Parameters
+    ----------
+    servo : JointServo
+        of which
+    settings : mapping of str to int
+        values of `SETTINGS`
+    task : ServoTask
+        what it shall do
+    holds : bool
+        whether it has torque already, in the right mode
+    """
+    items = servo.model.items
+    tracks = task.mode is ControlMode.POSITION
+    writes: list[RegisterWrite] = []
+
+    def write(name: str, value: int, reason: str) -> None:
+        writes.append(RegisterWrite(items[name], value, reason))
+
+    if tracks:
+        write("Goal Position", task.present, "stay where it is")
+    if not holds and settings["Operating Mode"] != (mode := operating_mode(servo, task.mode)):
+        write("Operating Mode", mode, "position under a cap of current" if tracks else "current")
+        if tracks:
+            write("Goal Position", task.present, "stay where it is, also after the change of mode")
+    write("Goal PWM", settings["PWM Limit"], "current is the cap, not voltage")
+    if tracks:
+        write("Profile Acceleration", 0, "follow each goal at once")
+        write("Profile Velocity", task.velocity_cap, "largest speed")
+    write("Goal Current", task.current_cap if tracks else 0, "cap of current" if tracks else "no current yet")
+    write("Bus Watchdog", task.watchdog_steps, f"stop after {task.watchdog_steps * WATCHDOG_STEP_S:g} s of silence")
+    if not holds:
+        write("Torque Enable", 1, "torque on")
+    return writes
+
+
+def watchdog_steps(watchdog_s: float) -> int:
+    """Bus Watchdog for a time, at most that time.
+
+    Parameters
+    ----------
+    watchdog_s : float
+        [s]
+
+    Raises
+    ------
+    DriverError
+        ``refused``: shorter or longer than the servos can
+    """
+    steps = math.floor(watchdog_s / WATCHDOG_STEP_S + _ROUNDING) if math.isfinite(watchdog_s) else 0
+    if not 1 <= steps <= WATCHDOG_MOST:
+        raise DriverError(
+            DriverErrorKind.REFUSED,
+            f"a watchdog of {watchdog_s:g} s is not possible; the servos take {WATCHDOG_STEP_S:g} s to "
+            f"{WATCHDOG_MOST * WATCHDOG_STEP_S:g} s",
+        )
+    return steps
+
+
+def current_cap(servo: JointServo, settings: Mapping[str, int], torque: float) -> int:
+    """Most current within a torque limit, the robot file's limit and the servo's own Current Limit [units].
+
+    Parameters
+    ----------
+    servo : JointServo
+        of which
+    settings : mapping of str to int
+        values of `SETTINGS`
+    torque : float
+        limit of the joint, infinite where there is none [Nm or N]
+
+    Raises
+    ------
+    DriverError
+        ``refused``: the limit cannot be turned into current, or leaves none
+    """
+    cap = settings["Current Limit"]
+    if servo.current_limit_ma is not None:
+        cap = min(cap, math.floor(servo.current_limit_ma / abs(servo.units.milliampere) + _ROUNDING))
+    if torque != math.inf:
+        if servo.units.torque_per_milliampere is not None:
+            cap = min(cap, servo.units.current_cap(torque))
+        elif servo.current_limit_ma is None:
+            raise DriverError(
+                DriverErrorKind.REFUSED,
+                f"{servo.label}: a torque limit of {torque:g} Nm is no current without a torque constant; state "
+                "torque_constant, or drive.current_limit_ma",
+            )
+    if cap <= 0:
+        raise DriverError(DriverErrorKind.REFUSED, f"{servo.label}: its limits leave no current at all; raise them")
+    return cap
+
+
+def position_counts(
+    servo: JointServo, settings: Mapping[str, int], low: float, high: float, mode: ControlMode
+) -> tuple[int, int]:
+    """Lowest and highest Goal Position within the joint's limits, and the servo's own where it applies them.
+
+    Parameters
+    ----------
+    servo : JointServo
+        of which
+    settings : mapping of str to int
+        values of `SETTINGS`
+    low, high : float
+        limits of the joint, infinite where there are none [rad or m]
+    mode : ControlMode
+        who closes the loop
+    """
+    lowest, highest = servo.units.counts_within(low, high)
+    if mode is ControlMode.POSITION and servo.model.family.position_mode not in _MULTI_TURN_MODES:
+        return max(lowest, settings["Min Position Limit"]), min(highest, settings["Max Position Limit"])
+    return lowest, highest
+
+
+_MULTI_TURN_MODES = (4, 5)

@@ -1,0 +1,85 @@
+"""What can be said of a bus without moving anything on it: findings, devices, and the frames that would be sent."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Severity(StrEnum):
+    """How much a finding matters."""
+
+    GOOD = "good"
+    WARNING = "warning"
+    FAILURE = "failure"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was looked at.
+
+    severity : Severity
+        how much it matters: a failure keeps the arm from running
+    subject : str
+        the port, or the joint with its drive
+    detail : str
+        what was found, in one line
+    remedy : str
+        what the user does next, in one line; empty where nothing is to be done
+    """
+
+    severity: Severity
+    subject: str
+    detail: str
+    remedy: str = ""
+
+
+@dataclass(frozen=True)
+class FoundDevice:
+    """A device that answered on a bus.
+
+    address : int
+        servo ID or node ID
+    bit_rate : int
+        at which it answered [bit/s]
+    model : str
+        as printed on its case, or what it says of itself
+    firmware : str
+        version, as it says; empty where it says none
+    """
+
+    address: int
+    bit_rate: int
+    model: str
+    firmware: str = ""
+
+
+@dataclass(frozen=True)
+class PlannedFrame:
+    """A frame that would be sent.
+
+    phase : str
+        ``connect``, ``enable``, ``cycle`` or ``stop``
+    meaning : str
+        in one line
+    wire : str
+        as the bus's own tools write it: bytes in hexadecimal on a serial bus, ``201#0F00`` on CAN
+    """
+
+    phase: str
+    meaning: str
+    wire: str
+
+
+PHASES = ("connect", "enable", "cycle", "stop")
+"""In the order in which a run goes through them."""
+
+
+def split_remedy(message: str) -> tuple[str, str]:
+    """Detail and remedy of a driver's message: what follows the last semicolon is what to do.
+
+    Parameters
+    ----------
+    message : str
+        of a `drivers.DriverError`
+    """
+    detail, _, remedy = message.rpartition("; ")
+    return (detail, remedy) if detail else (message, "see the message")

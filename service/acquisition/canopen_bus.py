@@ -1,0 +1,134 @@
+"""The bus of CiA 402 drives on CANopen, from a robot file."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from drivers import Backend
+from drivers.inspection import Finding, FoundDevice, PlannedFrame
+from service.acquisition.field_bus import FrameRequest, drivers_words
+from service.errors import AcquisitionError
+from service.robot import Robot
+from service.robot.messages import nearest, shown
+
+if TYPE_CHECKING:
+    from drivers.canopen import DriveJoint
+
+_SETTINGS = ("interface", "channel", "patience_s")
+_LONGEST_PATIENCE_S = 1.0
+_PATIENCE_S = 0.002
+
+
+class CanopenBus:
+    """Implements `FieldBus`; the libraries behind it are imported when they are used."""
+
+    name = "canopen"
+
+    def is_meant(self, robot: Robot) -> bool:
+        """Whether a joint's ``drive`` block has a ``node_id``.
+
+        Parameters
+        ----------
+        robot : Robot
+            the arm
+        """
+        return any("node_id" in (joint.drive or {}) for joint in robot.joints)
+
+    def backend(self, robot: Robot, settings: Mapping[str, Any], folder: Path | None) -> Backend:
+        """The arm, not connected yet.
+
+        Parameters
+        ----------
+        robot : Robot
+            with a ``drive`` block on every joint
+        settings : mapping
+            ``interface`` and ``channel`` in place of the robot file's, and ``patience_s``: how much longer than the bus
+            takes an answer is waited for
+        folder : Path or None
+            not needed
+        """
+        del folder
+        from drivers.canopen import CanopenArm
+
+        for key in settings:
+            if key not in _SETTINGS:
+                raise AcquisitionError(f"backend canopen: unknown setting {shown(key)}; {nearest(key, _SETTINGS)}")
+        patience_s = settings.get("patience_s", _PATIENCE_S)
+        if isinstance(patience_s, bool) or not isinstance(patience_s, int | float):
+            patience_s = -1.0
+        if not 0.0 < patience_s <= _LONGEST_PATIENCE_S:
+            raise AcquisitionError(
+                f"backend canopen: patience_s is {shown(settings['patience_s'])}; give seconds up to 1"
+            )
+        changes = {key: settings[key] for key in ("interface", "channel") if key in settings}
+        with drivers_words():
+            return CanopenArm(_joints(robot, changes), patience_s=patience_s)
+
+    def adapters(self) -> list[Finding]:
+        """CAN interfaces of this machine."""
+        from drivers.canopen import can_interfaces
+
+        return can_interfaces()
+
+    def examine(self, robot: Robot) -> list[Finding]:
+        """Bus, and every drive that the robot file names.
+
+        Parameters
+        ----------
+        robot : Robot
+            with a ``drive`` block on every joint
+        """
+        from drivers.canopen import examine
+
+        with drivers_words():
+            return examine(_joints(robot))
+
+    def scan(self, port: str, bit_rates: Sequence[int] | None) -> Iterator[FoundDevice]:
+        """Nodes that answer when they are asked for their device type.
+
+        Parameters
+        ----------
+        port : str
+            ``INTERFACE:CHANNEL`` as python-can names them, such as ``socketcan:can0``
+        bit_rates : sequence of int or None
+            to try [bit/s]; the usual ones where None
+        """
+        from drivers.canopen import scan_bus
+
+        interface, separator, channel = port.partition(":")
+        if not separator or not interface or not channel:
+            raise AcquisitionError(f"{shown(port)} names no CAN bus; write INTERFACE:CHANNEL, as in socketcan:can0")
+        with drivers_words():
+            yield from scan_bus(interface, channel, bit_rates)
+
+    def planned_frames(self, robot: Robot, request: FrameRequest) -> Iterator[PlannedFrame]:
+        """The frames of a run, without a bus.
+
+        Parameters
+        ----------
+        robot : Robot
+            with a ``drive`` block on every joint, which states the drive's rated torque
+        request : FrameRequest
+            which run
+        """
+        from drivers.canopen import plan_frames
+
+        with drivers_words():
+            yield from plan_frames(_joints(robot), request.mode, request.limits, request.watchdog_s, request.targets)
+
+
+def _joints(robot: Robot, changes: Mapping[str, Any] | None = None) -> list["DriveJoint"]:
+    """The joints as the driver sees them."""
+    from drivers.canopen import DriveJoint
+
+    joints: list[DriveJoint] = []
+    for joint in robot.joints:
+        if joint.drive is None:
+            raise AcquisitionError(
+                f"{robot.name}: {joint.name} has no drive block; state its drive, as in drive: {{node_id: 1, ...}}"
+            )
+        joints.append(DriveJoint(joint.name, joint.gear_ratio or 1.0, joint.drive))
+    if changes:
+        joints[0] = replace(joints[0], drive={**joints[0].drive, **changes})
+    return joints

@@ -1,0 +1,134 @@
+"""The bus of Dynamixel servos, from a robot file."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from drivers import Backend
+from drivers.inspection import Finding, FoundDevice, PlannedFrame
+from service.acquisition.field_bus import FrameRequest, drivers_words
+from service.errors import AcquisitionError
+from service.robot import Robot
+from service.robot.messages import nearest, shown
+
+if TYPE_CHECKING:
+    from drivers.dynamixel import DynamixelJoint
+
+UNSTATED_CONSTANT = 1.0
+"""A robot file that states no torque constant reads so; no servo gives a newton metre for a milliampere."""
+
+_SETTINGS = ("port", "patience_s")
+_LONGEST_PATIENCE_S = 1.0
+_PATIENCE_S = 0.002
+
+
+class DynamixelBus:
+    """Implements `FieldBus`; the library behind it is imported when it is used."""
+
+    name = "dynamixel"
+
+    def is_meant(self, robot: Robot) -> bool:
+        """Whether a joint's ``drive`` block has a servo's ``id``.
+
+        Parameters
+        ----------
+        robot : Robot
+            the arm
+        """
+        return any("id" in (joint.drive or {}) for joint in robot.joints)
+
+    def backend(self, robot: Robot, settings: Mapping[str, Any], folder: Path | None) -> Backend:
+        """The arm, not connected yet.
+
+        Parameters
+        ----------
+        robot : Robot
+            with a ``drive`` block on every joint
+        settings : mapping
+            ``port`` in place of the robot file's, and ``patience_s``: how much longer than the bus takes an answer is
+            waited for
+        folder : Path or None
+            not needed
+        """
+        del folder
+        from drivers.dynamixel import DynamixelArm
+
+        for key in settings:
+            if key not in _SETTINGS:
+                raise AcquisitionError(f"backend dynamixel: unknown setting {shown(key)}; {nearest(key, _SETTINGS)}")
+        patience_s = settings.get("patience_s", _PATIENCE_S)
+        if isinstance(patience_s, bool) or not isinstance(patience_s, int | float):
+            patience_s = -1.0
+        if not 0.0 < patience_s <= _LONGEST_PATIENCE_S:
+            raise AcquisitionError(
+                f"backend dynamixel: patience_s is {shown(settings['patience_s'])}; give seconds up to 1"
+            )
+        with drivers_words():
+            return DynamixelArm(_joints(robot, settings.get("port")), slack_s=patience_s)
+
+    def adapters(self) -> list[Finding]:
+        """Serial ports of this machine."""
+        from drivers.dynamixel import serial_adapters
+
+        return serial_adapters()
+
+    def examine(self, robot: Robot) -> list[Finding]:
+        """Port, and every servo that the robot file names.
+
+        Parameters
+        ----------
+        robot : Robot
+            with a ``drive`` block on every joint
+        """
+        from drivers.dynamixel import examine
+
+        with drivers_words():
+            return examine(_joints(robot))
+
+    def scan(self, port: str, bit_rates: Sequence[int] | None) -> Iterator[FoundDevice]:
+        """Servos that answer a ping to all.
+
+        Parameters
+        ----------
+        port : str
+            serial device
+        bit_rates : sequence of int or None
+            baud rates to try [bit/s]; all that servos can be set to where None
+        """
+        from drivers.dynamixel import USUAL_BAUDS, scan_bus
+
+        with drivers_words():
+            yield from scan_bus(port, USUAL_BAUDS if bit_rates is None else bit_rates)
+
+    def planned_frames(self, robot: Robot, request: FrameRequest) -> Iterator[PlannedFrame]:
+        """The frames of a run, without a port.
+
+        Parameters
+        ----------
+        robot : Robot
+            with a ``drive`` block on every joint, which names the servo's model
+        request : FrameRequest
+            which run
+        """
+        from drivers.dynamixel import plan_frames
+
+        with drivers_words():
+            yield from plan_frames(_joints(robot), request.mode, request.limits, request.watchdog_s, request.targets)
+
+
+def _joints(robot: Robot, port: Any = None) -> list["DynamixelJoint"]:
+    """The joints as the driver sees them."""
+    from drivers.dynamixel import DynamixelJoint
+
+    joints: list[DynamixelJoint] = []
+    for joint in robot.joints:
+        if joint.drive is None:
+            raise AcquisitionError(
+                f"{robot.name}: {joint.name} has no drive block; state its servo, as in drive: {{id: 1}}"
+            )
+        constant = None if joint.torque_constant == UNSTATED_CONSTANT else joint.sign * joint.torque_constant
+        joints.append(DynamixelJoint(joint.name, joint.drive, constant))
+    if port is not None:
+        joints[0] = replace(joints[0], drive={**joints[0].drive, "port": port})
+    return joints

@@ -1,0 +1,148 @@
+"""The arm behind emulated drives: what each drive demands becomes torque, and what the arm does, a measurement."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from service.robot import Robot
+from sim_backend.canopen_bus.axis import AxisDemand, AxisMeasurement, AxisMode
+from sim_backend.canopen_bus.drive import EmulatedDrive
+from sim_backend.device.inertia import InertiaSchedule
+from sim_backend.device.servo import Servo
+from sim_backend.device.target import Target
+from sim_backend.scenario import Scenario
+
+Array = NDArray[np.float64]
+
+ACCELERATION = 40.0
+"""With which a joint catches up with targets that leapt [rad/s² or m/s²]."""
+
+TRACKING = (AxisMode.POSITION, AxisMode.HOLDING)
+"""What is done by tracking a target: the master's, or the place where the joint comes to rest."""
+
+
+class DrivenArm:
+    """Moves an arm by the demands of its drives, a period of their loops at a time.
+
+    In cyclic synchronous position mode a drive interpolates between the targets of two SYNCs, as CiA 402 asks; while it
+    holds, or where targets stay away, it brakes on a ramp and stays where it came to rest. The arm stands on a stand
+    until all its drives have had power once.
+    """
+
+    def __init__(
+        self, drives: Sequence[EmulatedDrive], robot: Robot, scenario: Scenario, position: ArrayLike, period_s: float
+    ) -> None:
+        """Everything at rest.
+
+        Parameters
+        ----------
+        drives : sequence of EmulatedDrive
+            one a joint
+        robot : Robot
+            the arm; its model block has to hold the links
+        scenario : Scenario
+            what is concealed in it
+        position : (n,) float64
+            where it stands [rad or m]
+        period_s : float
+            of the drives' loops [s]
+        """
+        count = robot.joint_count
+        self.torque = np.zeros(count)
+        self.stands_on_stand = True
+        self.encoder_offset = np.zeros(count)
+        self._plant = scenario.plant(robot)
+        self._plant.place(position)
+        self._servo = Servo(robot, InertiaSchedule(robot, scenario.effects), period_s)
+        self._drives = drives
+        self._period_s = period_s
+        self._modes: list[AxisMode] = [AxisMode.RELEASED] * count
+        self._targets: dict[AxisMode, tuple[list[int], Target]] = {}
+        self._goal, self._goal_rate = (values.copy() for values in self.motion)
+        self._measured_torque, self._measured_motion = self.torque, self.motion
+        self.measure()
+
+    @property
+    def motion(self) -> tuple[Array, Array]:
+        """Position and velocity of the motors, in joint units, each (n,)."""
+        return self._plant.state.motor_position, self._plant.state.motor_velocity
+
+    def take_targets(self, time_s: float) -> None:
+        """Let the drives take over the targets that SYNC made valid.
+
+        Parameters
+        ----------
+        time_s : float
+            when SYNC came [s]
+        """
+        demands = self._demands()
+        if AxisMode.POSITION in self._targets:
+            joints, target = self._targets[AxisMode.POSITION]
+            wanted = np.array([demands[joint].position for joint in joints]) - self.encoder_offset[joints]
+            target.follow(wanted, None, time_s / self._period_s)
+
+    def step(self, tick: int) -> None:
+        """One period: torque from the demands of this instant, and the motion until the next.
+
+        Parameters
+        ----------
+        tick : int
+            number of the period
+        """
+        demands = self._demands()
+        for joints, target in self._targets.values():
+            target.advance(tick)
+            self._goal[joints], self._goal_rate[joints] = target.position, target.velocity
+        torque = self._torque_of(demands)
+        # torque is constant between two ticks: at the tick itself, the mean of both sides
+        self._measured_torque, self._measured_motion = 0.5 * (self.torque + torque), self.motion
+        self.torque = torque
+        if self.stands_on_stand:
+            self.stands_on_stand = any(mode is AxisMode.RELEASED for mode in self._modes)
+        if not self.stands_on_stand:
+            self._plant.advance(torque, self._period_s)
+
+    def measure(self) -> None:
+        """Let the drives see their joints as they were at the last tick."""
+        position, velocity = self._measured_motion
+        seen = zip(position + self.encoder_offset, velocity, self._measured_torque, strict=True)
+        for drive, (q, v, tau) in zip(self._drives, seen, strict=True):
+            drive.measure(AxisMeasurement(float(q), float(v), float(tau)))
+
+    def _demands(self) -> list[AxisDemand]:
+        """What the drives demand now; targets begin anew where a drive does something else than before."""
+        demands = [drive.demand() for drive in self._drives]
+        modes = [demand.mode for demand in demands]
+        if modes != self._modes:
+            self._regroup(modes)
+        return demands
+
+    def _regroup(self, modes: list[AxisMode]) -> None:
+        """Joints that do the same share a target, which begins where they are, or where their last one was."""
+        position, velocity = self.motion
+        for joint, before in enumerate(self._modes):
+            if before not in TRACKING:
+                self._goal[joint], self._goal_rate[joint] = position[joint], velocity[joint]
+        if [mode in TRACKING for mode in modes] != [mode in TRACKING for mode in self._modes]:
+            self._servo.begin()
+        self._modes, self._targets = modes, {}
+        for kind in TRACKING:
+            joints = [joint for joint, mode in enumerate(modes) if mode is kind]
+            if joints:
+                acceleration = np.full(len(joints), ACCELERATION)
+                target = Target(self._goal[joints], self._goal_rate[joints], acceleration, self._period_s)
+                self._targets[kind] = joints, target
+
+    def _torque_of(self, demands: Sequence[AxisDemand]) -> Array:
+        """Torque of the position loops where a target is tracked, else what is demanded."""
+        cap = np.array([demand.torque_cap for demand in demands])
+        wanted = np.array([demand.torque for demand in demands])
+        tracks = np.array([mode in TRACKING for mode in self._modes])
+        if tracks.any():
+            position, velocity = self.motion
+            error = np.where(tracks, self._goal - position, 0.0)
+            error_rate = np.where(tracks, self._goal_rate - velocity, 0.0)
+            self._servo.set_torque_limit(np.where(tracks, cap, np.inf))
+            wanted = np.where(tracks, self._servo.track(error, error_rate, None, position), wanted)
+        return np.clip(wanted, -cap, cap)

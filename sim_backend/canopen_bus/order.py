@@ -1,0 +1,82 @@
+"""The order that starts emulated drives as a process, as JSON."""
+
+import json
+import math
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from service.robot import read_robot
+from sim_backend.canopen_bus.axis import AxisScale
+from sim_backend.canopen_bus.drive import EmulatedDrive
+from sim_backend.canopen_bus.driven_arm import DrivenArm
+from sim_backend.canopen_bus.emulator import STEP_S, CanEmulator
+from sim_backend.scenario import Scenario
+from sim_backend.scenario_file import read_scenario
+
+
+@dataclass(frozen=True)
+class CanOrder:
+    """What to emulate.
+
+    robot : str
+        robot file whose ``drive`` blocks say which drives there are, and whose links they move
+    start : tuple of float
+        where the joints stand [rad or m]
+    port : str
+        where the name of the pseudo terminal is linked to
+    control : str
+        Unix socket for the test
+    scenario : str or None
+        scenario file of what is concealed in the arm
+    rated_torque_mnm : tuple of int
+        object 0x6076 of each drive, at the motor shaft [mNm]
+    bit_rate : int
+        of the bus [bit/s]
+    trace : str or None
+        file that what the drives do is appended to
+    """
+
+    robot: str
+    start: tuple[float, ...]
+    port: str
+    control: str
+    rated_torque_mnm: tuple[int, ...]
+    scenario: str | None = None
+    bit_rate: int = 1_000_000
+    trace: str | None = None
+
+    def to_json(self) -> str:
+        """The order as text."""
+        return json.dumps(asdict(self))
+
+    @staticmethod
+    def from_json(text: str) -> "CanOrder":
+        """The order in a text.
+
+        Parameters
+        ----------
+        text : str
+            as `to_json` writes it
+        """
+        document = json.loads(text)
+        tuples = {name: tuple(document[name]) for name in ("start", "rated_torque_mnm")}
+        return CanOrder(**{**document, **tuples})
+
+    def build(self, now_s: float) -> CanEmulator:
+        """The emulator.
+
+        Parameters
+        ----------
+        now_s : float
+            present instant [s]
+        """
+        robot = read_robot(Path(self.robot))
+        scenario = Scenario() if self.scenario is None else read_scenario(Path(self.scenario), robot)
+        drives = []
+        for joint, rated in zip(robot.joints, self.rated_torque_mnm, strict=True):
+            block, ratio = joint.drive or {}, joint.gear_ratio or 1.0
+            turns = block["counts_per_turn"] * ratio * block.get("direction", 1)
+            scale = AxisScale(turns / (2.0 * math.pi), rated, abs(ratio))
+            drives.append(EmulatedDrive(block["node_id"], scale))
+        driven = DrivenArm(drives, robot, scenario, self.start, STEP_S)
+        return CanEmulator(drives, driven, now_s, self.bit_rate)

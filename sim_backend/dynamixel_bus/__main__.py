@@ -1,0 +1,9 @@
+"""``python -m sim_backend.dynamixel_bus ORDER``: emulated servos on a pseudo terminal, until standard input ends."""
+
+import sys
+
+from sim_backend.dynamixel_bus.order import EmulatorOrder
+from sim_backend.dynamixel_bus.server import EmulatorServer
+
+if __name__ == "__main__":
+    EmulatorServer(EmulatorOrder.from_json(sys.argv[1])).run()

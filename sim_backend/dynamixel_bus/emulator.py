@@ -1,0 +1,145 @@
+"""Servos, the arm that they move, and a clock: everything of the emulator but its pseudo terminal."""
+
+import heapq
+from collections.abc import Sequence
+from math import ceil
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim_backend.dynamixel_bus.arm import MovedArm
+from sim_backend.dynamixel_bus.bus import EmulatedBus
+from sim_backend.dynamixel_bus.servo import EmulatedServo
+
+Array = NDArray[np.float64]
+
+STEP_S = 1e-3
+"""Period of the servos' own loops and of the physics [s]."""
+
+MOST_STEPS = 10
+"""Steps that are taken in a row while nothing is asked."""
+
+LONGEST_CATCH_UP_S = 0.25
+"""Where the machine stood still for longer than this, the device's clock has lost the rest [s]."""
+
+
+class Emulator:
+    """An arm of emulated servos on one bus; the instants are those of the caller's clock."""
+
+    def __init__(
+        self, bus: EmulatedBus, order: Sequence[int], arm: MovedArm, now_s: float, *, latency_s: float = 0.0
+    ) -> None:
+        """Everything at rest. The arm stands on a stand until all its servos have had torque once.
+
+        Parameters
+        ----------
+        bus : EmulatedBus
+            of the servos
+        order : sequence of int
+            ID of the servo of each joint
+        arm : MovedArm
+            what they move
+        now_s : float
+            present instant [s]
+        latency_s : float
+            how much later than over the wire an answer reaches the master: the latency of an adapter [s]
+        """
+        self.bus = bus
+        self.arm = arm
+        self.torque = np.zeros(arm.joint_count)
+        self.stands_on_stand = True
+        self.lost_s = 0.0
+        self._servos = [bus.servos[servo] for servo in order]
+        self._latency_s = latency_s
+        self._now_s = now_s
+        self._outgoing: list[tuple[float, int, bytes]] = []
+        self._count = 0
+        self._look()
+
+    @property
+    def servos(self) -> list[EmulatedServo]:
+        """In the order of the joints."""
+        return self._servos
+
+    @property
+    def now_s(self) -> float:
+        """Instant up to which the device has come [s]."""
+        return self._now_s
+
+    def receive(self, data: bytes, now_s: float) -> None:
+        """Take bytes of the master, and answer with what is measured now, however long the machine stood still.
+
+        They are heard before the device catches up with the clock: they may have waited while this process slept, and
+        its sleep is no silence of the master.
+
+        Parameters
+        ----------
+        data : bytes
+            as they came
+        now_s : float
+            when [s]
+        """
+        instructions = self.bus.hear(data, now_s)
+        self.advance_to(now_s, most_steps=ceil(LONGEST_CATCH_UP_S / STEP_S))
+        for servo in self._servos:
+            servo.sense(self._now_s, min(STEP_S, max(0.0, now_s - self._now_s)))
+        for due_s, frame in self.bus.answer(instructions, now_s):
+            self._count += 1
+            heapq.heappush(self._outgoing, (due_s + self._latency_s, self._count, frame))
+
+    def due(self, now_s: float) -> bytes:
+        """Bytes that have reached the master by now.
+
+        Parameters
+        ----------
+        now_s : float
+            present instant [s]
+        """
+        arrived = b""
+        while self._outgoing and self._outgoing[0][0] <= now_s:
+            arrived += heapq.heappop(self._outgoing)[2]
+        return arrived
+
+    @property
+    def next_due_s(self) -> float:
+        """When the next bytes reach the master; infinite where none are under way [s]."""
+        return self._outgoing[0][0] if self._outgoing else float("inf")
+
+    def advance_to(self, now_s: float, most_steps: int = MOST_STEPS) -> None:
+        """Let time pass: not all at once where the machine stood still, so that the master is heard in between.
+
+        Parameters
+        ----------
+        now_s : float
+            present instant [s]
+        most_steps : int
+            how many steps are taken
+        """
+        if now_s - self._now_s > LONGEST_CATCH_UP_S:
+            self.lost_s += now_s - self._now_s - LONGEST_CATCH_UP_S
+            self._now_s = now_s - LONGEST_CATCH_UP_S
+        for _ in range(most_steps):
+            if self._now_s + STEP_S > now_s:
+                return
+            self._now_s += STEP_S
+            self.bus.run_faults(self._now_s)
+            self._step()
+
+    def _step(self) -> None:
+        """One period of the servos' loops."""
+        position, _ = self.arm.motion
+        demands = [
+            servo.demand(float(place), self._now_s, STEP_S) for servo, place in zip(self._servos, position, strict=True)
+        ]
+        self.torque = self.arm.torque(demands)
+        if self.stands_on_stand:
+            self.stands_on_stand = not all(servo.has_torque for servo in self._servos)
+        if not self.stands_on_stand:
+            self.arm.advance(self.torque, STEP_S)
+        self._look()
+
+    def _look(self) -> None:
+        """Let the servos see their joints."""
+        position, velocity = self.arm.motion
+        for servo, *seen in zip(self._servos, position, velocity, self.torque, strict=True):
+            servo.take_motion(*map(float, seen))

@@ -1,0 +1,87 @@
+"""What can be said of a CAN bus without moving anything: doctor, scan, and the frames of a run."""
+
+import numpy as np
+import pytest
+
+from drivers import ControlMode, DriveLimits, DriverError
+from drivers.canopen import DriveJoint, examine, plan_frames, scan_bus
+from drivers.inspection import PHASES, Severity
+from emulated_can_bus import COUNTS_PER_TURN, GEAR, EmulatedBus
+
+LIMITS = DriveLimits(np.full(2, -1.0), np.full(2, 1.0), np.full(2, 2.0), np.full(2, 10.0))
+JOINTS = [
+    DriveJoint(
+        f"joint{node}",
+        GEAR,
+        {
+            "node_id": node,
+            "counts_per_turn": COUNTS_PER_TURN,
+            "rated_torque_nm": 0.5,
+            "interface": "slcan",
+            "channel": "port",
+        },
+    )
+    for node in (1, 2)
+]
+
+
+def test_sound_drives_have_nothing_to_be_mended() -> None:
+    with EmulatedBus() as bus:
+        findings = examine(bus.joints())
+    assert {finding.severity for finding in findings} == {Severity.GOOD}
+    assert sum("a per mille" in finding.detail for finding in findings) == 3
+    assert "answered in" in findings[-1].detail
+
+
+def test_a_missing_drive_and_one_in_fault_are_told_with_a_remedy() -> None:
+    with EmulatedBus() as bus:
+        bus.drives[1].fail(0x4310)
+        joints = bus.joints()
+        joints[2] = DriveJoint("joint3", GEAR, {**joints[2].drive, "node_id": 9})
+        failures = [finding for finding in examine(joints) if finding.severity is Severity.FAILURE]
+    assert [finding.subject for finding in failures] == ["joint 2 (node 2)", "joint 3 (node 9)"]
+    assert "0x4310" in failures[0].detail
+    assert "check node number" in failures[1].remedy
+
+
+def test_doctor_and_scan_move_nothing_and_leave_every_state() -> None:
+    with EmulatedBus() as bus:
+        before = [drive.power.state for drive in bus.drives]
+        examine(bus.joints())
+        found = list(scan_bus("virtual", bus.channel))
+        assert [drive.power.state for drive in bus.drives] == before
+        assert bus.furthest == [0.0, 0.0, 0.0]
+    assert [(device.address, device.model) for device in found] == [(n, "profile 402") for n in (1, 2, 3)]
+
+
+def test_planned_frames_are_those_of_the_standard() -> None:
+    """Bytes worked out by hand: expedited transfers, controlwords 6, 7, 15, and 50 · 65,536 counts a turn."""
+    targets = np.array([[0.0, 0.0], [np.pi / 50.0, 0.0]])
+    frames = list(plan_frames(JOINTS, ControlMode.POSITION, LIMITS, 0.1, targets))
+    wires = [frame.wire for frame in frames]
+    assert wires[0] == "000#8000"
+    assert "601#2F60600008000000" in wires, "cyclic synchronous position"
+    assert "601#2B5A600006000000" in wires, "quick stop, then hold"
+    assert "602#2316100164007F00" in wires, "watch node 127 for 100 ms"
+    assert "601#2B72600090010000" in wires, "10 Nm are 400 per mille of 0.5 Nm behind the gear"
+    enabling = [frame.wire for frame in frames if frame.phase == "enable" and frame.wire.startswith("201#")]
+    assert enabling == ["201#060000000000", "201#070000000000", "201#0F0000000000"]
+    cycle = [frame.wire for frame in frames if frame.phase == "cycle"]
+    # half a motor turn
+    assert cycle == [
+        "201#0F0000000000",
+        "202#0F0000000000",
+        "080#",
+        "201#0F0000800000",
+        "202#0F0000000000",
+        "080#",
+    ]
+    assert frames[-3].wire == "201#020000800000"
+    assert sorted({frame.phase for frame in frames}, key=PHASES.index) == list(PHASES)
+
+
+def test_a_dry_run_needs_the_rated_torque() -> None:
+    joints = [DriveJoint("joint1", GEAR, {key: v for key, v in JOINTS[0].drive.items() if key != "rated_torque_nm"})]
+    limits = DriveLimits(*(np.full(1, value) for value in (-1.0, 1.0, 2.0, 10.0)))
+    with pytest.raises(DriverError, match="rated_torque_nm"):
+        list(plan_frames(joints, ControlMode.POSITION, limits, 0.1, np.zeros((1, 1))))

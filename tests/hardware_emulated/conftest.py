@@ -1,0 +1,34 @@
+"""Emulated servos that several tests use one after the other, each of them as delivered."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from hardware_emulated.dynamixel_bench import Bench, bench
+from prompt_process import prompt_process
+
+
+@pytest.fixture(scope="session")
+def three_servos(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
+    with bench(tmp_path_factory.mktemp("servos")) as one:
+        yield one
+
+
+@pytest.fixture(scope="session")
+def weightless_servos(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
+    with bench(tmp_path_factory.mktemp("servos"), weight=0.0) as one:
+        yield one
+
+
+@pytest.fixture
+def three(three_servos: Bench) -> Iterator[Bench]:
+    with prompt_process():
+        yield three_servos.anew()
+        three_servos.clear()
+
+
+@pytest.fixture
+def weightless(weightless_servos: Bench) -> Iterator[Bench]:
+    with prompt_process():
+        yield weightless_servos.anew()
+        weightless_servos.clear()
