@@ -348,7 +348,8 @@ class CanopenArm:
             velocity=np.array(columns["velocity"]),
             effort=np.array(columns["effort"]),
             temperature=np.full(len(self._nodes), math.nan),
-            enabled=np.array([node.state in _UNDER_POWER for node in self._nodes]),
+            # of a node that did not answer, as it last told: whether it is missed is what NaN says
+            enabled=np.array([node.last_state in _UNDER_POWER for node in self._nodes]),
             faults=self._faults(),
         )
 
