@@ -1,0 +1,147 @@
+"""Our driver against nodes of durand: their service data, process data, network management and heartbeats are not ours.
+
+Only the power states and the motion of a drive, which durand leaves to its user, are written here.
+"""
+
+import time
+from collections.abc import Callable, Iterator
+from uuid import uuid4
+
+import can
+import numpy as np
+import pytest
+
+from drivers import ControlMode, DriveLimits, Setpoint, StopPolicy
+from drivers.canopen import CanopenArm, DriveJoint, scan_bus
+
+durand = pytest.importorskip("durand")
+
+U8, U16, U32 = (durand.DatatypeEnum[f"UNSIGNED{bits}"] for bits in (8, 16, 32))
+I8, I16, I32 = (durand.DatatypeEnum[f"INTEGER{bits}"] for bits in (8, 16, 32))
+COUNTS, GEAR = 4096, 10.0
+START = (2000, -3000)
+LIMITS = DriveLimits(*(np.full(2, value) for value in (-5.0, 5.0, 4.0, 8.0)))
+
+_OBJECTS = {
+    0x6007: (I16, 1), 0x603F: (U16, 0), 0x6040: (U16, 0), 0x6041: (U16, 0x0240), 0x605A: (I16, 2), 0x605E: (I16, 2),
+    0x6060: (I8, 0), 0x6061: (I8, 0), 0x6064: (I32, 0), 0x606C: (I32, 0), 0x6071: (I16, 0), 0x6072: (U16, 2000),
+    0x6076: (U32, 1000), 0x6077: (I16, 0), 0x607A: (I32, 9_999_999), 0x6502: (U32, 1 << 7 | 1 << 9),
+}  # fmt: skip
+_AFTER = {(0x0240, 6): 0x0221, (0x0221, 7): 0x0223, (0x0223, 15): 0x1227, (0x1227, 2): 0x0207, (0x0207, 15): 0x1227}
+"""Statusword before, controlword, statusword after."""
+
+
+class ForeignDrive:
+    """A durand node with the objects of a drive; its joint follows its target at once."""
+
+    def __init__(self, bus: can.BusABC, node_id: int, start: int) -> None:
+        self.network = durand.CANBusNetwork(bus)
+        self.node = durand.MinimalNode(self.network, node_id)
+        self.objects = self.node.object_dictionary
+        self.targets: list[int] = []
+        for index, (kind, value) in _OBJECTS.items():
+            self.objects[index] = durand.Variable(kind, "rw", value)
+        for index, kind, count in ((0x1016, U32, 1), (0x607D, I32, 2)):
+            self.objects[index] = durand.Array(durand.Variable(kind, "rw", 0), length=count)
+        self.objects.write(0x6064, 0, start)
+        self.objects.write(0x1000, 0, 0x00020192)
+        self.objects.write(0x1008, 0, b"foreign drive")
+        self.objects.update_callbacks[0x6040, 0].add(self._take_controlword)
+        self.objects.update_callbacks[0x607A, 0].add(self._take_target)
+
+    def read(self, index: int) -> int:
+        return self.objects.read(index, 0)
+
+    def close(self) -> None:
+        self.network.stop()
+
+    def _take_controlword(self, word: int) -> None:
+        status = 0x0240 if word == 0 else _AFTER.get((self.read(0x6041), word), self.read(0x6041))
+        self.objects.write(0x6041, 0, status)
+
+    def _take_target(self, target: int) -> None:
+        self.targets.append(target)
+        if self.read(0x6041) == 0x1227:
+            self.objects.write(0x6064, 0, target)
+
+
+@pytest.fixture
+def channel() -> str:
+    return uuid4().hex
+
+
+@pytest.fixture
+def drives(channel: str) -> Iterator[list[ForeignDrive]]:
+    buses = [can.Bus(interface="virtual", channel=channel) for _ in START]
+    found = [ForeignDrive(bus, number, start) for bus, number, start in zip(buses, (4, 9), START, strict=True)]
+    yield found
+    for drive, bus in zip(found, buses, strict=True):
+        drive.close()
+        bus.shutdown()
+
+
+@pytest.fixture
+def arm(channel: str, drives: list[ForeignDrive]) -> Iterator[CanopenArm]:
+    assert drives
+    bus = {"interface": "virtual", "channel": channel}
+    blocks = [{"node_id": 4, "counts_per_turn": COUNTS, **bus}, {"node_id": 9, "counts_per_turn": COUNTS}]
+    joints = [DriveJoint(f"joint{number}", GEAR, block) for number, block in enumerate(blocks, 1)]
+    one = CanopenArm(joints, patience_s=0.1)
+    yield one
+    one.disconnect()
+
+
+def eventually(is_so: Callable[[], bool], within_s: float = 5.0) -> bool:
+    deadline = time.monotonic() + within_s
+    while not is_so() and time.monotonic() < deadline:
+        time.sleep(0.002)
+    return is_so()
+
+
+def test_foreign_drives_are_found_and_read(channel: str, drives: list[ForeignDrive], arm: CanopenArm) -> None:
+    assert drives
+    found = [(device.address, device.model) for device in scan_bus("virtual", channel)]
+    assert found == [(4, "foreign drive (profile 402)"), (9, "foreign drive (profile 402)")]
+    state = arm.connect()
+    np.testing.assert_allclose(state.position, np.array(START) * 2.0 * np.pi / (COUNTS * GEAR))
+
+
+def test_foreign_drives_are_enabled_where_they_stand_moved_and_stopped(
+    drives: list[ForeignDrive], arm: CanopenArm
+) -> None:
+    arm.connect()
+    state = arm.enable(ControlMode.POSITION, LIMITS, StopPolicy.HOLD, 1.0)
+    assert state.enabled.all()
+    assert [drive.read(0x6064) for drive in drives] == list(START), "the target left over is far away"
+    assert [drive.read(0x6060) for drive in drives] == [8, 8]
+    place = state.position
+    for _ in range(60):
+        place = place + 0.002
+        state = arm.exchange(Setpoint(place, np.zeros(2)))
+        arm.clock.wait_until_ns(state.time_ns + 5_000_000)
+    count = 2.0 * np.pi / (COUNTS * GEAR)
+    moved = [drive.read(0x6064) * count for drive in drives]
+    np.testing.assert_allclose(moved, place, atol=count)
+    np.testing.assert_allclose(state.position[state.fresh], place[state.fresh], atol=0.01)
+    arm.stop(StopPolicy.HOLD)
+    assert eventually(lambda: [drive.read(0x6041) for drive in drives] == [0x0207, 0x0207])
+
+
+def test_a_run_decodes_cleanly_by_python_cans_own_log(
+    channel: str, drives: list[ForeignDrive], arm: CanopenArm, tmp_path
+) -> None:
+    """Every frame of a run has an identifier that CANopen knows and the length that its service has."""
+    assert drives
+    listener = can.Bus(interface="virtual", channel=channel)
+    with can.Logger(str(tmp_path / "run.asc")) as log:
+        notifier = can.Notifier(listener, [log], timeout=0.05)
+        arm.connect()
+        arm.enable(ControlMode.POSITION, LIMITS, StopPolicy.HOLD, 1.0)
+        arm.stop(StopPolicy.HOLD)
+        notifier.stop()
+    listener.shutdown()
+    messages = list(can.LogReader(str(tmp_path / "run.asc")))
+    assert len(messages) > 200
+    lengths = {0x000: {2}, 0x080: {0, 8}, 0x180: {8}, 0x200: {6}, 0x280: {6}, 0x580: {8}, 0x600: {8}, 0x700: {1}}
+    for message in messages:
+        assert message.dlc in lengths[message.arbitration_id & 0x780], message
