@@ -139,6 +139,16 @@ class EmulatorProcess:
         """
         self.ask({"put": [servo, item, value]})
 
+    def advance_to(self, instant_s: float) -> None:
+        """Let the device's time pass, where its order says that nothing else does.
+
+        Parameters
+        ----------
+        instant_s : float
+            by the device's clock; nothing happens where that has passed [s]
+        """
+        self.ask({"advance_to": instant_s})
+
     def reset(self) -> None:
         """Begin anew, with an empty trace, as if it had just been started; the master's port stays."""
         self.ask({"reset": True})
@@ -148,4 +158,6 @@ class EmulatorProcess:
         if self.order.trace is None:
             return []
         with Path(self.order.trace).open(encoding="utf-8") as file:
-            return [json.loads(line) for line in file if line.endswith("\n")]
+            # in one piece: the last line may be only half written
+            *whole, _ = file.read().split("\n")
+        return [json.loads(line) for line in whole]

@@ -123,4 +123,6 @@ class EmulatorProcess:
             return []
         with Path(self.order.trace).open(encoding="utf-8") as file:
             file.seek(self._trace_start)
-            return [json.loads(line) for line in file if line.endswith("\n")]
+            # in one piece: the last line may be only half written
+            *whole, _ = file.read().split("\n")
+        return [json.loads(line) for line in whole]

@@ -65,6 +65,14 @@ class CanopenRig:
         self._emulator.inject({"kind": _KINDS[injection.kind], "servo": injection.joint, "seconds": seconds})
         self.watch(0.01)
 
+    def disturb(self, **fault: Any) -> None:
+        """Set a fault of the kit off."""
+        self._emulator.inject(fault)
+
+    def drive_states(self) -> list[str]:
+        """Power states of the drives."""
+        return self._emulator.state["state"]
+
     def torque(self, effort: np.ndarray) -> np.ndarray:
         return effort
 

@@ -1,0 +1,136 @@
+"""The control process killed or frozen at any instant while CiA 402 drives move: they stop by themselves and hold."""
+
+import contextlib
+import os
+import signal
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sim_backend.examples
+from acquisition.control_runs import wait_for
+from acquisition.doubles import short_motion
+from arm_rigs import START
+from hardware_emulated.canopen_rig import ANSWER_PATIENCE_S
+from hardware_emulated.canopen_robot import RATED_TORQUE_MNM, write_canopen_robot
+from service.acquisition import BackendOrder, RunOptions, RunOrder, RunRecord, recover_runs
+from service.acquisition.run_process import RunProcess
+from service.excitation import write_trajectory
+from service.robot import read_robot
+from sim_backend.canopen_bus.order import CanOrder
+from sim_backend.emulation.process import EmulatorProcess
+
+WATCHDOG_S = 0.25
+STANDSTILL_S = 0.4
+GLANCE_S = 0.01
+
+
+@dataclass
+class Site:
+    """An emulated arm, and a folder of runs."""
+
+    folder: Path
+    emulator: EmulatorProcess
+    runs: int = 0
+
+    def start(self, *, acknowledge: bool) -> tuple[RunProcess, list[str]]:
+        """A run, and the states that it tells."""
+        self.runs += 1
+        states: list[str] = []
+        order = RunOrder(
+            robot=str(self.folder / "robot.yaml"),
+            trajectory=str(self.folder / "motion.json"),
+            backend=BackendOrder(name="canopen", settings={"patience_s": ANSWER_PATIENCE_S}),
+            options=RunOptions(
+                rate_hz=100.0,
+                watchdog_s=WATCHDOG_S,
+                heartbeat_s=5.0,
+                following_error=1.0,
+                stale_misses=30,
+                stale_s=0.3,
+                acknowledge_faults=acknowledge,
+                settle_s=0.0,
+            ),
+        )
+
+        def hear(event) -> None:
+            if event["event"] == "state":
+                states.append(event["state"])
+
+        folder = self.folder / "runs" / f"{self.runs:03d}"
+        return RunProcess(folder, order, read_robot(order.robot), report=hear), states
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    folder = tmp_path_factory.mktemp("can")
+    (folder / "runs").mkdir()
+    robot = write_canopen_robot(Path(sim_backend.examples.__file__).with_name("paper_arm.yaml"), folder)
+    motion = short_motion(read_robot(robot), period_s=3.0, repeats=30, amplitude=0.15)
+    write_trajectory(motion, folder / "motion.json")
+    order = CanOrder(
+        robot=str(robot),
+        start=tuple(START.tolist()),
+        port=str(folder / "port"),
+        control=str(folder / "control"),
+        rated_torque_mnm=(RATED_TORQUE_MNM,) * 3,
+        trace=str(folder / "trace"),
+    )
+    with EmulatorProcess("sim_backend.canopen_bus", order) as emulator:
+        yield Site(folder, emulator)
+
+
+def kill_once(site: Site, how: signal.Signals, after_s: float) -> bool:
+    """Kill or freeze a moving run; False where it had ended by itself, as on a busy machine."""
+    site.emulator.reset()
+    run, states = site.start(acknowledge=False)
+    try:
+        wait_for(lambda: "running" in states or run.has_ended, "the motion")
+        time.sleep(after_s)
+        if run.has_ended:
+            return False
+        os.kill(run.pid, how)
+        killed_ns = time.monotonic_ns()
+        allowed_ns = killed_ns + round((1.1 * WATCHDOG_S + GLANCE_S) * 1e9)
+        rest_ns = allowed_ns + round(STANDSTILL_S * 1e9)
+        wait_for(lambda: site.emulator.state["monotonic_ns"] > rest_ns + 100_000_000, "the end of the stop")
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(run.pid, signal.SIGKILL)
+        run.wait()
+    trace = site.emulator.trace()
+    late = [entry for entry in trace if entry["monotonic_ns"] > allowed_ns]
+    assert not any(any(entry["commanded"]) for entry in late), "under command after the watchdog's time"
+    resting = [entry for entry in late if entry["monotonic_ns"] > rest_ns]
+    assert resting
+    assert np.abs([entry["velocity"] for entry in resting]).max() < 0.03
+    assert {state for entry in late for state in entry["state"]} == {"QUICK_STOP_ACTIVE"}, "nothing was dropped"
+    return True
+
+
+def refused_without_acknowledgement(site: Site) -> RunRecord:
+    """What the next start makes of it."""
+    recover_runs(site.folder / "runs")
+    run, _ = site.start(acknowledge=False)
+    return run.wait()
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
+def test_fifty_times_each(site: Site, how: signal.Signals) -> None:
+    rng = np.random.default_rng([3, how])
+    counted = 0
+    for attempt in range(75):
+        counted += kill_once(site, how, float(rng.uniform(0.0, 1.0)))
+        if counted == 1 or attempt % 10 == 0:
+            problem = refused_without_acknowledgement(site).problem
+            assert problem is not None
+            assert "acknowledge" in problem.detail
+        if counted == 50:
+            return
+    pytest.fail(f"only {counted} runs went on until they were killed: the machine is too busy")
