@@ -33,7 +33,8 @@ test: $(INSTALLED) ## the quick tests
 	$(BIN)/pytest -n 2 $(PYTEST_FLAGS)
 
 test-slow: $(INSTALLED) ## the tests that take long or need something of the host
-	$(BIN)/pytest -n 2 -m "slow or system" $(PYTEST_FLAGS)
+	$(BIN)/pytest -n 2 -m "(slow or system) and not realtime" $(PYTEST_FLAGS)
+	$(BIN)/pytest -m realtime $(PYTEST_FLAGS)
 
 bench: $(INSTALLED) ## time and memory; leave the machine alone meanwhile
 	@set -e; for script in tests/benchmarks/benchmark_*.py; do echo "== $$script"; $(BIN)/python $$script; done

@@ -254,7 +254,7 @@ def test_the_arm_stops_and_the_run_is_interrupted(site: Site, victim: str, how: 
     kill(site, victim, how, np.random.default_rng([1, CASES.index((victim, how))]), times=1)
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize(("victim", "how"), CASES)
 def test_fifty_times_each(site: Site, victim: str, how: signal.Signals) -> None:

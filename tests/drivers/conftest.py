@@ -15,7 +15,10 @@ ALL_RIGS = {**RIGS, "dynamixel": dynamixel_rigs, "canopen": canopen_rigs}
 """Makers of rigs by name; the emulated buses join here."""
 
 
-@pytest.fixture(scope="session", params=list(ALL_RIGS))
+BY_THE_CLOCK = [pytest.param(name, marks=[] if name in RIGS else pytest.mark.realtime) for name in ALL_RIGS]
+
+
+@pytest.fixture(scope="session", params=BY_THE_CLOCK)
 def make_rig(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[], Rig]]:
     with ALL_RIGS[request.param](tmp_path_factory.mktemp("rig")) as maker:
         yield maker

@@ -119,8 +119,8 @@ def refused_without_acknowledgement(site: Site) -> RunRecord:
     return run.wait()
 
 
-@pytest.mark.slow
-@pytest.mark.timeout(1800)
+@pytest.mark.realtime
+@pytest.mark.timeout(2400)
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
 def test_fifty_times_each(site: Site, how: signal.Signals) -> None:
     rng = np.random.default_rng([3, how])
