@@ -7,9 +7,10 @@ from pydantic import Field, ValidationError
 
 from service.acquisition.options import RunOptions
 from service.acquisition.record import ORDER_FILE
-from service.acquisition.stored import StoredModel, replace_file
+from service.acquisition.stored import StoredModel
 from service.errors import AcquisitionError
 from service.robot.messages import one_line
+from service.store import write_atomically
 
 
 class BackendOrder(StoredModel):
@@ -46,7 +47,7 @@ def write_order(folder: Path, order: RunOrder) -> None:
     OSError
         the disk does not take it
     """
-    replace_file(folder / ORDER_FILE, order.model_dump_json(indent=1).encode())
+    write_atomically(folder / ORDER_FILE, order.model_dump_json(indent=1).encode())
 
 
 def read_order(folder: Path) -> RunOrder:

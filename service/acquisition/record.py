@@ -10,10 +10,11 @@ from pydantic import AwareDatetime, Field, ValidationError
 from service.acquisition.real_time import RealTime
 from service.acquisition.spawning import process_start
 from service.acquisition.states import RunState, may_follow
-from service.acquisition.stored import StoredModel, replace_file
+from service.acquisition.stored import StoredModel
 from service.acquisition.timing import Timing
 from service.acquisition.violation import Violation
 from service.errors import AcquisitionError
+from service.store import write_atomically
 
 RUN_FILE = "run.json"
 ORDER_FILE = "order.json"
@@ -63,7 +64,7 @@ def write_process(folder: Path, pid: int) -> None:
     OSError
         the disk does not take it
     """
-    replace_file(folder / PROCESS_FILE, ProcessName.of(pid).model_dump_json().encode())
+    write_atomically(folder / PROCESS_FILE, ProcessName.of(pid).model_dump_json().encode())
 
 
 def read_process(folder: Path) -> ProcessName | None:
@@ -205,7 +206,7 @@ def write_record(folder: Path, record: RunRecord) -> None:
     OSError
         the disk does not take it
     """
-    replace_file(folder / RUN_FILE, record.model_dump_json(indent=1).encode())
+    write_atomically(folder / RUN_FILE, record.model_dump_json(indent=1).encode())
 
 
 def read_record(folder: Path) -> RunRecord:
