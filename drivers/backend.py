@@ -79,6 +79,8 @@ class Capabilities:
         ``permille``) that the robot file's torque constant turns into torque
     policies_by_mode : mapping of ControlMode to frozenset of StopPolicy, or None
         ways to stop that the device carries out itself in each mode, where they differ; None where every mode has all
+    rate_limited_by : str
+        what limits the rate, and what to do about it; empty where nothing is known
     holds_before_torque : bool
         whether an arm that was enabled in torque mode is held until the first torque; else it is given none
     """
@@ -91,6 +93,7 @@ class Capabilities:
     takes_feed_forward: bool
     effort_unit: str = "Nm"
     policies_by_mode: Mapping[ControlMode, frozenset[StopPolicy]] | None = None
+    rate_limited_by: str = ""
     holds_before_torque: bool = True
 
     def policies_in(self, mode: ControlMode) -> frozenset[StopPolicy]:

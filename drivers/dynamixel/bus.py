@@ -4,6 +4,7 @@ import struct
 import time
 from collections.abc import Mapping, Sequence
 
+from drivers.clock import Clock, MonotonicClock
 from drivers.dynamixel import packets
 from drivers.dynamixel.control_table import Block, Item
 from drivers.dynamixel.packets import FrameParser, Status
@@ -32,15 +33,18 @@ _FAST_SERVO_BYTES = 4
 class ServoBus:
     """Speaks to the servos of one port; one thread's own."""
 
-    def __init__(self, port: SerialPort) -> None:
+    def __init__(self, port: SerialPort, clock: Clock | None = None) -> None:
         """Use a port, open or not yet.
 
         Parameters
         ----------
         port : SerialPort
             that this process owns
+        clock : Clock or None
+            by which readings are stamped; the machine's where None
         """
         self.port = port
+        self._clock = MonotonicClock() if clock is None else clock
         self.return_delay_s = FACTORY_RETURN_DELAY_S
         self.discarded_bytes = 0
         self._missed_ns: dict[int, int] = {}
@@ -191,7 +195,7 @@ class ServoBus:
         Returns
         -------
         int
-            instant at which the instruction had left [ns, monotonic]
+            instant at which the instruction had left [ns, by the bus' clock]
         dict of int to Status
             whole answers by ID; a servo that did not answer is not in it
         """
@@ -200,7 +204,7 @@ class ServoBus:
             self.port.drain()
         request = packets.encode_sync_read(servos, block.address, block.length, fast=fast)
         # Taken before: who is woken by the bytes may run before this process does again.
-        asked_ns = time.monotonic_ns() + round(len(request) * BITS_PER_BYTE * 1e9 / self.port.baudrate)
+        asked_ns = self._clock.now_ns() + round(len(request) * BITS_PER_BYTE * 1e9 / self.port.baudrate)
         self.port.send(request)
         receive = self._receive_fast if fast else self._receive_each
         waits_s = len(servos) * self.return_delay_s + patience_s

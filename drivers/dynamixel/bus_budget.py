@@ -138,13 +138,26 @@ def require_rate(rate_hz: float, traffic: CycleTraffic, timing: BusTiming) -> No
     most = largest_rate_hz(traffic, timing)
     if rate_hz <= most:
         return
-    parts = cycle_parts(traffic, timing)
-    longest = max(parts, key=parts.__getitem__)
+    reason, remedy = largest_part(traffic, timing)
     raise DriverError(
         DriverErrorKind.REFUSED,
-        f"{rate_hz:g} Hz: {longest} takes {parts[longest] * 1e3:.2f} ms of each cycle and {traffic.servos} servos get "
-        f"{most:.0f} Hz at most; {_REMEDIES[list(parts).index(longest)]}, or ask for less",
+        f"{rate_hz:g} Hz: {reason} and {traffic.servos} servos get {most:.0f} Hz at most; {remedy}, or ask for less",
     )
+
+
+def largest_part(traffic: CycleTraffic, timing: BusTiming) -> tuple[str, str]:
+    """What takes most of a cycle, and what to do about it.
+
+    Parameters
+    ----------
+    traffic : CycleTraffic
+        what goes over the bus
+    timing : BusTiming
+        how fast it is
+    """
+    parts = cycle_parts(traffic, timing)
+    longest = max(parts, key=parts.__getitem__)
+    return f"{longest} takes {parts[longest] * 1e3:.2f} ms of each cycle", _REMEDIES[list(parts).index(longest)]
 
 
 _REMEDIES = (

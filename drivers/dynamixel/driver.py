@@ -1,27 +1,27 @@
 """An arm of Dynamixel servos as a backend: the order of calls, and what a cycle is made of."""
 
 import contextlib
-import os
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.backend import Capabilities, ControlMode, DriveLimits, StopPolicy
-from drivers.clock import MonotonicClock
+from drivers.clock import Clock, MonotonicClock
 from drivers.dynamixel.bounds import Bounds, goals_of
 from drivers.dynamixel.bus import ServoBus
-from drivers.dynamixel.bus_budget import BusTiming, CycleTraffic, largest_rate_hz, require_rate
+from drivers.dynamixel.bus_budget import BusTiming, CycleTraffic, largest_part, largest_rate_hz, require_rate
 from drivers.dynamixel.configuration import DynamixelJoint, read_configuration
+from drivers.dynamixel.cycle_budget import found_budget, planned_budget
 from drivers.dynamixel.enabling import enable_servos
 from drivers.dynamixel.faults import lost_bus_fault, silent_servo_fault
 from drivers.dynamixel.group import GroupReading
 from drivers.dynamixel.models import WATCHDOG_MOST, WATCHDOG_STEP_S
-from drivers.dynamixel.port import LEAST_LATENCY_S, SerialPort, read_latency_timer_ms
+from drivers.dynamixel.observation import arm_state, blind_state, observe
+from drivers.dynamixel.port import SerialPort
 from drivers.dynamixel.preparation import commissioning_writes
 from drivers.dynamixel.runaway import RunawayWatch
-from drivers.dynamixel.session import SHORTEST_RETURN_DELAY_S, Session, open_session
+from drivers.dynamixel.session import Session, open_session
 from drivers.dynamixel.stopping import clear_watchdogs, stop_servos
 from drivers.errors import DriverError, DriverErrorKind, Fault
 from drivers.state import ArmState, Setpoint
@@ -47,7 +47,7 @@ class DynamixelArm:
     limit of position or speed: the driver does, and catches the arm by holding it. Effort is motor current.
     """
 
-    def __init__(self, joints: Sequence[DynamixelJoint], *, slack_s: float = 0.002) -> None:
+    def __init__(self, joints: Sequence[DynamixelJoint], *, slack_s: float = 0.002, clock: Clock | None = None) -> None:
         """Nothing is opened yet.
 
         Parameters
@@ -56,6 +56,8 @@ class DynamixelArm:
             base first
         slack_s : float
             how much longer than the bus takes an answer is waited for [s]
+        clock : Clock or None
+            that the servos' time is told by; the machine's where None
 
         Raises
         ------
@@ -63,7 +65,7 @@ class DynamixelArm:
             ``refused``: a ``drive`` block is not valid
         """
         self._configuration = read_configuration(joints)
-        self._clock = MonotonicClock()
+        self._clock = MonotonicClock() if clock is None else clock
         self._port = SerialPort(self._configuration.port, self._configuration.baud, slack_s)
         self._session: Session | None = None
         self._mode: ControlMode | None = None
@@ -89,12 +91,13 @@ class DynamixelArm:
             takes_feed_forward=False,
             effort_unit="mA",
             policies_by_mode=_POLICIES,
+            rate_limited_by=", ".join(largest_part(traffic, timing)),
             holds_before_torque=False,
         )
 
     @property
-    def clock(self) -> MonotonicClock:
-        """The machine's monotonic clock."""
+    def clock(self) -> Clock:
+        """The machine's monotonic clock, where no other was given."""
         return self._clock
 
     def require_rate(self, rate_hz: float) -> None:
@@ -125,11 +128,11 @@ class DynamixelArm:
         self._lost = ()
         self._port.open()
         try:
-            self._session = open_session(ServoBus(self._port), self._configuration.servos)
+            self._session = open_session(ServoBus(self._port, self._clock), self._configuration.servos)
         except DriverError as error:
             self._port.close()
             raise DriverError(DriverErrorKind.CANNOT_CONNECT, str(error), error.faults) from error
-        return self._observe(self._session)
+        return self._observe(self._session, self._session.health.temperature.copy())
 
     def acknowledge_faults(self) -> ArmState:
         """Clear watchdogs that have fired; an arm that is still enabled is stopped by its policy first.
@@ -224,7 +227,7 @@ class DynamixelArm:
         session.health.take(joint, values)
         temperature = np.full(len(session.servos), np.nan)
         temperature[joint] = values.get(session.servos[joint].model.temperature_item.name, np.nan)
-        return self._state(session, reading, temperature)
+        return arm_state(session, reading, temperature)
 
     def stop(self, policy: StopPolicy) -> ArmState:
         """Stop the arm; legal at any time. `DAMP` is carried out as `HOLD`: these servos cannot damp.
@@ -279,37 +282,23 @@ class DynamixelArm:
         if self._watch is None or self._bounds is None or session.health.runaway is not None:
             return
         session.health.runaway = self._watch.look(reading.position, reading.velocity)
-        if session.health.runaway is not None:
+        if session.health.runaway is None:
+            return
+        try:
             stop_servos(session, StopPolicy.HOLD, self._bounds.current, None)
+        except DriverError as error:
+            # A servo that does not answer is told of by its missing samples.
+            if error.kind is DriverErrorKind.LOST:
+                raise
 
     def _observe(self, session: Session, temperature: Array | None = None, *failures: Fault) -> ArmState:
-        """State without moving anything, and what failed before; temperatures where they were just read."""
+        """State without moving anything."""
         with self._watching_the_port():
-            reading = session.group.read_patiently()
-        unknown = np.full(len(session.servos), np.nan)
-        state = self._state(session, reading, unknown if temperature is None else temperature)
-        return replace(state, faults=state.faults + failures)
-
-    def _state(self, session: Session, reading: GroupReading, temperature: Array) -> ArmState:
-        """State of a cycle."""
-        for joint, alert in enumerate(reading.alerts):
-            if alert is not None:
-                session.health.take_alert(joint, alert)
-        return ArmState(
-            time_ns=reading.time_ns,
-            position=reading.position,
-            velocity=reading.velocity,
-            effort=reading.current,
-            temperature=temperature,
-            enabled=session.enabled,
-            faults=session.health.faults,
-        )
+            return observe(session, temperature, *failures)
 
     def _blind(self) -> ArmState:
         """State of an arm that cannot be seen."""
-        unknown = np.full(len(self._configuration.servos), np.nan)
-        enabled = np.zeros(unknown.size, dtype=np.bool_)
-        return ArmState(self._clock.now_ns(), unknown, unknown, unknown, unknown, enabled, self._lost)
+        return blind_state(self._clock.now_ns(), len(self._configuration.servos), self._lost)
 
     def _reached(self) -> Session:
         if self._session is None:
@@ -330,15 +319,5 @@ class DynamixelArm:
             raise
 
     def _budget(self) -> tuple[CycleTraffic, BusTiming]:
-        """Traffic and timing of a cycle; before the servos are reached, with what they will be set to."""
-        session = self._session
-        count = len(self._configuration.servos)
-        if session is None:
-            latency_ms = read_latency_timer_ms(self._configuration.port)
-            exists = os.path.exists(self._configuration.port)
-            latency_s = LEAST_LATENCY_S if latency_ms is None and exists else (latency_ms or 1) * 1e-3
-            return CycleTraffic(count), BusTiming(self._configuration.baud, SHORTEST_RETURN_DELAY_S, latency_s)
-        longest = max(block.length for servo in session.servos for block in servo.model.watched_blocks)
-        families = session.group.family_count
-        traffic = CycleTraffic(count, health_bytes=longest, fast=session.group.fast, families=families)
-        return traffic, BusTiming(self._port.baudrate, session.bus.return_delay_s, self._port.latency_s)
+        """Traffic and timing of a cycle."""
+        return planned_budget(self._configuration) if self._session is None else found_budget(self._session)

@@ -71,6 +71,16 @@ class Health:
         """
         self._alerts[joint] = alert
 
+    def states_error(self, joint: int) -> bool:
+        """Whether a servo's error register was read and stated an error.
+
+        Parameters
+        ----------
+        joint : int
+            index of the joint, from 0
+        """
+        return bool(self._registers[joint])
+
     def expect_torque(self, expected: bool) -> None:
         """Say whether the servos shall have torque from now on; one that loses it meanwhile is at fault.
 

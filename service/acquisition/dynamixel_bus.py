@@ -65,7 +65,7 @@ class DynamixelBus:
                 f"backend dynamixel: patience_s is {shown(settings['patience_s'])}; give seconds up to 1"
             )
         with drivers_words():
-            return DynamixelArm(_joints(robot, settings.get("port")), slack_s=patience_s)
+            return DynamixelArm(dynamixel_joints(robot, settings.get("port")), slack_s=patience_s)
 
     def adapters(self) -> list[Finding]:
         """Serial ports of this machine."""
@@ -84,7 +84,7 @@ class DynamixelBus:
         from drivers.dynamixel import examine
 
         with drivers_words():
-            return examine(_joints(robot))
+            return examine(dynamixel_joints(robot))
 
     def scan(self, port: str, bit_rates: Sequence[int] | None) -> Iterator[FoundDevice]:
         """Servos that answer a ping to all.
@@ -114,11 +114,26 @@ class DynamixelBus:
         from drivers.dynamixel import plan_frames
 
         with drivers_words():
-            yield from plan_frames(_joints(robot), request.mode, request.limits, request.watchdog_s, request.targets)
+            yield from plan_frames(
+                dynamixel_joints(robot), request.mode, request.limits, request.watchdog_s, request.targets
+            )
 
 
-def _joints(robot: Robot, port: Any = None) -> list["DynamixelJoint"]:
-    """The joints as the driver sees them."""
+def dynamixel_joints(robot: Robot, port: Any = None) -> list["DynamixelJoint"]:
+    """The joints of a robot file as the driver sees them.
+
+    Parameters
+    ----------
+    robot : Robot
+        with a ``drive`` block on every joint
+    port : object
+        serial device in place of the robot file's; None for that
+
+    Raises
+    ------
+    AcquisitionError
+        a joint has no ``drive`` block
+    """
     from drivers.dynamixel import DynamixelJoint
 
     joints: list[DynamixelJoint] = []

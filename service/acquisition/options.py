@@ -72,8 +72,10 @@ def cycle_rate_hz(options: RunOptions, capabilities: Capabilities) -> float:
     if options.rate_hz is None:
         return min(DEFAULT_RATE_HZ, largest)
     if options.rate_hz > largest:
+        limit = f" ({capabilities.rate_limited_by})" if capabilities.rate_limited_by else ""
         raise AcquisitionError(
-            f"{options.rate_hz:g} cycles a second are more than this arm's bus allows; ask for at most {largest:g}"
+            f"{options.rate_hz:g} cycles a second are more than this arm's bus allows{limit}; ask for at most "
+            f"{largest:.4g}"
         )
     return options.rate_hz
 

@@ -135,8 +135,8 @@ class Run:
         stops, backend = self._around.stops, self._backend
         stops.acknowledge()
         try:
-            if backend is not None:
-                backend.stop(self._policy)
+            if backend is not None and (faults := backend.stop(self._policy).faults):
+                self._unconfirmed = f"while the arm was stopped: {faults[0]}"
         except BaseException as error:
             # Then the device's watchdog stops the arm.
             self._unconfirmed = f"the drives did not confirm the stop ({_reason(error)}): look at the arm"

@@ -31,6 +31,9 @@ class EmulatorOrder:
         whether bytes take the time of their baud rate
     latency_s : float
         latency of the adapter [s]
+    stepped : bool
+        whether time passes only when `EmulatorProcess.advance_to` says so, and answers come at once; else it is the
+        machine's
     port : str
         where the name of the pseudo terminal is linked to
     control : str
@@ -49,6 +52,7 @@ class EmulatorOrder:
     fast_sync_read: bool = True
     paced: bool = True
     latency_s: float = 0.0
+    stepped: bool = False
     trace: str | None = None
 
     def to_json(self) -> str:
@@ -78,7 +82,7 @@ class EmulatorOrder:
         """
         arm = self._arm()
         servos = [EmulatedServo(servo, seed=joint) for joint, servo in enumerate(self.servos)]
-        bus = EmulatedBus(servos, fast_sync_read=self.fast_sync_read, paced=self.paced)
+        bus = EmulatedBus(servos, fast_sync_read=self.fast_sync_read, paced=self.paced and not self.stepped)
         return Emulator(bus, [servo.servo for servo in servos], arm, now_s, latency_s=self.latency_s)
 
     def _arm(self) -> MovedArm:

@@ -19,6 +19,9 @@ _PERIOD_S = 0.001
 _TRACE_PERIOD_S = 0.002
 _LONGEST_MESSAGE = 65_536
 _PRIORITY = 40
+_ROUNDING_S = 1e-9
+_AT_ONCE_S = 0.02
+"""Where time is stepped, a master that waits lets none pass: what is due so soon arrives at once."""
 
 
 class EmulatorServer:
@@ -65,11 +68,12 @@ class EmulatorServer:
         """Servos as delivered, the arm where it stands at first, the clock at zero."""
         self._emulator = self._order.build(0.0)
         self._start_ns = time.monotonic_ns()
+        self._stepped_s = 0.0
         self._next_trace_s = 0.0
 
     @property
     def _now_s(self) -> float:
-        return (time.monotonic_ns() - self._start_ns) * 1e-9
+        return self._stepped_s if self._order.stepped else (time.monotonic_ns() - self._start_ns) * 1e-9
 
     def _wait(self) -> None:
         """Until something comes, an answer is due, or the physics want their step."""
@@ -90,7 +94,7 @@ class EmulatorServer:
         if received and self._terminal.baud in self._baud:
             self._emulator.receive(received, self._now_s)
         self._emulator.advance_to(self._now_s)
-        if arrived := self._emulator.due(self._now_s):
+        if arrived := self._emulator.due(self._now_s + (_AT_ONCE_S if self._order.stepped else 0.0)):
             self._terminal.write(arrived)
 
     def _serve_test(self) -> None:
@@ -110,6 +114,8 @@ class EmulatorServer:
         *lines, self._pending = (self._pending + received).split(b"\n")
         for line in lines:
             request = json.loads(line)
+            if "advance_to" in request:
+                self._step_to(request["advance_to"])
             if "reset" in request:
                 self._begin()
                 if self._trace is not None:
@@ -118,6 +124,14 @@ class EmulatorServer:
             self._test.setblocking(True)
             self._test.sendall(json.dumps(answer).encode() + b"\n")
             self._test.setblocking(False)
+
+    def _step_to(self, instant_s: float) -> None:
+        """Let time pass where only that makes it pass."""
+        while self._stepped_s < instant_s:
+            self._stepped_s = min(instant_s, self._stepped_s + _PERIOD_S)
+            # A step is due although the sum of steps falls short of it by its rounding.
+            self._emulator.advance_to(self._stepped_s + _ROUNDING_S)
+            self._write_trace()
 
     def _describe(self) -> dict[str, Any]:
         """What the device is doing, and when, by the machine's clock."""
@@ -165,10 +179,12 @@ def answer_request(emulator: Emulator, request: dict[str, Any]) -> dict[str, int
         with which
     request : dict
         ``{"inject": [{kind, servo, after_s, …}]}``, ``{"get": [servo, item]}``, ``{"put": [servo, item, value]}``,
-        ``{"stand": bool}`` (put the stand under it, or take it away), ``{"reset": true}`` (done already), or ``{}``
+        ``{"stand": bool}`` (put the stand under it, or take it away), or ``{}``; ``reset`` and ``advance_to`` are the
+        server's own
     """
     if "inject" in request:
         emulator.bus.schedule.add(_fault(emulator, document) for document in request["inject"])
+        emulator.bus.run_faults(emulator.now_s)
     elif "get" in request:
         servo, item = request["get"]
         return {"value": emulator.bus.servos[servo].memory.get(item)}

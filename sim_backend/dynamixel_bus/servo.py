@@ -47,6 +47,7 @@ class EmulatedServo:
         self._registered: tuple[int, bytes] | None = None
         self.latched_s: float | None = None
         self._heard_s = 0.0
+        self._motion: tuple[float, float] | None = None
         self._seen: deque[tuple[float, float, float]] = deque(maxlen=_FILTERED_STEPS)
 
     @property
@@ -203,7 +204,11 @@ class EmulatedServo:
         torque : float
             [Nm or N]
         """
-        self._seen.append((position, velocity, torque / self.specification.torque_per_unit))
+        # Torque is that of the period that ends here; position and velocity are taken at its middle too.
+        before, speed_before = self._motion or (position, velocity)
+        current = torque / self.specification.torque_per_unit
+        self._seen.append((0.5 * (before + position), 0.5 * (speed_before + velocity), current))
+        self._motion = (position, velocity)
 
     def sense(self, now_s: float, age_s: float = 0.0) -> None:
         """Show the present measurement in the control table.

@@ -17,6 +17,8 @@ from hardware_emulated.dynamixel_bench import (
 )
 from sim_backend.dynamixel_bus import ServoSpecification
 
+pytestmark = pytest.mark.realtime
+
 ONE_COUNT = 2.0 * np.pi / 4096
 START = 0.2
 FAR_GOALS = {"Goal Position": 3500, "Goal Current": 1193, "Goal Velocity": 200}
