@@ -10,6 +10,8 @@ from service.api import health, pages
 from service.api.body_limit import BodyLimit
 from service.api.campaigns.models import CampaignRequest
 from service.api.campaigns.router import router as campaigns
+from service.api.diagnoses.models import DiagnosisRequest
+from service.api.diagnoses.router import router as diagnoses
 from service.api.excitations.models import ExcitationRequest
 from service.api.excitations.router import router as excitations
 from service.api.identifications.models import IdentificationRequest
@@ -28,7 +30,7 @@ from service.api.services import open_services
 from service.api.settings import Settings
 from service.jobs import StartControl
 
-API_VERSION = "1.1.0"
+API_VERSION = "1.2.0"
 """Of the interface, not of the package; a change of tests/api/openapi.json goes with a change here."""
 
 PREFIX = "/api/v1"
@@ -63,12 +65,19 @@ def create_app(settings: Settings, executor: Executor | None = None, start: Star
         docs_url=None,
         redoc_url=None,
     )
-    for router in (campaigns, excitations, runs, recordings, identifications, robots):
+    for router in (campaigns, excitations, runs, recordings, identifications, diagnoses, robots):
         app.include_router(router, prefix=PREFIX)
     app.include_router(health.router)
     app.include_router(pages.router)
     install_problem_handlers(app)
-    requests = [IdentificationRequest, ExcitationRequest, RunRequest, CampaignRequest, RobotCheckRequest]
+    requests = [
+        IdentificationRequest,
+        DiagnosisRequest,
+        ExcitationRequest,
+        RunRequest,
+        CampaignRequest,
+        RobotCheckRequest,
+    ]
     install_openapi(app, [*requests, Problem, *EVENT_MODELS])
     # The last one added is the first to see a request.
     app.add_middleware(BodyLimit, limit=settings.max_upload_bytes)

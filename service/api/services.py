@@ -23,6 +23,7 @@ from service.jobs import (
     StartControl,
     WorkerPool,
     Workshop,
+    run_diagnosis,
     run_excitation,
     run_identification,
     start_control,
@@ -38,8 +39,8 @@ class Services:
         of the operator
     recordings : RecordingStore
         recordings on the server
-    identifications, excitations : JobKind
-        identifications and designed motions, each a folder
+    identifications, diagnoses, excitations : JobKind
+        identifications, diagnoses and designed motions, each a folder
     jobs : JobQueue
         waiting and running jobs of every kind
     runs : RunDesk
@@ -59,6 +60,7 @@ class Services:
     settings: Settings
     recordings: RecordingStore
     identifications: JobKind
+    diagnoses: JobKind
     excitations: JobKind
     jobs: JobQueue
     runs: RunDesk
@@ -103,9 +105,13 @@ def open_services(
         ItemStore(settings.identifications_folder, "identification"),
         partial(run_identification, server_recordings=settings.recordings_folder),
     )
+    diagnoses = JobKind(
+        ItemStore(settings.diagnoses_folder, "diagnosis"),
+        partial(run_diagnosis, server_recordings=settings.recordings_folder),
+    )
     excitations = JobKind(ItemStore(settings.excitations_folder, "excitation"), run_excitation)
     jobs = JobQueue(
-        [identifications, excitations],
+        [identifications, diagnoses, excitations],
         executor or WorkerPool(settings.workers),
         slots=settings.workers,
         most_waiting=settings.max_waiting,
@@ -114,10 +120,11 @@ def open_services(
     claims = DeviceClaims(settings.max_arms)
     start = start or partial(start_control, sim_socket=settings.sim_socket)
     runs = RunDesk(ItemStore(settings.runs_folder, "run"), recordings, start, claims, pulse.is_felt)
-    shop = Workshop(jobs, excitations, identifications, runs, recordings)
+    shop = Workshop(jobs, excitations, identifications, diagnoses, runs, recordings)
     campaigns = CampaignDesk(ItemStore(settings.campaigns_folder, "campaign"), shop)
     checks = executor or WorkerPool(1)
-    services = Services(settings, recordings, identifications, excitations, jobs, runs, campaigns, checks, pulse)
+    kinds = (identifications, diagnoses, excitations)
+    services = Services(settings, recordings, *kinds, jobs, runs, campaigns, checks, pulse)
     try:
         yield services
     finally:

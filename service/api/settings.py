@@ -48,6 +48,11 @@ class Settings(BaseModel):
         return self.data_folder / "identifications"
 
     @property
+    def diagnoses_folder(self) -> Path:
+        """Diagnoses, each a folder."""
+        return self.data_folder / "diagnoses"
+
+    @property
     def excitations_folder(self) -> Path:
         """Designed motions, each a folder."""
         return self.data_folder / "excitations"

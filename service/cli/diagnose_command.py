@@ -1,7 +1,7 @@
 """``tauscope diagnose``: its arguments."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -20,11 +20,16 @@ Recordings = Annotated[
 Against = Annotated[
     list[str] | None,
     typer.Option(
-        metavar="identified|model|SIM...",
+        metavar="identified|model|MODEL.json|SIM...",
         help="What the recordings are compared with: the best model that the data allow (default), the robot file's"
-        " model block, or recordings made in your own simulator.",
+        " model block, a model that --model wrote, or recordings made in your own simulator.",
     ),
 ]
+
+
+def _output(words: str, metavar: str = "OUT") -> Any:
+    """An option that names a file to write."""
+    return typer.Option(metavar=metavar, dir_okay=False, help=words)
 
 
 def diagnose(
@@ -34,8 +39,18 @@ def diagnose(
     held_out: HeldOut = None,
     against: Against = None,
     cutoff: Cutoff = "auto",
-    json: Annotated[
-        Path | None, typer.Option(metavar="OUT", dir_okay=False, help="Write the result as JSON; - is standard output.")
+    json: Annotated[Path | None, _output("Write the result as JSON; - is standard output.")] = None,
+    report: Annotated[Path | None, _output("Write a page with verdict, findings and residuals.", "OUT.html")] = None,
+    next_trajectory: Annotated[
+        Path | None, _output("Write the motion to record next: what best separates, or shows, what is open.")
+    ] = None,
+    model: Annotated[Path | None, _output("Write the model with all findings, for --against.", "OUT.json")] = None,
+    export: Annotated[
+        list[Path] | None, _output("Write compensation code of the model with all findings.", "OUT.py|OUT.h")
+    ] = None,
+    scenario: Annotated[Path | None, _output("Write the findings for the simulated arm.", "OUT.yaml")] = None,
+    improved_robot: Annotated[
+        Path | None, _output("Write the robot file with identified links and friction.", "OUT.yaml")
     ] = None,
 ) -> None:
     """Say what an arm's model leaves out.
@@ -57,8 +72,21 @@ def diagnose(
         ``auto``, ``none`` or a frequency [Hz], for the identification
     json : Path or None
         where the result goes
+    report : Path or None
+        where the page goes
+    next_trajectory : Path or None
+        where the motion to record next goes
+    model : Path or None
+        where the model with all findings goes
+    export : list of Path or None
+        where its compensation code goes
+    scenario : Path or None
+        where the findings go, as a scenario of the simulated arm
+    improved_robot : Path or None
+        where the robot file with what was identified goes
     """
     cutoff_hz = parse_cutoff(cutoff)
+    from service.cli.diagnose_outputs import OutputRequest
     from service.cli.diagnose_run import DiagnoseRequest, run_diagnose
     from service.identification import Options
 
@@ -70,5 +98,13 @@ def diagnose(
             against=tuple(against or ("identified",)),
             options=Options(cutoff_hz=cutoff_hz),
             json=json,
+            outputs=OutputRequest(
+                model=model,
+                code=tuple(export or ()),
+                scenario=scenario,
+                improved_robot=improved_robot,
+                next_trajectory=next_trajectory,
+                report=report,
+            ),
         )
     )

@@ -6,21 +6,26 @@ from pathlib import Path
 
 import typer
 
+from service.cli.diagnose_outputs import OutputRequest, contents
 from service.cli.diagnose_summary import show_diagnosis
 from service.cli.output_files import STANDARD_OUTPUT, require_distinct, require_free, write_file
 from service.cli.terminal import output, plain, shown_progress
 from service.diagnosis import (
+    Diagnosis,
     DiagnosisDocument,
+    against_model,
+    against_saved,
+    against_simulation,
     diagnose,
-    differences_from_model,
-    differences_from_simulation,
     document,
 )
+from service.diagnosis.extended_model import read_model
+from service.diagnosis.next_experiment import PlannedExperiment, planned_experiment
 from service.identification import Options
 from service.recording import Recording, read_recording
 from service.robot import Robot, read_robot
 
-IDENTIFIED, MODEL = "identified", "model"
+IDENTIFIED, MODEL, SAVED = "identified", "model", ".json"
 
 
 @dataclass(frozen=True)
@@ -37,6 +42,8 @@ class DiagnoseRequest:
         of the identification
     json : Path or None
         where the result goes
+    outputs : OutputRequest
+        what else is written
     """
 
     robot: Path
@@ -45,11 +52,19 @@ class DiagnoseRequest:
     against: tuple[str, ...] = (IDENTIFIED,)
     options: Options = Options()  # noqa: RUF009 - frozen
     json: Path | None = None
+    outputs: OutputRequest = OutputRequest()  # noqa: RUF009 - frozen
 
     @property
     def simulated(self) -> tuple[Path, ...]:
         """Recordings of a simulator."""
-        return () if self.against in ((IDENTIFIED,), (MODEL,)) else tuple(Path(word) for word in self.against)
+        words = () if self.against in ((IDENTIFIED,), (MODEL,)) or self.saved is not None else self.against
+        return tuple(Path(word) for word in words)
+
+    @property
+    def saved(self) -> Path | None:
+        """A model that was saved before."""
+        path = Path(self.against[0])
+        return path if len(self.against) == 1 and path.suffix.lower() == SAVED else None
 
 
 def run_diagnose(request: DiagnoseRequest) -> None:
@@ -67,26 +82,62 @@ def run_diagnose(request: DiagnoseRequest) -> None:
     TauscopeError
         where the data or the robot cannot answer
     """
-    inputs = (*request.recordings, *request.held_out, *request.simulated)
-    for path in request.simulated:
+    compared = request.simulated if request.saved is None else (request.saved,)
+    inputs = (*request.recordings, *request.held_out, *compared)
+    for path in compared:
         if not path.exists():
             raise typer.BadParameter(
-                f"{str(path)!r} is neither {IDENTIFIED}, {MODEL} nor a recording", param_hint="'--against'"
+                f"{str(path)!r} is neither {IDENTIFIED}, {MODEL}, a recording nor a saved model",
+                param_hint="'--against'",
             )
+    request.outputs.check()
     require_distinct(inputs)
-    outputs = () if request.json is None else (request.json,)
+    outputs = (*(() if request.json is None else (request.json,)), *request.outputs.paths)
     require_free(outputs, (request.robot, *inputs))
     with shown_progress() as progress:
-        result = diagnose_files(request, progress)
+        outcome = diagnose_files(request, progress)
+        files = contents(
+            request.outputs,
+            outcome.diagnosis,
+            outcome.document,
+            outcome.planned,
+            request.robot,
+            list(zip(request.recordings, outcome.recordings, strict=True)),
+            progress,
+        )
         if request.json is not None:
-            write_file(request.json, (result.model_dump_json(by_alias=True, indent=1) + "\n").encode())
+            files[request.json] = (outcome.document.model_dump_json(by_alias=True, indent=1) + "\n").encode()
+        progress("write files")
+        for path, content in files.items():
+            write_file(path, content)
     if request.json is None:
-        show_diagnosis(output(), result)
-    elif request.json != STANDARD_OUTPUT:
-        output().print(plain(f"wrote {request.json}"), soft_wrap=True)
+        show_diagnosis(output(), outcome.document)
+    if STANDARD_OUTPUT not in outputs:
+        for path in outputs:
+            output().print(plain(f"wrote {path}"), soft_wrap=True)
 
 
-def diagnose_files(request: DiagnoseRequest, progress: Callable[[str], None]) -> DiagnosisDocument:
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What came of it.
+
+    diagnosis : Diagnosis
+        the result
+    document : DiagnosisDocument
+        the same as plain data
+    planned : PlannedExperiment or None
+        the motion to record next, where anything is open or it was asked for
+    recordings : tuple of Recording
+        as they were read
+    """
+
+    diagnosis: Diagnosis
+    document: DiagnosisDocument
+    planned: PlannedExperiment | None
+    recordings: tuple[Recording, ...]
+
+
+def diagnose_files(request: DiagnoseRequest, progress: Callable[[str], None]) -> Outcome:
     """Read the files and diagnose the arm.
 
     Parameters
@@ -98,21 +149,29 @@ def diagnose_files(request: DiagnoseRequest, progress: Callable[[str], None]) ->
 
     Returns
     -------
-    DiagnosisDocument
+    Outcome
         the result
     """
     progress(f"read {request.robot}")
     robot = read_robot(request.robot)
+    saved = None if request.saved is None else read_model(request.saved, robot)
     recordings = tuple(_read(request.recordings, robot, progress))
     held_out = tuple(_read(request.held_out, robot, progress))
     simulated = tuple(_read(request.simulated, robot, progress))
     found = diagnose(robot, recordings, held_out, request.options, progress)
     if simulated:
         progress("compare with the simulation")
-        return document(found, "simulation", differences_from_simulation(found, robot, simulated, request.options))
-    if request.against == (MODEL,):
-        return document(found, MODEL, differences_from_model(found))
-    return document(found)
+        found = against_simulation(found, simulated, request.options)
+    elif saved is not None:
+        progress("compare with the saved model")
+        found = against_saved(found, saved)
+    elif request.against == (MODEL,):
+        progress("compare with the model")
+        found = against_model(found)
+    path = request.outputs.next_trajectory
+    planned = planned_experiment(found, progress, asked=path is not None)
+    where = None if path is None or planned is None else str(path)
+    return Outcome(found, document(found, planned, where), planned, recordings)
 
 
 def _read(paths: Sequence[Path], robot: Robot, progress: Callable[[str], None]) -> Iterator[Recording]:

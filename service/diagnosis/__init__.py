@@ -1,6 +1,8 @@
 """What the model leaves out: locate the mismatch, name the missing physics, model it, show the fit improve."""
 
-from service.diagnosis.against import ParameterDifference, differences_from_model, differences_from_simulation
+from service.diagnosis.against import against_model, against_simulation
+from service.diagnosis.against_saved import against_saved
+from service.diagnosis.diagnosed import ParameterDifference
 from service.diagnosis.diagnosis import Diagnosis, Finding, diagnose
 from service.diagnosis.document import document
 from service.diagnosis.result import DiagnosisDocument
@@ -12,8 +14,9 @@ __all__ = [
     "Finding",
     "ParameterDifference",
     "Verdict",
+    "against_model",
+    "against_saved",
+    "against_simulation",
     "diagnose",
-    "differences_from_model",
-    "differences_from_simulation",
     "document",
 ]

@@ -18,6 +18,9 @@ CLEARLY_WORSE = -3.0
 CLEARLY_BETTER = 1.0
 """…and above which it must lie where the noise is not known from repetitions, so that significance is less certain."""
 
+BEYOND_DOUBT = 2.5
+"""…and above which the prediction alone confirms it: these recordings may be too few to estimate it anew."""
+
 SEEN_AGAIN = 1.64
 """Standard errors that a finding estimated on the held-out recordings alone must differ from zero, its sign kept."""
 
@@ -28,7 +31,11 @@ SAME_SIZE = 0.4
 """…as long as it is at least this part of what training says."""
 
 SHOULD_BE_SEEN = 3.0
-"""Standard errors at which the finding, if true, is expected there: below, its absence says nothing."""
+"""Standard errors at which the finding, if true, is expected there: below, estimated anew it says little; what it
+predicts still has to be better than what is predicted without it."""
+
+TELLS_NOTHING = 1.0
+"""…and below which the held-out motion does not even do that."""
 
 
 @dataclass(frozen=True)
@@ -58,10 +65,16 @@ class Confirmation:
         cautious : bool
             whether the noise is not known from repetitions
         """
+        if self.gain_z <= CLEARLY_WORSE:
+            return False
+        if self.gain > 0.0 and self.gain_z > BEYOND_DOUBT:
+            return True
+        if self.expected_z < TELLS_NOTHING:
+            return not cautious or self.gain_z > CLEARLY_BETTER
+        if self.seen_z > max(PLAINLY_SEEN, SAME_SIZE * self.expected_z):
+            return True
         seen = self.expected_z < SHOULD_BE_SEEN or self.seen_z > SEEN_AGAIN
-        if cautious and self.gain_z <= CLEARLY_BETTER:
-            return self.gain_z > CLEARLY_WORSE and self.seen_z > max(PLAINLY_SEEN, SAME_SIZE * self.expected_z)
-        return seen and self.gain_z > CLEARLY_WORSE
+        return seen and self.gain > 0.0 and (not cautious or self.gain_z > CLEARLY_BETTER)
 
 
 class HeldOut:

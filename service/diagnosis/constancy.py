@@ -90,6 +90,7 @@ def constancy(fitter: Fitter, fit: Fit, held_out: Fitter | None, inflation: floa
     inflation : float
         factor by which the residual exceeds the modelled noise
     """
+    inflation = max(inflation, fit.inflation())
     size = fit.model.size
     columns = fitter.columns(fit.model)
     groups = _groups(fitter, columns, list(fit.projection.residual), size)

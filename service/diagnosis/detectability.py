@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import optimize, stats
 
+from service.diagnosis.catalogue.plain_terms import PlainTerm
+from service.diagnosis.fit import Fit
 from service.diagnosis.screening import Candidate
 
 POWER = 0.9
@@ -61,6 +63,34 @@ def detectable(candidates: Sequence[Candidate], level: float, inflation: float) 
     return tuple(best.values())
 
 
+def detectable_parameters(
+    fit: Fit, kinds: Sequence[type[PlainTerm]], level: float, inflation: float
+) -> tuple[Detectable, ...]:
+    """The same for effects that are parameters of the nominal model, from their standard errors.
+
+    Parameters
+    ----------
+    fit : Fit
+        of the final model
+    kinds : sequence of PlainTerm classes
+        which of them
+    level : float
+        chance of a false name that each is given
+    inflation : float
+        factor by which the residual exceeds the modelled noise
+    """
+    found = []
+    for kind in kinds:
+        for joint in range(fit.model.structure.robot.joint_count):
+            place = fit.model.structure.coefficient(joint, kind.term)
+            if place is None:
+                continue
+            variance = float(fit.covariance[place, place]) * inflation
+            size = float(np.sqrt(_strength(1, 1.0, level) * variance)) if variance > 0.0 else None
+            found.append(Detectable(kind.id, joint, size, kind.coefficients[0].unit, size is not None))
+    return tuple(found)
+
+
 def needed_strength(candidate: Candidate, level: float) -> float:
     """Noncentrality λ at which a form is significant with probability `POWER`.
 
@@ -71,9 +101,13 @@ def needed_strength(candidate: Candidate, level: float) -> float:
     level : float
         chance of a false name that it is given
     """
-    threshold = float(stats.chi2.isf(min(level / candidate.shapes_tried, 0.5), candidate.count))
+    return _strength(candidate.count, candidate.shapes_tried, level)
+
+
+def _strength(count: int, shapes_tried: float, level: float) -> float:
+    threshold = float(stats.chi2.isf(min(level / shapes_tried, 0.5), count))
     return float(
         optimize.brentq(
-            lambda strength: stats.ncx2.sf(threshold, candidate.count, strength) - POWER, 1e-6, 100.0 + 10.0 * threshold
+            lambda strength: stats.ncx2.sf(threshold, count, strength) - POWER, 1e-6, 100.0 + 10.0 * threshold
         )
     )

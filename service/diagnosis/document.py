@@ -4,10 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from service.diagnosis.against import ParameterDifference
-from service.diagnosis.catalogue import Effect, Quantity, catalogue
-from service.diagnosis.diagnosis import Diagnosis, Finding
+from service.diagnosis.catalogue import Effect, Quantity, TimeLocalEffect, catalogue
+from service.diagnosis.diagnosed import Diagnosis
+from service.diagnosis.findings import Finding
 from service.diagnosis.location import JointMismatch, Place
+from service.diagnosis.next_experiment import PlannedExperiment
 from service.diagnosis.result import (
     ConstancyEntry,
     DetectableEntry,
@@ -32,18 +33,18 @@ UNKNOWN = "unknown"
 
 
 def document(
-    diagnosis: Diagnosis, against: str = "identified", differences: Sequence[ParameterDifference] = ()
+    diagnosis: Diagnosis, planned: PlannedExperiment | None = None, trajectory: str | None = None
 ) -> DiagnosisDocument:
     """The document of a diagnosis.
 
     Parameters
     ----------
     diagnosis : Diagnosis
-        the result of `diagnose`
-    against : str
-        ``identified``, ``model`` or ``simulation``
-    differences : sequence of ParameterDifference
-        what the simulation has wrong
+        the result of `diagnose`, or of its comparison with a given model
+    planned : PlannedExperiment or None
+        the next motion, where one was planned
+    trajectory : str or None
+        file that holds it
 
     Returns
     -------
@@ -58,7 +59,7 @@ def document(
     return DiagnosisDocument(
         robot=diagnosis.robot.name,
         joints=names,
-        against="model" if against == "model" else "simulation" if against == "simulation" else "identified",
+        against=diagnosis.against,
         verdict=diagnosis.verdict.value,
         noise_std=_floats(diagnosis.noise_std),
         noise_method="periods" if diagnosis.pure_error else "residual",
@@ -100,10 +101,10 @@ def document(
                 std=each.std,
                 difference_in_std=each.in_std,
             )
-            for each in differences
+            for each in diagnosis.differences
         ],
         parameter_shifts=_shifts(diagnosis),
-        next_experiment=_next_experiment(diagnosis, names),
+        next_experiment=_next_experiment(diagnosis, names, planned, trajectory),
     )
 
 
@@ -154,19 +155,18 @@ def _mismatch(found: JointMismatch, names: Sequence[str], *, significant: bool) 
 def _finding(finding: Finding, diagnosis: Diagnosis, names: Sequence[str]) -> FindingEntry:
     effect = finding.terms[0].effect
     quantities = _quantities(finding, diagnosis)
-    others = {option.candidate.effect.name(names): None for c in finding.choices[:1] for option in c.options[1:]}
-    confirmations = [choice.confirmation for choice in finding.choices if choice.confirmation is not None]
+    others = list({option.candidate.effect.name(names): None for option in finding.alternatives})
     before, after = finding.before, finding.after
     return FindingEntry(
         effect=effect.id,
         joint=None if effect.joint is None else names[effect.joint],
         probability=finding.probability,
-        equivalent=list(others),
+        equivalent=others,
         equation=effect.equation,
         parameters=[QuantityEntry(name=q.name, value=q.value, std=q.std, unit=q.unit) for q in quantities],
-        statement=_statement(effect, quantities, list(others), names),
+        statement=_statement(finding, quantities, others, diagnosis),
         gain=finding.gain,
-        confirmed=bool(confirmations) or None,
+        confirmed=finding.confirmed,
         rms_before=_floats(before.train),
         rms_after=_floats(after.train),
         held_out_rms_before=None if before.held_out is None else _floats(before.held_out),
@@ -184,11 +184,16 @@ def _quantities(finding: Finding, diagnosis: Diagnosis) -> list[Quantity]:
     return found
 
 
-def _statement(effect: Effect, quantities: Sequence[Quantity], others: Sequence[str], names: Sequence[str]) -> str:
-    where = effect.where(names)
+def _statement(finding: Finding, quantities: Sequence[Quantity], others: Sequence[str], diagnosis: Diagnosis) -> str:
+    term = finding.terms[0]
+    names = [joint.name for joint in diagnosis.robot.joints]
     sizes = ", ".join(f"{q.name} = {q.value:.4g} ± {q.std:.2g} {q.unit}" for q in quantities[:4])
+    when = ""
+    if isinstance(term.effect, TimeLocalEffect):
+        names_of_recordings = diagnosis.fitter.observations.names
+        when = f", {term.effect.when(term.coefficients, term.shape, names_of_recordings, diagnosis.setting.durations)}"
     doubt = f"; these data cannot tell it from {', '.join(others)}" if others else ""
-    return f"{where}: {effect.meaning} ({sizes}){doubt}; {effect.remedy}"
+    return f"{term.effect.where(names)}: {term.effect.meaning}{when} ({sizes}){doubt}; {term.effect.remedy}"
 
 
 def _unknown(diagnosis: Diagnosis, names: Sequence[str]) -> list[FindingEntry]:
@@ -241,25 +246,31 @@ def _shifts(diagnosis: Diagnosis) -> list[ShiftEntry]:
     ]
 
 
-def _next_experiment(diagnosis: Diagnosis, names: Sequence[str]) -> NextExperimentEntry | None:
+def _next_experiment(
+    diagnosis: Diagnosis, names: Sequence[str], planned: PlannedExperiment | None, trajectory: str | None
+) -> NextExperimentEntry | None:
     """The motion that would tell equivalents apart, or show what an inconclusive motion hides."""
+    separates, why = _open_question(diagnosis, names)
+    if planned is not None:
+        why = f"{why}; planned: {planned.words}" if why else planned.words
+    return NextExperimentEntry(separates=separates, trajectory=trajectory, why=why) if why else None
+
+
+def _open_question(diagnosis: Diagnosis, names: Sequence[str]) -> tuple[list[str], str]:
+    """What is to be told apart, and the motion for it in words; empty where nothing is open."""
     for finding in diagnosis.findings:
-        options = finding.choices[0].options
-        if len(options) > 1:
-            motions = dict.fromkeys(option.candidate.effect.revealing_motion for option in options)
-            return NextExperimentEntry(
-                separates=[option.candidate.effect.name(names) for option in options],
-                trajectory=None,
-                why="record " + "; and ".join(motions),
-            )
+        if finding.alternatives:
+            effects = [finding.terms[0].effect, *(option.candidate.effect for option in finding.alternatives)]
+            motions = dict.fromkeys(effect.revealing_motion for effect in effects)
+            return [effect.name(names) for effect in effects], "record " + "; and ".join(motions)
     if diagnosis.verdict is Verdict.INCONCLUSIVE:
         moved = sorted({parameter_names(diagnosis)[move.parameter] for move in diagnosis.constancy.moves})
         why = "the parameters do not hold from one recording to the next" + (
             f" ({', '.join(moved[:4])})" if moved else ""
         )
         why += ": record one motion through the whole range of positions and speeds, slow reversals included"
-        return NextExperimentEntry(separates=[], trajectory=None, why=why)
+        return [], why
     if diagnosis.verdict is Verdict.UNEXPLAINED:
         why = "repeat the same motion several times and slower: what repeats with time, angle or speed shows its kind"
-        return NextExperimentEntry(separates=[UNKNOWN], trajectory=None, why=why)
-    return None
+        return [UNKNOWN], why
+    return [], ""

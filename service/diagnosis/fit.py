@@ -48,9 +48,15 @@ class Fit:
         """Covariance of all parameters for white noise of the modelled size, (p, p)."""
         return self.projection.spread @ self.projection.spread.T
 
-    def inflation(self) -> float:
-        """Residual energy per degree of freedom, at least 1: what is left is more than noise by this factor."""
-        return max(1.0, self.energy / max(self.projection.freedom, 1))
+    def inflation(self, *, at_least: float = 1.0) -> float:
+        """Residual energy per degree of freedom: what is left is more than the modelled noise by this factor.
+
+        Parameters
+        ----------
+        at_least : float
+            1 where the noise is known; less where its size is no more than a guess that the fit may correct
+        """
+        return max(at_least, self.energy / self.projection.freedom)
 
 
 class Fitter:
@@ -77,26 +83,49 @@ class Fitter:
             most Gauss–Newton steps
         """
         start = [model.constant(place) for place in range(len(model.constants))]
-        residual, columns = self._linearised(model)
+        model, residual, columns = self._linear_optimum(model)
         rows = sum(len(row) for row in residual)
         energy = _energy(model, residual)
-        projection = project(columns, residual, model.size, model.prior())
+        projection = self._project(columns, residual, model)
         for _ in range(steps):
-            moved, found, lower = model, residual, np.inf
+            tried = None
             for halving in range(HALVINGS):
-                moved = _stepped(model, projection.step, 0.5**halving, start)
-                found = self._residual(moved)
-                lower = _energy(moved, found)
-                if lower <= energy * (1.0 + 1e-12):
+                tried = self._linear_optimum(_stepped(model, projection.step, 0.5**halving, start))
+                if _energy(tried[0], tried[1]) <= energy * (1.0 + 1e-12):
                     break
-            if lower > energy * (1.0 + 1e-12):
+                tried = None
+            if tried is None:
                 break
-            gained, energy, model = energy - lower, lower, moved
-            residual, columns = found, self._columns(model)
-            projection = project(columns, residual, model.size, model.prior())
+            model, residual, columns = tried
+            gained, energy = energy - _energy(model, residual), _energy(model, residual)
+            projection = self._project(columns, residual, model)
             if gained < SETTLED * rows and not _moves(model, projection.step):
                 break
         return Fit(model, projection)
+
+    def _linear_optimum(self, model: ExtendedModel) -> tuple[ExtendedModel, list[Array], list[JointColumns]]:
+        """The model with the best Θ and coefficients for its shapes, its residual, and columns of all parameters.
+
+        A step in a shape that is cut short would else leave coefficients that belong to another shape.
+        """
+        residual, columns = self._linearised(model)
+        linear = np.ones(model.size, dtype=bool)
+        linear[model.structure.size : model.structure.size + len(model.constants)] = False
+        linear[list(model.held)] = False
+        for term, place in zip(model.terms, model.term_places(), strict=True):
+            linear[place.start + len(term.coefficients) : place.stop] = False
+        kept = [linear[own.index] for own in columns]
+        places = np.cumsum(linear) - 1
+        own = [
+            JointColumns(places[each.index[mask]], each.rows[mask]) for each, mask in zip(columns, kept, strict=True)
+        ]
+        found = project(own, residual, int(linear.sum()))
+        step = np.zeros(model.size)
+        step[linear] = found.step
+        moved = _stepped(model, step, 1.0, [])
+        if model.terms:  # their columns may depend on Θ
+            return moved, self._residual(moved), columns
+        return moved, list(found.residual), columns
 
     def projected(self, model: ExtendedModel) -> Fit:
         """The linear step at a model as it is, without moving it.
@@ -107,7 +136,7 @@ class Fitter:
             the model
         """
         residual, columns = self._linearised(model)
-        return Fit(model, project(columns, residual, model.size, model.prior()))
+        return Fit(model, self._project(columns, residual, model))
 
     def white_residual(self, model: ExtendedModel) -> list[Array]:
         """Whitened residual of a model as it is, (R_j,) a joint.
@@ -128,6 +157,11 @@ class Fitter:
             the model
         """
         return self._columns(model)
+
+    def _project(self, columns: list[JointColumns], residual: list[Array], model: ExtendedModel) -> Projection:
+        noise = self.observations.noise
+        rows = sum(own.share * len(row) for own, row in zip(noise, residual, strict=True))
+        return replace(project(columns, residual, model.size, model.prior()), independent=rows)
 
     def _linearised(self, model: ExtendedModel) -> tuple[list[Array], list[JointColumns]]:
         return self._residual(model), self._columns(model)
@@ -204,6 +238,8 @@ def _stepped(model: ExtendedModel, step: Array, share: float, start: list[float]
     size = model.structure.size
     terms = list(model.structure.terms)
     for place, (joint, name) in enumerate(model.constants):
+        if not step[size + place]:
+            continue
         change = float(np.clip(share * step[size + place], -LARGEST_LOG_STEP, LARGEST_LOG_STEP))
         value = float(np.clip(model.constant(place) * np.exp(change), start[place] / FARTHEST, start[place] * FARTHEST))
         terms[joint] = replace(terms[joint], **{name: value})

@@ -59,15 +59,16 @@ def lack_of_fit(fit: Fit, observations: Observations, *, pure_error: bool, seed:
     """
     joints = observations.robot.joint_count
     omnibus, pure, excess = np.ones(joints), np.ones(joints), np.zeros(joints)
-    share = fit.projection.spread.shape[1] / max(sum(len(row) for row in fit.projection.residual), 1)
+    rows = sum(own.share * len(row) for own, row in zip(observations.noise, fit.projection.residual, strict=True))
+    share = fit.projection.spread.shape[1] / max(rows, 1.0)
     repeated = pure_error_rows(observations)
     for joint, residual in enumerate(fit.projection.residual):
         rows = [piece.reduced(_features(piece, joint, observations, seed)) for piece in observations]
         white = observations.white(joint, rows)
         basis = fit.projection.basis[joint]
         outside = white - (white @ basis.T) @ basis
-        omnibus[joint] = _f_test(outside, residual, share)
-        freedom = len(residual) * (1.0 - share)
+        freedom = observations.noise[joint].share * len(residual) * (1.0 - share)
+        omnibus[joint] = _f_test(outside, residual, freedom)
         energy = float(residual @ residual)
         excess[joint] = max(energy - freedom, 0.0)
         means = freedom - repeated[joint]
@@ -85,17 +86,19 @@ def pure_error_rows(observations: Observations) -> Array:
     observations : Observations
         the data
     """
-    joints = observations.robot.joint_count
-    return np.array(
-        [
-            sum((piece.repetitions - 1) * piece.used[j].all(axis=0).sum() for piece in observations)
-            for j in range(joints)
-        ],
-        dtype=float,
-    )
+    found = np.zeros(observations.robot.joint_count)
+    for piece in observations:
+        number, motion = piece.prepared.recording, piece.prepared.motion
+        runs = observations.repetitions[number] if 0 <= number < len(observations.repetitions) else ()
+        end = float(piece.time[0, -1])
+        for run in runs:
+            first = max(run.start_s, float(piece.time[0, 0]))
+            last = min(run.start_s + run.count * run.length_s, end) - run.length_s
+            found += max(last - first, 0.0) * motion.band.rate_hz
+    return found * np.array([noise.share for noise in observations.noise])
 
 
-def _f_test(columns: Array, residual: Array, share: float) -> float:
+def _f_test(columns: Array, residual: Array, freedom: float) -> float:
     """p-value of the residual's energy in the columns' span against the rest."""
     scale = np.linalg.norm(columns, axis=1)
     columns = columns[scale > 1e-9 * max(float(scale.max(initial=0.0)), 1e-300)]
@@ -105,7 +108,7 @@ def _f_test(columns: Array, residual: Array, share: float) -> float:
     span = right[singular > 1e-3 * singular[0]]
     inside = float(np.sum((span @ residual) ** 2))
     rest = float(residual @ residual) - inside
-    freedom = len(residual) * (1.0 - share) - len(span)
+    freedom -= len(span)
     if freedom < len(span) or rest <= 0.0:
         return 1.0
     return float(stats.f.sf((inside / len(span)) / (rest / freedom), len(span), freedom))

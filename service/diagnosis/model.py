@@ -16,6 +16,12 @@ DIFFERENCE = 1e-3
 """Step of a shape parameter for its derivative, relative to its bounds or, where logarithmic, to itself."""
 
 
+HOLDING = 1e8
+"""Inverse of the standard error [SI] of a parameter that no fit may move."""
+
+SIGNALS_KEPT = 3
+"""Sets of signals that are kept a piece: those of the model at hand, of the step that is tried, and of one more."""
+
 STATED_ERROR = 0.15
 """Relative standard error of a constant of the friction curve that the robot file states: it may be a guess."""
 
@@ -63,6 +69,8 @@ class ExtendedModel:
         for each of these the value that the robot file states, None where it states none
     terms : tuple of Term
         effects beside the nominal model
+    held : tuple of int
+        places among Θ that no fit moves
     """
 
     structure: ModelStructure
@@ -71,11 +79,17 @@ class ExtendedModel:
     constants: tuple[ShapeParameter, ...]
     stated: tuple[float | None, ...]
     terms: tuple[Term, ...] = ()
+    held: tuple[int, ...] = ()
 
     @property
     def size(self) -> int:
         """Number of all parameters: Θ, constants, then every term's."""
         return self.structure.size + len(self.constants) + sum(term.size for term in self.terms)
+
+    @property
+    def steepness(self) -> Array:
+        """K_v of every joint's friction, (n,) [s/rad or s/m]."""
+        return np.array([terms.k_v for terms in self.structure.terms])
 
     def constant(self, place: int) -> float:
         """Present value of an estimated constant of the friction curve.
@@ -92,9 +106,15 @@ class ExtendedModel:
     def prior(self) -> tuple[Array, Array]:
         """Rows of the robot file's statements about the friction curve, (s, p), and what they leave, (s,).
 
-        A stated constant counts as measured once, with a relative standard error of `STATED_ERROR`.
+        A stated constant counts as measured once, with a relative standard error of `STATED_ERROR`; a parameter that
+        is held, as measured `HOLDING` times better than any data can.
         """
         rows, left = [], []
+        for place in self.held:
+            row = np.zeros(self.size)
+            row[place] = HOLDING
+            rows.append(row)
+            left.append(0.0)
         for place, stated in enumerate(self.stated):
             if stated is not None:
                 row = np.zeros(self.size)
@@ -154,11 +174,23 @@ class ExtendedModel:
         piece : Piece
             from the observations
         """
+        kept: list[tuple[tuple[object, ...], Signals]] = piece.memory.setdefault("signals", [])
+        key = (self.structure, self.parameters, self.links)
+        for known, signals in kept:
+            if all(a is b for a, b in zip(known, key, strict=True)):
+                return signals
+        signals = self._made_signals(piece)
+        kept.append((key, signals))
+        del kept[:-SIGNALS_KEPT]
+        return signals
+
+    def _made_signals(self, piece: Piece) -> Signals:
+        """The same, made anew."""
         prepared, structure = piece.prepared, self.structure
         motion = prepared.motion
         bodies = np.where(np.arange(structure.size) < structure.base_count, self.parameters, 0.0)
         whole, rigid = prepared.predicted_torque(structure, np.stack([self.parameters, bodies]))
-        steepness = np.array([terms.k_v for terms in structure.terms])
+        steepness = self.steepness
         velocity = np.ascontiguousarray(motion.velocity.T)
         return Signals(
             robot=structure.robot,
@@ -175,6 +207,7 @@ class ExtendedModel:
             bodies=self.standard_parameters(),
             links=self.links,
             periodic=motion.repetitions > 1,
+            of_motion=piece.memory.setdefault("of_motion", {}),
         )
 
     def term_torque(self, term: Term, signals: Signals) -> Array:
@@ -285,7 +318,7 @@ def raw_squares(model: ExtendedModel, observations: Observations) -> tuple[Array
         signals, motion = model.signals(piece), piece.prepared.motion
         predicted = np.repeat(signals.torque[:, None], piece.repetitions, axis=1)
         for term in model.terms:
-            torque = model.term_torque(term, signals)
+            torque = term.effect.torque_of(signals, term.coefficients, term.shape)
             predicted[list(term.effect.touched(count))] += torque if torque.ndim == 3 else torque[:, None]
         own = motion.own
         measured = motion.torque[:, own].transpose(2, 0, 1)

@@ -6,9 +6,9 @@ left-out effect is not taken for the noise's colour and whitened away.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from service.diagnosis.catalogue import Effect
 from service.diagnosis.fit import Fitter
@@ -17,10 +17,14 @@ from service.diagnosis.observations import BoolArray, Observations, Piece
 from service.diagnosis.screening import Screen, model_signals
 from service.diagnosis.whitening import JointNoise, fitted_noise
 from service.identification.autocorrelation import Autoregression
+from service.recording.conditioning.common_band import Decimator
 from service.recording.recording import Array
 
-FEWEST_ROWS = 200
+FEWEST_ROWS = 150
 """Rows of pure error that a joint's noise model needs."""
+
+FEWEST_SAMPLES = 64
+"""Samples of a difference between periods below which it tells nothing."""
 
 MOST_ADDED = 40
 """Columns of the catalogue in a saturated fit at most, and not more than one in `ROWS_A_COLUMN` rows."""
@@ -47,19 +51,94 @@ def with_noise(
     effects : sequence of Effect
         the catalogue, for the saturated fit
     """
-    residual = residual_rows(model, observations)
-    joints = range(observations.robot.joint_count)
-    pure = [list(_pure_error(observations, rows, joint)) for joint, rows in enumerate(residual)]
+    differences = list(repeated_differences(observations, model))
+    pure = [[(rows[j], used[j], factor) for rows, used, factor in differences] for j in _joints(observations)]
     if all(sum(int(used.sum()) for _, used, _ in parts) >= FEWEST_ROWS for parts in pure):
-        noise = [fitted_noise(parts) for parts in pure]
+        share = _band_share(observations)
+        noise = [fitted_noise(parts, share) for parts in pure]
         return _beyond_pure_error(observations.with_noise(noise), model, effects)
+    return observations.with_noise(_saturated_noise(observations, model, effects)), False
+
+
+def repeated_differences(
+    observations: Observations, model: ExtendedModel
+) -> Iterator[tuple[Array, NDArray[np.bool_], float]]:
+    """What the residual of a period differs by from that of the period before: noise, whatever the model lacks.
+
+    Parameters
+    ----------
+    observations : Observations
+        the data
+    model : ExtendedModel
+        any model; the motion of each repetition is its own
+
+    Yields
+    ------
+    tuple of (n, M) float64, (n, M) bool and float
+        rows in the common band, which of them rest on measured torque, and the factor that turns their power into the
+        noise's
+    """
+    for piece in observations:
+        number = piece.prepared.recording
+        runs = observations.repetitions[number] if 0 <= number < len(observations.repetitions) else ()
+        if not any(run.count > 1 for run in runs):
+            continue
+        motion = piece.prepared.motion
+        residual = motion.torque[0].T - _full_torque(model, piece)
+        measured = np.ascontiguousarray(motion.measured[0].T)
+        for run in runs:
+            instants = piece.time[0]
+            first = int(np.searchsorted(instants, run.start_s - 0.5 / motion.rate_hz))
+            stop = int(np.searchsorted(instants, run.start_s + (run.count - 1) * run.length_s - 0.5 / motion.rate_hz))
+            shift = run.length_s * motion.rate_hz
+            whole = int(np.floor(shift + 1e-6))
+            part = float(np.clip(shift - whole, 0.0, 1.0))
+            stop = min(stop, residual.shape[1] - whole - 1)
+            if stop - first < FEWEST_SAMPLES:
+                continue
+            near, far = (slice(first + whole + step, stop + whole + step) for step in (0, 1))
+            later = (1.0 - part) * residual[:, near] + part * residual[:, far]
+            rows = motion.band.reduce(np.ascontiguousarray(later - residual[:, first:stop]))
+            used = motion.band.reduce_mask(measured[:, first:stop] & measured[:, near])
+            yield rows, used, 1.0 / (1.0 + part**2 + (1.0 - part) ** 2)
+
+
+def _full_torque(model: ExtendedModel, piece: Piece) -> Array:
+    """Torque of a model at the recorded rate, (n, N)."""
+    signals = model.signals(piece)
+    total = signals.torque.copy()
+    for term in model.terms:
+        torque = model.term_torque(term, signals)
+        total[list(term.effect.touched(len(total)))] += torque if torque.ndim == 2 else torque[:, 0]
+    return total
+
+
+def _joints(observations: Observations) -> range:
+    return range(observations.robot.joint_count)
+
+
+def _band_share(observations: Observations) -> float:
+    """Cut-off of the common band relative to the highest frequency of the rows; 1 where nothing is filtered."""
+    shares = []
+    for piece in observations:
+        band = piece.prepared.motion.band
+        if isinstance(band, Decimator):
+            response = np.abs(np.fft.rfft(band.kernel, 1 << 14))
+            cutoff = float(np.argmax(response < 0.5)) / (1 << 14) * piece.prepared.motion.rate_hz
+            shares.append(min(2.0 * cutoff / band.rate_hz, 1.0))
+    return min(shares, default=1.0)
+
+
+def _saturated_noise(observations: Observations, model: ExtendedModel, effects: Sequence[Effect]) -> list[JointNoise]:
+    """Noise of what a saturated fit leaves."""
+    residual = residual_rows(model, observations)
     plain = []
-    for joint in joints:
+    for joint in _joints(observations):
         power = float(np.mean(np.concatenate([rows[0] for rows in residual[joint]]) ** 2)) + np.finfo(float).tiny
         plain.append(JointNoise(Autoregression(np.empty(0), power, power)))
     left = _saturated(observations.with_noise(plain), model, effects)
-    noise = [fitted_noise(_by_piece(observations, j, rows * plain[j].std)) for j, rows in enumerate(left)]
-    return observations.with_noise(noise), False
+    share = _band_share(observations)
+    return [fitted_noise(_by_piece(observations, j, rows * plain[j].std), share) for j, rows in enumerate(left)]
 
 
 def _beyond_pure_error(
@@ -70,38 +149,15 @@ def _beyond_pure_error(
     if fit.inflation() < FAR_ABOVE:
         return observations, True
     left = _saturated(observations, fit.model, effects)
-    far = [float(rows @ rows) / len(rows) > FAR_ABOVE for rows in left]
+    far = [
+        float(rows @ rows) / len(rows) > FAR_ABOVE * noise.share
+        for rows, noise in zip(left, observations.noise, strict=True)
+    ]
     if not any(far):
         return observations, True
-    white, _ = with_noise(replace(observations, pieces=_single(observations)), fit.model, effects)
-    noise = [b if is_far else a for a, b, is_far in zip(observations.noise, white.noise, far, strict=True)]
+    other = _saturated_noise(observations, fit.model, effects)
+    noise = [b if is_far else a for a, b, is_far in zip(observations.noise, other, far, strict=True)]
     return observations.with_noise(noise), False
-
-
-def _single(observations: Observations) -> tuple[Piece, ...]:
-    """The pieces with the mean of their repetitions: what repeats is no noise there."""
-    pieces = []
-    for piece in observations:
-        used = piece.used.any(axis=1, keepdims=True)
-        count = np.maximum(piece.used.sum(axis=1, keepdims=True), 1)
-        mean = np.where(piece.used, piece.torque, 0.0).sum(axis=1, keepdims=True) / count
-        pieces.append(replace(piece, torque=mean, used=used, time=piece.time[:1]))
-    return tuple(pieces)
-
-
-def _pure_error(
-    observations: Observations, rows: Sequence[Array], joint: int
-) -> Iterator[tuple[Array, BoolArray, float]]:
-    """What differs between repetitions, scaled to the power of the noise."""
-    for piece, each in zip(observations, rows, strict=True):
-        if piece.repetitions > 1:
-            residual = each.reshape(piece.repetitions, piece.rows)
-            used = piece.used[joint]
-            known = used.all(axis=0)
-            deviation = residual - residual.mean(axis=0)
-            factor = piece.repetitions / (piece.repetitions - 1.0)
-            for repetition in deviation:
-                yield repetition, known, factor
 
 
 def _saturated(observations: Observations, model: ExtendedModel, effects: Sequence[Effect]) -> list[Array]:
@@ -111,7 +167,7 @@ def _saturated(observations: Observations, model: ExtendedModel, effects: Sequen
     signals = model_signals(model, observations)
     columns: dict[int, list[Array]] = {joint: [] for joint in range(observations.robot.joint_count)}
     for effect in effects:
-        for joint, white in screen.white_columns(effect, effect.grid, signals).items():
+        for joint, white in screen.white_columns(effect, effect.rough_grid(), signals).items():
             columns[joint].append(white.reshape(-1, white.shape[-1]))
     left = []
     for joint, parts in columns.items():

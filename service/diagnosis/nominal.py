@@ -93,6 +93,15 @@ def setting_of(
         top_speed=speed.max(axis=0),
         load=np.sqrt((load**2).mean(axis=1)),
         top_torque=np.abs(torque).max(axis=1),
-        durations=tuple(float(piece.time.max()) for piece in observations),
+        durations=_durations(observations),
         cutoff_hz=nyquist if cutoff_hz is None else cutoff_hz,
     )
+
+
+def _durations(observations: Observations) -> tuple[float, ...]:
+    """Length of every recording, however many pieces it has [s]."""
+    ends: dict[int, float] = {}
+    for piece in observations:
+        recording = piece.prepared.recording
+        ends[recording] = max(ends.get(recording, 0.0), float(piece.time.max()))
+    return tuple(ends[recording] for recording in sorted(ends))

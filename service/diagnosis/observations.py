@@ -1,11 +1,13 @@
 """The recordings' rows as a diagnosis sees them: in one band, repetitions kept apart, every joint's noise white.
 
-The positions of a repeated motion are averaged as for the identification, the torques are not: what differs from
-repetition to repetition is noise, or something that changes over time, and must be seen.
+An identification averages a motion's repetitions. Here each counts as the motion that it was: under stiff friction a
+joint that comes to rest creeps a little differently every time, and the average's torque is nobody's. What differs
+between repetitions beyond their motion is noise, or something that changes over time (`service.diagnosis.noise_floor`).
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +20,30 @@ from service.recording.recording import Array
 from service.robot import Robot
 
 BoolArray = NDArray[np.bool_]
+
+BLURRED = 0.4
+"""Noise of the velocity, relative to the width 1/K_v of friction's step, up to which the motion's own band is opened:
+narrower it rounds off how a joint sticks at its reversals, wider its noise blurs the step."""
+
+STATE_BANDS = (2.0, 8.0)
+"""Narrowest and widest band of the motion relative to the common one."""
+
+
+@dataclass(frozen=True)
+class Repetition:
+    """Where the motion of a recording repeats.
+
+    start_s : float
+        since the beginning of the recording [s]
+    length_s : float
+        of one period [s]
+    count : int
+        whole periods
+    """
+
+    start_s: float
+    length_s: float
+    count: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,12 +58,21 @@ class Piece:
         rows that rest on measured torque
     time : (P, N) float64
         instants at the recorded rate, from the beginning of the recording [s]
+    state_hz : float
+        band of the motion itself [Hz]
+    velocity_std : (n,) float64
+        noise of its velocity in that band [rad/s or m/s]
+    memory : dict
+        what others have made of this piece and may need again
     """
 
     prepared: PreparedMotion
     torque: Array
     used: BoolArray
     time: Array
+    state_hz: float
+    velocity_std: Array
+    memory: dict[str, Any] = field(default_factory=dict, repr=False)
 
     @property
     def repetitions(self) -> int:
@@ -90,17 +125,27 @@ class Observations:
         the recordings
     noise : tuple of JointNoise
         one a joint; empty until it is known
+    repetitions : tuple of tuple of Repetition
+        where each recording's motion repeats
+    weights : tuple of (R_j,) float64
+        of every whitened row that counts, one entry a joint; empty where all count alike
     """
 
     robot: Robot
     pieces: tuple[Piece, ...]
     names: tuple[str, ...]
     noise: tuple[JointNoise, ...] = ()
+    repetitions: tuple[tuple[Repetition, ...], ...] = ()
+    weights: tuple[Array, ...] = ()
     _kept: dict[int, BoolArray] = field(default_factory=dict, repr=False)
 
     @staticmethod
     def prepare(
-        conditioners: Sequence[Conditioner], robot: Robot, base: BaseParameters, cutoff_hz: float | None
+        conditioners: Sequence[Conditioner],
+        robot: Robot,
+        base: BaseParameters,
+        cutoff_hz: float | None,
+        steepness: Array | None = None,
     ) -> "Observations":
         """Condition recordings in a band.
 
@@ -114,11 +159,25 @@ class Observations:
             its identifiable combinations
         cutoff_hz : float or None
             the common band [Hz]; None for no filter
+        steepness : (n,) float64 or None
+            K_v of every joint's friction, for the band of the motion itself [s/rad or s/m]
         """
         starts = [float(c.recording.samples(0, 1).time[0]) for c in conditioners]
-        prepared = Dataset(conditioners, robot, base, cutoff_hz)
-        pieces = tuple(_piece(each, starts[each.recording]) for each in prepared)
-        return Observations(robot, pieces, tuple(c.recording.name for c in conditioners))
+        bands = [_state_cutoff(c, cutoff_hz, steepness) for c in conditioners]
+        apart = [c.as_one_motion(band) for c, band in zip(conditioners, bands, strict=True)]
+        prepared = Dataset(apart, robot, base, cutoff_hz)
+        return Observations(
+            robot,
+            pieces=tuple(
+                _piece(each, starts[each.recording], conditioners[each.recording], bands[each.recording])
+                for each in prepared
+            ),
+            names=tuple(c.recording.name for c in conditioners),
+            repetitions=tuple(
+                tuple(Repetition(run.start_s - start, run.length_s, run.count) for run in c.timing.runs)
+                for c, start in zip(conditioners, starts, strict=True)
+            ),
+        )
 
     def with_noise(self, noise: Sequence[JointNoise]) -> "Observations":
         """The same rows with their noise known.
@@ -128,12 +187,17 @@ class Observations:
         noise : sequence of JointNoise, length n
             one a joint
         """
-        return replace(self, noise=tuple(noise), _kept={})
+        return replace(self, noise=tuple(noise), weights=(), _kept={})
 
-    @property
-    def repeated(self) -> bool:
-        """Whether any motion is there more than once."""
-        return any(piece.repetitions > 1 for piece in self.pieces)
+    def with_weights(self, weights: Sequence[Array]) -> "Observations":
+        """The same rows with weights of their own.
+
+        Parameters
+        ----------
+        weights : sequence of (R_j,) float64
+            of every whitened row that counts, one entry a joint
+        """
+        return replace(self, weights=tuple(weights))
 
     def torque(self, joint: int) -> list[Array]:
         """Measured torque of one joint in the common band, piece by piece, (1, P M) each.
@@ -157,7 +221,8 @@ class Observations:
         """
         whitened = np.concatenate([self.noise[joint].whitened(each) for each in rows], axis=-1)
         kept = self.kept(joint)
-        return whitened if kept.all() else whitened[..., kept]
+        counted = whitened if kept.all() else whitened[..., kept]
+        return counted * self.weights[joint] if self.weights else counted
 
     def kept(self, joint: int) -> BoolArray:
         """Whitened rows that count.
@@ -192,7 +257,21 @@ class Observations:
         return iter(self.pieces)
 
 
-def _piece(prepared: PreparedMotion, start_s: float) -> Piece:
+def _state_cutoff(conditioner: Conditioner, cutoff_hz: float | None, steepness: Array | None) -> float | None:
+    """Band of the motion [Hz] in which noise of density D makes K_v √(D (2π)² f³/3) of `BLURRED` at the worst joint."""
+    if cutoff_hz is None:
+        return None
+    if steepness is None:
+        return STATE_BANDS[0] * cutoff_hz
+    density = conditioner.noise.density
+    moving = conditioner.moving & (density > 0.0)
+    widths = 3.0 * (BLURRED / np.maximum(steepness, 1e-9)) ** 2 / (4.0 * np.pi**2)
+    bands = np.cbrt(widths[moving] / density[moving])
+    narrowest, widest = (ratio * cutoff_hz for ratio in STATE_BANDS)
+    return float(np.clip(bands.min(initial=np.inf), narrowest, widest))
+
+
+def _piece(prepared: PreparedMotion, start_s: float, conditioner: Conditioner, state_hz: float | None) -> Piece:
     """The torque of every repetition in the common band."""
     motion = prepared.motion
     length = len(motion.time) / motion.rate_hz
@@ -200,4 +279,6 @@ def _piece(prepared: PreparedMotion, start_s: float) -> Piece:
     reduce, reduce_mask = motion.band.reduce, motion.band.reduce_mask
     used = np.stack([reduce_mask(np.ascontiguousarray(measured.T)) for measured in motion.measured], axis=1)
     torque = np.stack([reduce(np.ascontiguousarray(each.T)) for each in motion.torque], axis=1)
-    return Piece(prepared, torque, used, time)
+    width = motion.rate_hz / 2.0 if state_hz is None else min(state_hz, motion.rate_hz / 2.0)
+    velocity_std = 2.0 * np.pi * np.sqrt(conditioner.noise.density * width**3 / 3.0)
+    return Piece(prepared, torque, used, time, width, velocity_std)

@@ -20,6 +20,9 @@ from service.recording.recording import Array
 RANK_TOLERANCE = 1e-10
 """Singular values of the column-scaled nominal columns below this share of the largest are no direction."""
 
+SINGULAR = 1e-9
+"""Eigenvalues of a candidate's normalised Gram matrix below this are no direction."""
+
 INVISIBLE = 1e-7
 """Share of a candidate's energy outside the nominal columns below which no data of this kind can show it."""
 
@@ -52,6 +55,8 @@ class Projection:
         the fitted parameters
     prior_energy : float
         Σ r² of the prior's rows
+    independent : float or None
+        independent rows, where rows are closer than their band asks for
     """
 
     spread: Array
@@ -59,6 +64,7 @@ class Projection:
     residual: tuple[Array, ...]
     step: Array
     prior_energy: float = 0.0
+    independent: float | None = None
 
     @property
     def energy(self) -> float:
@@ -66,9 +72,10 @@ class Projection:
         return float(sum(row @ row for row in self.residual)) + self.prior_energy
 
     @property
-    def freedom(self) -> int:
-        """Rows less parameters."""
-        return sum(len(row) for row in self.residual) - self.spread.shape[1]
+    def freedom(self) -> float:
+        """Independent rows less parameters."""
+        rows = sum(len(row) for row in self.residual) if self.independent is None else self.independent
+        return max(rows - self.spread.shape[1], 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,9 +174,24 @@ def statistics(found: Moments, positive: Sequence[bool]) -> tuple[Array, Array]:
     """
     gains = np.zeros(len(found.target))
     coefficients = np.zeros_like(found.target)
-    for place, (target, gram, shares) in enumerate(zip(found.target, found.gram, found.shares, strict=True)):
-        gains[place], coefficients[place] = _solved(target, gram, shares > INVISIBLE, positive)
+    present = found.shares > INVISIBLE
+    whole = np.flatnonzero(present.all(axis=1))
+    solved = _all_solved(found.target[whole], found.gram[whole])
+    right = ~((solved < 0.0) & np.asarray(positive)).any(axis=1)
+    coefficients[whole[right]] = solved[right]
+    gains[whole[right]] = np.sum(solved[right] * found.target[whole[right]], axis=1)
+    for place in np.setdiff1d(np.flatnonzero(present.any(axis=1)), whole[right]):
+        gains[place], coefficients[place] = _solved(found.target[place], found.gram[place], present[place], positive)
     return gains, coefficients
+
+
+def _all_solved(target: Array, gram: Array) -> Array:
+    """Coefficients of many shapes of which every column counts, (g, c)."""
+    scale = np.sqrt(np.einsum("gcc->gc", gram))
+    values, vectors = np.linalg.eigh(gram / (scale[:, :, None] * scale[:, None, :]))
+    inverse = np.where(values > SINGULAR, 1.0 / np.where(values > SINGULAR, values, 1.0), 0.0)
+    inner = np.einsum("gcv,gc->gv", vectors, target / scale)
+    return np.einsum("gcv,gv->gc", vectors, inverse * inner) / scale
 
 
 def _solved(target: Array, gram: Array, present: NDArray[np.bool_], positive: Sequence[bool]) -> tuple[float, Array]:
@@ -181,7 +203,7 @@ def _solved(target: Array, gram: Array, present: NDArray[np.bool_], positive: Se
         part = gram[np.ix_(keep, keep)]
         scale = np.sqrt(np.diag(part))
         values, vectors = np.linalg.eigh(part / np.outer(scale, scale))
-        known = values > 1e-9
+        known = values > SINGULAR
         half = vectors[:, known] / np.sqrt(values[known])
         solved = (half @ (half.T @ (target[keep] / scale))) / scale
         wrong = [k for k, value in zip(keep, solved, strict=True) if positive[k] and value < 0.0]

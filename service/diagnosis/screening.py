@@ -6,13 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from service.diagnosis.catalogue import Effect, Signals
+from service.diagnosis.catalogue import Effect, Signals, TimeLocalEffect
 from service.diagnosis.effective_number import effective_number
 from service.diagnosis.fit import Fit
 from service.diagnosis.model import ExtendedModel
 from service.diagnosis.observations import Observations
 from service.diagnosis.projection import INVISIBLE, Moments, moments, statistics
+from service.diagnosis.windows import Windows, white_torque, windowed_moments, windows_on_rows, windows_tried
 from service.recording.recording import Array
+
+MOST_KEPT = 400 * 1024 * 1024
+"""Bytes of columns that are kept from one model to the next."""
 
 SHAPES_AT_ONCE = 48
 """Shapes whose columns are made together: bounds memory."""
@@ -60,16 +64,19 @@ class Candidate:
         """T less what as many coefficients and shapes would explain of noise."""
         return self.gain - self.count - 2.0 * float(np.log(self.shapes_tried))
 
-    def p_value(self, inflation: float = 1.0) -> float:
+    def p_value(self, inflation: float = 1.0, *, refined: bool = False) -> float:
         """Chance that noise alone explains as much somewhere on this form's grid.
 
         Parameters
         ----------
         inflation : float
             factor by which the residual exceeds the modelled noise
+        refined : bool
+            whether the shape was moved between the grid's points: then noise had that freedom too
         """
-        tail = float(stats.chi2.sf(self.gain / inflation, self.count))
-        return min(1.0, self.shapes_tried * tail * self._one_sided)
+        free = sum(self.effect.is_free(place) for place in range(len(self.shape))) if refined else 0
+        tail = float(stats.chi2.sf(self.gain / inflation, self.count + free))
+        return min(1.0, self.shapes_tried * tail * (1.0 if free else self._one_sided))
 
     @property
     def _one_sided(self) -> float:
@@ -87,14 +94,22 @@ class Screen:
         all forms to look at
     seed : int
         of the draws for the effective numbers
+    count_all : bool
+        whether every window counts, as if none resembled another: quicker, and never too bold
     """
 
-    def __init__(self, observations: Observations, effects: Sequence[Effect], seed: int = 0) -> None:
+    def __init__(
+        self, observations: Observations, effects: Sequence[Effect], seed: int = 0, *, count_all: bool = False
+    ) -> None:
         self.observations = observations
         self.effects = tuple(effects)
         self._rng = np.random.default_rng(seed)
+        self._count_all = count_all
+        self._kept_columns: dict[tuple[int, int], dict[int, Array]] = {}
+        self._kept_bytes = 0
         self._numbers: dict[int, float] = {}
-        self._white: dict[int, dict[int, Array]] = {}
+        self._windows: dict[int, Windows] = {}
+        self._first: tuple[Fit, list[Candidate]] | None = None
 
     def candidates(self, fit: Fit) -> list[Candidate]:
         """Every form at its best shape on the grid.
@@ -104,8 +119,13 @@ class Screen:
         fit : Fit
             the model so far
         """
-        signals = [fit.model.signals(piece) for piece in self.observations]
-        return [self._candidate(place, effect, fit, signals) for place, effect in enumerate(self.effects)]
+        if self._first is None or self._first[0] is not fit:
+            signals = [fit.model.signals(piece) for piece in self.observations]
+            found = [self._candidate(place, effect, fit, signals) for place, effect in enumerate(self.effects)]
+            if self._first is not None:
+                return found
+            self._first = fit, found  # the nominal model, which is looked at twice
+        return list(self._first[1])
 
     def at_shapes(self, effect: Effect, shapes: Array, fit: Fit, signals: Sequence[Signals]) -> Moments:
         """Moments of an effect at any shapes.
@@ -149,18 +169,14 @@ class Screen:
         return {joint: each.reshape(len(shapes), count, -1) for joint, each in white.items()}
 
     def _candidate(self, place: int, effect: Effect, fit: Fit, signals: Sequence[Signals]) -> Candidate:
-        parts, whitened = [], []
-        known = place in self._numbers
-        for first in range(0, len(effect.grid), SHAPES_AT_ONCE):
-            columns = self.white_columns(effect, effect.grid[first : first + SHAPES_AT_ONCE], signals)
-            parts.append(moments(fit.projection, columns))
-            if not known and len(effect.grid) > 1:
-                whitened.append(columns)
-        found = Moments(*(np.concatenate([getattr(part, name) for part in parts]) for name in Moments.__annotations__))
-        if not known:
-            self._numbers[place] = effective_number(found, whitened, self._rng) if whitened else 1.0
+        if isinstance(effect, TimeLocalEffect):
+            found = self._through_windows(place, effect, fit, signals)
+        else:
+            found = self._on_grid(place, effect, fit, signals)
+        shares = np.where(found.shares > effect.least_share, found.shares, 0.0)
+        found = Moments(found.target, found.gram, shares, found.inner)
         gains, coefficients = statistics(found, [each.positive for each in effect.coefficients])
-        best = int(np.argmax(gains))
+        best = int(np.argmax(gains - effect.reluctance(effect.grid)))
         visible = (found.shares > INVISIBLE).all(axis=1)
         return Candidate(
             effect=effect,
@@ -172,6 +188,44 @@ class Screen:
             shapes_tried=self._numbers[place],
             information=float(np.median(found.gram[visible, 0, 0])) if visible.any() else 0.0,
         )
+
+    def _on_grid(self, place: int, effect: Effect, fit: Fit, signals: Sequence[Signals]) -> Moments:
+        """Moments of all shapes of the grid."""
+        parts, whitened = [], []
+        known = place in self._numbers
+        for first in range(0, len(effect.grid), SHAPES_AT_ONCE):
+            columns = self._grid_columns(place, first, effect, signals)
+            parts.append(moments(fit.projection, columns))
+            if not known and len(effect.grid) > 1:
+                whitened.append(columns)
+        found = Moments(*(np.concatenate([getattr(part, name) for part in parts]) for name in Moments.__annotations__))
+        if not known:
+            self._numbers[place] = effective_number(found, whitened, self._rng) if whitened else 1.0
+        return found
+
+    def _grid_columns(self, place: int, first: int, effect: Effect, signals: Sequence[Signals]) -> dict[int, Array]:
+        """Whitened columns of some of the grid's shapes; those that no model changes are kept."""
+        kept = self._kept_columns.get((place, first))
+        if kept is not None:
+            return kept
+        columns = self.white_columns(effect, effect.grid[first : first + SHAPES_AT_ONCE], signals)
+        size = sum(rows.nbytes for rows in columns.values())
+        if effect.of_motion_alone and self._kept_bytes + size < MOST_KEPT:
+            self._kept_columns[place, first] = columns
+            self._kept_bytes += size
+        return columns
+
+    def _through_windows(self, place: int, effect: TimeLocalEffect, fit: Fit, signals: Sequence[Signals]) -> Moments:
+        """Moments of all windows, on rows that are whitened once."""
+        if place not in self._windows:
+            self._windows[place] = windows_on_rows(effect, self.observations)
+        white = white_torque(effect, self.observations, signals)
+        found = windowed_moments(white, self._windows[place], fit)
+        if place not in self._numbers and self._count_all:
+            self._numbers[place] = float(len(effect.grid))
+        elif place not in self._numbers:
+            self._numbers[place] = windows_tried(found, white, self._windows[place], fit, self._rng)
+        return found
 
 
 def model_signals(model: ExtendedModel, observations: Observations) -> list[Signals]:

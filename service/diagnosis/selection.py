@@ -7,10 +7,13 @@ import numpy as np
 from scipy import stats
 
 from service.diagnosis.block_scores import score_inflation
+from service.diagnosis.catalogue import TimeLocalEffect
 from service.diagnosis.choice import Choice, Option, Place, Selection, distinct, is_physical, place_of
 from service.diagnosis.confirmation import Confirmation, HeldOut
 from service.diagnosis.fit import Fit, Fitter
+from service.diagnosis.interleaved import interleaved_confirmation
 from service.diagnosis.model import ExtendedModel, Term, with_terms
+from service.diagnosis.proxies import proxies
 from service.diagnosis.refinement import refined
 from service.diagnosis.screening import Candidate, Screen, model_signals
 
@@ -19,6 +22,9 @@ LEVEL = 0.01
 
 MOST_EFFECTS = 4
 """Different effects in one model."""
+
+UNCONFIRMED = 0.1
+"""Share of the level that is left to effects that no other motion can confirm."""
 
 UNCOUNTED = ("rotor_inertia",)
 """Effects beside which others are looked for without limit: every geared joint may have one."""
@@ -51,6 +57,9 @@ LIKELY = 0.02
 `CLEARLY_PREDICTED` standard errors: few blocks tell little, and the two tests are independent."""
 
 CLEARLY_PREDICTED = 2.5
+
+GUESSED = 0.01
+"""Power of the noise, relative to what a saturated fit makes of it, that a better fit may find."""
 
 MOST_TERMS = 24
 MOST_REJECTED = 12
@@ -85,7 +94,7 @@ class Selector:
         model : ExtendedModel
             the nominal model
         beforehand : sequence of Term
-            effects that are there for other reasons; they stay unless others make them superfluous
+            effects that others have found; those that count here too are there before any other is looked for
         progress : callable
             told what was found
         """
@@ -93,8 +102,11 @@ class Selector:
         choices: list[Choice] = []
         for term in beforehand:
             option = self._option(fit, term)
-            choices.append(Choice((option,), None, 0.0))
-            fit = option.fit
+            p_value = self._robust_p_value(option, fit, blocks=False)
+            confirmation = self._confirmation(fit, option)
+            if p_value < self._level and (confirmation is None or confirmation.confirmed(cautious=not self.pure_error)):
+                choices.append(Choice((option,), confirmation, 0.0))
+                fit = option.fit
         rejected: list[Choice] = []
         while len(choices) < MOST_TERMS:
             choice = self._next(fit, choices, rejected)
@@ -105,6 +117,7 @@ class Selector:
             names = [joint.name for joint in model.structure.robot.joints]
             progress(f"found {choice.options[0].candidate.effect.name(names)}")
         fit, choices = self._without_superfluous(fit, choices)
+        fit, choices = self._without_proxies(nominal, fit, choices)
         choices = [self._compared(fit, choices, place) for place in range(len(choices))]
         return Selection(nominal, fit, tuple(choices), tuple(rejected))
 
@@ -125,34 +138,45 @@ class Selector:
     def _best(self, table: "_Table", choices: Sequence[Choice]) -> Choice | None:
         """The best significant option, with those that explain nearly as much."""
         fit = table.fit
-        inflation = fit.inflation() if not self.pure_error else 1.0
-        level = LEVEL / max(len(self.screen.effects), 1)
+        level = self._level
+        inflation = self._inflation(fit) if not self.pure_error else 1.0
         significant = [each for each in table.candidates if each.p_value(inflation) < level]
         if not significant:
             return None
         top = max(each.gain for each in significant)
         closest = [table.refined(each) for each in significant if each.gain > WORTH_REFINING * top]
         closest.sort(key=lambda each: -each.score)
-        near = CLOSE * fit.inflation() + 0.1 * closest[0].gain
+        near = CLOSE * self._inflation(fit) + 0.1 * closest[0].gain
         fitted = [table.fitted(each) for each in closest[:MOST_FITTED] if each.score > closest[0].score - near]
         fitted = [each for each in fitted if is_physical(each, fit) and not self._outsized(each)]
         fitted.sort(key=lambda each: -each.score)
         for option in fitted:
             known = place_of(option.candidate) in [place_of(choice.options[0].candidate) for choice in choices]
             p_value = self._robust_p_value(option, fit, blocks=not known)
+            if isinstance(option.candidate.effect, TimeLocalEffect):
+                p_value = min(1.0, p_value / UNCONFIRMED)
             if p_value < (level if self.pure_error else LIKELY) and self._large_enough(
                 option, fit, choices, known=known
             ):
                 confirmation = self._confirmation(fit, option)
                 if p_value >= level and (confirmation is None or confirmation.gain_z < CLEARLY_PREDICTED):
                     continue
-                margin = EQUIVALENT * option.fit.inflation()
+                margin = EQUIVALENT * self._inflation(option.fit)
                 alike = [each for each in fitted if option.score - margin < each.score <= option.score]
                 options = distinct([option, *(each for each in alike if each is not option)])
                 return Choice(options, confirmation, p_value / level)
         for each in closest:  # none of the largest is significant by the stricter measure: look below
             table.refuse(place_of(each))
         return self._best(table, choices)
+
+    @property
+    def _level(self) -> float:
+        """Chance of a false name that each form is given."""
+        return LEVEL / max(len(self.screen.effects), 1)
+
+    def _inflation(self, fit: Fit) -> float:
+        """By how much the residual exceeds the modelled noise; where nothing repeats, the residual itself is right."""
+        return fit.inflation(at_least=1.0 if self.pure_error else GUESSED)
 
     def allowed(self, candidate: Candidate, chosen: Sequence[Place], refused: set[Place]) -> bool:
         """Whether a form may be added to a model.
@@ -202,7 +226,7 @@ class Selector:
             again = self._best(table, rest)
             found = [] if again is None else list(again.options)
             others = [each for each in found if place_of(each.candidate) != place_of(own.candidate)]
-        margin = EQUIVALENT * fit.inflation()
+        margin = EQUIVALENT * self._inflation(fit)
         alike = [each for each in others if is_physical(each, without) and each.score > own.score - margin]
         return replace(choice, options=distinct([own, *sorted(alike, key=lambda each: -each.score)]))
 
@@ -228,11 +252,9 @@ class Selector:
         A further order of what was found before needs no such care: the orders still missing are what the blocks see.
         """
         candidate = replace(option.candidate, gain=max(option.gain, 0.0))
-        if self.pure_error:
-            return candidate.p_value()
-        inflation = option.fit.inflation()
-        plain = candidate.p_value(inflation)
-        if not blocks:
+        inflation = self._inflation(option.fit)
+        plain = candidate.p_value(inflation, refined=True)
+        if self.pure_error or not blocks:
             return plain
         ratio, pieces = score_inflation(option.fit.model.terms[-1], fit, option.fit, self.screen)
         if ratio <= inflation or pieces <= candidate.count + 2:
@@ -263,13 +285,26 @@ class Selector:
         return bool((own > measured).any())
 
     def _confirmation(self, fit: Fit, option: Option) -> Confirmation | None:
+        term = option.fit.model.terms[-1]
+        if isinstance(term.effect, TimeLocalEffect):
+            return interleaved_confirmation(term, fit, option.fit, self.screen, self.held_out)
         if self.held_out is None:
             return None
-        return self.held_out.confirm(fit.model, option.fit.model, option.fit.model.terms[-1])
+        return self.held_out.confirm(fit.model, option.fit.model, term)
+
+    def _without_proxies(self, nominal: Fit, fit: Fit, choices: list[Choice]) -> tuple[Fit, list[Choice]]:
+        """Drop what only stands in for an effect that the catalogue does not have."""
+        rows = self.screen.observations
+        dropped = proxies(nominal, fit, choices, rows, pure_error=self.pure_error)
+        if not dropped:
+            return fit, choices
+        kept = [place for place in range(len(choices)) if place not in dropped]
+        terms = [fit.model.terms[place] for place in kept]
+        return self.fitter.fit(with_terms(fit.model, terms)), [choices[place] for place in kept]
 
     def _without_superfluous(self, fit: Fit, choices: list[Choice]) -> tuple[Fit, list[Choice]]:
         """Drop terms that the others have made superfluous, the weakest first."""
-        while len(choices) > 1:
+        while choices:
             gains = []
             for place in range(len(choices)):
                 terms = [term for other, term in enumerate(fit.model.terms) if other != place]
@@ -277,8 +312,8 @@ class Selector:
                 gains.append((without.energy - fit.energy, without))
             weakest = int(np.argmin([gain for gain, _ in gains]))
             candidate = choices[weakest].options[0].candidate
-            inflation = fit.inflation() if not self.pure_error else 1.0
-            level = LEVEL / max(len(self.screen.effects), 1)
+            level = self._level
+            inflation = self._inflation(fit)
             if replace(candidate, gain=max(gains[weakest][0], 0.0)).p_value(inflation) < level:
                 break
             fit = gains[weakest][1]

@@ -10,6 +10,14 @@ from scipy import signal
 from service.identification.autocorrelation import AutocovarianceSum, Autoregression, LaggedProducts
 from service.recording.recording import Array
 
+WELL_INSIDE = 0.85
+"""Part of the band in which its own filter leaves the noise as it is."""
+
+FEWEST_FOR_SPECTRUM = 32
+
+SMALLEST_SHARE = 0.3
+"""Rows are never taken for more dependent than this."""
+
 FLOOR = 0.01
 """Share of the noise's power that counts as white, so that whitening does not amplify by more than this what the
 band's own filter has cut."""
@@ -21,9 +29,13 @@ class JointNoise:
 
     model : Autoregression
         its coefficients and variances
+    share : float
+        independent rows among a hundred, as a fraction: rows are closer than the band asks for, and above the band
+        there is no noise
     """
 
     model: Autoregression
+    share: float = 1.0
 
     @property
     def std(self) -> float:
@@ -62,13 +74,17 @@ class JointNoise:
         return ~missed[self.order :]
 
 
-def fitted_noise(pieces: Iterable[tuple[Array, NDArray[np.bool_], float]]) -> JointNoise:
+def fitted_noise(pieces: Iterable[tuple[Array, NDArray[np.bool_], float]], band_share: float = 1.0) -> JointNoise:
     """Noise model of smallest BIC of pieces that are noise alone.
+
+    Within the band the whitened noise has unit density: its mean power is `JointNoise.share`.
 
     Parameters
     ----------
     pieces : iterable of ((T,) float64, (T,) bool, float)
         consecutive rows, which of them count, and the factor that turns their power into the noise's
+    band_share : float
+        the band's cut-off relative to the rows' own highest frequency
     """
     pieces = list(pieces)
     total = AutocovarianceSum()
@@ -81,8 +97,23 @@ def fitted_noise(pieces: Iterable[tuple[Array, NDArray[np.bool_], float]]) -> Jo
     variance = max(model.variance / (1.0 + FLOOR), smallest)
     filtering = JointNoise(Autoregression(model.coefficients, 1.0, variance))
     squares, count = 0.0, 0
+    inside, whole = 0.0, 0.0
     for rows, used, factor in pieces:  # what the filter makes of these rows: the floor must not count as noise
         kept = filtering.kept(used)
-        squares += factor * float(np.sum(filtering.whitened(rows)[kept] ** 2))
+        left = np.where(kept, filtering.whitened(rows), 0.0)
+        squares += factor * float(left @ left)
         count += int(kept.sum())
-    return JointNoise(Autoregression(model.coefficients, max(squares / max(count, 1), smallest), variance))
+        of_band, of_all = _densities(left, band_share)
+        inside, whole = inside + factor * of_band * len(left), whole + factor * of_all * len(left)
+    share = float(np.clip(whole / inside, SMALLEST_SHARE, 1.0)) if band_share < 1.0 and inside > 0.0 else 1.0
+    innovation = max(squares / max(count, 1) / share, smallest)
+    return JointNoise(Autoregression(model.coefficients, innovation, variance), share)
+
+
+def _densities(rows: Array, band_share: float) -> tuple[float, float]:
+    """Mean spectral density of rows well inside the band, and everywhere."""
+    if len(rows) < FEWEST_FOR_SPECTRUM:
+        return 0.0, 0.0
+    power = np.abs(np.fft.rfft(rows * signal.windows.hann(len(rows), sym=False))) ** 2
+    last = max(2, int(WELL_INSIDE * band_share * (len(power) - 1)))
+    return float(power[1:last].mean()), float(power[1:].mean())

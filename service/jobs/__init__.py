@@ -6,6 +6,10 @@ from service.jobs.campaign_order import CampaignLinks, CampaignOrder, HeldOutMot
 from service.jobs.campaign_workspace import CampaignWorkspace
 from service.jobs.check_work import check_kept_recording
 from service.jobs.device_claims import BusyError, DeviceClaims
+from service.jobs.diagnosis_order import DiagnosisOptions, DiagnosisOrder
+from service.jobs.diagnosis_work import run_diagnosis
+from service.jobs.diagnosis_workspace import ROLES as DIAGNOSIS_ROLES
+from service.jobs.diagnosis_workspace import DiagnosisWorkspace
 from service.jobs.excitation_order import ExcitationDesignOptions, ExcitationOrder, ForbiddenBox
 from service.jobs.excitation_submission import hand_in_excitation
 from service.jobs.excitation_work import check_trajectory, read_designed_trajectory, run_excitation
@@ -29,6 +33,7 @@ from service.jobs.worker_pool import WorkerPool
 from service.jobs.workspace import Workspace
 
 __all__ = [
+    "DIAGNOSIS_ROLES",
     "EXPORT_FILES",
     "BackendChoice",
     "BusyError",
@@ -39,6 +44,9 @@ __all__ = [
     "ControlProcess",
     "DesignedMotion",
     "DeviceClaims",
+    "DiagnosisOptions",
+    "DiagnosisOrder",
+    "DiagnosisWorkspace",
     "ExcitationDesignOptions",
     "ExcitationOrder",
     "ExcitationWorkspace",
@@ -69,6 +77,7 @@ __all__ = [
     "hand_in_excitation",
     "read_designed_trajectory",
     "ready_motion",
+    "run_diagnosis",
     "run_excitation",
     "run_identification",
     "run_recording_name",

@@ -12,6 +12,8 @@ from service.acquisition.states import RunState
 from service.errors import NotFoundError, TauscopeError
 from service.jobs.campaign_order import CampaignOrder
 from service.jobs.campaign_workspace import CampaignWorkspace
+from service.jobs.diagnosis_order import DiagnosisOptions
+from service.jobs.diagnosis_submission import hand_in_diagnosis
 from service.jobs.excitation_order import ExcitationDesignOptions
 from service.jobs.excitation_submission import hand_in_excitation
 from service.jobs.excitation_workspace import ExcitationWorkspace
@@ -43,7 +45,7 @@ class Workshop:
 
     jobs : JobQueue
         designs and identifies
-    excitations, identifications : JobKind
+    excitations, identifications, diagnoses : JobKind
         kinds of its jobs
     runs : RunDesk
         moves arms
@@ -54,6 +56,7 @@ class Workshop:
     jobs: JobQueue
     excitations: JobKind
     identifications: JobKind
+    diagnoses: JobKind
     runs: RunDesk
     recordings: RecordingStore
 
@@ -149,6 +152,9 @@ class CampaignLeader:
         self._release_arm()
         self._begin("identify")
         self._identify()
+        if order.diagnosis is not None:
+            self._begin("diagnose")
+            self._diagnose(order.diagnosis)
 
     def _design(self, options: ExcitationDesignOptions, link: str) -> str:
         """Have a motion designed; returns at once."""
@@ -226,6 +232,24 @@ class CampaignLeader:
         self._note(identification=identifier)
         self._wait(Workspace, shop.identifications, identifier, "identification")
 
+    def _diagnose(self, options: DiagnosisOptions) -> None:
+        """From the same recordings to what the model leaves out."""
+        made, shop = self._workspace.read_made(), self._shop
+        identifier = self._when_there_is_room(
+            lambda: hand_in_diagnosis(
+                shop.jobs,
+                shop.diagnoses,
+                shop.recordings,
+                self._workspace.robot,
+                self._robot,
+                train=made.recordings,
+                held_out=made.held_out,
+                options=options,
+            )
+        )
+        self._note(diagnosis=identifier)
+        self._wait(Workspace, shop.diagnoses, identifier, "diagnosis")
+
     def _begin(self, step: str) -> None:
         """Tell a step, unless nobody wants to know any more."""
         if self._stop_asked.is_set():
@@ -237,10 +261,11 @@ class CampaignLeader:
         self._workspace.write_made(self._workspace.read_made().model_copy(update=made))
 
     def _cancel_jobs(self) -> None:
-        """Nobody waits for what is still designed or identified."""
+        """Nobody waits for what is still designed, identified or diagnosed."""
         made, shop = self._workspace.read_made(), self._shop
         jobs = [(shop.excitations, made.excitation), (shop.excitations, made.held_out_excitation)]
-        for kind, identifier in [*jobs, (shop.identifications, made.identification)]:
+        jobs += [(shop.identifications, made.identification), (shop.diagnoses, made.diagnosis)]
+        for kind, identifier in jobs:
             with suppress(NotFoundError):
                 if identifier is not None:
                     shop.jobs.cancel(kind, identifier)

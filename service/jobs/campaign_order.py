@@ -5,6 +5,7 @@ from typing import Literal
 from pydantic import Field
 
 from service.acquisition.options import RunOptions
+from service.jobs.diagnosis_order import DiagnosisOptions
 from service.jobs.excitation_order import ExcitationDesignOptions
 from service.jobs.identification_order import IdentificationOptions
 from service.jobs.run_order import BackendChoice
@@ -37,6 +38,7 @@ class CampaignOrder(StoredModel):
     identification: IdentificationOptions = Field(
         default=IdentificationOptions(), description="how the arm is identified"
     )
+    diagnosis: DiagnosisOptions | None = Field(default=None, description="how it is diagnosed; null: it is not")
 
     def backend_of(self, *, held_out: bool) -> BackendChoice:
         """Which arm is moved by a run; the noise that a scenario's seed fixes is another one in each.
@@ -68,5 +70,6 @@ class CampaignLinks(StoredModel):
     run: str | None = Field(default=None, description="identifier of the training run")
     held_out_run: str | None = Field(default=None, description="identifier of the held-out run")
     identification: str | None = Field(default=None, description="identifier of the identification")
+    diagnosis: str | None = Field(default=None, description="identifier of the diagnosis")
     recordings: tuple[str, ...] = Field(default=(), description="recordings that the model is made from")
     held_out: tuple[str, ...] = Field(default=(), description="recordings that it is judged by")

@@ -102,6 +102,8 @@ class Page:
         the rest
     footer : str
         what made it
+    kind : str
+        what the page is about, in a word
     """
 
     robot: str
@@ -111,6 +113,7 @@ class Page:
     cautions: Sequence[str]
     sections: Sequence[Section]
     footer: str
+    kind: str = "identification"
 
     @property
     def contents(self) -> list[tuple[str, str]]:

@@ -14,8 +14,12 @@ from service.cli.diagnose_command import diagnose
 from service.cli.values import SeveralValuesCommand
 from service.cli.verbs import add_verb
 from service.diagnosis import DiagnosisDocument
+from service.diagnosis.extended_model import read_model
+from service.excitation import motion_limits, read_trajectory, require_within_limits
 from service.recording import Recording
+from service.robot import read_robot
 from sim_backend.examples import example_robot
+from sim_backend.scenario_file import read_scenario
 
 app = typer.Typer()
 add_verb(app, diagnose, SeveralValuesCommand)
@@ -39,7 +43,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
 
 
 def run(*words: str) -> tuple[int, str]:
-    result = CliRunner().invoke(app, [str(example_robot("paper_arm")), *words])
+    result = CliRunner(env={"COLUMNS": "400"}).invoke(app, [str(example_robot("paper_arm")), *words])
     return result.exit_code, result.output
 
 
@@ -57,6 +61,39 @@ def test_a_terminal_shows_verdict_and_statement(files: list[str]) -> None:
     assert status == 0
     assert "explained" in shown
     assert "joint1: an elastic torque grows linearly with the angle" in shown
+
+
+def test_everything_that_can_be_written_is_written_and_read_again(files: list[str], tmp_path: Path) -> None:
+    names = ["model.json", "code.py", "code.h", "scenario.yaml", "robot.yaml", "next.json", "page.html"]
+    out = {name: tmp_path / name for name in names}
+    status, shown = run(
+        *files[:2],
+        *("--model", str(out["model.json"]), "--export", str(out["code.py"]), "--export", str(out["code.h"])),
+        *("--scenario", str(out["scenario.yaml"]), "--improved-robot", str(out["robot.yaml"])),
+        *("--next-trajectory", str(out["next.json"]), "--report", str(out["page.html"])),
+    )
+    assert status == 0, shown
+    arm = read_robot(example_robot("paper_arm"))
+    saved = read_model(out["model.json"], arm)
+    assert [term.effect.id for term in saved.terms] == ["joint_spring"]
+    improved = read_robot(out["robot.yaml"])
+    require_within_limits(read_trajectory(out["next.json"], arm), arm, motion_limits(arm))
+    assert "joint_spring" in [each.effect_id for each in read_scenario(out["scenario.yaml"], improved).effects]
+    page = out["page.html"].read_text()
+    assert page.count("<svg") == 1 + 3  # residuals over time, and where they are, joint by joint
+    assert "explained" in page
+    assert "http://" not in page.replace("http://www.w3.org", "")
+    compile(out["code.py"].read_text(), "code.py", "exec")
+    status, shown = run(*files[:2], "--against", str(out["model.json"]))
+    assert status == 0
+    assert "consistent" in shown
+
+
+def test_a_suffix_that_names_nothing_is_wrong_usage(files: list[str], tmp_path: Path) -> None:
+    for option, name in (("--export", "code.rs"), ("--next-trajectory", "next.txt")):
+        status, shown = run(*files[:1], option, str(tmp_path / name))
+        assert status == 2
+        assert name in shown
 
 
 def test_against_the_model_wrong_values_and_missing_structure_are_told_apart(files: list[str], tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ import pytest
 from scipy import signal
 
 from service.diagnosis.whitening import fitted_noise
+from service.recording.conditioning.common_band import Decimator
 
 
 def coloured(rng: np.random.Generator, rows: int) -> np.ndarray:
@@ -48,3 +49,24 @@ def test_the_scale_of_differences_between_repetitions_is_taken_out() -> None:
     deviation = repetitions - repetitions.mean(axis=0)
     noise = fitted_noise([(row, np.ones(4000, bool), 3 / 2) for row in deviation])
     assert noise.std == pytest.approx(0.7, rel=0.03)
+
+
+def test_a_slow_column_explains_one_variance_of_noise_however_close_its_rows_lie() -> None:
+    rng = np.random.default_rng(5)
+    band = Decimator.design(200.0, 6.0)
+    waves = np.sin(2.0 * np.pi * np.outer(np.linspace(0.4, 4.0, 25), np.arange(4000) / 200.0))
+    share_of_nyquist = 2.0 * 6.0 / band.rate_hz
+    gains, power, rows = [], 0.0, 0
+    for _ in range(60):
+        noise = fitted_noise(
+            [(band.reduce(0.5 * rng.standard_normal(12_000)), np.ones(band.reduce(np.ones(12_000)).size, bool), 1.0)],
+            share_of_nyquist,
+        )
+        white = noise.whitened(band.reduce(0.5 * rng.standard_normal(4000)))
+        columns = noise.whitened(band.reduce(waves))
+        gains.append((columns @ white) ** 2 / np.sum(columns**2, axis=1))
+        power += float(white @ white)
+        rows += noise.share * len(white)
+    assert np.mean(gains) == pytest.approx(1.0, abs=0.12)
+    assert power / rows == pytest.approx(1.0, abs=0.05)
+    assert noise.share < 0.9

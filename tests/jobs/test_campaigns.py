@@ -18,6 +18,8 @@ from service.jobs import (
     CampaignOrder,
     CampaignWorkspace,
     DeviceClaims,
+    DiagnosisOptions,
+    DiagnosisWorkspace,
     ExcitationDesignOptions,
     ExcitationWorkspace,
     HeldOutMotion,
@@ -44,6 +46,10 @@ def identify(_: Path) -> None:
     return None
 
 
+def diagnose(_: Path) -> None:
+    return None
+
+
 def no_room(_: Path) -> JobProblem:
     return JobProblem(code="excitation", detail="joint2: no room")
 
@@ -62,12 +68,13 @@ class Bench:
         self.recordings = RecordingStore(folder / "recordings")
         self.excitations = JobKind(ItemStore(folder / "excitations", "excitation"), design)
         self.identifications = JobKind(ItemStore(folder / "identifications", "identification"), identify)
-        kinds = [self.excitations, self.identifications]
+        self.diagnoses = JobKind(ItemStore(folder / "diagnoses", "diagnosis"), diagnose)
+        kinds = [self.excitations, self.identifications, self.diagnoses]
         self.jobs = JobQueue(kinds, executor or InlineExecutor(), slots=1, most_waiting=9)
         self.claims = DeviceClaims(4)
         items = ItemStore(folder / "runs", "run")
         self.runs = RunDesk(items, self.recordings, start, self.claims, lambda: True)
-        shop = Workshop(self.jobs, self.excitations, self.identifications, self.runs, self.recordings)
+        shop = Workshop(self.jobs, self.excitations, self.identifications, self.diagnoses, self.runs, self.recordings)
         self.desk = CampaignDesk(ItemStore(folder / "campaigns", "campaign"), shop)
 
     def submit(self, **changes: object) -> str:
@@ -137,6 +144,19 @@ def test_a_campaign_from_its_beginning_to_its_end(tmp_path: Path) -> None:
     assert [entry.name for entry in order.recordings] == [f"run-{made.run}.csv"]
     assert [entry.name for entry in order.held_out] == [f"run-{made.held_out_run}.csv"]
     assert (made.recordings, made.held_out) == ((f"run-{made.run}.csv",), (f"run-{made.held_out_run}.csv",))
+
+
+def test_a_campaign_that_ends_with_a_diagnosis_of_the_same_recordings(tmp_path: Path) -> None:
+    bench = Bench(tmp_path)
+    campaign = bench.submit(diagnosis=DiagnosisOptions(against="model"))
+    assert bench.ended(campaign).state is JobState.SUCCEEDED
+    assert bench.steps(campaign) == [*ALL_STEPS, "diagnose"]
+    made = bench.workspace(campaign).read_made()
+    order = DiagnosisWorkspace(bench.diagnoses.items.folder(made.diagnosis or "")).read_order()
+    assert order is not None
+    assert order.options.against == "model"
+    assert [entry.name for entry in order.recordings] == list(made.recordings)
+    assert [entry.name for entry in order.held_out] == list(made.held_out)
 
 
 def test_a_campaign_without_a_held_out_motion(tmp_path: Path) -> None:

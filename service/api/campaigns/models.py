@@ -10,8 +10,16 @@ from service.api.jobs.answers import JobAnswer
 from service.api.jobs.submission import RobotRequest
 from service.api.models import AnswerModel
 from service.api.robots.models import EXAMPLE_ROBOT
+from service.diagnosis import DiagnosisDocument
 from service.identification import IdentificationDocument
-from service.jobs import BackendChoice, ExcitationDesignOptions, HeldOutMotion, IdentificationOptions, JobState
+from service.jobs import (
+    BackendChoice,
+    DiagnosisOptions,
+    ExcitationDesignOptions,
+    HeldOutMotion,
+    IdentificationOptions,
+    JobState,
+)
 
 
 class CampaignRequest(RobotRequest):
@@ -27,6 +35,9 @@ class CampaignRequest(RobotRequest):
     run: RunOptions = Field(default=RunOptions(), description="how the motions are run")
     identification: IdentificationOptions = Field(
         default=IdentificationOptions(), description="how the arm is identified"
+    )
+    diagnosis: DiagnosisOptions | None = Field(
+        default=None, description="how what the model leaves out is diagnosed; null: it is not"
     )
 
 
@@ -48,9 +59,11 @@ EXAMPLES: dict[str, tuple[str, Any]] = {
 class CampaignStepAnswer(AnswerModel):
     """One step of a campaign."""
 
-    name: Literal["design", "run", "held-out design", "held-out run", "identify"] = Field(description="of the step")
-    state: str = Field(description="waiting, or the state of its excitation, run or identification")
-    link: str | None = Field(default=None, description="its excitation, run or identification")
+    name: Literal["design", "run", "held-out design", "held-out run", "identify", "diagnose"] = Field(
+        description="of the step"
+    )
+    state: str = Field(description="waiting, or the state of its excitation, run, identification or diagnosis")
+    link: str | None = Field(default=None, description="its excitation, run, identification or diagnosis")
 
 
 class CampaignLinksAnswer(AnswerModel):
@@ -62,6 +75,7 @@ class CampaignLinksAnswer(AnswerModel):
     recordings: tuple[str, ...] = Field(default=(), description="recordings that the model is made from")
     held_out: tuple[str, ...] = Field(default=(), description="recordings that it is judged by")
     identification: str | None = Field(default=None, description="its identification, exports included")
+    diagnosis: str | None = Field(default=None, description="its diagnosis, where one was asked for")
     result: str | None = Field(default=None, description="its result, once it succeeded")
 
 
@@ -87,6 +101,9 @@ class CampaignResult(AnswerModel):
         default="tauscope.campaign/1", alias="schema", description="name and version of this form"
     )
     identification: IdentificationDocument = Field(description="the same document as `tauscope identify --json`")
+    diagnosis: DiagnosisDocument | None = Field(
+        default=None, description="the same document as `tauscope diagnose --json`, where one was asked for"
+    )
     steps: tuple[CampaignStepAnswer, ...] = Field(description="how it came about")
     links: CampaignLinksAnswer = Field(description="everything that was made on the way")
 

@@ -5,11 +5,13 @@ from typing import Literal
 from urllib.parse import quote
 
 from service.api.campaigns.models import CampaignAnswer, CampaignLinksAnswer, CampaignResult, CampaignStepAnswer
+from service.api.diagnoses.status import find_diagnosis, finished_diagnosis
 from service.api.excitations.status import find_excitation
 from service.api.identifications.status import find_identification, finished_identification
 from service.api.jobs.answers import damaged_fields, job_fields, require_document, require_success
 from service.api.runs.status import find_run
 from service.api.services import Services
+from service.diagnosis import DiagnosisDocument
 from service.errors import NotFoundError
 from service.identification import IdentificationDocument
 from service.jobs import CampaignLinks, CampaignOrder, CampaignWorkspace, JobState, Workspace
@@ -88,7 +90,12 @@ def result_of(services: Services, identifier: str, root: str) -> CampaignResult:
     identification = finished_identification(services, made.identification or "")
     content = require_document(identification.read_result(), identification.folder.name)
     document = IdentificationDocument.model_validate_json(content)
-    return CampaignResult(identification=document, steps=answer.steps, links=answer.links)
+    diagnosis = None
+    if made.diagnosis is not None:
+        found = finished_diagnosis(services, made.diagnosis)
+        content = require_document(found.read_result(), made.diagnosis)
+        diagnosis = DiagnosisDocument.model_validate_json(content)
+    return CampaignResult(identification=document, diagnosis=diagnosis, steps=answer.steps, links=answer.links)
 
 
 def _steps(services: Services, order: CampaignOrder, made: CampaignLinks, root: str) -> Iterator[CampaignStepAnswer]:
@@ -100,6 +107,8 @@ def _steps(services: Services, order: CampaignOrder, made: CampaignLinks, root: 
     if order.held_out is not None:
         yield _run_step(services, "held-out run", made.held_out_run, root)
     yield _identification_step(services, made.identification, root)
+    if order.diagnosis is not None:
+        yield _diagnosis_step(services, made.diagnosis, root)
 
 
 def _identification_step(services: Services, identifier: str | None, root: str) -> CampaignStepAnswer:
@@ -111,6 +120,17 @@ def _identification_step(services: Services, identifier: str | None, root: str) 
     except NotFoundError:
         state = GONE
     return CampaignStepAnswer(name="identify", state=state, link=f"{root}/identifications/{identifier}")
+
+
+def _diagnosis_step(services: Services, identifier: str | None, root: str) -> CampaignStepAnswer:
+    """The diagnosis and its state."""
+    if identifier is None:
+        return CampaignStepAnswer(name="diagnose", state=WAITING)
+    try:
+        state = _job_state(find_diagnosis(services, identifier))
+    except NotFoundError:
+        state = GONE
+    return CampaignStepAnswer(name="diagnose", state=state, link=f"{root}/diagnoses/{identifier}")
 
 
 def _excitation_step(
@@ -156,5 +176,6 @@ def _links(here: str, root: str, made: CampaignLinks, *, has_result: bool) -> Ca
         recordings=tuple(f"{root}/recordings/{quote(name)}" for name in made.recordings),
         held_out=tuple(f"{root}/recordings/{quote(name)}" for name in made.held_out),
         identification=None if identification is None else f"{root}/identifications/{identification}",
+        diagnosis=None if made.diagnosis is None else f"{root}/diagnoses/{made.diagnosis}",
         result=f"{here}/result" if has_result else None,
     )

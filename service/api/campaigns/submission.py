@@ -57,6 +57,7 @@ def _hand_in(received: Received[CampaignRequest], services: Services, workspace:
             held_out=document.held_out,
             run=document.run,
             identification=document.identification,
+            diagnosis=document.diagnosis,
         )
     )
     return services.campaigns.submit(workspace.folder)

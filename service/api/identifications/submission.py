@@ -1,7 +1,7 @@
 """From a request to a job: what was sent is written into the job's folder and checked as far as that is quick."""
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import Any
 
 from fastapi import Request
 from starlette.concurrency import run_in_threadpool
@@ -15,8 +15,6 @@ from service.api.services import Services
 from service.errors import LimitExceededError
 from service.jobs import IdentificationOrder, IdentificationWorkspace, OrderedRecording
 from service.store import KeptFile, RecordingStore
-
-Role = Literal["recordings", "held_out"]
 
 _Received = Received[IdentificationRequest]
 
@@ -63,9 +61,9 @@ def _hand_in(received: _Received, services: Services, workspace: IdentificationW
     """Check what was received, and queue it."""
     robot_file = keep_robot(received, workspace.robot)
     robot = read_received_robot(workspace.robot, robot_file)
-    recordings = _ordered("recordings", received, services.recordings)
-    held_out = _ordered("held_out", received, services.recordings)
-    _check_roles(recordings, held_out, services.settings.max_recordings)
+    recordings = ordered_recordings("recordings", received, services.recordings)
+    held_out = ordered_recordings("held_out", received, services.recordings)
+    check_roles(recordings, held_out, services.settings.max_recordings)
     order = IdentificationOrder(
         robot_file=robot_file,
         robot_name=robot.name,
@@ -77,8 +75,25 @@ def _hand_in(received: _Received, services: Services, workspace: IdentificationW
     return services.jobs.submit(services.identifications, workspace.folder)
 
 
-def _ordered(role: Role, received: _Received, store: RecordingStore) -> tuple[OrderedRecording, ...]:
-    """The recordings of a role: each a file of the form, or else a recording on the server."""
+def ordered_recordings(role: str, received: Received[Any], store: RecordingStore) -> tuple[OrderedRecording, ...]:
+    """The recordings of a role: each a file of the form, or else a recording on the server.
+
+    Parameters
+    ----------
+    role : str
+        name of the form's part and of the request's field
+    received : Received
+        the request
+    store : RecordingStore
+        recordings on the server
+
+    Raises
+    ------
+    ProblemError
+        if a file was sent but is not listed
+    NotFoundError
+        if a recording is neither sent nor on the server
+    """
     files: dict[str, KeptFile] = {file.name: file for file in received.form.files.get(role, [])}
     listed: Sequence[str] | None = getattr(received.document, role)
     names = list(files) if listed is None else listed
@@ -96,10 +111,25 @@ def _ordered(role: Role, received: _Received, store: RecordingStore) -> tuple[Or
     return tuple(ordered)
 
 
-def _check_roles(
+def check_roles(
     recordings: Sequence[OrderedRecording], held_out: Sequence[OrderedRecording], max_recordings: int
 ) -> None:
-    """There is something to identify from, not too much, and no recording is its own judge."""
+    """There is something to work on, not too much, and no recording is its own judge.
+
+    Parameters
+    ----------
+    recordings, held_out : sequence of OrderedRecording
+        what is worked on, and everything else
+    max_recordings : int
+        most of all together
+
+    Raises
+    ------
+    ProblemError
+        naming the recording
+    LimitExceededError
+        for too many
+    """
     if not recordings:
         text = "no recording was sent or named; send part recordings, or name recordings on the server"
         raise ProblemError("invalid-request", text)

@@ -1,8 +1,20 @@
 """The catalogue of effects that a model may have left out: one small file an effect."""
 
 from service.diagnosis.catalogue.effect import Coefficient, Effect, Quantity, Shape
-from service.diagnosis.catalogue.registry import catalogue, possible_effects
+from service.diagnosis.catalogue.registry import catalogue, doubtful_effects, possible_effects
 from service.diagnosis.catalogue.setting import Setting
 from service.diagnosis.catalogue.signals import Signals
+from service.diagnosis.catalogue.time_local import TimeLocalEffect
 
-__all__ = ["Coefficient", "Effect", "Quantity", "Setting", "Shape", "Signals", "catalogue", "possible_effects"]
+__all__ = [
+    "Coefficient",
+    "Effect",
+    "Quantity",
+    "Setting",
+    "Shape",
+    "Signals",
+    "TimeLocalEffect",
+    "catalogue",
+    "doubtful_effects",
+    "possible_effects",
+]

@@ -48,6 +48,7 @@ class AsymmetricCoulomb(Effect):
 class AsymmetricViscous(Effect):
     """τ = b |q̇|: viscous friction is larger by b one way and smaller by b the other."""
 
+    of_motion_alone: ClassVar[bool] = True
     id: ClassVar[str] = "asymmetric_viscous"
     equation: ClassVar[str] = "tau = b |qd|: viscous friction F_v + b forwards, F_v - b backwards"
     meaning: ClassVar[str] = "viscous friction differs with the direction of motion"

@@ -98,6 +98,10 @@ class Effect(ABC):
         values of the shape parameters at which the effect is looked for
     lower, upper : (k,) float64
         bounds of the shape parameters
+
+    Columns of an effect `of_motion_alone` are the same beside every model, and are made once.
+    An effect that is `screened` is looked for beside the nominal model, one that is `doubtful` only where its columns
+    have `least_share` of their energy outside it; any other becomes a finding by comparison with a given model.
     """
 
     id: ClassVar[str]
@@ -108,6 +112,10 @@ class Effect(ABC):
     coefficients: ClassVar[tuple[Coefficient, ...]]
     shapes: ClassVar[tuple[Shape, ...]] = ()
     repeats: ClassVar[bool] = False
+    of_motion_alone: ClassVar[bool] = False
+    screened: ClassVar[bool] = True
+    doubtful: ClassVar[bool] = False
+    least_share: ClassVar[float] = 0.0
 
     joint: int | None
     grid: Array = field(default_factory=lambda: NO_SHAPE)
@@ -141,6 +149,35 @@ class Effect(ABC):
         (g, c, m, N) or (g, c, m, P, N) float64
             for the m joints of `touched`; with P where repetitions of the same motion differ
         """
+
+    def torque_of(self, signals: Signals, coefficients: Array, shape: Array) -> Array:
+        """Torque of the effect at its full size, (m, N) or (m, P, N): what its columns stand for to first order.
+
+        Parameters
+        ----------
+        signals : Signals
+            one piece of motion
+        coefficients : (c,) float64
+            values of the coefficients
+        shape : (k,) float64
+            values of the shape parameters
+        """
+        (columns,) = self.columns(signals, shape[None])
+        return np.asarray(np.tensordot(coefficients, columns, axes=1), dtype=np.float64)
+
+    def rough_grid(self) -> Array:
+        """Some of the grid's shapes, for those who only want to know what the effect may look like, (g, k)."""
+        return self.grid
+
+    def reluctance(self, shapes: Array) -> Array:
+        """By how much more than others a shape has to explain before it is preferred, (g,) [noise variances].
+
+        Parameters
+        ----------
+        shapes : (g, k) float64
+            values of the shape parameters
+        """
+        return np.zeros(len(shapes))
 
     def touched(self, joint_count: int) -> tuple[int, ...]:
         """Joints whose torque the effect changes: its own one, or all.

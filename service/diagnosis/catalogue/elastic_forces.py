@@ -16,10 +16,17 @@ ONSETS = np.linspace(0.2, 0.9, 8)
 
 EXPONENTS = np.array([1.0, 1.5, 2.0])
 
+USUAL_EXPONENT = 1.5
+"""Of hoses and cables; data that see a short way past the angle hardly tell exponents apart, and extrapolate badly."""
+
+CLEARLY_BETTER = 10.0
+"""What another exponent has to explain more [noise variances]."""
+
 
 class JointSpring(Effect):
     """τ = k (q - q_0); the constant part is in the nominal model's offset."""
 
+    of_motion_alone: ClassVar[bool] = True
     id: ClassVar[str] = "joint_spring"
     equation: ClassVar[str] = "tau = k (q - q_0)"
     meaning: ClassVar[str] = "an elastic torque grows linearly with the angle"
@@ -59,6 +66,7 @@ class CableForce(Effect):
         +1 where it pulls beyond q_t, -1 where below
     """
 
+    of_motion_alone: ClassVar[bool] = True
     id: ClassVar[str] = "cable_force"
     equation: ClassVar[str] = "tau = +-k max(+-(q - q_t), 0)^p"
     meaning: ClassVar[str] = "a one-sided elastic torque sets in past an angle"
@@ -87,6 +95,16 @@ class CableForce(Effect):
                     bounds = np.array([onsets[0], 1.0]), np.array([onsets[-1], 2.0])
                     made.append(cls(joint, mesh(onsets, EXPONENTS), *bounds, side=side))
         return made
+
+    def reluctance(self, shapes: Array) -> Array:
+        """Another exponent than the usual one has to be clearly better.
+
+        Parameters
+        ----------
+        shapes : (g, 2) float64
+            q_t [rad or m], p
+        """
+        return np.where(shapes[:, 1] == USUAL_EXPONENT, 0.0, CLEARLY_BETTER)
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """±max(±(q - q_t), 0)^p.

@@ -17,6 +17,7 @@ POWERS = np.array([0.35, 0.5, 0.65, 0.8, 1.25, 1.6, 2.0, 2.4, 3.0])
 class NonlinearViscous(Effect):
     """τ = c sgn(q̇) |q̇|ᵖ."""
 
+    of_motion_alone: ClassVar[bool] = True
     id: ClassVar[str] = "nonlinear_viscous"
     equation: ClassVar[str] = "tau = c sgn(qd) |qd|^p"
     meaning: ClassVar[str] = "friction grows with a power of speed other than one"

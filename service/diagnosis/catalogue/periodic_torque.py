@@ -144,6 +144,7 @@ class _Periodic(Effect):
 class Cogging(_Periodic):
     """τ = Σ a sin(k q + φ)."""
 
+    of_motion_alone: ClassVar[bool] = True
     id: ClassVar[str] = "cogging"
     equation: ClassVar[str] = "tau = sum a sin(k q + phi)"
     meaning: ClassVar[str] = "torque repeats with the angle, whatever the load"

@@ -12,11 +12,16 @@ from service.diagnosis.catalogue.base_tilt import BaseTilt
 from service.diagnosis.catalogue.compliance import Backlash, JointElasticity
 from service.diagnosis.catalogue.effect import Effect
 from service.diagnosis.catalogue.elastic_forces import CableForce, JointSpring
+from service.diagnosis.catalogue.external_contact import ExternalContact
 from service.diagnosis.catalogue.friction_coupling import FrictionCoupling
 from service.diagnosis.catalogue.friction_drift import FrictionDrift
+from service.diagnosis.catalogue.kinematic_error import KinematicError
 from service.diagnosis.catalogue.load_dependent_friction import LoadDependentFriction
 from service.diagnosis.catalogue.nonlinear_viscous import NonlinearViscous
+from service.diagnosis.catalogue.payload import Payload
+from service.diagnosis.catalogue.payload_change import PayloadChange
 from service.diagnosis.catalogue.periodic_torque import Cogging, TorqueRipple
+from service.diagnosis.catalogue.plain_terms import CoulombFriction, TorqueOffset, ViscousFriction
 from service.diagnosis.catalogue.position_dependent_friction import PositionDependentFriction
 from service.diagnosis.catalogue.presliding_hysteresis import PreslidingHysteresis
 from service.diagnosis.catalogue.rotor_inertia import RotorInertia
@@ -48,6 +53,13 @@ BUILT_IN: tuple[type[Effect], ...] = (
     JointSpring,
     CableForce,
     BaseTilt,
+    PayloadChange,
+    ExternalContact,
+    KinematicError,
+    Payload,
+    TorqueOffset,
+    CoulombFriction,
+    ViscousFriction,
 )
 
 
@@ -75,11 +87,22 @@ def catalogue() -> tuple[type[Effect], ...]:
 
 
 def possible_effects(setting: Setting) -> Sequence[Effect]:
-    """Every form of every effect worth looking at.
+    """Every form of every effect worth looking at beside the nominal model.
 
     Parameters
     ----------
     setting : Setting
         the arm and the ranges of its motion
     """
-    return [form for effect in catalogue() for form in effect.forms(setting)]
+    return [form for effect in catalogue() if effect.screened and not effect.doubtful for form in effect.forms(setting)]
+
+
+def doubtful_effects(setting: Setting) -> Sequence[Effect]:
+    """Every form of the effects that hardly any data can show: looked for where these do.
+
+    Parameters
+    ----------
+    setting : Setting
+        the arm and the ranges of its motion
+    """
+    return [form for effect in catalogue() if effect.screened and effect.doubtful for form in effect.forms(setting)]

@@ -12,6 +12,7 @@ from service.recording.recording import Array
 class RotorInertia(Effect):
     """τ = I_a q̈."""
 
+    of_motion_alone: ClassVar[bool] = True
     id: ClassVar[str] = "rotor_inertia"
     equation: ClassVar[str] = "tau = I_a qdd"
     meaning: ClassVar[str] = "the motor's reflected inertia is left out"

@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from service.recording.conditioning.filters import smooth
+from service.recording.conditioning.filters import derivative, smooth
 from service.recording.recording import Array
 from service.robot import Robot
 
@@ -41,6 +41,8 @@ class Signals:
         standard parameters of the nearest physically consistent links, for another chain or another gravity
     periodic : bool
         whether the piece is one period of a motion that repeats
+    of_motion : dict of str to anything
+        what was made of the motion alone, whatever the model: shared by all signals of the same piece
     """
 
     robot: Robot
@@ -57,6 +59,7 @@ class Signals:
     bodies: Array
     links: Array
     periodic: bool
+    of_motion: dict[str, Any] = field(default_factory=dict, repr=False)
     _memory: dict[str, Any] = field(default_factory=dict, repr=False)
 
     def remembered(self, name: str, make: Callable[[], T]) -> T:
@@ -73,6 +76,20 @@ class Signals:
             self._memory[name] = make()
         return self._memory[name]
 
+    def remembered_of_motion(self, name: str, make: Callable[[], T]) -> T:
+        """What depends on the motion and not on the model, made once for all models.
+
+        Parameters
+        ----------
+        name : str
+            by which it is known
+        make : callable
+            makes it
+        """
+        if name not in self.of_motion:
+            self.of_motion[name] = make()
+        return self.of_motion[name]
+
     def derivative(self, values: Array) -> Array:
         """Derivative in time of signals (..., N): by their Fourier series where periodic, else by differences.
 
@@ -83,7 +100,7 @@ class Signals:
         """
         count = values.shape[-1]
         if not self.periodic:
-            return np.gradient(values, 1.0 / self.rate_hz, axis=-1)
+            return _differences(values, self.rate_hz)
         rate = 2j * np.pi * np.fft.rfftfreq(count, 1.0 / self.rate_hz)
         if count % 2 == 0:
             rate[-1] = 0.0
@@ -104,3 +121,11 @@ class Signals:
         spectrum = np.fft.rfft(values)
         frequency = np.fft.rfftfreq(len(values), 1.0 / self.rate_hz)
         return np.fft.irfft(spectrum / (1.0 + (frequency / cutoff_hz) ** 8), n=len(values))
+
+
+def _differences(values: Array, rate_hz: float) -> Array:
+    """Central differences of eighth order, of second order at the ends."""
+    rows = np.ascontiguousarray(values.reshape(-1, values.shape[-1]).T)
+    slope = derivative(rows, rate_hz)
+    ends = np.isnan(slope[:, :1])
+    return np.where(ends, np.gradient(rows, 1.0 / rate_hz, axis=0), slope).T.reshape(values.shape)

@@ -1,17 +1,21 @@
 """What is wrong with the recorded torque itself: scaled, compressed at high load, or late."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from service.diagnosis.catalogue.effect import Coefficient, Effect, Shape, per_joint_columns
+from service.diagnosis.catalogue.effect import Coefficient, Effect, Quantity, Shape, per_joint_columns
 from service.diagnosis.catalogue.setting import Setting
 from service.diagnosis.catalogue.signals import Signals
 from service.recording.recording import Array
 
-LEVELS = np.array([0.0, 0.3, 0.5, 0.7, 0.8, 0.9])
-"""Torque, relative to the largest, beyond which the recorded one falls short; at zero the cubic of a soft curve."""
+COMPRESSIONS = np.array([0.3, 0.5, 0.8, 1.3, 2.2, 4.0])
+"""Levels of a soft curve looked at, relative to the largest torque."""
+
+CLIPS = np.array([0.3, 0.45, 0.6, 0.7, 0.8, 0.9])
+"""Levels of a hard one."""
 
 
 class TorqueGainError(Effect):
@@ -48,22 +52,27 @@ class TorqueGainError(Effect):
         return per_joint_columns(signals.torque[self.joint][None, None])
 
 
+@dataclass(frozen=True, eq=False)
 class TorqueSaturation(Effect):
-    """τ_recorded = τ - c sgn(τ) max(|τ| - τ_0, 0), or - c τ|τ|² where τ_0 = 0."""
+    """τ_recorded = τ - a (τ - c tanh(τ/c)), or τ - a (τ - clip(τ, ±c)); a is 1 where nothing else bends the curve.
+
+    clips : bool
+        whether the torque is clipped rather than compressed
+    """
 
     id: ClassVar[str] = "torque_saturation"
-    equation: ClassVar[str] = (
-        "tau_recorded = tau - c sgn(tau) max(|tau| - tau_0, 0); - c tau |tau|^2 / tau_max^2 at tau_0 = 0"
-    )
+    equation: ClassVar[str] = "tau_recorded = tau - a (tau - c tanh(tau/c)); clipped: tau - a (tau - clip(tau, +-c))"
     meaning: ClassVar[str] = "the recorded torque is compressed or clipped at high load"
     remedy: ClassVar[str] = "record within the sensor's or the drive's linear range"
     revealing_motion: ClassVar[str] = "the same motion slower and without payload, well below the level"
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("c", "1", positive=True, largest=1.0),)
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("tau_0", "{tau}", fixed=True),)
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("a", "1", positive=True, largest=2.0),)
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("c", "{tau}", logarithmic=True),)
+
+    clips: bool = False
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """One a joint.
+        """Both curves at every joint.
 
         Parameters
         ----------
@@ -72,9 +81,9 @@ class TorqueSaturation(Effect):
         """
         made = []
         for joint in setting.joints:
-            top = float(setting.top_torque[joint])
-            levels = LEVELS * top
-            made.append(cls(joint, levels[:, None], np.zeros(1), np.array([top])))
+            for clips, parts in ((False, COMPRESSIONS), (True, CLIPS)):
+                levels = parts * float(setting.top_torque[joint])
+                made.append(cls(joint, levels[:, None], 0.7 * levels[:1], 1.5 * levels[-1:], clips=clips))
         return made
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
@@ -85,12 +94,34 @@ class TorqueSaturation(Effect):
         signals : Signals
             one piece of motion
         shapes : (g, 1) float64
-            τ_0 [Nm or N]
+            c [Nm or N]
         """
         torque = signals.torque[self.joint]
-        beyond = -np.sign(torque) * np.maximum(np.abs(torque) - shapes, 0.0)
-        soft = -(torque**3) / self.upper[0] ** 2
-        return per_joint_columns(np.where(shapes == 0.0, soft, beyond)[:, None])
+        recorded = np.clip(torque, -shapes, shapes) if self.clips else shapes * np.tanh(torque / shapes)
+        return per_joint_columns((recorded - torque)[:, None])
+
+    def quantities(
+        self, setting: Setting, coefficients: Array, shape: Array, covariance: Array
+    ) -> tuple[Quantity, ...]:
+        """The level alone where a soft curve is only bent a little: then no data tell a and c apart, but c/√a.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        coefficients : (1,) float64
+            a
+        shape : (1,) float64
+            c [Nm or N]
+        covariance : (2, 2) float64
+            of both
+        """
+        if self.clips:
+            return super().quantities(setting, coefficients, shape, covariance)
+        share, level = max(float(coefficients[0]), 1e-12), float(shape[0])
+        slope = np.array([-0.5 * level / share**1.5, 1.0 / np.sqrt(share)])
+        std = float(np.sqrt(max(slope @ covariance @ slope, 0.0)))
+        return (Quantity("c", level / np.sqrt(share), std, self.unit("{tau}", setting)),)
 
 
 class TimeDelay(Effect):
@@ -125,5 +156,24 @@ class TimeDelay(Effect):
         shapes : (1, 0) float64
             none
         """
-        rate = -signals.derivative(signals.torque[list(self.touched(len(signals.torque)))])
-        return rate[None, None]
+        torque = signals.torque[list(self.touched(len(signals.torque)))]
+        # Over two samples: where friction steps from one sample to the next, a finer slope is no torque that anybody
+        # records.
+        return -np.gradient(torque, 1.0 / signals.rate_hz, axis=-1)[None, None]
+
+    def torque_of(self, signals: Signals, coefficients: Array, shape: Array) -> Array:
+        """τ(t - d) - τ(t): friction's step arrives late, it does not become a spike.
+
+        Parameters
+        ----------
+        signals : Signals
+            one piece of motion
+        coefficients : (1,) float64
+            d [s]
+        shape : (0,) float64
+            none
+        """
+        torque = signals.torque[list(self.touched(len(signals.torque)))]
+        instants = np.arange(torque.shape[1]) / signals.rate_hz
+        late = [np.interp(instants - float(coefficients[0]), instants, row) for row in torque]
+        return np.stack(late) - torque

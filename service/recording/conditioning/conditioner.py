@@ -58,6 +58,8 @@ class Conditioner:
         noise of the positions, and the band that the motion's sources allow
     source : MotionSource
         what every joint's velocity and acceleration are made from
+    state_hz : float or None
+        cut-off of the smoothing of motion that is not averaged [Hz]; by the common band's where None
     """
 
     recording: Recording
@@ -65,6 +67,7 @@ class Conditioner:
     timing: Timing
     noise: PositionNoise
     source: MotionSource
+    state_hz: float | None = None
 
     @staticmethod
     def survey(recording: Recording, robot: Robot) -> "Conditioner":
@@ -90,6 +93,16 @@ class Conditioner:
         source = choose_sources(stretches, noise)
         noise = replace(noise, limit_hz=lowest_limit(source.limits_hz), joint_limits_hz=source.limits_hz)
         return Conditioner(recording, robot, timing, noise, source)
+
+    def as_one_motion(self, state_hz: float | None) -> "Conditioner":
+        """The same recording with no period averaged: each repetition of a motion counts as the motion that it was.
+
+        Parameters
+        ----------
+        state_hz : float or None
+            cut-off of the motion's own smoothing [Hz]; by the common band's where None
+        """
+        return replace(self, timing=replace(self.timing, runs=()), state_hz=state_hz)
 
     @property
     def position_noise_std(self) -> Array:
@@ -227,7 +240,7 @@ class Conditioner:
         Consecutive windows overlap by what filters cost. Where averaged periods lie before or after, the filters run on
         into them by half the kernel: an output belongs to where its kernel's centre lies.
         """
-        trim = Trim.design(self.timing.rate_hz, cutoff_hz)
+        trim = Trim.design(self.timing.rate_hz, cutoff_hz, self.state_hz)
         if end - begin < trim.factor:
             return
         spare = trim.margin + (trim.kernel - trim.factor) // 2

@@ -1,5 +1,7 @@
 """Zero-phase smoothing of the motion, and its derivatives."""
 
+from functools import lru_cache
+
 import numpy as np
 from scipy import signal
 
@@ -16,6 +18,12 @@ STATE_BAND_RATIO = 2.0
 
 SMOOTHED_FRACTION = 0.45
 """A cut-off at or above this part of the sampling rate smooths nothing."""
+
+
+@lru_cache(maxsize=64)
+def _low_pass(rate_hz: float, cutoff_hz: float) -> Array:
+    """Fourth-order Butterworth in second-order sections; to design it takes longer than to run it."""
+    return np.asarray(signal.butter(4, cutoff_hz, output="sos", fs=rate_hz))
 
 
 def smooth(values: Array, rate_hz: float, cutoff_hz: float) -> Array:
@@ -39,7 +47,7 @@ def smooth(values: Array, rate_hz: float, cutoff_hz: float) -> Array:
     """
     if cutoff_hz >= SMOOTHED_FRACTION * rate_hz:
         return values
-    sections = signal.butter(4, cutoff_hz, output="sos", fs=rate_hz)
+    sections = _low_pass(rate_hz, cutoff_hz)
     padding = min(smoothing_margin(rate_hz, cutoff_hz), len(values) - 1)
     return signal.sosfiltfilt(sections, values, axis=0, padlen=padding)
 

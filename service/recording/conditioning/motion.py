@@ -75,16 +75,19 @@ class Trim:
         the same for every piece, so that pieces join
     cutoff_hz : float or None
         of the band [Hz]; None where it is open
+    state_hz : float
+        cut-off of the motion's own smoothing [Hz]; the sampling rate where nothing is smoothed
     margin : int
         samples that smoothing and differentiation take from each end of a piece
     """
 
     band: AllPass | Decimator
     cutoff_hz: float | None
+    state_hz: float
     margin: int
 
     @staticmethod
-    def design(rate_hz: float, cutoff_hz: float | None) -> "Trim":
+    def design(rate_hz: float, cutoff_hz: float | None, state_hz: float | None = None) -> "Trim":
         """Band and margin for a cut-off.
 
         Parameters
@@ -93,12 +96,15 @@ class Trim:
             sampling rate [Hz]
         cutoff_hz : float or None
             of the common band [Hz]; None for no filter
+        state_hz : float or None
+            of the motion's own smoothing [Hz]; `state_cutoff` where None
         """
         margin = 2 * DIFFERENCE_MARGIN
         if cutoff_hz is None or cutoff_hz >= OPEN_BAND_FRACTION * rate_hz:
-            return Trim(AllPass(rate_hz), None, margin)
-        margin += smoothing_margin(rate_hz, state_cutoff(rate_hz, cutoff_hz))
-        return Trim(Decimator.design(rate_hz, cutoff_hz), cutoff_hz, margin)
+            return Trim(AllPass(rate_hz), None, rate_hz, margin)
+        smoothing = state_cutoff(rate_hz, cutoff_hz) if state_hz is None else state_hz
+        margin += smoothing_margin(rate_hz, smoothing)
+        return Trim(Decimator.design(rate_hz, cutoff_hz), cutoff_hz, smoothing, margin)
 
     @property
     def kernel(self) -> int:
@@ -154,7 +160,7 @@ def transient_motion(stretch: Stretch, trim: Trim, source: MotionSource) -> Moti
     rate, count = stretch.rate_hz, len(stretch.position)
     if not trim.outputs(count):
         return None
-    cutoff = rate if trim.cutoff_hz is None else state_cutoff(rate, trim.cutoff_hz)
+    cutoff = trim.state_hz
     position = smooth(stretch.position, rate, cutoff)
     velocity = derivative(position, rate)
     use_velocity = _usable(stretch.velocity, source.velocity)

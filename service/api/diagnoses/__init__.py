@@ -1,0 +1,1 @@
+"""Diagnoses: handed in, followed, their results, figures and models fetched."""

@@ -1,0 +1,210 @@
+"""What was found, each finding beside all others: how much it explains, and what the model without it leaves."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from service.diagnosis.catalogue import TimeLocalEffect
+from service.diagnosis.choice import Choice, Option, Selection
+from service.diagnosis.confirmation import HeldOut
+from service.diagnosis.fit import Fit, Fitter
+from service.diagnosis.interleaved import interleaved_confirmation
+from service.diagnosis.model import ExtendedModel, Term, raw_squares, with_terms
+from service.diagnosis.observations import Observations
+from service.diagnosis.screening import Screen
+from service.recording.recording import Array
+
+
+@dataclass(frozen=True, eq=False)
+class FitSizes:
+    """Rms of the torque residual at the recorded rate, no filter.
+
+    train : (n,) float64
+        on the recordings that the model was made from [Nm or N]
+    held_out : (n,) float64 or None
+        on recordings that were not used
+    """
+
+    train: Array
+    held_out: Array | None
+
+
+@dataclass(frozen=True, eq=False)
+class Finding:
+    """Effects of one kind at one place: one term, or several orders of a periodic torque.
+
+    terms : tuple of Term
+        as in the final model
+    covariances : tuple of (k, k) float64
+        of each term's coefficients and shapes
+    gain : float
+        what they take off the residual's energy beside all other findings [noise variances]
+    probability : float
+        that it is this effect and not one of its equivalents
+    before, after : FitSizes
+        residuals of the model without it, and with all findings
+    alternatives : tuple of Option
+        what explains nearly as much in its place
+    confirmed : bool or None
+        by motion that was not used; None where there was none
+    in_model : bool
+        whether the terms stand in the final model beside its nominal part, and not within that
+    """
+
+    terms: tuple[Term, ...]
+    covariances: tuple[Array, ...]
+    gain: float
+    probability: float
+    before: FitSizes
+    after: FitSizes
+    alternatives: tuple[Option, ...] = ()
+    confirmed: bool | None = None
+    in_model: bool = True
+
+    @property
+    def place(self) -> tuple[str, int | None]:
+        """Effect id and joint index."""
+        effect = self.terms[0].effect
+        return effect.id, effect.joint
+
+
+def sizes(model: ExtendedModel, fitter: Fitter, held_out: HeldOut | None) -> FitSizes:
+    """Raw residuals of a model on training and held-out recordings.
+
+    Parameters
+    ----------
+    model : ExtendedModel
+        the model
+    fitter : Fitter
+        of the training recordings
+    held_out : HeldOut or None
+        the others
+    """
+    train = _rms(model, fitter.observations)
+    return FitSizes(train, None if held_out is None else _rms(model, held_out.observations))
+
+
+def _rms(model: ExtendedModel, observations: Observations) -> Array:
+    squares, samples = raw_squares(model, observations)
+    return np.sqrt(squares / np.maximum(samples, 1.0))
+
+
+def selected_findings(
+    selection: Selection, screen: Screen, fitter: Fitter, held_out: HeldOut | None, inflation: float
+) -> tuple[Finding, ...]:
+    """Terms of one effect at one place together, each compared with the model without it.
+
+    Parameters
+    ----------
+    selection : Selection
+        what was selected
+    screen : Screen
+        of the training recordings
+    fitter : Fitter
+        of the same
+    held_out : HeldOut or None
+        the others
+    inflation : float
+        factor by which the residual exceeds the modelled noise
+    """
+    fit = selection.fit
+    covariance = fit.covariance * inflation
+    groups: dict[tuple[str, int | None], list[int]] = {}
+    for place, term in enumerate(fit.model.terms):
+        groups.setdefault((term.effect.id, term.effect.joint), []).append(place)
+    after = sizes(fit.model, fitter, held_out)
+    found = []
+    for places in groups.values():
+        others = [term for place, term in enumerate(fit.model.terms) if place not in places]
+        without = fitter.fit(with_terms(fit.model, others))
+        slices = fit.model.term_places()
+        terms = tuple(fit.model.terms[place] for place in places)
+        choices = [selection.choices[place] for place in places]
+        found.append(
+            Finding(
+                terms=terms,
+                covariances=tuple(
+                    _spread_out(t, covariance[slices[p], slices[p]]) for t, p in zip(terms, places, strict=True)
+                ),
+                gain=without.energy - fit.energy,
+                probability=_probability(choices[0], inflation),
+                before=sizes(without.model, fitter, held_out),
+                after=after,
+                alternatives=_likely(choices[0].options[1:], without, screen, held_out),
+                confirmed=any(choice.confirmation is not None for choice in choices) or None,
+            )
+        )
+    return in_order(found)
+
+
+def _likely(options: Sequence[Option], without: Fit, screen: Screen, held_out: HeldOut | None) -> tuple[Option, ...]:
+    """The options less those windows that do not hold within themselves: one can be found on anything."""
+    return tuple(
+        option
+        for option in options
+        if not isinstance(option.candidate.effect, TimeLocalEffect)
+        or interleaved_confirmation(option.fit.model.terms[-1], without, option.fit, screen, held_out).confirmed(
+            cautious=True
+        )
+    )
+
+
+def in_order(found: Sequence[Finding]) -> tuple[Finding, ...]:
+    """Findings, most explained energy first.
+
+    Parameters
+    ----------
+    found : sequence of Finding
+        in any order
+    """
+    return tuple(sorted(found, key=lambda each: -each.gain))
+
+
+def without_nominal(fit: Fit, place: int, fitter: Fitter) -> Fit:
+    """The model fitted anew with one of its nominal parameters held at zero.
+
+    Parameters
+    ----------
+    fit : Fit
+        the model
+    place : int
+        of the parameter among Θ
+    fitter : Fitter
+        of the recordings
+    """
+    parameters = fit.model.parameters.copy()
+    parameters[place] = 0.0
+    return fitter.fit(replace(fit.model, parameters=parameters, held=(*fit.model.held, place)))
+
+
+def probability_among(score: float, others: Sequence[float], inflation: float) -> float:
+    """Share of one explanation among all by their likelihoods.
+
+    Parameters
+    ----------
+    score : float
+        of the one [noise variances]
+    others : sequence of float
+        of the rest
+    inflation : float
+        factor by which the residual exceeds the modelled noise
+    """
+    scores = np.array([score, *others]) / inflation
+    weights = np.exp(-0.5 * (scores.max() - scores))
+    return float(min(weights[0] / weights.sum(), 0.999))
+
+
+def _spread_out(term: Term, covariance: Array) -> Array:
+    """Covariance of coefficients and all shapes; shapes that were only chosen have none."""
+    count = len(term.coefficients)
+    places = [*range(count), *(count + place for place in term.free_shapes)]
+    whole = np.zeros((count + len(term.shape), count + len(term.shape)))
+    whole[np.ix_(places, places)] = covariance
+    return whole
+
+
+def _probability(choice: Choice, inflation: float) -> float:
+    """Share of the chosen option among its equivalents."""
+    first, *others = choice.options
+    return probability_among(first.score, [option.score for option in others], inflation)

@@ -1,0 +1,57 @@
+"""Findings that only stand in for something that the catalogue does not have.
+
+Several weak likenesses of an unknown effect each take a part of it and pass every test but one: together they leave
+most of it, where a finding that is what it says leaves nothing but noise; how much is left can only be told where the
+noise is known from repetitions. A window in time can stand in for anything that is strong for a while: what happens
+once explains its joints wholly, or it is taken for something else.
+"""
+
+from collections.abc import Sequence
+
+from service.diagnosis.catalogue import TimeLocalEffect
+from service.diagnosis.choice import Choice
+from service.diagnosis.fit import Fit
+from service.diagnosis.lack_of_fit import lack_of_fit
+from service.diagnosis.observations import Observations
+
+EXPLAINED = 0.6
+"""Share of a joint's excess residual that findings have to explain between them where they leave more than noise."""
+
+
+def proxies(
+    nominal: Fit, fit: Fit, choices: Sequence[Choice], observations: Observations, *, pure_error: bool
+) -> list[int]:
+    """Places of the choices that are at joints where the model leaves most of what there is to explain.
+
+    Parameters
+    ----------
+    nominal, fit : Fit
+        models without and with all choices
+    choices : sequence of Choice
+        one a term of `fit`
+    observations : Observations
+        the rows that both were fitted to
+    pure_error : bool
+        whether their noise is known from repetitions
+    """
+    if not choices:
+        return []
+    after = lack_of_fit(fit, observations, pure_error=pure_error)
+    if not any(after.significant):
+        return []
+    before = lack_of_fit(nominal, observations, pure_error=pure_error)
+    weak = {
+        joint
+        for joint, left in enumerate(after.significant)
+        if pure_error and left and after.excess[joint] > (1.0 - EXPLAINED) * before.excess[joint]
+    }
+    unexplained = {joint for joint, left in enumerate(after.significant) if left}
+    found = []
+    for place, choice in enumerate(choices):
+        effect = choice.options[0].candidate.effect
+        joints = set(effect.touched(len(after.excess)))
+        if effect.joint is None:  # the whole arm: where anything was wrong
+            joints = {joint for joint in joints if before.significant[joint]} or joints
+        if joints <= weak or (isinstance(effect, TimeLocalEffect) and joints & unexplained):
+            found.append(place)
+    return found

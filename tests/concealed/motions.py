@@ -1,0 +1,79 @@
+"""What the arm is asked to do: random Fourier series, slow reversals, and motions too narrow or too slow to tell."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service.robot import Joint, JointLimits, Robot
+from sim_backend.motion import FourierMotion, random_fourier_motion
+
+Array = NDArray[np.float64]
+
+RATE_HZ = 200.0
+HOLD_S = 0.5
+"""Rest before the motion begins [s]."""
+
+SLOW_SPEED = 0.12
+"""Speed limit of slow reversals [rad/s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A motion with rest before it.
+
+    name : str
+        of the recording
+    series : FourierMotion
+        one period
+    periods : int
+        how often
+    """
+
+    name: str
+    series: FourierMotion
+    periods: int
+
+    @property
+    def setpoints(self) -> Array:
+        """Position at `RATE_HZ`, (N, n) [rad or m]."""
+        count = round(self.series.period_s * RATE_HZ)
+        period = self.series.evaluate(np.arange(count) / RATE_HZ).position
+        rest = np.tile(period[:1], (round(HOLD_S * RATE_HZ), 1))
+        return np.concatenate([rest, *[period] * self.periods])
+
+    @property
+    def period(self) -> Array:
+        """Index of the period at every setpoint, NaN at rest, (N,)."""
+        count = round(self.series.period_s * RATE_HZ)
+        rest = np.full(round(HOLD_S * RATE_HZ), np.nan)
+        return np.concatenate([rest, np.repeat(np.arange(self.periods, dtype=np.float64), count)])
+
+
+def campaign(robot: Robot, seed: int, kind: str = "rich", period_s: float = 8.0) -> tuple[list[Motion], list[Motion]]:
+    """Training and held-out motions.
+
+    `rich`: two Fourier motions and slow reversals; `narrow` and `slow`: training that hides much, held out as for
+    `rich`.
+    """
+    rng = np.random.default_rng([seed, 77])
+    joints = {
+        "rich": robot.joints,
+        "narrow": [_limited(joint, 0.25, 0.5) for joint in robot.joints],
+        "slow": [_limited(joint, 0.9, 0.25) for joint in robot.joints],
+    }[kind]
+    train = [Motion(f"train{k}", _fourier(joints, rng, period_s), 2) for k in (1, 2)]
+    if kind == "rich":
+        slow = [_limited(joint, 0.5, SLOW_SPEED) for joint in robot.joints]
+        train.append(Motion("train3", _fourier(slow, rng, 1.5 * period_s), 1))
+    held_out = [Motion("held-out", _fourier(robot.joints, rng, period_s), 2)]
+    return train, held_out
+
+
+def _fourier(joints: list[Joint] | tuple[Joint, ...], rng: np.random.Generator, period_s: float) -> FourierMotion:
+    return random_fourier_motion(joints, rng, period_s=period_s, limit_fraction=0.9)
+
+
+def _limited(joint: Joint, reach: float, speed: float) -> Joint:
+    """The joint with a narrower range, drawn about its middle by the motion itself, and a lower speed."""
+    return replace(joint, limits=JointLimits((-reach, reach), speed, joint.limits.acceleration, joint.limits.torque))

@@ -1,0 +1,156 @@
+"""The motions to choose from, and the choice: limits, closed forms, and whether a run of it settles the set."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from identification.simulated import Array, paper_robot, simulate
+from service.acquisition import RunOptions, RunState, make_backend, run_trajectory
+from service.diagnosis import diagnose, document
+from service.diagnosis.next_experiment import is_wanted, plan_experiment
+from service.diagnosis.next_experiment.bank import KINDS, Bank
+from service.diagnosis.next_experiment.separation import equations, log_variances, separations
+from service.diagnosis.next_experiment.sweeps import sweep
+from service.excitation import Trajectory, motion_limits, read_trajectory, require_within_limits, write_trajectory
+from service.identification import Identification, identify
+from service.recording import Recording, read_recording
+
+
+@pytest.fixture(scope="module")
+def identification() -> Identification:
+    made = [simulate(paper_robot(), seed=seed, periods=2).recording(0.01) for seed in (1, 2)]
+    return identify(paper_robot(), made)
+
+
+def test_every_motion_of_the_bank_keeps_all_limits_and_can_be_written(
+    identification: Identification, tmp_path: Path
+) -> None:
+    robot = identification.robot
+    seen = list(Bank(identification, np.random.default_rng(0)).first_look(2))
+    assert {primitive.kind for primitive in seen} > set(KINDS)
+    assert any("sweeps" in primitive.kind for primitive in seen)
+    assert any("slow reversals" in primitive.kind for primitive in seen)
+    for number, primitive in enumerate(seen):
+        require_within_limits(primitive.trajectory, robot, motion_limits(robot))
+        write_trajectory(primitive.trajectory, tmp_path / f"{number}.json")
+        again = read_trajectory(tmp_path / f"{number}.json", robot)
+        assert again.duration_s == pytest.approx(primitive.trajectory.duration_s)
+
+
+def test_motions_ask_for_no_more_torque_than_there_is(identification: Identification) -> None:
+    """With a tight limit at joint 2, by the true arm's inverse dynamics."""
+    robot = identification.robot
+    joints = list(robot.joints)
+    joints[1] = replace(joints[1], limits=replace(joints[1].limits, torque=12.0))
+    tight = replace(identification, robot=replace(robot, joints=tuple(joints)))
+    from service.dynamics import inverse_dynamics
+
+    links = paper_robot().model.links
+    assert links is not None
+    truth = np.concatenate([link.to_vector() for link in links])
+    for primitive in Bank(tight, np.random.default_rng(0)).first_look(2):
+        motion = primitive.trajectory.samples(50.0)
+        torque = inverse_dynamics(paper_robot(), truth, motion.position, motion.velocity, motion.acceleration)
+        assert np.abs(torque[:, 1]).max() + 1.3 < 12.0 * 1.02, primitive.kind
+
+
+def test_a_sweep_is_its_own_derivatives_and_mostly_at_its_speed() -> None:
+    limits = motion_limits(paper_robot())
+    segment = sweep(limits, 0.3, 20.0)
+    time = np.arange(0.0, 20.0, 1e-3)
+    motion = segment.evaluate(time)
+    inner = slice(5, -5)
+    for values, rates, most in (
+        (motion.position, motion.velocity, limits.velocity),
+        (motion.velocity, motion.acceleration, limits.acceleration),
+    ):
+        slopes = np.gradient(values, 1e-3, axis=0)
+        assert np.abs(slopes - rates)[inner].max() < 0.02 * most.max()
+    top = np.abs(motion.velocity).max(axis=0)
+    assert ((np.abs(motion.velocity) > 0.99 * top).mean(axis=0) > 0.5).all()
+
+
+class _Rows:
+    """Stands in for a fitter: two models of one joint whose columns are given."""
+
+    def __init__(self, columns: Array, torque: Array) -> None:
+        self._columns, self._torque = columns, torque
+
+    def white_residual(self, model: "_Flat") -> list[Array]:
+        return [self._torque - model.parameters @ self._columns]
+
+    def columns(self, model: "_Flat") -> list:
+        from service.diagnosis.projection import JointColumns
+
+        used = np.flatnonzero(model.uses)
+        return [JointColumns(np.arange(len(used)), self._columns[used])]
+
+
+class _Flat:
+    """A linear model that uses some of the columns."""
+
+    def __init__(self, uses: list[bool], parameters: list[float]) -> None:
+        self.uses, self.parameters = uses, np.array(parameters)
+        self.size = sum(uses)
+
+    def prior(self) -> tuple[Array, Array]:
+        return np.zeros((0, self.size)), np.zeros(0)
+
+
+def test_separation_is_what_is_left_beside_the_other_models_columns() -> None:
+    """A model 1 + 2 x against one with 1 alone: λ = 4 Σ (x - mean x)², over old and new rows together."""
+    rng = np.random.default_rng(3)
+    old, new = 0.01 * rng.standard_normal(50) + 5.0, rng.uniform(-1.0, 1.0, 50)
+    right, other = _Flat([True, True], [1.0, 2.0]), _Flat([True, False], [1.0, 0.0])
+    stacked = []
+    for x in (old, new):
+        rows = _Rows(np.stack([np.ones(50), x]), np.zeros(50))
+        stacked.append(equations(other, rows, [right]))  # pyright: ignore[reportArgumentType]
+    for rows, x in ((stacked[:1], old), (stacked, np.concatenate([old, new]))):
+        found = separations(other, np.concatenate(rows))  # pyright: ignore[reportArgumentType]
+        assert found == pytest.approx([4.0 * np.sum((x - x.mean()) ** 2)], rel=1e-9)
+    rows = _Rows(np.stack([np.ones(50), new]), np.zeros(50))
+    known = log_variances(right, equations(right, rows))  # pyright: ignore[reportArgumentType]
+    assert known[1] == pytest.approx(-np.log(np.sum((new - new.mean()) ** 2)))
+
+
+def recorded(trajectory: Trajectory, scenario: Path, folder: Path, seed: int) -> Recording:
+    """A run of the simulated arm."""
+    robot = paper_robot()
+    text = scenario.read_text() + f"seed: {seed}\n"
+    own = folder.with_suffix(".yaml")
+    own.write_text(text)
+    settings = {"start": trajectory.start.tolist(), "scenario": str(own)}
+    options = RunOptions.model_validate({"mode": "position", "rate_hz": 200.0})
+    record = run_trajectory(robot, trajectory, lambda: make_backend("sim", robot, settings), folder, options)
+    assert record.state is RunState.FINISHED, record.problem
+    return read_recording(folder / "recording.csv")
+
+
+@pytest.mark.slow
+def test_a_run_of_what_is_planned_settles_what_the_recordings_left_open(
+    identification: Identification, tmp_path: Path
+) -> None:
+    """Joint 1's friction is larger one way: beside the friction curve's flanks it is all but a constant."""
+    scenario = tmp_path / "worn.yaml"
+    scenario.write_text(
+        "torque_noise_std: [0.5, 0.3, 0.7]\nposition_noise_std: 2.0e-5\n"
+        "effects:\n  - {effect: asymmetric_coulomb, joint: 1, amplitude: 0.6}\n"
+    )
+    bank = Bank(identification, np.random.default_rng(5))
+    motions = list(bank.fourier("a random motion", 3))
+    old = [recorded(m.trajectory, scenario, tmp_path / f"old-{k}", k) for k, m in enumerate(motions)]
+    before = diagnose(paper_robot(), old)
+    names = {f"{f.effect}@{f.joint}" for f in document(before).findings} | {
+        each for finding in document(before).findings for each in finding.equivalent
+    }
+    assert names >= {"asymmetric_coulomb@joint1", "torque_offset@joint1"}
+    assert is_wanted(before)
+    planned = plan_experiment(before)
+    assert planned.after > 3.0 * planned.before
+    new = recorded(planned.trajectory, scenario, tmp_path / "new", 9)
+    after = document(diagnose(paper_robot(), [*old, new]))
+    assert [(f.effect, f.joint) for f in after.findings] == [("asymmetric_coulomb", "joint1")]
+    assert after.findings[0].equivalent == []
