@@ -19,11 +19,12 @@ from service.diagnosis.diagnosed import Diagnosis
 from service.diagnosis.events import beside_events
 from service.diagnosis.findings import Finding, FitSizes, selected_findings, sizes
 from service.diagnosis.fit import Fitter
+from service.diagnosis.friction_slopes import open_slopes, with_fitting_slopes
 from service.diagnosis.lack_of_fit import lack_of_fit
 from service.diagnosis.location import locate
 from service.diagnosis.model import ExtendedModel, Term
 from service.diagnosis.noise_floor import with_noise
-from service.diagnosis.nominal import identified_rotors, nominal_model, setting_of
+from service.diagnosis.nominal import delivered_model, identified_rotors, nominal_model, setting_of
 from service.diagnosis.observations import Observations
 from service.diagnosis.plain_findings import undeclared_offsets, with_plain_terms
 from service.diagnosis.regressor_noise import row_weights
@@ -92,10 +93,23 @@ def diagnose(
         Term(RotorInertia(j), np.zeros(0), np.array([value])) for j, value in identified_rotors(identification).items()
     ]
     screen, fitter = Screen(rows, effects), Fitter(rows)
+    model = with_fitting_slopes(model, fitter, open_slopes(identification), setting.speed)
     selection = Selector(screen, fitter, confirming, pure_error=pure_error).select(model, rotors, progress)
+    if confirming is not None and identification.constrained:
+        selection = _unless_plainer_is_better(selection, delivered_model(identification), confirming)
     progress("weigh the evidence")
     found = _concluded(identification, setting, screen, fitter, confirming, selection, pure_error, cutoff)
     return with_plain_terms(found, undeclared_offsets(found))
+
+
+def _unless_plainer_is_better(selection: Selection, delivered: ExtendedModel, held_out: HeldOut) -> Selection:
+    """Nothing selected, where the plain model of a possible body predicts held-out motion better than all of it.
+
+    Motion that excites an arm too poorly leaves free parameters that no body has; findings then explain their errors.
+    """
+    if not selection.choices or held_out.block_gains(delivered, selection.fit.model).sum() > 0.0:
+        return selection
+    return Selection(selection.nominal, selection.nominal, (), (*selection.rejected, *selection.choices))
 
 
 def _held_out(

@@ -10,6 +10,7 @@ from service.diagnosis.observations import Observations
 from service.identification import Identification
 from service.identification.shape_sensitivity import ShapeParameter
 from service.recording.conditioning import Conditioner
+from service.recording.recording import Array
 
 
 def nominal_model(identification: Identification) -> ExtendedModel:
@@ -32,14 +33,31 @@ def nominal_model(identification: Identification) -> ExtendedModel:
             constants.append((joint, "delta"))
             stated.append(shape.delta)
     structure = identification.structure
-    rotors = [structure.coefficient(joint, "rotor_inertia") for joint in range(structure.robot.joint_count)]
     return ExtendedModel(
         structure=structure.with_terms(tuple(replace(terms, rotor=False) for terms in structure.terms)),
-        parameters=np.delete(identification.free_parameters, [column for column in rotors if column is not None]),
+        parameters=_without_rotors(identification, identification.free_parameters),
         links=identification.consistent.parameters[: 10 * identification.robot.joint_count],
         constants=tuple(constants),
         stated=tuple(stated),
     )
+
+
+def delivered_model(identification: Identification) -> ExtendedModel:
+    """The model that the identification delivers, which is a body's where the free estimate is none's.
+
+    Parameters
+    ----------
+    identification : Identification
+        the result
+    """
+    parameters = _without_rotors(identification, identification.parameters)
+    return replace(nominal_model(identification), parameters=parameters)
+
+
+def _without_rotors(identification: Identification, parameters: Array) -> Array:
+    structure = identification.structure
+    rotors = [structure.coefficient(joint, "rotor_inertia") for joint in range(structure.robot.joint_count)]
+    return np.delete(parameters, [column for column in rotors if column is not None])
 
 
 def identified_rotors(identification: Identification) -> dict[int, float]:
