@@ -1,6 +1,7 @@
 """Every form of every effect beside the fitted model: how much each would explain, and how likely noise does that."""
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,13 @@ from service.recording.recording import Array
 
 MOST_KEPT = 400 * 1024 * 1024
 """Bytes of columns that are kept from one model to the next."""
+
+THREADS = 2
+"""Effects that are looked at together: nearly all of it is array work, which runs beside other threads."""
+
+WORTH_COUNTING = 1e-3
+"""Chance below which the best of many windows is worth the draws that tell how many windows there are in effect; above,
+all of them count, which changes no decision."""
 
 SHAPES_AT_ONCE = 48
 """Shapes whose columns are made together: bounds memory."""
@@ -103,7 +111,7 @@ class Screen:
     ) -> None:
         self.observations = observations
         self.effects = tuple(effects)
-        self._rng = np.random.default_rng(seed)
+        self._seed = seed
         self._count_all = count_all
         self._kept_columns: dict[tuple[int, int], dict[int, Array]] = {}
         self._kept_bytes = 0
@@ -121,7 +129,9 @@ class Screen:
         """
         if self._first is None or self._first[0] is not fit:
             signals = [fit.model.signals(piece) for piece in self.observations]
-            found = [self._candidate(place, effect, fit, signals) for place, effect in enumerate(self.effects)]
+            with ThreadPoolExecutor(THREADS) as threads:
+                places = range(len(self.effects))
+                found = list(threads.map(lambda at: self._candidate(at, self.effects[at], fit, signals), places))
             if self._first is not None:
                 return found
             self._first = fit, found  # the nominal model, which is looked at twice
@@ -185,7 +195,7 @@ class Screen:
             gain=float(gains[best]),
             gram=found.gram[best],
             visible=bool(visible.any()),
-            shapes_tried=self._numbers[place],
+            shapes_tried=self._numbers.get(place, float(len(effect.grid))),
             information=float(np.median(found.gram[visible, 0, 0])) if visible.any() else 0.0,
         )
 
@@ -200,7 +210,7 @@ class Screen:
                 whitened.append(columns)
         found = Moments(*(np.concatenate([getattr(part, name) for part in parts]) for name in Moments.__annotations__))
         if not known:
-            self._numbers[place] = effective_number(found, whitened, self._rng) if whitened else 1.0
+            self._numbers[place] = effective_number(found, whitened, self._draws(place)) if whitened else 1.0
         return found
 
     def _grid_columns(self, place: int, first: int, effect: Effect, signals: Sequence[Signals]) -> dict[int, Array]:
@@ -223,9 +233,18 @@ class Screen:
         found = windowed_moments(white, self._windows[place], fit)
         if place not in self._numbers and self._count_all:
             self._numbers[place] = float(len(effect.grid))
-        elif place not in self._numbers:
-            self._numbers[place] = windows_tried(found, white, self._windows[place], fit, self._rng)
+        elif place not in self._numbers and self._may_count(found):
+            self._numbers[place] = windows_tried(found, white, self._windows[place], fit, self._draws(place))
         return found
+
+    def _may_count(self, found: Moments) -> bool:
+        """Whether any of many shapes would be worth a look if it were the only one."""
+        gains, _ = statistics(found, [False] * found.target.shape[1])
+        return float(stats.chi2.sf(gains.max(initial=0.0), found.target.shape[1])) < WORTH_COUNTING
+
+    def _draws(self, place: int) -> np.random.Generator:
+        """Source of an effect's draws, whichever thread makes them."""
+        return np.random.default_rng([self._seed, place])
 
 
 def model_signals(model: ExtendedModel, observations: Observations) -> list[Signals]:

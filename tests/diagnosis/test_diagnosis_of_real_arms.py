@@ -71,3 +71,11 @@ def test_the_coupled_wrist_of_the_tx40_is_named_first() -> None:
     assert 0.4 < values(found, "friction_coupling")["w"] < 0.8
     assert found.fit.held_out is not None
     assert found.fit.held_out.rms_after[4] < 0.4 * found.fit.held_out.rms_before[4]
+
+
+@pytest.mark.slow
+def test_nothing_is_named_where_the_plain_model_predicts_better() -> None:
+    """The LWR4+ excited poorly: free parameters explain one motion, and a possible body's predict the other better."""
+    found = told("kuka-lwr4")
+    assert {finding.effect for finding in found.findings} <= {"unknown"}
+    assert found.verdict != "consistent"

@@ -1,0 +1,51 @@
+"""Slopes that an identification left open: found where the data show them, left where they do not."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from identification.simulated import PAPER_NOISE, paper_robot, simulate, with_shapes
+from service.diagnosis.fit import Fitter
+from service.diagnosis.friction_slopes import open_slopes, with_fitting_slopes
+from service.diagnosis.model import ExtendedModel
+from service.diagnosis.noise_floor import with_noise
+from service.diagnosis.nominal import nominal_model
+from service.diagnosis.observations import Observations
+from service.identification import identify
+from service.recording.conditioning import Conditioner
+from service.robot import FrictionCoefficients
+
+SPEED = np.full(3, 1.0)
+NO_STRIBECK = tuple(FrictionCoefficients(stiction, 0.0, 0.3) for stiction in (2.0, 1.0, 2.0))
+"""With a Stribeck term its slope may take the other one's place."""
+
+
+def far_away(model: ExtendedModel, slope: float) -> ExtendedModel:
+    """The model with slopes from which no step leads anywhere."""
+    terms = tuple(replace(each, k_v=slope) for each in model.structure.terms)
+    return replace(model, structure=model.structure.with_terms(terms))
+
+
+def fitted_slopes(true_slope: float) -> list[float]:
+    rng = np.random.default_rng(3)
+    arm = simulate(with_shapes(paper_robot(), true_slope, None), seed=2, periods=3, friction=NO_STRIBECK)
+    recording = arm.recording(arm.white(0.1 * PAPER_NOISE, rng), 2e-6 * rng.standard_normal((1, 3)))
+    found = identify(with_shapes(arm.robot, None, None), [recording])
+    conditioners = [Conditioner.survey(recording, found.robot)]
+    model = far_away(nominal_model(found), 3000.0)
+    rows = Observations.prepare(conditioners, found.robot, found.structure.base, 20.0, model.steepness)
+    rows, _ = with_noise(rows, model, ())
+    fitted = with_fitting_slopes(model, Fitter(rows), range(3), SPEED)
+    return [terms.k_v for terms in fitted.structure.terms]
+
+
+def test_a_gentle_slope_is_found_from_far_away() -> None:
+    np.testing.assert_allclose(fitted_slopes(15.0), 15.0, rtol=0.1)
+
+
+def test_only_slopes_that_nobody_stated_and_no_data_showed_are_open() -> None:
+    rng = np.random.default_rng(4)
+    arm = simulate(with_shapes(paper_robot(), 15.0, 2.0), seed=2, periods=3)
+    recording = arm.recording(arm.white(0.1 * PAPER_NOISE, rng))
+    assert open_slopes(identify(with_shapes(arm.robot, 15.0, 2.0), [recording])) == []
+    assert open_slopes(identify(with_shapes(arm.robot, None, None), [recording])) == []
