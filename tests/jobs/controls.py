@@ -18,7 +18,8 @@ class HandControl:
     def __init__(self, workspace: RunWorkspace, report: Callable[[Mapping[str, Any]], None]) -> None:
         self.folder, self._report = workspace.control, report
         self.folder.mkdir()
-        self.record = new_record("arm", "sim", "position")
+        request = workspace.read_request()
+        self.record = new_record("arm" if request is None else request.robot_name, "sim", "position")
         write_record(self.folder, self.record)
         self.stops = self.beats = 0
         self.obeys = False
