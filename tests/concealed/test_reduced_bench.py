@@ -5,7 +5,7 @@ import pytest
 from concealed.score import Score, diagnosed, scored
 from concealed.trial import effect_trial, null_trial, unknown_trial
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
 AT_40 = {
     "asymmetric_viscous": 1,

@@ -130,6 +130,7 @@ def recorded(trajectory: Trajectory, scenario: Path, folder: Path, seed: int) ->
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)
 def test_a_run_of_what_is_planned_settles_what_the_recordings_left_open(
     identification: Identification, tmp_path: Path
 ) -> None:
