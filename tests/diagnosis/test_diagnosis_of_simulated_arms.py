@@ -146,6 +146,7 @@ def test_the_document_is_the_contracts() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)
 def test_at_most_one_null_data_set_in_fifty_names_anything() -> None:
     named = [seed for seed in range(50) if diagnosed(None, 1000 + seed).findings]
     assert len(named) <= 1
