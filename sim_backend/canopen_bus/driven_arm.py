@@ -18,6 +18,11 @@ Array = NDArray[np.float64]
 ACCELERATION = 40.0
 """With which a joint catches up with targets that leapt [rad/s² or m/s²]."""
 
+PACE_CYCLES = 2
+FASTER = 0.7
+LONGEST_PACE_S = 0.1
+"""SYNC has another pace where so many intervals in a row are shorter by this factor; a longer one is a pause."""
+
 TRACKING = (AxisMode.POSITION, AxisMode.HOLDING)
 """What is done by tracking a target: the master's, or the place where the joint comes to rest."""
 
@@ -57,6 +62,8 @@ class DrivenArm:
         self._servo = Servo(robot, InertiaSchedule(robot, scenario.effects), period_s)
         self._drives = drives
         self._period_s = period_s
+        self._last_sync_s, self._pace_s = -1.0, 0.0
+        self._intervals: list[float] = []
         self._modes: list[AxisMode] = [AxisMode.RELEASED] * count
         self._targets: dict[AxisMode, tuple[list[int], Target]] = {}
         self._goal, self._goal_rate = (values.copy() for values in self.motion)
@@ -77,6 +84,8 @@ class DrivenArm:
             when SYNC came [s]
         """
         demands = self._demands()
+        if self._has_new_pace(time_s):
+            self._regroup(self._modes)
         if AxisMode.POSITION in self._targets:
             joints, target = self._targets[AxisMode.POSITION]
             wanted = np.array([demands[joint].position for joint in joints]) - self.encoder_offset[joints]
@@ -109,6 +118,21 @@ class DrivenArm:
         seen = zip(position + self.encoder_offset, velocity, self._measured_torque, strict=True)
         for drive, (q, v, tau) in zip(self._drives, seen, strict=True):
             drive.measure(AxisMeasurement(float(q), float(v), float(tau)))
+
+    def _has_new_pace(self, time_s: float) -> bool:
+        """Whether SYNC comes at another rate than it did: the master begins its cycle after settling at a slower one.
+
+        Interpolation then begins anew; at the old pace the new targets would be run through too fast.
+        """
+        interval, self._last_sync_s = time_s - self._last_sync_s, time_s
+        self._intervals = [*self._intervals[-(PACE_CYCLES - 1) :], interval]
+        if self._pace_s == 0.0 or interval > LONGEST_PACE_S:
+            self._pace_s = 0.0 if interval > LONGEST_PACE_S else interval
+            return False
+        if len(self._intervals) < PACE_CYCLES or max(self._intervals) > FASTER * self._pace_s:
+            return False
+        self._pace_s = max(self._intervals)
+        return True
 
     def _demands(self) -> list[AxisDemand]:
         """What the drives demand now; targets begin anew where a drive does something else than before."""
