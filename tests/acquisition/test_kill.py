@@ -19,6 +19,7 @@ import pytest
 
 from acquisition.control_runs import wait_for
 from acquisition.doubles import point_robot, short_motion
+from kills import KILLS
 from service.acquisition import BackendOrder, RunOptions, RunOrder, RunRecord, RunState, read_record, recover_runs
 from service.acquisition.spawning import child_environment
 from service.excitation import write_trajectory
@@ -259,5 +260,5 @@ def test_the_arm_stops_and_the_run_is_interrupted(site: Site, victim: str, how: 
 @pytest.mark.parametrize(("victim", "how"), CASES)
 def test_fifty_times_each(site: Site, victim: str, how: signal.Signals) -> None:
     rng = np.random.default_rng([2, CASES.index((victim, how))])
-    states = kill(site, victim, how, rng, times=50)
-    assert states.count("state running") >= 25, states
+    states = kill(site, victim, how, rng, times=KILLS)
+    assert states.count("state running") >= KILLS // 2, states
