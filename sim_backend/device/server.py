@@ -137,7 +137,7 @@ class DeviceServer:
         self._trace.note()
 
     def _serve(self) -> None:
-        """Answer the host that is there, then take a new one: in this order, so that one that has gone is out."""
+        """Answer the host that is there, then take a new one."""
         if self._host is not None:
             self._hear(self._host)
         self._accept()
@@ -168,6 +168,8 @@ class DeviceServer:
             connection, _ = self._listener.accept()
         except (BlockingIOError, ConnectionAbortedError):
             return
+        if self._host is not None:
+            self._hear(self._host)  # it may have gone since it was last heard, before the new one came
         if self._host is None:
             self._host = _Host(connection)
             return
