@@ -14,7 +14,7 @@ from service.api.campaigns.models import (
 from service.api.campaigns.status import describe, find_campaign, result_of
 from service.api.campaigns.submission import submit_campaign
 from service.api.jobs.events import add_events_route
-from service.api.jobs.routes import ENDINGS, Identifier, Limit, collection
+from service.api.jobs.routes import ENDINGS, SUBMISSION, Identifier, Limit, collection
 from service.api.jobs.submission import request_body
 from service.api.problems import ProblemError, problem_responses
 from service.api.services import Offered
@@ -27,16 +27,7 @@ router = APIRouter(prefix="/campaigns", tags=["campaigns"], responses=problem_re
     status_code=202,
     summary="Begin a campaign",
     response_model=CampaignAnswer,
-    responses=problem_responses(
-        "bad-request",
-        "busy",
-        "limit-exceeded",
-        "media-type",
-        "robot-file",
-        "robot-unphysical",
-        "invalid-request",
-        "storage-full",
-    ),
+    responses=problem_responses(*SUBMISSION, "busy"),
     openapi_extra=request_body(CampaignRequest, EXAMPLES),
 )
 async def hand_in(request: Request, response: Response, services: Offered) -> CampaignAnswer:

@@ -8,7 +8,8 @@ from service.api.diagnoses.status import describe, find_diagnosis, finished_diag
 from service.api.diagnoses.submission import submit_diagnosis
 from service.api.jobs.answers import require_document
 from service.api.jobs.events import add_events_route
-from service.api.jobs.routes import ENDINGS, Identifier, Limit, collection
+from service.api.jobs.removal import add_removal_route
+from service.api.jobs.routes import ENDINGS, SUBMISSION, Identifier, Limit, collection
 from service.api.jobs.submission import request_body
 from service.api.problems import problem_responses
 from service.api.services import Offered
@@ -45,17 +46,7 @@ _PROBLEMS = (
     status_code=202,
     summary="Hand in a diagnosis",
     response_model=DiagnosisAnswer,
-    responses=problem_responses(
-        "bad-request",
-        "not-found",
-        "limit-exceeded",
-        "media-type",
-        "robot-file",
-        "robot-unphysical",
-        "invalid-request",
-        "queue-full",
-        "storage-full",
-    ),
+    responses=problem_responses(*SUBMISSION, "not-found", "queue-full"),
     openapi_extra=request_body(DiagnosisRequest, EXAMPLES, _UPLOADS),
 )
 async def hand_in(request: Request, response: Response, services: Offered) -> DiagnosisAnswer:
@@ -138,21 +129,9 @@ def get_next_trajectory(identifier: Identifier, services: Offered) -> Response:
     return Response(content, media_type="application/json")
 
 
-@router.delete(
-    "/{identifier}",
-    summary="Cancel or remove a diagnosis",
-    response_model=DiagnosisAnswer,
-    responses={204: {"description": "it had ended, and was removed"}, **problem_responses("not-found")},
-)
-def cancel_or_remove(request: Request, identifier: Identifier, services: Offered) -> DiagnosisAnswer | Response:
-    """One that waits or runs is cancelled; one that has ended is removed with all its files."""
-    if services.jobs.cancel_or_remove(services.diagnoses, identifier):
-        return Response(status_code=204)
-    return describe(services, identifier, collection(request, 1))
-
-
 def _json(content: bytes | None, identifier: str) -> Response:
     return Response(require_document(content, identifier), media_type="application/json")
 
 
+add_removal_route(router, "a diagnosis", lambda services: services.diagnoses, DiagnosisAnswer, describe)
 add_events_route(router, "a diagnosis", find_diagnosis)

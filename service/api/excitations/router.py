@@ -10,7 +10,8 @@ from service.api.excitations.status import describe, find_excitation, finished_e
 from service.api.excitations.submission import submit_excitation
 from service.api.jobs.answers import require_document
 from service.api.jobs.events import add_events_route
-from service.api.jobs.routes import ENDINGS, Identifier, Limit, collection
+from service.api.jobs.removal import add_removal_route
+from service.api.jobs.routes import ENDINGS, SUBMISSION, Identifier, Limit, collection
 from service.api.jobs.submission import request_body
 from service.api.problems import problem_responses
 from service.api.services import Offered
@@ -30,16 +31,7 @@ Rate = Annotated[float, Query(gt=0.0, le=10_000.0, description="samples a second
     status_code=202,
     summary="Have a motion designed",
     response_model=ExcitationAnswer,
-    responses=problem_responses(
-        "bad-request",
-        "limit-exceeded",
-        "media-type",
-        "robot-file",
-        "robot-unphysical",
-        "invalid-request",
-        "queue-full",
-        "storage-full",
-    ),
+    responses=problem_responses(*SUBMISSION, "queue-full"),
     openapi_extra=request_body(ExcitationRequest, EXAMPLES),
 )
 async def hand_in(request: Request, response: Response, services: Offered) -> ExcitationAnswer:
@@ -100,17 +92,5 @@ def get_trajectory(
     return Response(require_document(content, identifier), headers=disposition, media_type=media_type)
 
 
-@router.delete(
-    "/{identifier}",
-    summary="Cancel or remove an excitation",
-    response_model=ExcitationAnswer,
-    responses={204: {"description": "it had ended, and was removed"}, **problem_responses("not-found")},
-)
-def cancel_or_remove(request: Request, identifier: Identifier, services: Offered) -> ExcitationAnswer | Response:
-    """One that waits or runs is cancelled; one that has ended is removed with all its files."""
-    if services.jobs.cancel_or_remove(services.excitations, identifier):
-        return Response(status_code=204)
-    return describe(services, identifier, collection(request, 1))
-
-
+add_removal_route(router, "an excitation", lambda services: services.excitations, ExcitationAnswer, describe)
 add_events_route(router, "an excitation", find_excitation)

@@ -15,7 +15,8 @@ from service.api.identifications.status import describe, find_identification, fi
 from service.api.identifications.submission import submit_identification
 from service.api.jobs.answers import require_document
 from service.api.jobs.events import add_events_route
-from service.api.jobs.routes import ENDINGS, Identifier, Limit, collection
+from service.api.jobs.removal import add_removal_route
+from service.api.jobs.routes import ENDINGS, SUBMISSION, Identifier, Limit, collection
 from service.api.jobs.submission import request_body
 from service.api.problems import problem_responses
 from service.api.services import Offered
@@ -46,17 +47,7 @@ _EXPORT_CONTENT: dict[str, Any] = {
     status_code=202,
     summary="Hand in an identification",
     response_model=IdentificationAnswer,
-    responses=problem_responses(
-        "bad-request",
-        "not-found",
-        "limit-exceeded",
-        "media-type",
-        "robot-file",
-        "robot-unphysical",
-        "invalid-request",
-        "queue-full",
-        "storage-full",
-    ),
+    responses=problem_responses(*SUBMISSION, "not-found", "queue-full"),
     openapi_extra=request_body(IdentificationRequest, EXAMPLES, _UPLOADS),
 )
 async def hand_in(request: Request, response: Response, services: Offered) -> IdentificationAnswer:
@@ -129,17 +120,7 @@ def get_export(identifier: Identifier, format_: Format, services: Offered) -> Re
     return Response(workspace.read_export(file.name), headers=disposition, media_type=file.media_type)
 
 
-@router.delete(
-    "/{identifier}",
-    summary="Cancel or remove an identification",
-    response_model=IdentificationAnswer,
-    responses={204: {"description": "it had ended, and was removed"}, **problem_responses("not-found")},
+add_removal_route(
+    router, "an identification", lambda services: services.identifications, IdentificationAnswer, describe
 )
-def cancel_or_remove(request: Request, identifier: Identifier, services: Offered) -> IdentificationAnswer | Response:
-    """One that waits or runs is cancelled; one that has ended is removed with all its files."""
-    if services.jobs.cancel_or_remove(services.identifications, identifier):
-        return Response(status_code=204)
-    return describe(services, identifier, collection(request, 1))
-
-
 add_events_route(router, "an identification", find_identification)

@@ -11,6 +11,18 @@ ENDINGS = ("not-finished", "cancelled", "interrupted", "damaged")
 """Problems of a job without result, beside those of its work."""
 
 
+SUBMISSION = (
+    "bad-request",
+    "limit-exceeded",
+    "media-type",
+    "robot-file",
+    "robot-unphysical",
+    "invalid-request",
+    "storage-full",
+)
+"""Problems of handing anything in that comes with a robot file."""
+
+
 def collection(request: Request, steps_below: int) -> str:
     """Path of the collection, seen from a request below it.
 

@@ -8,7 +8,7 @@ from starlette.concurrency import run_in_threadpool
 
 from service.api.downloads import file_answer
 from service.api.jobs.events import add_events_route
-from service.api.jobs.routes import Identifier, Limit, collection
+from service.api.jobs.routes import SUBMISSION, Identifier, Limit, collection
 from service.api.jobs.submission import request_body
 from service.api.openapi import binary_part
 from service.api.problems import ProblemError, problem_responses
@@ -29,20 +29,7 @@ _PARTS = {"trajectory": binary_part("the motion: a trajectory document (.json), 
     status_code=202,
     summary="Begin a run",
     response_model=RunAnswer,
-    responses=problem_responses(
-        "bad-request",
-        "not-found",
-        "busy",
-        "not-finished",
-        "limit-exceeded",
-        "media-type",
-        "robot-file",
-        "robot-unphysical",
-        "excitation",
-        "invalid-request",
-        "queue-full",
-        "storage-full",
-    ),
+    responses=problem_responses(*SUBMISSION, "not-found", "busy", "not-finished", "excitation", "queue-full"),
     openapi_extra=request_body(RunRequest, EXAMPLES, _PARTS),
 )
 async def hand_in(request: Request, response: Response, services: Offered) -> RunAnswer:
