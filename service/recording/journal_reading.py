@@ -17,6 +17,9 @@ from service.recording.mcap_format import scan_mcap
 from service.recording.recording import Array, EffortKind, Recording
 from service.recording.words import reason
 
+LONGEST_HOLD = 1.5
+"""Cycles between two samples of which none was missed between them."""
+
 
 @dataclass(frozen=True, eq=False)
 class Journal:
@@ -78,7 +81,8 @@ def journal_recording(journal: Journal, name: str) -> Recording:
     """The recording of a journal's motion, without the ramp; time runs from the motion's first sample.
 
     Columns t, q, tau (i where the drives report no torque), qd and temp where they report them, qref, taucmd where
-    effort was commanded, and period where the motion is repeated.
+    effort was commanded, and period where the motion is repeated. Where the host commanded effort, tau (i) is the mean
+    of what acted before and after the sample; the journal keeps what was reported.
 
     Parameters
     ----------
@@ -97,11 +101,12 @@ def journal_recording(journal: Journal, name: str) -> Recording:
         ramp = f" of {len(journal.rows)} cycles of the ramp" if len(journal.rows) else ""
         raise RecordingError(f"{name}: the run ended before its motion began{ramp}: there is nothing to keep")
     is_torque = header.effort_unit == "Nm"
+    is_held = header.mode == "torque"
     return Recording.from_arrays(
         name,
         (rows["time_ns"] - rows["time_ns"][0]) * 1e-9,
         rows["position"],
-        rows["effort"],
+        _at_samples(rows, 1e9 / header.rate_hz) if is_held else rows["effort"],
         effort_kind=EffortKind.TORQUE if is_torque else EffortKind.CURRENT,
         velocity=_reported(rows["velocity"]),
         reference=_reported(rows["reference"]),
@@ -161,6 +166,19 @@ def _decoded(messages: list[bytes]) -> JointStates:
     if states is None:
         raise RecordingError("its joint states change their layout")
     return states
+
+
+def _at_samples(rows: NDArray[np.void], period_ns: float) -> Array:
+    """Effort at the instants of the samples, where drives hold it from one command to the next, (N, n).
+
+    A drive reports what it has held until the sample: by itself that is half a cycle late. The next sample tells what it
+    held from there on; where that one was missed, nothing does.
+    """
+    before = rows["effort"]
+    after = np.full_like(before, np.nan)
+    is_next = np.diff(rows["time_ns"]) < LONGEST_HOLD * period_ns
+    after[:-1][is_next] = before[1:][is_next]
+    return 0.5 * (before + after)
 
 
 def _reported(column: Array) -> Array | None:

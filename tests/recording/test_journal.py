@@ -23,10 +23,10 @@ RATE = 500.0
 RAMP = 100
 
 
-def header(joints: int = 2, *, unit: str = "Nm", has_velocity: bool = True) -> JournalHeader:
+def header(joints: int = 2, *, unit: str = "Nm", mode: str = "position", has_velocity: bool = True) -> JournalHeader:
     names = tuple(f"joint{joint}" for joint in range(1, joints + 1))
     factor = tuple(1.0 if unit == "Nm" else 0.25 * joint for joint in range(1, joints + 1))
-    return JournalHeader("arm", names, RATE, "position", unit, factor, has_velocity, 1_700_000_000_000_000_000)
+    return JournalHeader("arm", names, RATE, mode, unit, factor, has_velocity, 1_700_000_000_000_000_000)
 
 
 def rows(count: int = 600, joints: int = 2, seed: int = 3) -> np.ndarray:
@@ -112,6 +112,23 @@ def test_the_recording_is_the_motion_without_the_ramp(tmp_path: Path) -> None:
         "period": "period",
     }.items():
         np.testing.assert_array_equal(getattr(samples, ours), motion[group], err_msg=ours)
+
+
+def test_effort_that_is_held_between_samples_is_that_of_the_samples(tmp_path: Path) -> None:
+    """What a drive reports it has held since the command before: the mean of both sides belongs to the sample."""
+    table, head = rows(), header(mode="torque")
+    path = written(tmp_path / "journal.mcap", table, head)
+    recording = journal_recording(read_journal(path), "run")
+    reported, effort = table["effort"][RAMP:], recording.samples().effort
+    np.testing.assert_allclose(effort[:-1], 0.5 * (reported[:-1] + reported[1:]), rtol=1e-15)
+    assert np.isnan(effort[-1]).all(), "what it held after the last sample nobody tells"
+
+
+def test_effort_beside_a_missed_sample_is_unknown(tmp_path: Path) -> None:
+    table = rows()
+    kept = np.delete(table, RAMP + 7)
+    recording = journal_recording(read_journal(written(tmp_path / "journal.mcap", kept, header(mode="torque"))), "run")
+    assert np.flatnonzero(np.isnan(recording.samples().effort[:, 0])).tolist() == [6, len(kept) - RAMP - 1]
 
 
 def test_what_nobody_reported_is_no_column(tmp_path: Path) -> None:
