@@ -158,6 +158,9 @@ def test_a_control_process_that_dies_is_told(service: Served) -> None:
     run = begin(client, LONG_S, rate_hz=200.0)
     wait_until(lambda: is_running(client, run))
     folder = Path(str(service.process.args[3])) / "runs" / run["id"]  # type: ignore[index]
+    journal = folder / "control" / "journal.mcap"
+    ramp = journal.stat().st_size
+    wait_until(lambda: journal.stat().st_size > ramp + 10_000)
     os.kill(control_process(folder), signal.SIGKILL)
     (*_, last) = follow(client, run)
     assert (last.kind, last.data["state"]) == ("ended", "interrupted")
