@@ -17,12 +17,12 @@ from scipy import signal
 
 from service.dynamics.base_parameters import BaseParameters
 from service.dynamics.regressor import torque_regressor
-from service.identification.dataset import Dataset
+from service.identification.dataset import Dataset, PreparedMotion
 from service.identification.estimate import Estimator, estimate
 from service.identification.friction_shape import ORDINARY
 from service.identification.least_squares import factorise
 from service.identification.structure import JointTerms, ModelStructure
-from service.recording.conditioning import Conditioner, Source
+from service.recording.conditioning import Conditioner, Motion, Source
 from service.recording.recording import Array
 from service.robot import Robot
 
@@ -123,18 +123,46 @@ def _quiet_band(
 ) -> float:
     """Widest band in which noise of q̈ makes little torque, by joint j: Σ_k H_jk² S_k (2π)⁴ f⁵/5 ≤ share² · residual.
 
-    The residual, less what that noise put into it, counts as white in the present band.
+    The residual, less what that noise put into it, counts as white in the present band. Where torque was measured in
+    several periods, what it does not repeat bounds it: a model that is wrong as yet is no reason for a wider band.
     """
     prepared = next(iter(motions))
     chosen = np.linspace(0, len(prepared.motion.position) - 1, PROBED_POSTURES).astype(int)
     inertia = _inertia(structure, parameters, prepared.motion.position[chosen])
     from_position = np.array([[name == Source.POSITION for name in c.source.names] for c in conditioners])
-    density = np.mean([c.noise.density for c in conditioners] * from_position, axis=0) / prepared.motion.repetitions
+    density = np.mean([c.noise.density for c in conditioners] * from_position, axis=0)
+    density *= _repeated_noise(prepared.motion, conditioners[0].position_noise_std)
     growth = (inertia**2).mean(axis=0) @ density * (2.0 * np.pi) ** 4 / 5.0
     cutoff = motions.cutoff_hz or np.inf
     own = np.maximum(residual_std**2 - growth * cutoff**5, SMALLEST_OWN_SHARE * residual_std**2)
+    own = np.minimum(own, _unrepeated_power(prepared))
     with np.errstate(divide="ignore"):
         return float(((NOISE_TORQUE_SHARE**2 * own / cutoff / growth) ** 0.25).min())
+
+
+def _unrepeated_power(prepared: PreparedMotion) -> Array:
+    """Variance of what torque does not repeat from period to period, in the band, (n,); infinite where nothing repeats.
+
+    Measured samples alone tell it; one that was missed counts as its period's mean.
+    """
+    motion = prepared.motion
+    if motion.repetitions == 1:
+        return np.full(motion.torque.shape[2], np.inf)
+    deviation = np.where(motion.measured, motion.torque - motion.mean_torque, 0.0)
+    in_band = np.stack([motion.band.reduce(each.T) for each in deviation])
+    return np.sum(np.mean(in_band**2, axis=2), axis=0) / (motion.repetitions - 1)
+
+
+def _repeated_noise(motion: Motion, noise_std: Array) -> Array:
+    """Power of the positions' noise in rows that stand for P periods, per noise of one period, (n,).
+
+    Such rows are weighted by √P, so that independent noise counts as in one period. Rounding that is the same in every
+    period, as where the motion repeats to the sample, is not averaged: it counts P times.
+    """
+    if motion.scatter is None:
+        return np.ones(len(noise_std))
+    independent = np.minimum(motion.scatter**2 / np.maximum(noise_std**2, np.finfo(float).tiny), 1.0)
+    return independent + (1.0 - independent) * motion.repetitions
 
 
 def _inertia(structure: ModelStructure, parameters: Array, position: Array) -> Array:

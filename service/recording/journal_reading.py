@@ -171,8 +171,8 @@ def _decoded(messages: list[bytes]) -> JointStates:
 def _at_samples(rows: NDArray[np.void], period_ns: float) -> Array:
     """Effort at the instants of the samples, where drives hold it from one command to the next, (N, n).
 
-    A drive reports what it has held until the sample: by itself that is half a cycle late. The next sample tells what it
-    held from there on; where that one was missed, nothing does.
+    A drive reports what it has held until the sample: by itself that is half a cycle late. The next sample tells what
+    it held from there on; where that one was missed, nothing does.
     """
     before = rows["effort"]
     after = np.full_like(before, np.nan)

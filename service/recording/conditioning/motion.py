@@ -39,6 +39,8 @@ class Motion:
         of it that is over
     own : slice
         samples that belong to no other piece: those before and after serve the band's filter only
+    scatter : (n,) float64 or None
+        standard deviation of the positions from period to period [rad or m]; None where nothing was averaged
     """
 
     time: Array
@@ -51,6 +53,7 @@ class Motion:
     band: BandFilter
     period: Array | None = None
     own: slice = field(default_factory=lambda: slice(None))
+    scatter: Array | None = None
 
     @property
     def repetitions(self) -> int:
@@ -220,6 +223,7 @@ def averaged_motion(periods: Periods, cutoff_hz: float | None, source: MotionSou
         measured=periods.measured,
         rate_hz=rate,
         band=AllPass(rate) if open_band or cutoff_hz is None else HarmonicBand.design(rate, count, cutoff_hz),
+        scatter=np.sqrt(periods.position.var(axis=0, ddof=1).mean(axis=0)),
     )
 
 
