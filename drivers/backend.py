@@ -140,7 +140,14 @@ class Backend(Protocol):
         """
         ...
 
-    def enable(self, mode: ControlMode, limits: DriveLimits, stop_policy: StopPolicy, watchdog_s: float) -> ArmState:
+    def enable(
+        self,
+        mode: ControlMode,
+        limits: DriveLimits,
+        stop_policy: StopPolicy,
+        watchdog_s: float,
+        cycle_s: float | None = None,
+    ) -> ArmState:
         """Take the arm under power where it stands: targets := present, limits and watchdog read back, then torque.
 
         Parameters
@@ -153,6 +160,9 @@ class Backend(Protocol):
             what the device does by itself when its watchdog fires
         watchdog_s : float
             time without `exchange` after which it does [s]
+        cycle_s : float or None
+            time between two calls of `exchange`, for drives that interpolate between targets; None where it is not
+            known [s]
 
         Raises
         ------

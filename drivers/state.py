@@ -30,6 +30,8 @@ class ArmState:
         whether the joint's drive holds or drives the joint
     faults : tuple of Fault
         what the drives report now; empty on a sound arm
+    late_ns : int
+        how much later than the bus takes the answers came: the instant of the reading is not known any better [ns]
     """
 
     time_ns: int
@@ -39,6 +41,7 @@ class ArmState:
     temperature: Array
     enabled: NDArray[np.bool_]
     faults: tuple[Fault, ...] = ()
+    late_ns: int = 0
 
     @property
     def fresh(self) -> NDArray[np.bool_]:

@@ -29,6 +29,9 @@ START = np.array([0.2, -1.0, 0.4])
 
 PATIENCE_S = 20.0
 
+RATE_HZ = 250.0
+"""Cycles a second, unless a test asks for others."""
+
 AT_REST = 5e-3
 """Speed below which a joint counts as resting: what is left is the integral's creep against friction [rad/s]."""
 
@@ -56,7 +59,8 @@ class Rig(Protocol):
 
     `position_resolution` [rad] and `torque_resolution` [Nm] are the smallest steps that the drives know; 0 where there
     is none. `swing` is how far position loops that the backend does not tune carry a joint past a place, or leave it
-    short of it [rad]. `is_real_time` says whether its clock is the machine's.
+    short of it [rad]. `is_real_time` says whether its clock is the machine's, `tells_temperature` whether its drives
+    measure theirs.
     """
 
     robot: Robot
@@ -64,6 +68,7 @@ class Rig(Protocol):
     torque_resolution: float
     swing: float
     is_real_time: bool
+    tells_temperature: bool
 
     @property
     def backend(self) -> Backend:
@@ -114,6 +119,7 @@ class ExactRig:
     position_resolution = 0.0
     torque_resolution = 0.0
     swing = 0.0
+    tells_temperature = True
 
     def torque(self, effort: Array) -> Array:
         return effort
@@ -230,7 +236,8 @@ def enable(
 ) -> ArmState:
     """Connect and take the arm under power."""
     rig.backend.connect()
-    return rig.backend.enable(mode, wide_limits(rig.robot, **limits), allowed(rig, mode, policy), watchdog_s)
+    bounds = wide_limits(rig.robot, **limits)
+    return rig.backend.enable(mode, bounds, allowed(rig, mode, policy), watchdog_s, 1.0 / RATE_HZ)
 
 
 def allowed(rig: Rig, mode: ControlMode, policy: StopPolicy) -> StopPolicy:
@@ -251,7 +258,7 @@ def setpoint(position: Array, torque: Array | None = None) -> Setpoint:
 
 
 def drive(
-    rig: Rig, command: Callable[[float], Setpoint], duration_s: float, *, rate_hz: float = 250.0
+    rig: Rig, command: Callable[[float], Setpoint], duration_s: float, *, rate_hz: float = RATE_HZ
 ) -> list[ArmState]:
     """Cycle for some time: the command is a function of the time since the start [s]."""
     clock = rig.backend.clock

@@ -9,13 +9,12 @@ from collections.abc import Callable
 
 import can
 import canopen
-from canopen.objectdictionary import ObjectDictionary
-from canopen.sdo.client import SdoClient
-from canopen.sdo.exceptions import SdoCommunicationError, SdoError
 
+from drivers.canopen.claim import BusClaim, ClaimedError
 from drivers.canopen.configuration import BusConfiguration
-from drivers.canopen.objects import DriveObject
 from drivers.canopen.serial_adapter import SerialAdapterBus
+from drivers.canopen.service_data import NodeDictionary, PumpedSdoClient
+from drivers.clock import Clock, MonotonicClock
 from drivers.errors import DriverError, DriverErrorKind
 
 SYNC_ID = 0x080
@@ -27,8 +26,6 @@ MASTER_NODE = 127
 NMT_START = 0x01
 NMT_PRE_OPERATIONAL = 0x80
 _NMT_OPERATIONAL_STATE = 0x05
-
-SDO_TIMEOUT_S = 0.5
 
 SEND_TIMEOUT_S = 0.5
 """Time in which the bus has to take a frame; the drives' own watchdog is what stops the arm meanwhile."""
@@ -42,7 +39,9 @@ FrameHandler = Callable[[int, bytes], None]
 class CanBus:
     """Sends frames, hands received ones to their subscribers, and reads and writes object dictionaries."""
 
-    def __init__(self, configuration: BusConfiguration, bus: can.BusABC | None = None) -> None:
+    def __init__(
+        self, configuration: BusConfiguration, bus: can.BusABC | None = None, clock: Clock | None = None
+    ) -> None:
         """Open the bus.
 
         Parameters
@@ -51,6 +50,8 @@ class CanBus:
             which bus
         bus : can.BusABC or None
             a bus that is open already, in place of the configured one
+        clock : Clock or None
+            by which heartbeats are due; the machine's where None
 
         Raises
         ------
@@ -58,13 +59,16 @@ class CanBus:
             ``cannot-connect``: the interface is not there, or another program holds it
         """
         self._name = f"{configuration.interface} {configuration.channel}"
+        self._clock = clock or MonotonicClock()
         self._network = canopen.Network()
         self._handlers: dict[int, FrameHandler] = {}
         self._heartbeat_period_ns = 0
         self._next_heartbeat_ns = 0
+        self._claim = _claimed(configuration) if bus is None else None
         try:
             self._bus = bus or _open(configuration)
         except (can.CanError, OSError, ValueError, NotImplementedError, ImportError) as error:
+            self._release()
             text = " ".join(str(error).split())
             raise DriverError(
                 DriverErrorKind.CANNOT_CONNECT,
@@ -84,7 +88,7 @@ class CanBus:
         """
         self._handlers[identifier] = handler
 
-    def add_node(self, node_id: int) -> "NodeDictionary":
+    def add_node(self, node_id: int) -> NodeDictionary:
         """The object dictionary of a node.
 
         Parameters
@@ -92,9 +96,9 @@ class CanBus:
         node_id : int
             1 to 127
         """
-        client = _PumpedSdoClient(self, node_id)
+        client = PumpedSdoClient(self, node_id)
         client.network = self._network
-        self.subscribe(client.tx_cobid, lambda identifier, data: client.on_response(identifier, bytearray(data), 0.0))
+        self.subscribe(client.tx_cobid, lambda identifier, data: client.on_response(identifier, data, 0.0))
         return NodeDictionary(client, node_id)
 
     def send(self, identifier: int, data: bytes) -> None:
@@ -170,12 +174,12 @@ class CanBus:
             time between heartbeats; 0 ends them [s]
         """
         self._heartbeat_period_ns = round(period_s * 1e9)
-        self._next_heartbeat_ns = time.monotonic_ns()
+        self._next_heartbeat_ns = self._clock.now_ns()
         self.beat()
 
     def beat(self) -> None:
         """Send the master's heartbeat where it is due."""
-        now = time.monotonic_ns()
+        now = self._clock.now_ns()
         if self._heartbeat_period_ns and now >= self._next_heartbeat_ns:
             self._next_heartbeat_ns = now + self._heartbeat_period_ns
             self.send(HEARTBEAT_ID + MASTER_NODE, bytes([_NMT_OPERATIONAL_STATE]))
@@ -196,6 +200,13 @@ class CanBus:
         """Let go of the bus."""
         self._heartbeat_period_ns = 0
         self._bus.shutdown()
+        self._release()
+
+    def _release(self) -> None:
+        """Let another process have the bus."""
+        if self._claim is not None:
+            self._claim.release()
+            self._claim = None
 
     def _lost(self, error: Exception) -> DriverError:
         text = " ".join(str(error).split())
@@ -204,124 +215,21 @@ class CanBus:
         )
 
 
+def _claimed(configuration: BusConfiguration) -> BusClaim | None:
+    """The claim on an interface that several programs may open; None where the adapter lets in one alone."""
+    if configuration.interface != "socketcan":
+        return None
+    try:
+        return BusClaim(configuration.channel)
+    except ClaimedError as error:
+        raise DriverError(
+            DriverErrorKind.CANNOT_CONNECT,
+            f"CAN bus {configuration.channel} is driven by {error} already; end that first",
+        ) from error
+
+
 def _open(configuration: BusConfiguration) -> can.BusABC:
     """The bus that python-can knows by this name."""
     if configuration.interface == "slcan":
         return SerialAdapterBus(configuration.channel, configuration.bit_rate)
     return can.Bus(interface=configuration.interface, channel=configuration.channel, bitrate=configuration.bit_rate)
-
-
-class NodeDictionary:
-    """The object dictionary of one node, read and written by service data."""
-
-    def __init__(self, client: SdoClient, node_id: int) -> None:
-        """Reach a node; nothing is sent yet.
-
-        Parameters
-        ----------
-        client : SdoClient
-            of the node
-        node_id : int
-            1 to 127
-        """
-        self._client = client
-        self.node_id = node_id
-
-    def read(self, entry: DriveObject) -> int:
-        """Value of an entry.
-
-        Parameters
-        ----------
-        entry : DriveObject
-            what to read
-
-        Raises
-        ------
-        DriverError
-            ``cannot-connect``: the node does not answer, or has no such entry
-        """
-        try:
-            data = self._client.upload(entry.index, entry.subindex)
-        except (SdoError, can.CanError, OSError) as error:
-            raise self._failure(f"{entry} cannot be read", error) from error
-        return int.from_bytes(data[: entry.bits // 8], "little", signed=entry.signed)
-
-    def read_optional(self, entry: DriveObject) -> int | None:
-        """Value of an entry that not every drive has; None where the drive has none.
-
-        Parameters
-        ----------
-        entry : DriveObject
-            what to read
-        """
-        try:
-            return self.read(entry)
-        except DriverError as error:
-            if isinstance(error.__cause__, SdoCommunicationError):
-                raise
-            return None
-
-    def read_text(self, entry: DriveObject) -> str:
-        """A text; empty where the node has none.
-
-        Parameters
-        ----------
-        entry : DriveObject
-            what to read
-        """
-        try:
-            return self._client.upload(entry.index, entry.subindex).decode("ascii", "replace").strip("\0 ")
-        except (SdoError, can.CanError, OSError):
-            return ""
-
-    def write(self, entry: DriveObject, value: int) -> None:
-        """Write an entry and read it back.
-
-        Parameters
-        ----------
-        entry : DriveObject
-            what to write
-        value : int
-            that fits the entry
-
-        Raises
-        ------
-        DriverError
-            ``refused``: the drive keeps another value; ``cannot-connect``: it does not answer or forbids the write
-        """
-        data = value.to_bytes(entry.bits // 8, "little", signed=entry.signed)
-        try:
-            self._client.download(entry.index, entry.subindex, data)
-        except (SdoError, can.CanError, OSError) as error:
-            raise self._failure(f"{entry} = {value} cannot be written", error) from error
-        kept = self.read(entry)
-        if kept != value:
-            raise DriverError(
-                DriverErrorKind.REFUSED,
-                f"node {self.node_id}: {entry} was written as {value} and reads {kept}; the drive limits or forbids it",
-            )
-
-    def _failure(self, what: str, error: Exception) -> DriverError:
-        return DriverError(
-            DriverErrorKind.CANNOT_CONNECT,
-            f"node {self.node_id}: {what} ({' '.join(str(error).split())}); check node number, power and wiring",
-        )
-
-
-class _PumpedSdoClient(SdoClient):
-    """The library's SDO client, taking its answers off the bus itself instead of from a receiving thread."""
-
-    RESPONSE_TIMEOUT = SDO_TIMEOUT_S
-    MAX_RETRIES = 2
-
-    def __init__(self, bus: CanBus, node_id: int) -> None:
-        super().__init__(0x600 + node_id, 0x580 + node_id, ObjectDictionary())
-        self._pumped_bus = bus
-
-    def read_response(self) -> bytes:
-        """Answer of the node, as the library reads it, after frames were taken off the bus until there is one."""
-        deadline = time.monotonic_ns() + round(SDO_TIMEOUT_S * 1e9)
-        while self.responses.empty():
-            if not self._pumped_bus.receive(deadline) and time.monotonic_ns() >= deadline:
-                raise SdoCommunicationError("no answer to a service data request")
-        return super().read_response()

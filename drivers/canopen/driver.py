@@ -16,9 +16,10 @@ from drivers.canopen.configuration import BusConfiguration, DriveJoint, read_con
 from drivers.canopen.emergency import HEARTBEAT_LOST, WATCHDOG_CODE
 from drivers.canopen.node import MOTION_PDO, RECEIVED_ID, STATE_PDO, TARGET_PDOS, DriveNode
 from drivers.canopen.state_machine import DISABLE_VOLTAGE, FAULT_RESET, DriveState, Goal, next_controlword
-from drivers.clock import MonotonicClock
+from drivers.canopen.target_limiter import TargetLimiter
+from drivers.clock import Clock, MonotonicClock
 from drivers.errors import DriverError, DriverErrorKind, Fault
-from drivers.limits import RunawayWatch, TargetLimiter, require_finite, require_sensible
+from drivers.limits import RunawayWatch, require_finite, require_sensible
 from drivers.state import ArmState, Array, Setpoint
 
 CYCLE_FRAMES = CycleFrames((TARGET_PDOS[ControlMode.POSITION].size,), (STATE_PDO.size, MOTION_PDO.size))
@@ -39,12 +40,11 @@ STILL_CYCLES = 4
 """Cycles at one place before anything moves: drives interpolate between the last few targets."""
 
 SETTLING_CYCLE_S = 0.01
-"""Cycle while drives change state, before and after the control loop's own."""
+"""Cycle while drives change state, before and after the control loop's own, where that is not known."""
 
 PATIENCE_S = 0.002
 """Time that drives and adapter may take to answer SYNC, beyond twice that of the frames on the wire."""
 
-_SETTLING_NS = round(SETTLING_CYCLE_S * 1e9)
 _UNDER_POWER = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
 _POLICY_GOALS = {StopPolicy.HOLD: Goal.QUICK_STOP, StopPolicy.TORQUE_OFF: Goal.SWITCH_ON_DISABLED}
 
@@ -57,7 +57,12 @@ class CanopenArm:
     """
 
     def __init__(
-        self, joints: Sequence[DriveJoint], bus: can.BusABC | None = None, *, patience_s: float = PATIENCE_S
+        self,
+        joints: Sequence[DriveJoint],
+        bus: can.BusABC | None = None,
+        *,
+        patience_s: float = PATIENCE_S,
+        clock: Clock | None = None,
     ) -> None:
         """Check the configuration; nothing is opened yet.
 
@@ -69,6 +74,8 @@ class CanopenArm:
             a bus that is open already, in place of the configured one
         patience_s : float
             how much longer than the bus takes an answer is waited for [s]
+        clock : Clock or None
+            that the arm runs by; the machine's where None
 
         Raises
         ------
@@ -83,11 +90,11 @@ class CanopenArm:
         self._modes = frozenset(ControlMode)
         self._mode: ControlMode | None = None
         self._policy = StopPolicy.HOLD
-        self._answer_ns = 0
+        self._answer_ns, self._settling_ns = 0, round(SETTLING_CYCLE_S * 1e9)
         self._limiter: TargetLimiter | None = None
         self._runaway: RunawayWatch | None = None
         self._caught: Fault | None = None
-        self.clock = MonotonicClock()
+        self.clock = clock or MonotonicClock()
 
     @property
     def configuration(self) -> BusConfiguration:
@@ -113,7 +120,7 @@ class CanopenArm:
         """Open the bus, make sure that every node is a drive, and read it by service data."""
         if self._bus is not None:
             raise DriverError(DriverErrorKind.CANNOT_CONNECT, "the arm is connected already; disconnect it first")
-        bus = CanBus(self._configuration, self._given_bus)
+        bus = CanBus(self._configuration, self._given_bus, self.clock)
         self._bus = bus
         self._nodes = [DriveNode.on_bus(bus, node, joint) for joint, node in enumerate(self._configuration.nodes, 1)]
         try:
@@ -140,7 +147,14 @@ class CanopenArm:
             raise DriverError(DriverErrorKind.FAULT, f"still in fault: {_listed(state.faults)}", state.faults)
         return state
 
-    def enable(self, mode: ControlMode, limits: DriveLimits, stop_policy: StopPolicy, watchdog_s: float) -> ArmState:
+    def enable(
+        self,
+        mode: ControlMode,
+        limits: DriveLimits,
+        stop_policy: StopPolicy,
+        watchdog_s: float,
+        cycle_s: float | None = None,
+    ) -> ArmState:
         """Commission every drive, arm its heartbeat consumer, and take all to *operation enabled* together.
 
         Parameters
@@ -153,21 +167,24 @@ class CanopenArm:
             ``hold`` or ``torque_off``
         watchdog_s : float
             time without the master's heartbeat after which the drives stop [s]
+        cycle_s : float or None
+            time between two SYNCs, over which the drives interpolate; they keep the one that they know where None [s]
         """
         bus = self._require_bus()
         if self._mode is not None:
             raise DriverError(DriverErrorKind.REFUSED, "the arm is enabled already; stop it first")
         self._refuse_impossible(mode, stop_policy, watchdog_s)
         state = self._read_by_service_data()
-        require_sensible(limits, state.position)
+        require_sensible(limits, state.position, [node.place for node in self._nodes])
         if state.faults:
             raise DriverError(DriverErrorKind.FAULT, f"{_listed(state.faults)}; acknowledge it first", state.faults)
+        self._settling_ns = round((SETTLING_CYCLE_S if cycle_s is None else cycle_s) * 1e9)
         bus.start_heartbeat(watchdog_s / HEARTBEATS_A_WATCHDOG)
         try:
             for index, node in enumerate(self._nodes):
                 low, high = float(limits.position_low[index]), float(limits.position_high[index])
                 torque = float(limits.torque[index])
-                node.commission(mode, stop_policy, torque, low, high, round(watchdog_s * 1e3))
+                node.commission(mode, stop_policy, torque, low, high, round(watchdog_s * 1e3), cycle_s)
             bus.command_nodes(NMT_START)
             self._mode, self._policy = mode, stop_policy
             state = self._power_up(mode, limits)
@@ -194,7 +211,7 @@ class CanopenArm:
         if any(node.error_code == HEARTBEAT_LOST for node in self._nodes):
             return self._read_by_service_data()  # such a drive takes no process data any more
         goal = Goal.OPERATION_ENABLED if self._caught is None else Goal.QUICK_STOP
-        state = self._cycle(mode, goal, limiter.limited(setpoint), self._answer_ns)
+        state = self._cycle(mode, goal, limiter.limited(setpoint, self.clock.now_ns()), self._answer_ns)
         if self._runaway is not None and self._caught is None:
             self._caught = self._runaway.look(state.position, state.velocity)
         if goal is Goal.OPERATION_ENABLED and (self._caught is not None or state.faults):
@@ -262,15 +279,15 @@ class CanopenArm:
                 if node.last_state is not DriveState.OPERATION_ENABLED:
                     place[index] = node.last_position
             still = Setpoint(place, np.zeros(len(self._nodes)))
-            return self._cycle(mode, Goal.OPERATION_ENABLED, still, _SETTLING_NS)
+            return self._cycle(mode, Goal.OPERATION_ENABLED, still, self._unhurried_ns)
 
         def is_up() -> bool:
             return all(node.last_state is DriveState.OPERATION_ENABLED for node in self._nodes)
 
         state = self._await(is_up, cycle)
-        self._limiter = TargetLimiter(limits, place)
+        self._limiter = TargetLimiter(limits, place, self._settling_ns * 1e-9)
         for _ in range(STILL_CYCLES):
-            self.clock.wait_until_ns(state.time_ns + _SETTLING_NS)
+            self.clock.wait_until_ns(state.time_ns + self._settling_ns)
             state = cycle()
         if not is_up():
             waiting = next(node for node in self._nodes if node.last_state is not DriveState.OPERATION_ENABLED)
@@ -287,10 +304,14 @@ class CanopenArm:
         began.
         """
         stay = Setpoint(self._present(), np.zeros(len(self._nodes)))
-        self._await(
-            lambda: all(node.has_answered for node in self._nodes),
-            lambda: self._cycle(mode, Goal.QUICK_STOP, stay, _SETTLING_NS),
-        )
+
+        def cycle() -> ArmState:
+            for node in self._nodes:
+                if not node.has_answered:  # it may have missed that it shall take process data
+                    self._require_bus().command_nodes(NMT_START, node.configuration.node_id)
+            return self._cycle(mode, Goal.QUICK_STOP, stay, self._unhurried_ns)
+
+        self._await(lambda: all(node.has_answered for node in self._nodes), cycle)
         return self._present()
 
     def _stop_in_cycle(self, mode: ControlMode, goal: Goal) -> bool:
@@ -298,10 +319,15 @@ class CanopenArm:
         still = Setpoint(self._present(), np.zeros(len(self._nodes)))
         self._await(
             lambda: all(_has_stopped(node, goal) for node in self._nodes),
-            lambda: self._cycle(mode, goal, still, _SETTLING_NS),
+            lambda: self._cycle(mode, goal, still, self._unhurried_ns),
             STOP_S,
         )
         return all(_has_stopped(node, goal) for node in self._nodes)
+
+    @property
+    def _unhurried_ns(self) -> int:
+        """Time for an answer while drives change state: no motion waits for the next cycle [ns]."""
+        return max(self._answer_ns, self._settling_ns)
 
     def _stop_by_service_data(self, goal: Goal) -> None:
         """Stop drives that no longer take process data, one by one; one that holds already stays as it is."""
@@ -321,8 +347,7 @@ class CanopenArm:
             node.values = {}
             bus.send(RECEIVED_ID + node.configuration.node_id, frame)
         bus.send(SYNC_ID, b"")
-        stamp = time.monotonic_ns()
-        deadline = stamp + answer_ns
+        stamp, deadline = self.clock.now_ns(), time.monotonic_ns() + answer_ns
         while not all(node.has_answered for node in self._nodes):
             if not bus.receive(deadline) and time.monotonic_ns() >= deadline:
                 break
@@ -334,7 +359,7 @@ class CanopenArm:
         self._require_bus()
         for node in self._nodes:
             node.read_now()
-        return self._state(time.monotonic_ns())
+        return self._state(self.clock.now_ns())
 
     def _state(self, stamp: int) -> ArmState:
         """What the nodes answered, in joint units; NaN where they did not."""
@@ -372,10 +397,10 @@ class CanopenArm:
         self, is_reached: Callable[[], bool], step: Callable[[], ArmState], within_s: float = TRANSITION_S
     ) -> ArmState:
         """Go on stepping until something is reached or the time for it has passed; the last state."""
-        deadline = time.monotonic_ns() + round(within_s * 1e9)
+        deadline = self.clock.now_ns() + round(within_s * 1e9)
         state = step()
-        while not is_reached() and time.monotonic_ns() < deadline:
-            self.clock.wait_until_ns(state.time_ns + _SETTLING_NS)
+        while not is_reached() and self.clock.now_ns() < deadline:
+            self.clock.wait_until_ns(state.time_ns + self._settling_ns)
             state = step()
         return state
 
@@ -396,7 +421,7 @@ class CanopenArm:
     def _unknown(self) -> ArmState:
         """The state of an arm that nobody is connected to."""
         nothing = np.full(len(self._configuration.nodes), math.nan)
-        return ArmState(time.monotonic_ns(), nothing, nothing, nothing, nothing, np.zeros(len(nothing), dtype=bool))
+        return ArmState(self.clock.now_ns(), nothing, nothing, nothing, nothing, np.zeros(len(nothing), dtype=bool))
 
 
 def _has_stopped(node: DriveNode, goal: Goal) -> bool:

@@ -19,7 +19,11 @@ from drivers.limits import require_sensible
 
 _TO_POWER = (DriveState.SWITCH_ON_DISABLED, DriveState.READY, DriveState.SWITCHED_ON)
 _DOWNLOAD, _UPLOAD = 0x23, 0x40
-_LARGEST_TORQUE_AS_DELIVERED = 0xFFFF
+_AS_DELIVERED = {
+    objects.LARGEST_TORQUE: 0xFFFF,
+    objects.INTERPOLATION_VALUE: 1,
+    objects.INTERPOLATION_EXPONENT: -3,
+}
 
 
 class _PlannedDictionary:
@@ -29,13 +33,17 @@ class _PlannedDictionary:
         self.frames: list[PlannedFrame] = []
         self.node_id = configuration.node_id
         self._label = label
-        self._values = {objects.LARGEST_TORQUE: _LARGEST_TORQUE_AS_DELIVERED}
+        self._values = dict(_AS_DELIVERED)
 
     def read(self, entry: DriveObject) -> int:
         """What was written, or what drives have as delivered."""
         request = bytes([_UPLOAD]) + _place(entry) + bytes(4)
         self._add(f"{entry}?", request)
         return self._values.get(entry, 0)
+
+    def read_optional(self, entry: DriveObject) -> int:
+        """As `read`: the drive has everything."""
+        return self.read(entry)
 
     def write(self, entry: DriveObject, value: int) -> None:
         """Keep a value, and read it back as the driver does."""
@@ -56,6 +64,7 @@ def plan_frames(
     limits: DriveLimits,
     watchdog_s: float,
     targets: NDArray[np.float64],
+    cycle_s: float | None = None,
 ) -> Iterator[PlannedFrame]:
     """Frames of a connection, of enabling, of some cycles and of a stop, for drives that answer as they should.
 
@@ -73,6 +82,8 @@ def plan_frames(
         time of silence after which the drives stop [s]
     targets : (K, n) float64
         positions of the first K cycles; the arm is supposed to stand at the first of them [rad or m]
+    cycle_s : float or None
+        time between them, which drives are told; None where it is not known [s]
 
     Yields
     ------
@@ -84,12 +95,13 @@ def plan_frames(
     DriverError
         ``refused``: a ``drive`` block or a limit is not possible
     """
-    require_sensible(limits, targets[0])
     nodes = [_planned_node(number, wanted) for number, wanted in enumerate(read_configuration(joints).nodes, 1)]
+    require_sensible(limits, targets[0], [node.place for node, _ in nodes])
     yield _frame("connect", "all nodes: pre-operational", NMT_ID, bytes([NMT_PRE_OPERATIONAL, 0]))
     for joint, (node, dictionary) in enumerate(nodes):
         low, high = float(limits.position_low[joint]), float(limits.position_high[joint])
-        node.commission(mode, StopPolicy.HOLD, float(limits.torque[joint]), low, high, round(watchdog_s * 1e3))
+        torque, ms = float(limits.torque[joint]), round(watchdog_s * 1e3)
+        node.commission(mode, StopPolicy.HOLD, torque, low, high, ms, cycle_s)
         yield from dictionary.frames
     yield _frame("enable", "master: alive", HEARTBEAT_ID + MASTER_NODE, bytes([0x05]))
     yield _frame("enable", "all nodes: operational", NMT_ID, bytes([NMT_START, 0]))

@@ -5,11 +5,13 @@ from dataclasses import dataclass, field
 
 from drivers.backend import ControlMode, StopPolicy
 from drivers.canopen import objects
-from drivers.canopen.bus import EMERGENCY_ID, HEARTBEAT_ID, MASTER_NODE, CanBus, NodeDictionary
+from drivers.canopen.bus import EMERGENCY_ID, HEARTBEAT_ID, MASTER_NODE, CanBus
 from drivers.canopen.configuration import NodeConfiguration
 from drivers.canopen.emergency import decode_emergency, describe_error
+from drivers.canopen.interpolation import interpolation_period
 from drivers.canopen.objects import DriveObject
 from drivers.canopen.pdo import PdoLayout, decode_pdo, encode_pdo, mapping_entries
+from drivers.canopen.service_data import NodeDictionary
 from drivers.canopen.state_machine import DriveState, Goal, decode_state, next_controlword
 from drivers.canopen.units import DriveUnits, drive_units
 from drivers.errors import DriverError, DriverErrorKind, Fault
@@ -122,7 +124,14 @@ class DriveNode:
         return frozenset(mode for mode, number in MODES.items() if supported >> (number - 1) & 1)
 
     def commission(
-        self, mode: ControlMode, policy: StopPolicy, torque: float, low: float, high: float, ms: int
+        self,
+        mode: ControlMode,
+        policy: StopPolicy,
+        torque: float,
+        low: float,
+        high: float,
+        ms: int,
+        cycle_s: float | None,
     ) -> None:
         """Set mode, limits, what it does when the host is gone, and process data; each value is read back.
 
@@ -138,6 +147,8 @@ class DriveNode:
             range of the joint, infinite where there is no limit [rad or m]
         ms : int
             time without the master's heartbeat after which the drive stops [ms]
+        cycle_s : float or None
+            time between two SYNCs; the drive keeps the one that it knows where None [s]
         """
         write = self.dictionary.write
         holds = policy is StopPolicy.HOLD
@@ -153,6 +164,8 @@ class DriveNode:
             counts = sorted((self.units.counts(low), self.units.counts(high)))
             write(objects.LOWEST_POSITION, counts[0])
             write(objects.HIGHEST_POSITION, counts[1])
+        if cycle_s is not None:
+            self._tell_cycle(cycle_s)
         write(objects.CONSUMER_HEARTBEAT, MASTER_NODE << 16 | ms)
         write(objects.PRODUCER_HEARTBEAT, PRODUCER_HEARTBEAT_MS)
         self._map(0x1400, 0x1600, RECEIVED_ID, TARGET_PDOS[mode])
@@ -232,6 +245,18 @@ class DriveNode:
     def place(self) -> str:
         """Joint and node, for messages."""
         return f"joint {self.joint} (node {self.configuration.node_id})"
+
+    def _tell_cycle(self, cycle_s: float) -> None:
+        """Tell the time between two targets; a drive without this object finds it from SYNC."""
+        if self.dictionary.read_optional(objects.INTERPOLATION_VALUE) is None:
+            return
+        try:
+            value, exponent = interpolation_period(cycle_s)
+        except ValueError as error:
+            raise DriverError(DriverErrorKind.REFUSED, f"{self.place}: {error}; choose another rate") from error
+        if self.dictionary.read(objects.INTERPOLATION_EXPONENT) != exponent:
+            self.dictionary.write(objects.INTERPOLATION_EXPONENT, exponent)
+        self.dictionary.write(objects.INTERPOLATION_VALUE, value)
 
     def _learn_units(self) -> DriveUnits:
         configuration = self.configuration

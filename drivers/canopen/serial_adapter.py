@@ -9,7 +9,7 @@ import time
 from can import CanInitializationError
 from can.interfaces.slcan import slcanBus
 
-from drivers.dynamixel.port_holder import find_holder
+from drivers.port_holder import find_holder
 
 RESTART_S = 2.0
 """Time that an adapter takes to restart after its port was opened, as python-can has it."""

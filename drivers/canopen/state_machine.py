@@ -34,12 +34,6 @@ QUICK_STOP = 0x0002
 DISABLE_VOLTAGE = 0x0000
 FAULT_RESET = 0x0080
 
-STATUS_FOLLOWS = 1 << 12
-"""Statusword bit 12 in the cyclic modes: the drive follows the target value."""
-
-STATUS_INTERNAL_LIMIT = 1 << 11
-"""Statusword bit 11: a limit of the drive is active."""
-
 _PATTERNS = (
     (0x4F, 0x00, DriveState.NOT_READY),
     (0x4F, 0x40, DriveState.SWITCH_ON_DISABLED),

@@ -5,8 +5,8 @@ import os
 from serial.tools.list_ports import comports
 
 from drivers.dynamixel.port import read_latency_timer_ms
-from drivers.dynamixel.port_holder import find_holder
 from drivers.inspection import Finding, Severity
+from drivers.port_holder import find_holder
 
 
 def serial_adapters() -> list[Finding]:

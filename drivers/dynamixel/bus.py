@@ -3,10 +3,11 @@
 import struct
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 from drivers.clock import Clock, MonotonicClock
 from drivers.dynamixel import packets
-from drivers.dynamixel.control_table import Block, Item
+from drivers.dynamixel.control_table import Block, Item, encode_items
 from drivers.dynamixel.packets import FrameParser, Status
 from drivers.dynamixel.port import BITS_PER_BYTE, SerialPort
 from drivers.dynamixel.turns import Turns
@@ -30,6 +31,23 @@ _FAST_BYTES = 8
 _FAST_SERVO_BYTES = 4
 
 
+@dataclass(frozen=True)
+class Answers:
+    """What came of one question to many servos.
+
+    asked_ns : int
+        instant at which the question had left [ns, by the bus' clock]
+    late_ns : int
+        how much later than bus and adapter take the last answer came [ns]
+    statuses : dict of int to Status
+        whole answers by ID; a servo that did not answer is not in it
+    """
+
+    asked_ns: int
+    late_ns: int
+    statuses: dict[int, Status]
+
+
 class ServoBus:
     """Speaks to the servos of one port; one thread's own."""
 
@@ -48,6 +66,7 @@ class ServoBus:
         self.return_delay_s = FACTORY_RETURN_DELAY_S
         self.discarded_bytes = 0
         self._missed_ns: dict[int, int] = {}
+        self._answered_ns = 0
 
     def ping(self, servo: int) -> tuple[int, int] | None:
         """Model number and firmware of a servo; None where it does not answer.
@@ -162,23 +181,32 @@ class ServoBus:
             DriverErrorKind.REFUSED, f"servo {servo}: {item.name} was written as {value} and reads otherwise; check it"
         )
 
-    def sync_write(self, item: Item, values: Mapping[int, int]) -> None:
-        """Write an item of many servos at once; no servo answers.
+    def clear_error(self, servo: int) -> None:
+        """Let a servo of the Y series forget its error; whether it did is what its Error Code says.
 
         Parameters
         ----------
-        item : Item
-            what to write
-        values : mapping of int to int
-            value for each ID
+        servo : int
+            ID
         """
-        self.port.send(
-            packets.encode_sync_write({servo: item.encode(value) for servo, value in values.items()}, item.address)
-        )
+        for _ in range(ATTEMPTS):
+            if self._ask(servo, packets.encode_clear_error(servo), 0, PATIENCE_S) is not None:
+                return
 
-    def sync_read(
-        self, servos: Sequence[int], block: Block, *, fast: bool = False, patience_s: float = 0.0
-    ) -> tuple[int, dict[int, Status]]:
+    def sync_write(self, items: Sequence[Item], values: Mapping[int, Sequence[int]]) -> None:
+        """Write items of many servos at once; no servo answers.
+
+        Parameters
+        ----------
+        items : sequence of Item
+            what to write, each where the one before ends
+        values : mapping of int to sequence of int
+            values for each ID
+        """
+        encoded = {servo: encode_items(items, own) for servo, own in values.items()}
+        self.port.send(packets.encode_sync_write(encoded, items[0].address))
+
+    def sync_read(self, servos: Sequence[int], block: Block, *, fast: bool = False, patience_s: float = 0.0) -> Answers:
         """Read the same block of many servos.
 
         Parameters
@@ -191,13 +219,6 @@ class ServoBus:
             ask for one packet for all
         patience_s : float
             how much longer to wait than in the control loop [s]
-
-        Returns
-        -------
-        int
-            instant at which the instruction had left [ns, by the bus' clock]
-        dict of int to Status
-            whole answers by ID; a servo that did not answer is not in it
         """
         owed = self._owed(servos)
         if owed:
@@ -206,12 +227,16 @@ class ServoBus:
         # Taken before: who is woken by the bytes may run before this process does again.
         asked_ns = self._clock.now_ns() + round(len(request) * BITS_PER_BYTE * 1e9 / self.port.baudrate)
         self.port.send(request)
+        self._answered_ns = asked_ns
         receive = self._receive_fast if fast else self._receive_each
         waits_s = len(servos) * self.return_delay_s + patience_s
         found = receive(servos, block.length, len(request), waits_s, owed)
         now_ns = time.monotonic_ns()
         self._missed_ns |= {servo: now_ns for servo in servos if servo not in found}
-        return asked_ns, found
+        answer_bytes = _fast_bytes(servos, block.length) if fast else len(servos) * (_STATUS_BYTES + block.length)
+        usual_s = answer_bytes * BITS_PER_BYTE / self.port.baudrate + len(servos) * self.return_delay_s
+        late_ns = self._answered_ns - asked_ns - round((usual_s + self.port.latency_s) * 1e9)
+        return Answers(asked_ns, max(0, late_ns), found)
 
     def _owed(self, servos: Sequence[int]) -> set[int]:
         """Servos whose answer to an earlier question may still be under way."""
@@ -232,6 +257,7 @@ class ServoBus:
                 status = packets.decode_status(frame)
                 if status is not None and len(status.data) == length and not status.refusal:
                     turns.take(status)
+                    self._answered_ns = self._clock.now_ns()
             if turns.complete:
                 if not owed:
                     break
@@ -243,7 +269,7 @@ class ServoBus:
         self, servos: Sequence[int], length: int, sent: int, waits_s: float, owed: set[int]
     ) -> dict[int, Status]:
         """One packet of all servos, or what is whole of one that breaks off; none where there are two that differ."""
-        answer_bytes = _FAST_BYTES + len(servos) * (length + _FAST_SERVO_BYTES)
+        answer_bytes = _fast_bytes(servos, length)
         deadline = self.port.reply_deadline_ns(sent + answer_bytes, waits_s)
         parser = FrameParser(longest=answer_bytes)
         packets_found: list[list[Status]] = []
@@ -251,6 +277,7 @@ class ServoBus:
             decoded = [packets.decode_fast(frame, servos, length) for frame in parser.feed(received)]
             packets_found += [statuses for statuses in decoded if statuses and statuses not in packets_found]
             if packets_found:
+                self._answered_ns = self._clock.now_ns()
                 if not owed:
                     break
                 deadline = min(deadline, time.monotonic_ns() + _AFTERTHOUGHT_NS)
@@ -275,6 +302,11 @@ class ServoBus:
         self.discarded_bytes += parser.discarded
         self._missed_ns[servo] = time.monotonic_ns()
         return None
+
+
+def _fast_bytes(servos: Sequence[int], length: int) -> int:
+    """Length of the packet with which all answer at once, each with so many bytes."""
+    return _FAST_BYTES + len(servos) * (length + _FAST_SERVO_BYTES)
 
 
 def _failure(servo: int, what: str, answer: Status | None) -> DriverError:

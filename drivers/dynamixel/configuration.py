@@ -9,6 +9,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from drivers.drive_block import (
+    read_direction,
+    read_positive,
+    read_text,
+    read_whole,
+    refusal,
+    require_distinct,
+    require_known_keys,
+)
 from drivers.dynamixel.control_table import find_model_by_name
 from drivers.dynamixel.packets import HIGHEST_ID
 from drivers.errors import DriverError, DriverErrorKind
@@ -17,7 +26,6 @@ DEFAULT_BAUD = 1_000_000
 
 _BUS_KEYS = ("port", "baud")
 _SERVO_KEYS = ("id", "model", "direction", "reduction", "zero_count", "milliampere_per_unit", "current_limit_ma")
-_SHARED_KEYS = ("stop_policy",)
 _LOWEST_BAUD, _HIGHEST_BAUD = 9_600, 10_500_000
 
 
@@ -106,69 +114,47 @@ def read_configuration(joints: Sequence[DynamixelJoint]) -> BusConfiguration:
         ``refused``: a key is missing, unknown or not usable; names the joint and the key
     """
     first = joints[0]
-    known = {*_BUS_KEYS, *_SERVO_KEYS, *_SHARED_KEYS}
-    for joint in joints:
-        for key in joint.drive:
-            if key not in known:
-                raise _refusal(joint, key, f"is not known; known keys: {', '.join(sorted(known))}")
-        for key in _BUS_KEYS:
-            if joint is not first and joint.drive.get(key, first.drive.get(key)) != first.drive.get(key):
-                raise _refusal(joint, key, f"differs from that of {first.name}; all servos are on one bus")
+    require_known_keys(joints, _BUS_KEYS, _SERVO_KEYS)
     servos = tuple(_servo(joint) for joint in joints)
-    for joint, servo in zip(joints, servos, strict=True):
-        if sum(other.servo == servo.servo for other in servos) > 1:
-            raise _refusal(joint, "id", f"= {servo.servo} is there twice; each servo has its own")
-    port = first.drive.get("port")
-    if not isinstance(port, str) or not port:
-        raise _refusal(first, "port", "is missing; give the serial device, like /dev/ttyUSB0")
-    baud = _whole(first, "baud", DEFAULT_BAUD, least=_LOWEST_BAUD, most=_HIGHEST_BAUD)
-    return BusConfiguration(servos, port, baud)
+    require_distinct(joints, "id")
+    port = read_text(first, "port", "give the serial device, like /dev/ttyUSB0")
+    return BusConfiguration(
+        servos, port, read_whole(first, "baud", DEFAULT_BAUD, least=_LOWEST_BAUD, most=_HIGHEST_BAUD)
+    )
 
 
 def _servo(joint: DynamixelJoint) -> ServoConfiguration:
     """The servo of a joint."""
-    model = joint.drive.get("model")
-    if model is not None:
-        if not isinstance(model, str):
-            raise _refusal(joint, "model", f"= {model!r}; write it as on the case, like XM430-W350")
-        find_model_by_name(model)
-    direction = _whole(joint, "direction", 1, least=-1, most=1)
-    if direction == 0:
-        raise _refusal(joint, "direction", "= 0; give 1 or -1")
     zero = joint.drive.get("zero_count")
+    return ServoConfiguration(
+        joint=joint.name,
+        servo=read_whole(joint, "id", None, least=0, most=HIGHEST_ID),
+        model=_model(joint),
+        direction=read_direction(joint),
+        reduction=read_positive(joint, "reduction") or 1.0,
+        zero_count=None if zero is None else read_whole(joint, "zero_count", None, least=-(2**31), most=2**31 - 1),
+        milliampere_per_unit=read_positive(joint, "milliampere_per_unit"),
+        current_limit_ma=read_positive(joint, "current_limit_ma"),
+        torque_per_milliampere=_torque_per_milliampere(joint),
+    )
+
+
+def _model(joint: DynamixelJoint) -> str | None:
+    """The model that a robot file promises."""
+    model = joint.drive.get("model")
+    if model is None:
+        return None
+    if not isinstance(model, str):
+        raise refusal(joint, "model", f"= {model!r}; write it as on the case, like XM430-W350")
+    find_model_by_name(model)
+    return model
+
+
+def _torque_per_milliampere(joint: DynamixelJoint) -> float | None:
+    """The constant that a robot file states."""
     constant = joint.torque_per_milliampere
     if constant is not None and (not math.isfinite(constant) or constant == 0.0):
         raise DriverError(
             DriverErrorKind.REFUSED, f"joint {joint.name}: torque_constant = {constant}; give one that is not zero"
         )
-    return ServoConfiguration(
-        joint=joint.name,
-        servo=_whole(joint, "id", None, least=0, most=HIGHEST_ID),
-        model=model,
-        direction=direction,
-        reduction=_positive(joint, "reduction") or 1.0,
-        zero_count=None if zero is None else _whole(joint, "zero_count", None, least=-(2**31), most=2**31 - 1),
-        milliampere_per_unit=_positive(joint, "milliampere_per_unit"),
-        current_limit_ma=_positive(joint, "current_limit_ma"),
-        torque_per_milliampere=constant,
-    )
-
-
-def _whole(joint: DynamixelJoint, key: str, default: int | None, *, least: int, most: int) -> int:
-    value = joint.drive.get(key, default)
-    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-        raise _refusal(joint, key, f"= {value!r}; give a whole number from {least} to {most}")
-    return value
-
-
-def _positive(joint: DynamixelJoint, key: str) -> float | None:
-    value = joint.drive.get(key)
-    if value is None:
-        return None
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value) or value <= 0:
-        raise _refusal(joint, key, f"= {value!r}; give a positive number")
-    return float(value)
-
-
-def _refusal(joint: DynamixelJoint, key: str, reason: str) -> DriverError:
-    return DriverError(DriverErrorKind.REFUSED, f"joint {joint.name}: drive.{key} {reason}")
+    return constant

@@ -69,6 +69,19 @@ class Item:
         return int.from_bytes(block[offset : offset + self.size], "little", signed=self.signed)
 
 
+def encode_items(items: Iterable[Item], values: Iterable[int]) -> bytes:
+    """Bytes of neighbours in a control table.
+
+    Parameters
+    ----------
+    items : iterable of Item
+        each where the one before ends
+    values : iterable of int
+        one of each
+    """
+    return b"".join(item.encode(value) for item, value in zip(items, values, strict=True))
+
+
 @dataclass(frozen=True)
 class Block:
     """A stretch of a control table that is read at once.
@@ -138,6 +151,12 @@ class ServoModel:
     def senses_current(self) -> bool:
         """Whether it measures and controls current; without that nothing can be identified."""
         return "Present Current" in self.items and "Goal Current" in self.items
+
+    @property
+    def paces_goals(self) -> bool:
+        """Whether Profile Velocity and Goal Position are neighbours, so that one write carries both."""
+        speed = self.items["Profile Velocity"]
+        return speed.address + speed.size == self.items["Goal Position"].address
 
     @property
     def temperature_item(self) -> Item:

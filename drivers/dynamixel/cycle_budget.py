@@ -1,11 +1,29 @@
 """Traffic and timing of an arm's cycle: as planned, and as found once the servos are reached."""
 
 import os
+from dataclasses import replace
 
-from drivers.dynamixel.bus_budget import BusTiming, CycleTraffic
+from drivers.dynamixel.bus_budget import BusTiming, CycleTraffic, largest_rate_hz
 from drivers.dynamixel.configuration import BusConfiguration
 from drivers.dynamixel.port import LEAST_LATENCY_S, read_latency_timer_ms
 from drivers.dynamixel.session import SHORTEST_RETURN_DELAY_S, Session
+
+_PACED_GOAL_BYTES = 8
+
+
+def has_room_for_speeds(traffic: CycleTraffic, timing: BusTiming, cycle_s: float) -> bool:
+    """Whether a cycle is long enough to send each servo a speed with its goal.
+
+    Parameters
+    ----------
+    traffic : CycleTraffic
+        of a cycle without
+    timing : BusTiming
+        of the bus
+    cycle_s : float
+        of the control loop [s]
+    """
+    return largest_rate_hz(replace(traffic, goal_bytes=_PACED_GOAL_BYTES), timing) * cycle_s >= 1.0
 
 
 def planned_budget(configuration: BusConfiguration) -> tuple[CycleTraffic, BusTiming]:

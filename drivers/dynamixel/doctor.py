@@ -120,7 +120,7 @@ def _loop_rate(bus: ServoBus, servos: Sequence[JointServo], return_delay_s: floa
     bus.return_delay_s = return_delay_s
     identifiers, block = [servo.servo for servo in servos], servos[0].model.state_block
     begin_ns = time.monotonic_ns()
-    missed = sum(len(identifiers) - len(bus.sync_read(identifiers, block)[1]) for _ in range(MEASURED_CYCLES))
+    missed = sum(len(identifiers) - len(bus.sync_read(identifiers, block).statuses) for _ in range(MEASURED_CYCLES))
     rate_hz = MEASURED_CYCLES / ((time.monotonic_ns() - begin_ns) * 1e-9)
     timing = BusTiming(bus.port.baudrate, 2e-6, bus.port.latency_s)
     possible = largest_rate_hz(CycleTraffic(len(servos)), timing)

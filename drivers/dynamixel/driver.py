@@ -12,18 +12,19 @@ from drivers.dynamixel.bounds import Bounds, goals_of
 from drivers.dynamixel.bus import ServoBus
 from drivers.dynamixel.bus_budget import BusTiming, CycleTraffic, largest_part, largest_rate_hz, require_rate
 from drivers.dynamixel.configuration import DynamixelJoint, read_configuration
-from drivers.dynamixel.cycle_budget import found_budget, planned_budget
+from drivers.dynamixel.cycle_budget import found_budget, has_room_for_speeds, planned_budget
 from drivers.dynamixel.enabling import enable_servos
 from drivers.dynamixel.faults import lost_bus_fault, silent_servo_fault
 from drivers.dynamixel.group import GroupReading
 from drivers.dynamixel.models import WATCHDOG_MOST, WATCHDOG_STEP_S
 from drivers.dynamixel.observation import arm_state, blind_state, observe
+from drivers.dynamixel.pacing import GoalPace
 from drivers.dynamixel.port import SerialPort
 from drivers.dynamixel.preparation import commissioning_writes
-from drivers.dynamixel.runaway import RunawayWatch
 from drivers.dynamixel.session import Session, open_session
-from drivers.dynamixel.stopping import clear_watchdogs, stop_servos
+from drivers.dynamixel.stopping import clear_errors, clear_watchdogs, stop_servos
 from drivers.errors import DriverError, DriverErrorKind, Fault
+from drivers.limits import RunawayWatch, require_finite
 from drivers.state import ArmState, Setpoint
 
 Array = NDArray[np.float64]
@@ -72,9 +73,10 @@ class DynamixelArm:
         self._policy = StopPolicy.HOLD
         self._bounds: Bounds | None = None
         self._watch: RunawayWatch | None = None
+        self._pace: GoalPace | None = None
         self._watchdog_s = 0.0
         self._last_exchange_ns = 0
-        self._last_goals: list[int | None] | None = None
+        self._last_goals: list[int] | None = None
         self._lost: tuple[Fault, ...] = ()
 
     @property
@@ -138,7 +140,7 @@ class DynamixelArm:
         """Clear watchdogs that have fired; an arm that is still enabled is stopped by its policy first.
 
         A hardware error (overload, heat …) stays until the servo was switched off and on: it is never restarted from
-        here, for a restart lets go of the joint.
+        here, for a restart lets go of the joint. Servos of the Y series forget errors without one, and are told to.
 
         Raises
         ------
@@ -152,6 +154,8 @@ class DynamixelArm:
             session.health.forget()
             session.read_health()
             clear_watchdogs(session)
+            session.read_health()
+            clear_errors(session)
             for joint, servo in enumerate(session.servos):
                 session.settings[joint] |= session.read(joint, ["Status Return Level"])
                 holds = bool(session.health.has_torque[joint])
@@ -162,7 +166,14 @@ class DynamixelArm:
             raise DriverError(DriverErrorKind.FAULT, f"{faults[0]}", faults)
         return self._observe(session, session.health.temperature.copy())
 
-    def enable(self, mode: ControlMode, limits: DriveLimits, stop_policy: StopPolicy, watchdog_s: float) -> ArmState:
+    def enable(
+        self,
+        mode: ControlMode,
+        limits: DriveLimits,
+        stop_policy: StopPolicy,
+        watchdog_s: float,
+        cycle_s: float | None = None,
+    ) -> ArmState:
         """Take the arm under power where it stands.
 
         Parameters
@@ -175,6 +186,9 @@ class DynamixelArm:
             what the servos do when their watchdog fires: `HOLD` in position mode, `TORQUE_OFF` in torque mode
         watchdog_s : float
             time without `exchange` after which they do; rounded down to 20 ms [s]
+        cycle_s : float or None
+            time between two goals, over which the servos go from one to the next; they leap where it is None, or too
+            short for a bus that has to carry the speeds as well [s]
 
         Raises
         ------
@@ -187,10 +201,13 @@ class DynamixelArm:
             session.read_health()
             if faults := session.health.faults:
                 raise DriverError(DriverErrorKind.FAULT, f"{faults[0]}", faults)
-            self._bounds = enable_servos(session, mode, limits, watchdog_s)
+            self._bounds, held = enable_servos(session, mode, limits, watchdog_s)
         session.health.expect_torque(True)
         self._mode, self._policy, self._watchdog_s = mode, stop_policy, watchdog_s
-        self._watch = RunawayWatch(session.servos, limits) if mode is ControlMode.TORQUE else None
+        self._watch = RunawayWatch(limits) if mode is ControlMode.TORQUE else None
+        self._pace = None
+        if mode is ControlMode.POSITION and cycle_s is not None and has_room_for_speeds(*self._budget(), cycle_s):
+            self._pace = GoalPace(session.servos, held, self._bounds.velocity, cycle_s, self._clock.now_ns())
         self._last_goals = None
         self._last_exchange_ns = self._clock.now_ns()
         return self._observe(session, session.health.temperature.copy())
@@ -211,11 +228,12 @@ class DynamixelArm:
         session = self._reached()
         if self._mode is None or self._bounds is None:
             raise DriverError(DriverErrorKind.NOT_ENABLED, "the arm is not enabled; enable it first")
+        require_finite(setpoint, len(session.servos))
         name, goals = goals_of(session.servos, self._mode, self._bounds, setpoint)
         silence_s = (self._clock.now_ns() - self._last_exchange_ns) * 1e-9
         with self._watching_the_port():
             if session.health.runaway is None:
-                session.group.write(name, goals)
+                self._send(session, name, goals)
             self._last_goals = goals if self._mode is ControlMode.POSITION else None
             reading = session.group.read()
             joint, values = session.group.read_health()
@@ -276,6 +294,13 @@ class DynamixelArm:
                 f"in {mode} mode the servos' watchdog ends in {wanted}, not in {policy}; ask for {wanted}"
                 + ("" if mode is ControlMode.POSITION else ", or track positions"),
             )
+
+    def _send(self, session: Session, name: str, goals: list[int]) -> None:
+        """Write the goals of a cycle, each with the speed that takes until the next."""
+        if self._pace is None:
+            session.group.write(name, goals)
+        else:
+            session.group.write_goals(goals, self._pace.speeds(goals, self._clock.now_ns()))
 
     def _catch(self, session: Session, reading: GroupReading) -> None:
         """Hold an arm that leaves its limits while it is given current: its servos would let it."""

@@ -1,16 +1,18 @@
 """The frames that a run would send, without a port."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.backend import ControlMode, DriveLimits
 from drivers.dynamixel import packets
-from drivers.dynamixel.bounds import Bounds, goals_of, require_sensible
+from drivers.dynamixel.bounds import Bounds, goals_of
 from drivers.dynamixel.configuration import DynamixelJoint, read_configuration
-from drivers.dynamixel.control_table import Block
-from drivers.dynamixel.group import health_turns, servo_families
+from drivers.dynamixel.control_table import Block, Item, encode_items
+from drivers.dynamixel.cycle_budget import has_room_for_speeds, planned_budget
+from drivers.dynamixel.group import health_turns, paced_goals, servo_families
+from drivers.dynamixel.pacing import GoalPace
 from drivers.dynamixel.preparation import (
     SETTINGS,
     ServoTask,
@@ -21,6 +23,7 @@ from drivers.dynamixel.preparation import (
 )
 from drivers.dynamixel.servo import JointServo, make_servo
 from drivers.inspection import PlannedFrame
+from drivers.limits import require_sensible
 from drivers.state import Setpoint
 
 _DELIVERED = {
@@ -40,6 +43,7 @@ def plan_frames(
     limits: DriveLimits,
     watchdog_s: float,
     targets: NDArray[np.float64],
+    cycle_s: float | None = None,
 ) -> Iterator[PlannedFrame]:
     """Frames of a connection, of enabling, of some cycles and of a stop, for servos as delivered.
 
@@ -58,6 +62,8 @@ def plan_frames(
         time of silence after which the servos stop [s]
     targets : (K, n) float64
         positions of the first K cycles; the arm is supposed to stand at the first of them [rad or m]
+    cycle_s : float or None
+        time between them, over which servos go from one to the next; None where it is not known [s]
 
     Yields
     ------
@@ -69,8 +75,9 @@ def plan_frames(
     DriverError
         ``refused``: a ``drive`` block, a limit or the watchdog's time is not possible
     """
-    servos = [make_servo(number, servo, None) for number, servo in enumerate(read_configuration(joints).servos, 1)]
-    require_sensible(servos, limits)
+    configuration = read_configuration(joints)
+    servos = [make_servo(number, servo, None) for number, servo in enumerate(configuration.servos, 1)]
+    require_sensible(limits, targets[0], [servo.label for servo in servos])
     tasks = [
         ServoTask(
             mode,
@@ -81,38 +88,86 @@ def plan_frames(
         )
         for joint, servo in enumerate(servos)
     ]
+    yield from _connection(servos)
+    yield from _enabling(servos, tasks)
+    if cycle_s is not None and not has_room_for_speeds(*planned_budget(configuration), cycle_s):
+        cycle_s = None
+    yield from _cycles(servos, mode, _bounds(servos, limits, tasks), targets, cycle_s)
+    yield from _stop(servos, mode)
+
+
+def _connection(servos: Sequence[JointServo]) -> Iterator[PlannedFrame]:
+    """A ping each, and what is put in order before anything moves."""
     for servo in servos:
         yield _frame("connect", f"{servo.label}: who are you?", packets.encode_ping(servo.servo))
         for write in commissioning_writes(servo, _DELIVERED, holds=False):
             yield _write(servo, "connect", write.item.name, write.value, write.reason)
+
+
+def _enabling(servos: Sequence[JointServo], tasks: Sequence[ServoTask]) -> Iterator[PlannedFrame]:
+    """Goal, limits, watchdog, torque, one servo after the other."""
     for servo, task in zip(servos, tasks, strict=True):
         for write in enabling_writes(servo, _DELIVERED, task, holds=False):
             yield _write(servo, "enable", write.item.name, write.value, write.reason)
+
+
+def _bounds(servos: Sequence[JointServo], limits: DriveLimits, tasks: Sequence[ServoTask]) -> Bounds:
+    """Ranges of the goals; the servos' own Position Limits are not known."""
     ends = [
         servo.units.counts_within(float(limits.position_low[joint]), float(limits.position_high[joint]))
         for joint, servo in enumerate(servos)
     ]
     lows, highs = zip(*ends, strict=True)
-    bounds = Bounds(lows, highs, tuple(task.current_cap for task in tasks))
+    caps = tuple(task.current_cap for task in tasks)
+    return Bounds(lows, highs, caps, tuple(task.velocity_cap for task in tasks))
+
+
+def _cycles(
+    servos: Sequence[JointServo],
+    mode: ControlMode,
+    bounds: Bounds,
+    targets: NDArray[np.float64],
+    cycle_s: float | None,
+) -> Iterator[PlannedFrame]:
+    """Goals out, states in, and one servo's health in turn."""
     turns = health_turns(servos)
+    pace = None
     for cycle, position in enumerate(targets):
         name, goals = goals_of(servos, mode, bounds, Setpoint(position, np.zeros(len(servos))))
-        yield from _goals(servos, name, goals)
+        if mode is ControlMode.TORQUE or cycle_s is None:
+            yield from _goals(servos, name, goals)
+        else:
+            pace = pace or GoalPace(servos, goals, bounds.velocity, cycle_s, 0)
+            yield from _paced_goals(servos, goals, pace.speeds(goals, round(cycle * cycle_s * 1e9)))
         yield from _questions(servos, *turns[cycle % len(turns)])
+
+
+def _stop(servos: Sequence[JointServo], mode: ControlMode) -> Iterator[PlannedFrame]:
+    """Servos that track positions hold the last one; those that are given current are let go."""
     for servo in servos:
         if mode is ControlMode.TORQUE:
             yield _write(servo, "stop", "Torque Enable", 0, "torque off")
         yield _write(servo, "stop", "Bus Watchdog", 0, "stays so without cycles")
 
 
-def _goals(servos: Sequence[JointServo], name: str, goals: Sequence[int | None]) -> Iterator[PlannedFrame]:
+def _goals(servos: Sequence[JointServo], name: str, goals: Sequence[int]) -> Iterator[PlannedFrame]:
     """Goals of a cycle, one frame a family."""
     for _, members in servo_families(servos):
-        item = servos[members[0]].model.items[name]
-        values = {servos[index].servo: value for index in members if (value := goals[index]) is not None}
-        told = ", ".join(f"{servo} := {value}" for servo, value in values.items())
-        encoded = {servo: item.encode(value) for servo, value in values.items()}
-        yield _frame("cycle", f"{name}: servo {told}", packets.encode_sync_write(encoded, item.address))
+        items = [servos[members[0]].model.items[name]]
+        yield _sync_write(items, {servos[index].servo: [goals[index]] for index in members})
+
+
+def _paced_goals(servos: Sequence[JointServo], goals: Sequence[int], speeds: Sequence[int]) -> Iterator[PlannedFrame]:
+    """Goals of a cycle with the speeds towards them."""
+    for items, values in paced_goals(servos, goals, speeds):
+        yield _sync_write(items, values)
+
+
+def _sync_write(items: Sequence[Item], values: Mapping[int, Sequence[int]]) -> PlannedFrame:
+    names = ", ".join(item.name for item in items)
+    told = ", ".join(f"{servo} := {', '.join(map(str, own))}" for servo, own in values.items())
+    encoded = {servo: encode_items(items, own) for servo, own in values.items()}
+    return _frame("cycle", f"{names}: servo {told}", packets.encode_sync_write(encoded, items[0].address))
 
 
 def _questions(servos: Sequence[JointServo], turn: int, health: Block) -> Iterator[PlannedFrame]:

@@ -1,9 +1,12 @@
 """Taking an arm under power where it stands: everything is checked before anything is written."""
 
 import contextlib
+import math
+
+import numpy as np
 
 from drivers.backend import ControlMode, DriveLimits
-from drivers.dynamixel.bounds import Bounds, require_sensible
+from drivers.dynamixel.bounds import Bounds
 from drivers.dynamixel.preparation import (
     ServoTask,
     current_cap,
@@ -15,9 +18,12 @@ from drivers.dynamixel.preparation import (
 )
 from drivers.dynamixel.session import Session
 from drivers.errors import DriverError, DriverErrorKind
+from drivers.limits import require_sensible
 
 
-def enable_servos(session: Session, mode: ControlMode, limits: DriveLimits, watchdog_s: float) -> Bounds:
+def enable_servos(
+    session: Session, mode: ControlMode, limits: DriveLimits, watchdog_s: float
+) -> tuple[Bounds, list[int]]:
     """Give every servo its goal, limits and watchdog, read them back, then torque, one servo at a time.
 
     A servo that holds its joint already, in the mode that is asked for, is taken over without letting go.
@@ -37,6 +43,8 @@ def enable_servos(session: Session, mode: ControlMode, limits: DriveLimits, watc
     -------
     Bounds
         for the cyclic exchange
+    list of int
+        Goal Position that each servo was given where positions are tracked [counts]
 
     Raises
     ------
@@ -44,8 +52,9 @@ def enable_servos(session: Session, mode: ControlMode, limits: DriveLimits, watc
         ``refused`` or ``cannot-connect``: no servo has torque that had none before
     """
     steps = watchdog_steps(watchdog_s)
-    require_sensible(session.servos, limits)
     present = _present_positions(session)
+    places = np.array([servo.units.position(count) for servo, count in zip(session.servos, present, strict=True)])
+    require_sensible(limits, places, [servo.label for servo in session.servos])
     tasks: list[ServoTask] = []
     ranges: list[tuple[int, int]] = []
     for joint, servo in enumerate(session.servos):
@@ -58,7 +67,8 @@ def enable_servos(session: Session, mode: ControlMode, limits: DriveLimits, watc
             _require_adoptable(session, joint, mode)
     _give_torque(session, tasks)
     lows, highs = zip(*ranges, strict=True)
-    return Bounds(tuple(lows), tuple(highs), tuple(task.current_cap for task in tasks))
+    caps = tuple(task.current_cap for task in tasks)
+    return Bounds(tuple(lows), tuple(highs), caps, tuple(task.velocity_cap for task in tasks)), present
 
 
 def _give_torque(session: Session, tasks: list[ServoTask]) -> None:
@@ -87,17 +97,19 @@ def _present_positions(session: Session) -> list[int]:
 
 
 def _range(session: Session, joint: int, limits: DriveLimits, mode: ControlMode, present: int) -> tuple[int, int]:
-    """Goal Positions that are allowed; the joint has to stand within them."""
-    servo = session.servos[joint]
-    low, high = float(limits.position_low[joint]), float(limits.position_high[joint])
-    lowest, highest = position_counts(servo, session.settings[joint], low, high, mode)
-    if not lowest <= present <= highest:
+    """Goal Positions that are allowed; the servo's own limits, where it applies them, leave the joint where it is."""
+    servo, settings = session.servos[joint], session.settings[joint]
+    lowest, highest = position_counts(
+        servo, settings, float(limits.position_low[joint]), float(limits.position_high[joint]), mode
+    )
+    own_lowest, own_highest = position_counts(servo, settings, -math.inf, math.inf, mode)
+    if not (own_lowest <= present <= own_highest and lowest < highest):
         place = servo.units.position(present)
-        ends = sorted((servo.units.position(lowest), servo.units.position(highest)))
+        ends = sorted((servo.units.position(own_lowest), servo.units.position(own_highest)))
         raise DriverError(
             DriverErrorKind.REFUSED,
-            f"{servo.label} stands at {place:.4g}, outside {ends[0]:.4g} to {ends[1]:.4g}; move it back by hand, or "
-            "widen the limits of the joint or the servo",
+            f"{servo.label} stands at {place:.4g}, its own Position Limits are {ends[0]:.4g} to {ends[1]:.4g}; move it "
+            "back by hand, or widen them",
         )
     return lowest, highest
 

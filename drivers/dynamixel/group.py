@@ -1,14 +1,13 @@
 """The cyclic exchange with all servos: goals by Sync Write, state by (Fast) Sync Read, one servo's health in turn."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.dynamixel.bus import ATTEMPTS, PATIENCE_S, ServoBus
-from drivers.dynamixel.control_table import STATE_ITEMS, Block
-from drivers.dynamixel.packets import Status
+from drivers.dynamixel.bus import ATTEMPTS, PATIENCE_S, Answers, ServoBus
+from drivers.dynamixel.control_table import STATE_ITEMS, Block, Item
 from drivers.dynamixel.servo import JointServo
 
 Array = NDArray[np.float64]
@@ -36,6 +35,8 @@ class GroupReading:
         [mA]
     alerts : tuple of bool or None
         alert bit of each servo; None for who did not answer
+    late_ns : int
+        how much later than the bus takes the last answer came [ns]
     """
 
     time_ns: int
@@ -43,6 +44,7 @@ class GroupReading:
     velocity: Array
     current: Array
     alerts: tuple[bool | None, ...]
+    late_ns: int
 
 
 class ServoGroup:
@@ -70,8 +72,8 @@ class ServoGroup:
 
     def probe_fast(self) -> bool:
         """Find out whether all servos know Fast Sync Read, and use it from now on if they do."""
-        probes = (self._read_all(fast=True, patience_s=PATIENCE_S)[1] for _ in range(PROBES))
-        self.fast = any(answers.keys() == self._ids for answers in probes)
+        probes = (self._read_all(fast=True, patience_s=PATIENCE_S).statuses for _ in range(PROBES))
+        self.fast = any(statuses.keys() == self._ids for statuses in probes)
         return self.fast
 
     def write(self, name: str, values: Sequence[int | None]) -> None:
@@ -86,9 +88,22 @@ class ServoGroup:
         """
         for _, members in self._families:
             item = self.servos[members[0]].model.items[name]
-            chosen = {self.servos[index].servo: value for index in members if (value := values[index]) is not None}
+            chosen = {self.servos[index].servo: [value] for index in members if (value := values[index]) is not None}
             if chosen:
-                self._bus.sync_write(item, chosen)
+                self._bus.sync_write([item], chosen)
+
+    def write_goals(self, goals: Sequence[int], speeds: Sequence[int]) -> None:
+        """Write Goal Position of all servos, with Profile Velocity where that is its neighbour.
+
+        Parameters
+        ----------
+        goals : sequence of int
+            one a joint [counts]
+        speeds : sequence of int
+            one a joint [units]
+        """
+        for items, values in paced_goals(self.servos, goals, speeds):
+            self._bus.sync_write(items, values)
 
     def read(self, patience_s: float = 0.0) -> GroupReading:
         """State of all servos.
@@ -100,10 +115,10 @@ class ServoGroup:
         """
         fast = self.fast and self._plain_cycles == 0
         self._plain_cycles = max(0, self._plain_cycles - 1)
-        time_ns, answers = self._read_all(fast=fast, patience_s=patience_s)
-        if fast and answers.keys() != self._ids:
+        answers = self._read_all(fast=fast, patience_s=patience_s)
+        if fast and answers.statuses.keys() != self._ids:
             self._plain_cycles = PLAIN_CYCLES
-        reading = self._reading(time_ns, answers)
+        reading = self._reading(answers)
         news = {index for index, alert in enumerate(reading.alerts) if alert} - self._known_alerts
         self._alerted |= news
         self._known_alerts = (self._known_alerts | news) - {
@@ -141,9 +156,9 @@ class ServoGroup:
         for _, members in self._families:
             blocks = self.servos[members[0]].model.health_blocks
             block = next(block for block in blocks if any(item.name == "Bus Watchdog" for item in block.items))
-            _, answers = self._bus.sync_read([self.servos[index].servo for index in members], block)
+            answers = self._bus.sync_read([self.servos[index].servo for index in members], block)
             for index in members:
-                if (status := answers.get(self.servos[index].servo)) is not None:
+                if (status := answers.statuses.get(self.servos[index].servo)) is not None:
                     found[index] = block.decode(status.data)
         return found
 
@@ -156,29 +171,29 @@ class ServoGroup:
     def _ids(self) -> set[int]:
         return {servo.servo for servo in self.servos}
 
-    def _read_all(self, *, fast: bool, patience_s: float) -> tuple[int, dict[int, Status]]:
-        """Answers of all families, and when the first was asked."""
-        first_ns, answers = 0, {}
-        for block, members in self._families:
-            time_ns, found = self._bus.sync_read(
+    def _read_all(self, *, fast: bool, patience_s: float) -> Answers:
+        """Answers of all families, as if to one question: asked when the first was, late as the latest."""
+        found = [
+            self._bus.sync_read(
                 [self.servos[index].servo for index in members], block, fast=fast, patience_s=patience_s
             )
-            first_ns = first_ns or time_ns
-            answers |= found
-        return first_ns, answers
+            for block, members in self._families
+        ]
+        statuses = {servo: status for answers in found for servo, status in answers.statuses.items()}
+        return Answers(found[0].asked_ns, max(answers.late_ns for answers in found), statuses)
 
-    def _reading(self, time_ns: int, answers: dict[int, Status]) -> GroupReading:
+    def _reading(self, answers: Answers) -> GroupReading:
         position, velocity, current = np.full((3, len(self.servos)), np.nan)
         alerts: list[bool | None] = [None] * len(self.servos)
         for index, servo in enumerate(self.servos):
-            if (status := answers.get(servo.servo)) is None:
+            if (status := answers.statuses.get(servo.servo)) is None:
                 continue
             values = servo.model.state_block.decode(status.data)
             position[index] = servo.units.position(values[_POSITION])
             velocity[index] = servo.units.velocity(values[_VELOCITY])
             current[index] = servo.units.current(values[_CURRENT])
             alerts[index] = status.alert
-        return GroupReading(time_ns, position, velocity, current, tuple(alerts))
+        return GroupReading(answers.asked_ns, position, velocity, current, tuple(alerts), answers.late_ns)
 
 
 def servo_families(servos: Sequence[JointServo]) -> list[tuple[Block, list[int]]]:
@@ -195,6 +210,29 @@ def servo_families(servos: Sequence[JointServo]) -> list[tuple[Block, list[int]]
         key = (block.address, block.length, servo.model.items["Goal Position"].address)
         families.setdefault(key, (block, []))[1].append(index)
     return list(families.values())
+
+
+def paced_goals(
+    servos: Sequence[JointServo], goals: Sequence[int], speeds: Sequence[int]
+) -> Iterator[tuple[list[Item], dict[int, list[int]]]]:
+    """Items and values of the Sync Writes of a cycle's goals, one a family.
+
+    Parameters
+    ----------
+    servos : sequence of JointServo
+        in the order of the joints
+    goals : sequence of int
+        one a joint [counts]
+    speeds : sequence of int
+        one a joint [units]
+    """
+    for _, members in servo_families(servos):
+        model = servos[members[0]].model
+        goal, speed = model.items["Goal Position"], model.items["Profile Velocity"]
+        if model.paces_goals:
+            yield [speed, goal], {servos[index].servo: [speeds[index], goals[index]] for index in members}
+        else:
+            yield [goal], {servos[index].servo: [goals[index]] for index in members}
 
 
 def health_turns(servos: Sequence[JointServo]) -> list[tuple[int, Block]]:

@@ -118,6 +118,21 @@ def family_of(model: str) -> FamilyFacts | None:
     return next((facts for prefix, facts in _FAMILIES if model.startswith(prefix)), None)
 
 
+def gear_ratio_of(model: str) -> int:
+    """Turns of the motor a turn of the horn, where the library's table counts the motor's: 1 for all but geared Y.
+
+    A servo of the Y series divides its motor's counts and speeds by its Electronic Gear Ratio, as delivered that of its
+    gear: only then are 524 288 counts a turn of the horn, as the tables have them. Source: e-Manual, YM070-210-R099,
+    Resolution and Electronic GearRatio Numerator; the model's name ends in the ratio.
+
+    Parameters
+    ----------
+    model : str
+        as the library's file is called: ``ym070_210_r099``
+    """
+    return int(model[-3:]) if model.startswith("ym") else 1
+
+
 def current_unit_of(model: str) -> CurrentUnit | None:
     """Unit of current of a model; None where no source states one.
 

@@ -62,6 +62,7 @@ def arm_state(session: Session, reading: GroupReading, temperature: Array) -> Ar
         temperature=temperature,
         enabled=session.enabled,
         faults=session.health.faults,
+        late_ns=reading.late_ns,
     )
 
 

@@ -19,7 +19,8 @@ ALERT = 0x80
 LONGEST_FRAME = 1024
 """Frames that say to be longer are noise [bytes]."""
 
-_PING, _READ, _WRITE, _STATUS = 0x01, 0x02, 0x03, 0x55
+_PING, _READ, _WRITE, _CLEAR, _STATUS = 0x01, 0x02, 0x03, 0x10, 0x55
+_ERROR_TO_CLEAR = b"\x02ERCL"
 _SYNC_READ, _SYNC_WRITE, _FAST_SYNC_READ = 0x82, 0x83, 0x8A
 _FIXED_BYTES = 7
 _SHORTEST_FRAME = 10
@@ -108,6 +109,17 @@ def encode_ping(servo: int = BROADCAST_ID) -> bytes:
         ID, or `BROADCAST_ID` for all
     """
     return encode_instruction(servo, _PING)
+
+
+def encode_clear_error(servo: int) -> bytes:
+    """Let a servo of the Y series forget its error, without a restart; one whose cause persists refuses.
+
+    Parameters
+    ----------
+    servo : int
+        ID
+    """
+    return encode_instruction(servo, _CLEAR, _ERROR_TO_CLEAR)
 
 
 def encode_read(servo: int, address: int, length: int) -> bytes:

@@ -16,8 +16,8 @@ from pathlib import Path
 import serial
 from dynamixel_sdk import PortHandler
 
-from drivers.dynamixel.port_holder import find_holder
 from drivers.errors import DriverError, DriverErrorKind
+from drivers.port_holder import find_holder
 
 BITS_PER_BYTE = 10
 """Start bit, eight bits, stop bit."""

@@ -10,13 +10,15 @@ from drivers.dynamixel.bus import FACTORY_RETURN_DELAY_S, ServoBus
 from drivers.dynamixel.configuration import ServoConfiguration
 from drivers.dynamixel.group import ServoGroup
 from drivers.dynamixel.health import Health
-from drivers.dynamixel.models import CURRENT_MODE
+from drivers.dynamixel.models import CURRENT_MODE, gear_ratio_of
 from drivers.dynamixel.preparation import SETTINGS, RegisterWrite, commissioning_writes
 from drivers.dynamixel.servo import JointServo, make_servo
 from drivers.errors import DriverError, DriverErrorKind
 
 SHORTEST_RETURN_DELAY_S = 2e-6
 """Of a servo whose Return Delay Time is 0 [s]."""
+
+ELECTRONIC_GEAR = ("Electronic GearRatio Numerator", "Electronic GearRatio Denominator")
 
 _RETURN_DELAY_UNIT_S = 2e-6
 
@@ -119,6 +121,8 @@ def open_session(bus: ServoBus, configurations: Sequence[ServoConfiguration]) ->
     bus.return_delay_s = FACTORY_RETURN_DELAY_S
     servos = tuple(_reach(bus, number, servo) for number, servo in enumerate(configurations, 1))
     settings = [read_items(bus, servo, SETTINGS) for servo in servos]
+    for servo in servos:
+        _require_delivered_gear(bus, servo)
     session = Session(bus, servos, settings, ServoGroup(bus, servos), Health(servos))
     session.read_health()
     for joint, servo in enumerate(servos):
@@ -128,6 +132,21 @@ def open_session(bus: ServoBus, configurations: Sequence[ServoConfiguration]) ->
     bus.return_delay_s = max(SHORTEST_RETURN_DELAY_S, slowest)
     session.group.probe_fast()
     return session
+
+
+def _require_delivered_gear(bus: ServoBus, servo: JointServo) -> None:
+    """Refuse a servo whose counts and speeds are not those of its model's table."""
+    gear = read_items(bus, servo, ELECTRONIC_GEAR)
+    if not gear:
+        return
+    numerator, denominator = (gear[name] for name in ELECTRONIC_GEAR)
+    ratio = gear_ratio_of(servo.model.name)
+    if numerator != ratio * denominator:
+        raise DriverError(
+            DriverErrorKind.CANNOT_CONNECT,
+            f"{servo.label}: its Electronic GearRatio is {numerator}:{denominator}, its counts are right at {ratio}:1; "
+            "set it back with the wizard, and state a reduction of your own as drive.reduction",
+        )
 
 
 def read_items(bus: ServoBus, servo: JointServo, names: Iterable[str]) -> dict[str, int]:

@@ -74,16 +74,44 @@ def clear_watchdogs(session: Session) -> None:
         ``fault``: a servo's old goal is too far away; nothing was cleared
     """
     latched = [joint for joint in range(len(session.servos)) if session.health.is_latched[joint]]
-    in_current_mode = [joint for joint in latched if session.settings[joint]["Operating Mode"] == CURRENT_MODE]
-    holding = [joint for joint in latched if session.health.has_torque[joint] and joint not in in_current_mode]
+    _clear(session, latched, lambda joint: session.write(joint, "Bus Watchdog", 0))
+
+
+def clear_errors(session: Session) -> None:
+    """Clear errors of servos that forget them without a restart (Y), just as `clear_watchdogs` does.
+
+    What cannot be cleared, or comes back at once, stays in the servo's Error Code.
+
+    Parameters
+    ----------
+    session : Session
+        whose health was just read
+
+    Raises
+    ------
+    DriverError
+        ``fault``: a servo holds, and its old goal is too far away; nothing was cleared
+    """
+    stating = [
+        joint
+        for joint, servo in enumerate(session.servos)
+        if servo.model.family.error_is_code and session.health.states_error(joint)
+    ]
+    _clear(session, stating, lambda joint: session.bus.clear_error(session.servos[joint].servo))
+
+
+def _clear(session: Session, joints: Sequence[int], clear: Callable[[int], None]) -> None:
+    """Clear what keeps servos from taking goals, without moving the arm."""
+    in_current_mode = [joint for joint in joints if session.settings[joint]["Operating Mode"] == CURRENT_MODE]
+    holding = [joint for joint in joints if session.health.has_torque[joint] and joint not in in_current_mode]
     for joint in holding:
         _require_near_goal(session, joint)
     for joint in in_current_mode:
         session.write(joint, "Torque Enable", 0)
     for joint in holding:
         session.write(joint, "Profile Velocity", _SLOWEST)
-    for joint in latched:
-        session.write(joint, "Bus Watchdog", 0)
+    for joint in joints:
+        clear(joint)
         if joint in holding:
             session.write(joint, "Goal Position", session.read(joint, ["Present Position"])["Present Position"])
 

@@ -1,23 +1,21 @@
 """The bus of CiA 402 drives on CANopen, from a robot file."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from drivers import Backend
 from drivers.inspection import Finding, FoundDevice, PlannedFrame
-from service.acquisition.field_bus import FrameRequest, drivers_words
+from service.acquisition.field_bus import FrameRequest, check_settings, drive_blocks, drivers_words
 from service.errors import AcquisitionError
 from service.robot import Robot
-from service.robot.messages import nearest, shown
+from service.robot.messages import shown
 
 if TYPE_CHECKING:
     from drivers.canopen import DriveJoint
 
-_SETTINGS = ("interface", "channel", "patience_s")
-_LONGEST_PATIENCE_S = 1.0
-_PATIENCE_S = 0.002
+_BUS_SETTINGS = ("interface", "channel")
 
 
 class CanopenBus:
@@ -51,19 +49,9 @@ class CanopenBus:
         del folder
         from drivers.canopen import CanopenArm
 
-        for key in settings:
-            if key not in _SETTINGS:
-                raise AcquisitionError(f"backend canopen: unknown setting {shown(key)}; {nearest(key, _SETTINGS)}")
-        patience_s = settings.get("patience_s", _PATIENCE_S)
-        if isinstance(patience_s, bool) or not isinstance(patience_s, int | float):
-            patience_s = -1.0
-        if not 0.0 < patience_s <= _LONGEST_PATIENCE_S:
-            raise AcquisitionError(
-                f"backend canopen: patience_s is {shown(settings['patience_s'])}; give seconds up to 1"
-            )
-        changes = {key: settings[key] for key in ("interface", "channel") if key in settings}
+        patience_s = check_settings(self.name, settings, _BUS_SETTINGS)
         with drivers_words():
-            return CanopenArm(_joints(robot, changes), patience_s=patience_s)
+            return CanopenArm(_joints(robot, settings), patience_s=patience_s)
 
     def adapters(self) -> list[Finding]:
         """CAN interfaces of this machine."""
@@ -115,20 +103,15 @@ class CanopenBus:
         from drivers.canopen import plan_frames
 
         with drivers_words():
-            yield from plan_frames(_joints(robot), request.mode, request.limits, request.watchdog_s, request.targets)
+            yield from plan_frames(
+                _joints(robot), request.mode, request.limits, request.watchdog_s, request.targets, request.cycle_s
+            )
 
 
-def _joints(robot: Robot, changes: Mapping[str, Any] | None = None) -> list["DriveJoint"]:
-    """The joints as the driver sees them."""
+def _joints(robot: Robot, settings: Mapping[str, Any] = MappingProxyType({})) -> list["DriveJoint"]:
+    """The joints as the driver sees them, on the bus of the settings where they name one."""
     from drivers.canopen import DriveJoint
 
-    joints: list[DriveJoint] = []
-    for joint in robot.joints:
-        if joint.drive is None:
-            raise AcquisitionError(
-                f"{robot.name}: {joint.name} has no drive block; state its drive, as in drive: {{node_id: 1, ...}}"
-            )
-        joints.append(DriveJoint(joint.name, joint.gear_ratio or 1.0, joint.drive))
-    if changes:
-        joints[0] = replace(joints[0], drive={**joints[0].drive, **changes})
-    return joints
+    bus = {key: settings[key] for key in _BUS_SETTINGS if key in settings}
+    blocks = drive_blocks(robot, "{node_id: 1, ...}", bus)
+    return [DriveJoint(joint.name, joint.gear_ratio or 1.0, drive) for joint, drive in blocks]

@@ -1,26 +1,19 @@
 """The bus of Dynamixel servos, from a robot file."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from drivers import Backend
 from drivers.inspection import Finding, FoundDevice, PlannedFrame
-from service.acquisition.field_bus import FrameRequest, drivers_words
-from service.errors import AcquisitionError
-from service.robot import Robot
-from service.robot.messages import nearest, shown
+from service.acquisition.field_bus import FrameRequest, check_settings, drive_blocks, drivers_words
+from service.robot import Joint, Robot
 
 if TYPE_CHECKING:
     from drivers.dynamixel import DynamixelJoint
 
 UNSTATED_CONSTANT = 1.0
 """A robot file that states no torque constant reads so; no servo gives a newton metre for a milliampere."""
-
-_SETTINGS = ("port", "patience_s")
-_LONGEST_PATIENCE_S = 1.0
-_PATIENCE_S = 0.002
 
 
 class DynamixelBus:
@@ -54,16 +47,7 @@ class DynamixelBus:
         del folder
         from drivers.dynamixel import DynamixelArm
 
-        for key in settings:
-            if key not in _SETTINGS:
-                raise AcquisitionError(f"backend dynamixel: unknown setting {shown(key)}; {nearest(key, _SETTINGS)}")
-        patience_s = settings.get("patience_s", _PATIENCE_S)
-        if isinstance(patience_s, bool) or not isinstance(patience_s, int | float):
-            patience_s = -1.0
-        if not 0.0 < patience_s <= _LONGEST_PATIENCE_S:
-            raise AcquisitionError(
-                f"backend dynamixel: patience_s is {shown(settings['patience_s'])}; give seconds up to 1"
-            )
+        patience_s = check_settings(self.name, settings, ("port",))
         with drivers_words():
             return DynamixelArm(dynamixel_joints(robot, settings.get("port")), slack_s=patience_s)
 
@@ -115,7 +99,12 @@ class DynamixelBus:
 
         with drivers_words():
             yield from plan_frames(
-                dynamixel_joints(robot), request.mode, request.limits, request.watchdog_s, request.targets
+                dynamixel_joints(robot),
+                request.mode,
+                request.limits,
+                request.watchdog_s,
+                request.targets,
+                request.cycle_s,
             )
 
 
@@ -136,14 +125,10 @@ def dynamixel_joints(robot: Robot, port: Any = None) -> list["DynamixelJoint"]:
     """
     from drivers.dynamixel import DynamixelJoint
 
-    joints: list[DynamixelJoint] = []
-    for joint in robot.joints:
-        if joint.drive is None:
-            raise AcquisitionError(
-                f"{robot.name}: {joint.name} has no drive block; state its servo, as in drive: {{id: 1}}"
-            )
-        constant = None if joint.torque_constant == UNSTATED_CONSTANT else joint.sign * joint.torque_constant
-        joints.append(DynamixelJoint(joint.name, joint.drive, constant))
-    if port is not None:
-        joints[0] = replace(joints[0], drive={**joints[0].drive, "port": port})
-    return joints
+    blocks = drive_blocks(robot, "{id: 1}", {} if port is None else {"port": port})
+    return [DynamixelJoint(joint.name, drive, _stated_constant(joint)) for joint, drive in blocks]
+
+
+def _stated_constant(joint: Joint) -> float | None:
+    """Joint torque for a milliampere, with the joint's sign [Nm/mA]; None where the file states none."""
+    return None if joint.torque_constant == UNSTATED_CONSTANT else joint.sign * joint.torque_constant

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from drivers import Backend, ControlMode, DriveLimits, DriverError
 from drivers.inspection import Finding, FoundDevice, PlannedFrame, Severity
 from service.errors import AcquisitionError
-from service.robot import Robot
+from service.robot import Joint, Robot
+from service.robot.messages import nearest, shown
 
 __all__ = [
     "FieldBus",
@@ -21,8 +22,13 @@ __all__ = [
     "FrameRequest",
     "PlannedFrame",
     "Severity",
+    "check_settings",
+    "drive_blocks",
     "drivers_words",
 ]
+
+_LONGEST_PATIENCE_S = 1.0
+_USUAL_PATIENCE_S = 0.002
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,12 +43,15 @@ class FrameRequest:
         time of silence after which they stop by themselves [s]
     targets : (K, n) float64
         positions of the first K cycles; the arm is supposed to stand at the first of them [rad or m]
+    cycle_s : float or None
+        time between them; None where it is not known [s]
     """
 
     mode: ControlMode
     limits: DriveLimits
     watchdog_s: float
     targets: NDArray[np.float64]
+    cycle_s: float | None = None
 
 
 class FieldBus(Protocol):
@@ -132,6 +141,61 @@ class FieldBus(Protocol):
             a ``drive`` block or a limit is not possible
         """
         ...
+
+
+def check_settings(bus: str, settings: Mapping[str, Any], known: Sequence[str]) -> float:
+    """Patience of a bus: how much longer than it takes an answer is waited for [s].
+
+    Parameters
+    ----------
+    bus : str
+        its name
+    settings : mapping
+        of the backend
+    known : sequence of str
+        which there are beside ``patience_s``
+
+    Raises
+    ------
+    AcquisitionError
+        one is unknown, or the patience is no such time
+    """
+    names = (*known, "patience_s")
+    for key in settings:
+        if key not in names:
+            raise AcquisitionError(f"backend {bus}: unknown setting {shown(key)}; {nearest(key, names)}")
+    patience_s = settings.get("patience_s", _USUAL_PATIENCE_S)
+    is_number = isinstance(patience_s, int | float) and not isinstance(patience_s, bool)
+    if not (is_number and 0.0 < patience_s <= _LONGEST_PATIENCE_S):
+        raise AcquisitionError(f"backend {bus}: patience_s is {shown(patience_s)}; give seconds up to 1")
+    return float(patience_s)
+
+
+def drive_blocks(robot: Robot, example: str, bus_settings: Mapping[str, Any]) -> list[tuple[Joint, dict[str, Any]]]:
+    """Every joint with its ``drive`` block; the first of them says which bus.
+
+    Parameters
+    ----------
+    robot : Robot
+        the arm
+    example : str
+        least that such a block states
+    bus_settings : mapping
+        keys of the first block, in place of the robot file's
+
+    Raises
+    ------
+    AcquisitionError
+        a joint has no ``drive`` block
+    """
+    pairs: list[tuple[Joint, dict[str, Any]]] = []
+    for joint in robot.joints:
+        if joint.drive is None:
+            raise AcquisitionError(
+                f"{robot.name}: {joint.name} has no drive block; state its drive, as in drive: {example}"
+            )
+        pairs.append((joint, {**joint.drive, **({} if pairs else bus_settings)}))
+    return pairs
 
 
 @contextmanager

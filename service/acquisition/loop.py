@@ -18,6 +18,9 @@ from service.recording.journal_rows import journal_row_type
 
 Array = NDArray[np.float64]
 
+LATEST_NS = 1_000_000
+"""An answer that comes this much later than the bus takes is no sample: its instant is not known [ns]."""
+
 
 class GuardedArm:
     """An arm that can only be commanded through its guard; nothing else calls `Backend.exchange`."""
@@ -86,6 +89,8 @@ class Cycles:
         told after every cycle; has to be quick
     worst_following : (n,) float64
         largest distance of arm and target so far [rad or m]
+    late : (n,) int64
+        readings whose instant is not known
     """
 
     plan: Plan
@@ -96,11 +101,13 @@ class Cycles:
     control: TorqueControl | None
     each_cycle: Callable[["Cycles"], None]
     worst_following: Array = field(init=False)
+    late: NDArray[np.int64] = field(init=False)
 
     def __post_init__(self) -> None:
         """Make the one row that all cycles are written into."""
         n = self.plan.position.shape[1]
         self.worst_following = np.zeros(n)
+        self.late = np.zeros(n, dtype=np.int64)
         self._row = np.zeros(1, dtype=journal_row_type(n))
         self._fields = {name: self._row[name] for name in self._row.dtype.names or ()}
         self._fields["time_ns"][0] = self.arm.state.time_ns - 1
@@ -137,8 +144,14 @@ class Cycles:
             self.each_cycle(self)
 
     def _log(self, cycle: int, state: ArmState, torque: Array) -> None:
-        """No answer at all, or one that is no newer than the one before, is no sample: the guard counts it."""
+        """No answer at all, or one that is no newer than the one before, is no sample: the guard counts it.
+
+        Nor is one that came so late that nobody knows of which instant it tells.
+        """
         plan, row = self.plan, self._fields
+        if state.late_ns > LATEST_NS:
+            self.late += state.fresh
+            return
         if state.time_ns <= row["time_ns"][0] or not state.fresh.any():
             return
         row["time_ns"][0], row["lateness_ns"][0] = state.time_ns, self.metronome.lateness_ns

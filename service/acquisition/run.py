@@ -106,11 +106,12 @@ class Run:
         torque_mode = options.mode is ControlMode.TORQUE
         control = torque_control(self._task.robot, plan, options.bandwidth_rad_s) if torque_mode else None
         raise_if_requested(stops)
-        state = backend.enable(options.mode, plan.limits.drive_limits, self._policy, options.watchdog_s)
+        period_s = plan.period_ns * 1e-9
+        state = backend.enable(options.mode, plan.limits.drive_limits, self._policy, options.watchdog_s, period_s)
         now = backend.clock.now_ns()
         guard = Guard(
             plan.limits,
-            period_s=plan.period_ns * 1e-9,
+            period_s=period_s,
             watchdog_s=options.watchdog_s,
             enabled_ns=now,
             stale_misses=options.stale_misses,
@@ -174,7 +175,7 @@ class Run:
             return {}
         return {
             "played": cycles.played,
-            "timing": cycles.metronome.timing(cycles.arm.stale),
+            "timing": cycles.metronome.timing(cycles.arm.stale + cycles.late),
             "worst_following": tuple(float(value) for value in cycles.worst_following),
         }
 

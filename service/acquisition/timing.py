@@ -22,7 +22,9 @@ class Timing(StoredModel):
     )
     cycles: int = Field(description="cycles that took place")
     missed_periods: int = Field(description="cycles that were left out because the loop was late")
-    stale_samples: tuple[int, ...] = Field(description="readings that a joint did not answer, one number a joint")
+    stale_samples: tuple[int, ...] = Field(
+        description="readings that a joint did not answer in time to tell their instant, one number a joint"
+    )
     lateness_us: Mapping[str, float] = Field(
         description="lateness of the cycles behind their deadlines: p50, p99, p99.9, max"
     )

@@ -73,9 +73,10 @@ def show_frames(robot_file: Path, backend: str, trajectory: Path | None, options
     """
     robot = read_robot(robot_file)
     targets = _targets(robot, trajectory, options)
-    speed = np.abs(np.diff(targets, axis=0)).max(axis=0) * (options.rate_hz or _RATE_HZ)
+    rate_hz = options.rate_hz or _RATE_HZ
+    speed = np.abs(np.diff(targets, axis=0)).max(axis=0) * rate_hz
     limits = guard_limits(robot, targets.min(axis=0), targets.max(axis=0), speed).drive_limits
-    request = FrameRequest(options.mode, limits, options.watchdog_s, targets[:SHOWN_CYCLES])
+    request = FrameRequest(options.mode, limits, options.watchdog_s, targets[:SHOWN_CYCLES], 1.0 / rate_hz)
     console = output()
     bus = bus_of(robot) if backend == _SIMULATION else find_bus(backend)
     for frame in bus.planned_frames(robot, request):

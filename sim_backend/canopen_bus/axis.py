@@ -25,12 +25,15 @@ class AxisDemand:
         target where the mode is torque [Nm or N]
     torque_cap : float
         most that it exerts; nothing where it is released [Nm or N]
+    interpolation_s : float
+        time in which it goes from one target to the next, where the mode is position; 0 where nobody told it [s]
     """
 
     mode: AxisMode
     position: float = 0.0
     torque: float = 0.0
     torque_cap: float = 0.0
+    interpolation_s: float = 0.0
 
 
 @dataclass(frozen=True)

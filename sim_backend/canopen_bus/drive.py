@@ -28,6 +28,7 @@ _ABORT_QUICK_STOP = 3
 _ABORT_DISABLE = 2
 _ABORT_FAULT = 1
 _STANDING = 1e-3
+_EXPONENTS = range(-6, 1)
 
 
 class EmulatedDrive:
@@ -108,7 +109,8 @@ class EmulatedDrive:
         if self._mode_taken == CYCLIC_POSITION:
             low, high = (self.dictionary.get(0x607D, end) for end in (1, 2))
             target = min(max(self.dictionary.get(0x607A), low), high)
-            return AxisDemand(AxisMode.POSITION, position=target / self.scale.counts_per_radian, torque_cap=cap)
+            place = target / self.scale.counts_per_radian
+            return AxisDemand(AxisMode.POSITION, position=place, torque_cap=cap, interpolation_s=self._interpolation_s)
         if self._mode_taken == CYCLIC_TORQUE:
             torque = self.dictionary.get(0x6071) * self.scale.torque_per_permille
             return AxisDemand(AxisMode.TORQUE, torque=min(max(torque, -cap), cap), torque_cap=cap)
@@ -146,6 +148,13 @@ class EmulatedDrive:
         """Node whose heartbeat is watched; -1 for none."""
         word = self.dictionary.get(0x1016, 1)
         return (word >> 16 & 0x7F) if word & 0xFFFF and word >> 16 & 0x7F else -1
+
+    @property
+    def _interpolation_s(self) -> float:
+        """Time from one target to the next; 0 where the drive has no such object and finds it from SYNC."""
+        if (0x60C2, 1) not in self.dictionary.entries:
+            return 0.0
+        return self.dictionary.get(0x60C2, 1) * 10.0 ** self.dictionary.get(0x60C2, 2)
 
     def _watch_master(self, now_s: float) -> None:
         """React to a master that stays away, also to one that was never heard since the watch began."""
@@ -215,6 +224,14 @@ class EmulatedDrive:
     def _take_quick_stop_option(self, option: int) -> None:
         self.power.quick_stop_stays = option in _QUICK_STOP_STAYS
 
+    def _take_interpolation(self, value: int) -> None:
+        if value == 0:
+            raise AbortError(Abort.VALUE_RANGE)
+
+    def _take_exponent(self, exponent: int) -> None:
+        if exponent not in _EXPONENTS:
+            raise AbortError(Abort.VALUE_RANGE)
+
     def _dictionary(self) -> ObjectDictionary:
         """Entries at power-up; the target position is stale on purpose, as it is on a real drive after a run."""
         dictionary = ObjectDictionary()
@@ -249,5 +266,7 @@ class EmulatedDrive:
             (0x607A, 0, 4, 0x00100000, True, True, None),
             (0x607D, 1, 4, -(2**31), True, True, None),
             (0x607D, 2, 4, 2**31 - 1, True, True, None),
+            (0x60C2, 1, 1, 1, False, True, self._take_interpolation),
+            (0x60C2, 2, 1, -3, True, True, self._take_exponent),
             (0x6502, 0, 4, 1 << (CYCLIC_POSITION - 1) | 1 << (CYCLIC_TORQUE - 1), False, False, None),
         )

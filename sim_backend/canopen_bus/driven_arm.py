@@ -15,28 +15,33 @@ from sim_backend.scenario import Scenario
 
 Array = NDArray[np.float64]
 
-ACCELERATION = 40.0
-"""With which a joint catches up with targets that leapt [rad/s² or m/s²]."""
-
-PACE_CYCLES = 2
-FASTER = 0.7
-LONGEST_PACE_S = 0.1
-"""SYNC has another pace where so many intervals in a row are shorter by this factor; a longer one is a pause."""
+ACCELERATION = 20.0
+"""With which a joint catches up with targets that leapt: what arms of this size have torque for [rad/s² or m/s²]."""
 
 TRACKING = (AxisMode.POSITION, AxisMode.HOLDING)
 """What is done by tracking a target: the master's, or the place where the joint comes to rest."""
 
 
+Kind = tuple[AxisMode, float]
+"""What a drive does, and over which time it interpolates: drives that agree in both share a target."""
+
+
 class DrivenArm:
     """Moves an arm by the demands of its drives, a period of their loops at a time.
 
-    In cyclic synchronous position mode a drive interpolates between the targets of two SYNCs, as CiA 402 asks; while it
-    holds, or where targets stay away, it brakes on a ramp and stays where it came to rest. The arm stands on a stand
-    until all its drives have had power once.
+    In cyclic synchronous position mode a drive interpolates between the targets of SYNCs, over the period that 0x60C2
+    tells; while it holds, or where targets stay away, it brakes on a ramp and stays where it came to rest. The arm
+    stands on a stand until all its drives have had power once.
     """
 
     def __init__(
-        self, drives: Sequence[EmulatedDrive], robot: Robot, scenario: Scenario, position: ArrayLike, period_s: float
+        self,
+        drives: Sequence[EmulatedDrive],
+        robot: Robot,
+        scenario: Scenario,
+        position: ArrayLike,
+        period_s: float,
+        torque_noise: float = 0.0,
     ) -> None:
         """Everything at rest.
 
@@ -52,6 +57,8 @@ class DrivenArm:
             where it stands [rad or m]
         period_s : float
             of the drives' loops [s]
+        torque_noise : float
+            standard deviation of what they measure of the torque [Nm or N]
         """
         count = robot.joint_count
         self.torque = np.zeros(count)
@@ -60,12 +67,11 @@ class DrivenArm:
         self._plant = scenario.plant(robot)
         self._plant.place(position)
         self._servo = Servo(robot, InertiaSchedule(robot, scenario.effects), period_s)
+        self._torque_noise, self._rng = torque_noise, np.random.default_rng(0)
         self._drives = drives
         self._period_s = period_s
-        self._last_sync_s, self._pace_s = -1.0, 0.0
-        self._intervals: list[float] = []
-        self._modes: list[AxisMode] = [AxisMode.RELEASED] * count
-        self._targets: dict[AxisMode, tuple[list[int], Target]] = {}
+        self._kinds: list[Kind] = [(AxisMode.RELEASED, 0.0)] * count
+        self._targets: dict[Kind, tuple[list[int], Target]] = {}
         self._goal, self._goal_rate = (values.copy() for values in self.motion)
         self._measured_torque, self._measured_motion = self.torque, self.motion
         self.measure()
@@ -84,12 +90,10 @@ class DrivenArm:
             when SYNC came [s]
         """
         demands = self._demands()
-        if self._has_new_pace(time_s):
-            self._regroup(self._modes)
-        if AxisMode.POSITION in self._targets:
-            joints, target = self._targets[AxisMode.POSITION]
-            wanted = np.array([demands[joint].position for joint in joints]) - self.encoder_offset[joints]
-            target.follow(wanted, None, time_s / self._period_s)
+        for (mode, _), (joints, target) in self._targets.items():
+            if mode is AxisMode.POSITION:
+                wanted = np.array([demands[joint].position for joint in joints]) - self.encoder_offset[joints]
+                target.follow(wanted, None, time_s / self._period_s)
 
     def step(self, tick: int) -> None:
         """One period: torque from the demands of this instant, and the motion until the next.
@@ -108,61 +112,51 @@ class DrivenArm:
         self._measured_torque, self._measured_motion = 0.5 * (self.torque + torque), self.motion
         self.torque = torque
         if self.stands_on_stand:
-            self.stands_on_stand = any(mode is AxisMode.RELEASED for mode in self._modes)
+            self.stands_on_stand = any(mode is AxisMode.RELEASED for mode, _ in self._kinds)
         if not self.stands_on_stand:
             self._plant.advance(torque, self._period_s)
 
     def measure(self) -> None:
         """Let the drives see their joints as they were at the last tick."""
         position, velocity = self._measured_motion
-        seen = zip(position + self.encoder_offset, velocity, self._measured_torque, strict=True)
+        torque = self._measured_torque + self._torque_noise * self._rng.standard_normal(len(self._drives))
+        seen = zip(position + self.encoder_offset, velocity, torque, strict=True)
         for drive, (q, v, tau) in zip(self._drives, seen, strict=True):
             drive.measure(AxisMeasurement(float(q), float(v), float(tau)))
-
-    def _has_new_pace(self, time_s: float) -> bool:
-        """Whether SYNC comes at another rate than it did: the master begins its cycle after settling at a slower one.
-
-        Interpolation then begins anew; at the old pace the new targets would be run through too fast.
-        """
-        interval, self._last_sync_s = time_s - self._last_sync_s, time_s
-        self._intervals = [*self._intervals[-(PACE_CYCLES - 1) :], interval]
-        if self._pace_s == 0.0 or interval > LONGEST_PACE_S:
-            self._pace_s = 0.0 if interval > LONGEST_PACE_S else interval
-            return False
-        if len(self._intervals) < PACE_CYCLES or max(self._intervals) > FASTER * self._pace_s:
-            return False
-        self._pace_s = max(self._intervals)
-        return True
 
     def _demands(self) -> list[AxisDemand]:
         """What the drives demand now; targets begin anew where a drive does something else than before."""
         demands = [drive.demand() for drive in self._drives]
-        modes = [demand.mode for demand in demands]
-        if modes != self._modes:
-            self._regroup(modes)
+        kinds = [(demand.mode, demand.interpolation_s) for demand in demands]
+        if kinds != self._kinds:
+            self._regroup(kinds)
         return demands
 
-    def _regroup(self, modes: list[AxisMode]) -> None:
+    def _regroup(self, kinds: list[Kind]) -> None:
         """Joints that do the same share a target, which begins where they are, or where their last one was."""
         position, velocity = self.motion
-        for joint, before in enumerate(self._modes):
+        for joint, (before, _) in enumerate(self._kinds):
             if before not in TRACKING:
                 self._goal[joint], self._goal_rate[joint] = position[joint], velocity[joint]
-        if [mode in TRACKING for mode in modes] != [mode in TRACKING for mode in self._modes]:
+        if [mode in TRACKING for mode, _ in kinds] != [mode in TRACKING for mode, _ in self._kinds]:
             self._servo.begin()
-        self._modes, self._targets = modes, {}
-        for kind in TRACKING:
-            joints = [joint for joint, mode in enumerate(modes) if mode is kind]
-            if joints:
-                acceleration = np.full(len(joints), ACCELERATION)
-                target = Target(self._goal[joints], self._goal_rate[joints], acceleration, self._period_s)
-                self._targets[kind] = joints, target
+        self._kinds, self._targets = kinds, {}
+        for kind in dict.fromkeys(kinds):
+            if kind[0] in TRACKING:
+                joints = [joint for joint, other in enumerate(kinds) if other == kind]
+                self._targets[kind] = joints, self._target(joints, kind)
+
+    def _target(self, joints: list[int], kind: Kind) -> Target:
+        """A target for joints, which begins where their last one was."""
+        period = kind[1] / self._period_s or None
+        acceleration = np.full(len(joints), ACCELERATION)
+        return Target(self._goal[joints], self._goal_rate[joints], acceleration, self._period_s, period)
 
     def _torque_of(self, demands: Sequence[AxisDemand]) -> Array:
         """Torque of the position loops where a target is tracked, else what is demanded."""
         cap = np.array([demand.torque_cap for demand in demands])
         wanted = np.array([demand.torque for demand in demands])
-        tracks = np.array([mode in TRACKING for mode in self._modes])
+        tracks = np.array([mode in TRACKING for mode, _ in self._kinds])
         if tracks.any():
             position, velocity = self.motion
             error = np.where(tracks, self._goal - position, 0.0)

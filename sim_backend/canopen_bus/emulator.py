@@ -1,14 +1,14 @@
-"""Drives, the arm that they move, the wire and the serial adapter: everything but the pseudo terminal."""
+"""Drives, the arm that they move, the wire and the adapter: everything but the port."""
 
 from collections.abc import Sequence
 from typing import Any
 
 from sim_backend.canopen_bus.drive import EmulatedDrive
 from sim_backend.canopen_bus.driven_arm import DrivenArm
+from sim_backend.canopen_bus.line import Line
 from sim_backend.canopen_bus.power_state import PowerState
-from sim_backend.canopen_bus.serial_line import SerialLine
 from sim_backend.canopen_bus.wire import Wire
-from sim_backend.dynamixel_bus.fault_kit import FaultKind, FaultSchedule, InjectedFault
+from sim_backend.emulation.fault_kit import FaultKind, FaultSchedule, InjectedFault, faults_from
 
 STEP_S = 1e-3
 """Period of the drives' own loops and of the physics [s]."""
@@ -29,7 +29,9 @@ _OVER_TEMPERATURE, _OVERLOAD = 0x4310, 0x7121
 class CanEmulator:
     """An arm of emulated drives; the instants are those of the caller's clock."""
 
-    def __init__(self, drives: Sequence[EmulatedDrive], driven: DrivenArm, now_s: float, bit_rate: int) -> None:
+    def __init__(
+        self, drives: Sequence[EmulatedDrive], driven: DrivenArm, now_s: float, bit_rate: float, line: Line
+    ) -> None:
         """Everything at rest.
 
         Parameters
@@ -40,15 +42,17 @@ class CanEmulator:
             what they move, in periods of `STEP_S`
         now_s : float
             present instant [s]
-        bit_rate : int
-            of the bus [bit/s]
+        bit_rate : float
+            of the bus; infinite where frames shall arrive at once [bit/s]
+        line : Line
+            frames as the master's end takes and gives them
         """
         self.drives = tuple(drives)
         self.driven = driven
         self.schedule = FaultSchedule()
         self.lost_s = 0.0
         self._wire = Wire(bit_rate)
-        self._line = SerialLine()
+        self._line = line
         self._answers = b""
         self._tick = round(now_s / STEP_S)
         self._away_until_s = {drive.node_id: 0.0 for drive in drives}
@@ -79,7 +83,7 @@ class CanEmulator:
         """Take text of the host.
 
         Drives hear it before they catch up: it may have waited while this process slept, and its sleep is no silence of
-        the master.
+        the master. SYNC is different: the time of interpolation is counted from when it came.
 
         Parameters
         ----------
@@ -97,7 +101,7 @@ class CanEmulator:
                 if self._is_there(drive, self.now_s):
                     self._wire.carry(drive.receive(frame, self.now_s), now_s)
             if frame[0] == _SYNC:
-                self.driven.take_targets(self.now_s - self.lost_s)
+                self.driven.take_targets(now_s - self.lost_s)
         self.advance_to(now_s, most_steps=MOST_STEPS)
 
     def advance_to(self, now_s: float, most_steps: int = MOST_STEPS) -> None:
@@ -151,18 +155,16 @@ class CanEmulator:
         Parameters
         ----------
         request : dict
-            ``{"inject": [{kind, servo, after_s, …}]}``, the node as ``servo``; ``{"get": [node, index, subindex]}``,
-            ``{"put": [node, index, subindex, value]}``, ``{"stand": bool}``, ``{"reset": true}`` (done already), ``{}``
+            ``{"inject": [fault, …]}``, ``{"get": [node, [index, subindex]]}``, ``{"put": [node, [index, subindex],
+            value]}``, ``{"stand": bool}`` (put the stand under it, or take it away), or nothing of these
         """
         if "inject" in request:
-            for document in request["inject"]:
-                at_s = self.now_s + document.pop("after_s", 0.0)
-                self.schedule.add([InjectedFault(**{**document, "kind": FaultKind(document["kind"])}, at_s=at_s)])
+            self.schedule.add(faults_from(request["inject"], self.now_s))
         elif "get" in request:
-            node, index, subindex = request["get"]
+            node, (index, subindex) = request["get"]
             return {"value": self._drive(node).dictionary.get(index, subindex)}
         elif "put" in request:
-            node, index, subindex, value = request["put"]
+            node, (index, subindex), value = request["put"]
             self._drive(node).dictionary.put(index, value, subindex)
         elif "stand" in request:
             self.driven.stands_on_stand = request["stand"]
@@ -185,7 +187,7 @@ class CanEmulator:
     def _carry_out(self, fault: InjectedFault) -> None:
         """Do what a fault does."""
         until_s = self.now_s + fault.seconds
-        concerned = [self._drive(fault.servo)] if fault.servo else list(self.drives)
+        concerned = [self._drive(fault.device)] if fault.device else list(self.drives)
         match fault.kind:
             case FaultKind.SILENT:
                 for drive in concerned:

@@ -4,14 +4,21 @@ import json
 import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import ClassVar
 
 from service.robot import read_robot
 from sim_backend.canopen_bus.axis import AxisScale
+from sim_backend.canopen_bus.can_socket import CanSocket, SocketLine
 from sim_backend.canopen_bus.drive import EmulatedDrive
 from sim_backend.canopen_bus.driven_arm import DrivenArm
 from sim_backend.canopen_bus.emulator import STEP_S, CanEmulator
+from sim_backend.canopen_bus.serial_line import SerialLine
+from sim_backend.emulation.emulator import Port
+from sim_backend.emulation.pseudo_terminal import PseudoTerminal
 from sim_backend.scenario import Scenario
 from sim_backend.scenario_file import read_scenario
+
+_SOCKET = "socketcan:"
 
 
 @dataclass(frozen=True)
@@ -23,18 +30,25 @@ class CanOrder:
     start : tuple of float
         where the joints stand [rad or m]
     port : str
-        where the name of the pseudo terminal is linked to
+        where the name of the pseudo terminal is linked to, or the SocketCAN interface behind ``socketcan:``
     control : str
         Unix socket for the test
     scenario : str or None
         scenario file of what is concealed in the arm
     rated_torque_mnm : tuple of int
         object 0x6076 of each drive, at the motor shaft [mNm]
+    torque_noise : float
+        standard deviation of what the drives measure of the torque [Nm or N]
     bit_rate : int
         of the bus [bit/s]
+    stepped : bool
+        whether time passes only when `EmulatorProcess.advance_to` says so, and frames arrive at once; else it is the
+        machine's
     trace : str or None
         file that what the drives do is appended to
     """
+
+    module: ClassVar[str] = "sim_backend.canopen_bus"
 
     robot: str
     start: tuple[float, ...]
@@ -42,7 +56,9 @@ class CanOrder:
     control: str
     rated_torque_mnm: tuple[int, ...]
     scenario: str | None = None
+    torque_noise: float = 0.0
     bit_rate: int = 1_000_000
+    stepped: bool = False
     trace: str | None = None
 
     def to_json(self) -> str:
@@ -62,6 +78,10 @@ class CanOrder:
         tuples = {name: tuple(document[name]) for name in ("start", "rated_torque_mnm")}
         return CanOrder(**{**document, **tuples})
 
+    def open_port(self) -> Port:
+        """A serial adapter on a pseudo terminal, or the kernel's CAN bus."""
+        return PseudoTerminal(self.port) if self._interface is None else CanSocket(self._interface)
+
     def build(self, now_s: float) -> CanEmulator:
         """The emulator.
 
@@ -78,5 +98,13 @@ class CanOrder:
             turns = block["counts_per_turn"] * ratio * block.get("direction", 1)
             scale = AxisScale(turns / (2.0 * math.pi), rated, abs(ratio))
             drives.append(EmulatedDrive(block["node_id"], scale))
-        driven = DrivenArm(drives, robot, scenario, self.start, STEP_S)
-        return CanEmulator(drives, driven, now_s, self.bit_rate)
+        driven = DrivenArm(drives, robot, scenario, self.start, STEP_S, self.torque_noise)
+        # the kernel's virtual bus and a stepped clock take their time by themselves
+        bit_rate = math.inf if self.stepped or self._interface is not None else self.bit_rate
+        line = SerialLine() if self._interface is None else SocketLine()
+        return CanEmulator(drives, driven, now_s, bit_rate, line)
+
+    @property
+    def _interface(self) -> str | None:
+        """Of SocketCAN; None for a serial adapter."""
+        return self.port.removeprefix(_SOCKET) if self.port.startswith(_SOCKET) else None

@@ -3,7 +3,7 @@
 import heapq
 
 from sim_backend.canopen_bus.drive import Frame
-from sim_backend.dynamixel_bus.fault_kit import FaultKind
+from sim_backend.emulation.fault_kit import FaultKind
 
 _FRAME_BITS = 47
 """Of a standard frame without data, with the space behind it."""
@@ -18,13 +18,13 @@ class Wire:
     can be lost, doubled or late all the same is lost in the adapter.
     """
 
-    def __init__(self, bit_rate: int) -> None:
+    def __init__(self, bit_rate: float) -> None:
         """Idle.
 
         Parameters
         ----------
-        bit_rate : int
-            [bit/s]
+        bit_rate : float
+            infinite where frames arrive at once [bit/s]
         """
         self._bit_s = 1.0 / bit_rate
         self._free_s = 0.0

@@ -18,11 +18,14 @@ _LATEST_PHASE = 5.0
 _CURVED_CYCLES = 2.0
 _MOST_SKIPPED = 10
 _EARLIEST = 0.3
+_EARLY, _LATE = 0.5, 1.9
 _LARGEST_ERROR = 0.1
 _MEMORY = 200
 _INTERVALS = 15
 _CHANGE_OF_PACE = 0.1
 _FIRST_PERIOD = 4.0
+_TOLD = 20
+"""A period that was told counts as much as one that was found from so many arrivals."""
 
 
 class SetpointSpline:
@@ -39,12 +42,15 @@ class SetpointSpline:
     ----------
     position : (n,) float64
         where the target stands [rad or m]
+    period : float or None
+        time between setpoints, where the host has told it: a drive that knows it does not have to find it [ticks]
     """
 
-    def __init__(self, position: Array) -> None:
+    def __init__(self, position: Array, period: float | None = None) -> None:
         self._points = np.tile(position, (4, 1))
         self._intervals: deque[float] = deque(maxlen=_INTERVALS)
-        self._period = _FIRST_PERIOD
+        self._is_told = period is not None
+        self._period = _FIRST_PERIOD if period is None else period
         self._arrival: float | None = None
         self._grid = 0.0
         self._arrivals = 0
@@ -142,21 +148,27 @@ class SetpointSpline:
             return self._begin_grid(arrival)
         self._intervals.append(max(arrival - before, 0.0))
         usual = max(1.0, median_low(self._intervals))
-        learning = len(self._intervals) < _INTERVALS
-        if not learning and abs(usual - self._period) > _CHANGE_OF_PACE * self._period:
+        learning = len(self._intervals) < _INTERVALS and not self._is_told
+        if not learning and not self._is_told and abs(usual - self._period) > _CHANGE_OF_PACE * self._period:
             self._period = usual
             self._intervals.clear()
             return self._begin_grid(arrival)
         unit = usual if learning else self._period
-        cycles = int((arrival - self._grid) / unit + _EARLIEST)
+        cycles = self._cycles((arrival - self._grid) / unit)
         if cycles > _MOST_SKIPPED:
             return self._begin_grid(arrival)
-        self._lock(arrival, max(cycles, 0), learning)
-        return max(cycles, 0)
+        self._lock(arrival, cycles, learning)
+        return cycles
+
+    def _cycles(self, waited: float) -> int:
+        """How many cycles passed while so many were waited for: a host that tells its period skips whole ones."""
+        if self._is_told and _EARLY < waited < _LATE:
+            return 1
+        return max(int(waited + _EARLIEST), 0)
 
     def _begin_grid(self, arrival: float) -> int:
         """Let an arrival be the first of the grid."""
-        self._grid, self._arrivals = arrival, 1
+        self._grid, self._arrivals = arrival, _TOLD if self._is_told else 1
         return 1
 
     def _lock(self, arrival: float, cycles: int, learning: bool) -> None:

@@ -36,9 +36,13 @@ class Target:
         with which it catches up with setpoints that leapt [rad/s² or m/s²]
     tick_s : float
         time between two ticks [s]
+    period : float or None
+        time between setpoints, where the host has told it [ticks]
     """
 
-    def __init__(self, position: Array, velocity: Array, acceleration: Array, tick_s: float) -> None:
+    def __init__(
+        self, position: Array, velocity: Array, acceleration: Array, tick_s: float, period: float | None = None
+    ) -> None:
         count = len(position)
         self.position = position.copy()
         self.velocity = velocity.copy()
@@ -47,13 +51,14 @@ class Target:
         self._low, self._high = np.full(count, -np.inf), np.full(count, np.inf)
         self._fastest = np.full(count, np.inf)
         self._acceleration = acceleration
+        self._period = period
         self.resume()
         self.brake()
 
     def resume(self) -> None:
         """Be ready for setpoints that begin where the target is."""
         self.feed_forward = np.zeros_like(self.position)
-        self._spline = SetpointSpline(self._resting_point())
+        self._spline = SetpointSpline(self._resting_point(), self._period)
         self._asked = self.position
         self._behind = False
 

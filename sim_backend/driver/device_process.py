@@ -13,11 +13,11 @@ from types import TracebackType
 from drivers import DriverError
 from drivers.errors import DriverErrorKind
 from service.robot import Robot, robot_to_dict
+from sim_backend.own_process import process_environment
 
 START_TIMEOUT_S = 60.0
 """Time within which the process has to be ready [s]."""
 
-_TREE = Path(__file__).resolve().parents[2]
 _LONGEST_SOCKET_PATH = 107
 
 
@@ -91,32 +91,33 @@ def start_device(
     socket, trace, log = folder / "device.sock", folder / "device.csv", folder / "device.log"
     if len(os.fsencode(socket)) > _LONGEST_SOCKET_PATH:
         raise _cannot_start(f"{socket}: longer than a socket's path can be; choose a folder with a shorter path")
-    if isinstance(robot, Robot):
-        robot_file = folder / "device-robot.json"
-        robot_file.write_text(json.dumps(robot_to_dict(robot)), encoding="utf-8")
-    else:
-        robot_file = robot
     command = [sys.executable, "-m", "sim_backend.device", "--linger", str(linger_s)]
-    command += ["--robot", str(robot_file), "--socket", str(socket), "--trace", str(trace)]
+    command += ["--robot", str(_robot_file(robot, folder)), "--socket", str(socket), "--trace", str(trace)]
     if scenario is not None:
         command += ["--scenario", str(scenario)]
     if start_position is not None:
         command += ["--start-position", json.dumps([float(number) for number in start_position])]
-    path = os.pathsep.join(filter(None, [str(_TREE), os.environ.get("PYTHONPATH")]))
-    # one thread: the matrices are small, and the control loop needs the other cores
-    environment = {**os.environ, "PYTHONPATH": path, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     with log.open("wb") as messages:
         process = subprocess.Popen(  # noqa: S603 (our own module with our own arguments)
             command,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=messages,
-            env=environment,
+            env=process_environment(),
             start_new_session=True,
         )
     device = DeviceProcess(process, socket, trace)
     _await_ready(device, log)
     return device
+
+
+def _robot_file(robot: Robot | Path, folder: Path) -> Path:
+    """The robot file, written where the arm is not one already."""
+    if isinstance(robot, Path):
+        return robot
+    file = folder / "device-robot.json"
+    file.write_text(json.dumps(robot_to_dict(robot)), encoding="utf-8")
+    return file
 
 
 def _await_ready(device: DeviceProcess, log: Path) -> None:

@@ -121,7 +121,14 @@ class RemoteSimulatedArm:
         """Clear the latched faults; see `drivers.Backend`."""
         return self._state_after(FrameKind.ACKNOWLEDGE)
 
-    def enable(self, mode: ControlMode, limits: DriveLimits, stop_policy: StopPolicy, watchdog_s: float) -> ArmState:
+    def enable(
+        self,
+        mode: ControlMode,
+        limits: DriveLimits,
+        stop_policy: StopPolicy,
+        watchdog_s: float,
+        cycle_s: float | None = None,
+    ) -> ArmState:
         """Take the arm under power where it stands; see `drivers.Backend`.
 
         Parameters
@@ -134,7 +141,10 @@ class RemoteSimulatedArm:
             what the device does by itself when its watchdog fires
         watchdog_s : float
             time without `exchange` after which it does [s]
+        cycle_s : float or None
+            not needed: the device finds its host's pace
         """
+        del cycle_s
         return self._state_after(FrameKind.ENABLE, encode_enable(mode, limits, stop_policy, watchdog_s))
 
     def exchange(self, setpoint: Setpoint) -> ArmState:

@@ -79,7 +79,14 @@ class SimulatedArm:
         self.device.acknowledge_faults()
         return self.device.read()
 
-    def enable(self, mode: ControlMode, limits: DriveLimits, stop_policy: StopPolicy, watchdog_s: float) -> ArmState:
+    def enable(
+        self,
+        mode: ControlMode,
+        limits: DriveLimits,
+        stop_policy: StopPolicy,
+        watchdog_s: float,
+        cycle_s: float | None = None,
+    ) -> ArmState:
         """Take the arm under power where it stands; see `drivers.Backend`.
 
         Parameters
@@ -92,7 +99,10 @@ class SimulatedArm:
             what the device does by itself when its watchdog fires
         watchdog_s : float
             time without `exchange` after which it does, in virtual time [s]
+        cycle_s : float or None
+            not needed: the device finds its host's pace
         """
+        del cycle_s
         self._require_connection()
         self.device.enable(mode, limits, stop_policy, watchdog_s)
         return self.device.read()

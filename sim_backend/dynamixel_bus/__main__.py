@@ -2,8 +2,8 @@
 
 import sys
 
-from sim_backend.dynamixel_bus.order import EmulatorOrder
-from sim_backend.dynamixel_bus.server import EmulatorServer
+from sim_backend.dynamixel_bus.order import DynamixelOrder
+from sim_backend.emulation.server import EmulatorServer
 
 if __name__ == "__main__":
-    EmulatorServer(EmulatorOrder.from_json(sys.argv[1])).run()
+    EmulatorServer(DynamixelOrder.from_json(sys.argv[1])).run()

@@ -2,8 +2,8 @@
 
 from collections.abc import Callable, Iterable, Sequence
 
+from sim_backend.dynamixel_bus.answer_faults import AnswerFaults
 from sim_backend.dynamixel_bus.control_memory import WriteRefusedError
-from sim_backend.dynamixel_bus.fault_kit import AnswerFaults, FaultKind, FaultSchedule, InjectedFault
 from sim_backend.dynamixel_bus.framing import (
     BROADCAST_ID,
     Instruction,
@@ -12,6 +12,7 @@ from sim_backend.dynamixel_bus.framing import (
     status_frame,
 )
 from sim_backend.dynamixel_bus.servo import ENCODER, OVERHEATING, OVERLOAD, EmulatedServo
+from sim_backend.emulation.fault_kit import FaultKind, FaultSchedule, InjectedFault
 
 Delivery = tuple[float, bytes]
 """When bytes arrive at the master [s], and which."""
@@ -53,6 +54,7 @@ class EmulatedBus:
             REG_WRITE: self._write,
             ACTION: self._act,
             REBOOT: self._reboot,
+            CLEAR: self._clear,
             SYNC_READ: self._sync_read,
             SYNC_WRITE: self._sync_write,
             BULK_READ: self._bulk_read,
@@ -112,12 +114,12 @@ class EmulatedBus:
             for servo in self.servos:
                 self._restart(servo, now_s + fault.seconds)
             return
-        servo = self.servos[fault.servo]
+        servo = self.servos[fault.device]
         match fault.kind:
             case FaultKind.SILENT:
-                self._away_until_s[fault.servo] = now_s + fault.seconds
+                self._away_until_s[fault.device] = now_s + fault.seconds
             case FaultKind.RESET:
-                self._restart(fault.servo, now_s + fault.seconds)
+                self._restart(fault.device, now_s + fault.seconds)
             case FaultKind.OVER_TEMPERATURE:
                 servo.fail(OVERHEATING)
             case FaultKind.OVERLOAD:
@@ -127,7 +129,7 @@ class EmulatedBus:
                 if not fault.counts:
                     servo.fail(ENCODER)
             case _:
-                self._answer_faults[fault.servo] = AnswerFaults(fault.kind, fault.count, fault.seconds)
+                self._answer_faults[fault.device] = AnswerFaults(fault.kind, fault.count, fault.seconds)
 
     def _restart(self, servo: int, back_s: float) -> None:
         self.servos[servo].restart()
@@ -211,6 +213,17 @@ class EmulatedBus:
         for servo in servos:
             self._restart(servo.servo, end_s + _REBOOT_S)
         return answers
+
+    def _clear(self, instruction: Instruction, end_s: float) -> list[Delivery]:
+        parts: list[tuple[EmulatedServo, int, bytes]] = []
+        for servo in self._addressed(instruction, end_s):
+            error = 0
+            try:
+                servo.clear(instruction.parameters)
+            except WriteRefusedError as refusal:
+                error = refusal.error
+            parts.append((servo, error, b""))
+        return [] if instruction.servo == BROADCAST_ID else self._answers(parts, end_s)
 
     def _refuse(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         servos = [] if instruction.servo == BROADCAST_ID else self._addressed(instruction, end_s)

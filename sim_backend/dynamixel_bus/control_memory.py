@@ -172,6 +172,8 @@ class ControlMemory:
             "Velocity Limit": figures.velocity_limit,
             "Max Position Limit": figures.zero_count + half - 1,
             "Min Position Limit": figures.zero_count - half,
+            "Electronic GearRatio Numerator": figures.gear_ratio,
+            "Electronic GearRatio Denominator": 1,
             "Shutdown": 0x34,
         }
         for name, value in eeprom.items():

@@ -3,6 +3,7 @@
 import heapq
 from collections.abc import Sequence
 from math import ceil
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from sim_backend.dynamixel_bus.arm import MovedArm
 from sim_backend.dynamixel_bus.bus import EmulatedBus
 from sim_backend.dynamixel_bus.servo import EmulatedServo
+from sim_backend.emulation.fault_kit import faults_from
 
 Array = NDArray[np.float64]
 
@@ -23,7 +25,7 @@ LONGEST_CATCH_UP_S = 0.25
 """Where the machine stood still for longer than this, the device's clock has lost the rest [s]."""
 
 
-class Emulator:
+class DynamixelEmulator:
     """An arm of emulated servos on one bus; the instants are those of the caller's clock."""
 
     def __init__(
@@ -50,6 +52,7 @@ class Emulator:
         self.stands_on_stand = True
         self.lost_s = 0.0
         self._servos = [bus.servos[servo] for servo in order]
+        self._bauds = {servo.specification.baud for servo in self._servos}
         self._latency_s = latency_s
         self._now_s = now_s
         self._outgoing: list[tuple[float, int, bytes]] = []
@@ -65,6 +68,16 @@ class Emulator:
     def now_s(self) -> float:
         """Instant up to which the device has come [s]."""
         return self._now_s
+
+    def hears(self, baud: int) -> bool:
+        """Whether a master that has set this baud rate is understood.
+
+        Parameters
+        ----------
+        baud : int
+            of the master's port [bit/s]
+        """
+        return baud in self._bauds
 
     def receive(self, data: bytes, now_s: float) -> None:
         """Take bytes of the master, and answer with what is measured now, however long the machine stood still.
@@ -82,7 +95,7 @@ class Emulator:
         instructions = self.bus.hear(data, now_s)
         self.advance_to(now_s, most_steps=ceil(LONGEST_CATCH_UP_S / STEP_S))
         for servo in self._servos:
-            servo.sense(self._now_s, min(STEP_S, max(0.0, now_s - self._now_s)))
+            servo.sense(self._now_s, min(1.0, max(0.0, now_s - self._now_s) / STEP_S))
         for due_s, frame in self.bus.answer(instructions, now_s):
             self._count += 1
             heapq.heappush(self._outgoing, (due_s + self._latency_s, self._count, frame))
@@ -124,6 +137,45 @@ class Emulator:
             self._now_s += STEP_S
             self.bus.run_faults(self._now_s)
             self._step()
+
+    def describe(self) -> dict[str, Any]:
+        """Where the arm is and what its servos do."""
+        position, velocity = self.arm.motion
+        return {
+            "time": self._now_s,
+            "position": position.tolist(),
+            "velocity": velocity.tolist(),
+            "torque": self.torque.tolist(),
+            "enabled": [servo.has_torque for servo in self._servos],
+            "latched": [servo.memory.is_latched for servo in self._servos],
+            "commanded": [servo.is_commanded for servo in self._servos],
+            "latched_at": [servo.latched_s for servo in self._servos],
+            "error": [servo.hardware_error for servo in self._servos],
+            "on_stand": self.stands_on_stand,
+            "lost": self.lost_s,
+        }
+
+    def answer(self, request: dict[str, Any]) -> dict[str, int] | None:
+        """Do what a test asks.
+
+        Parameters
+        ----------
+        request : dict
+            ``{"inject": [fault, …]}``, ``{"get": [servo, item]}``, ``{"put": [servo, item, value]}``, ``{"stand":
+            bool}`` (put the stand under it, or take it away), or nothing of these
+        """
+        if "inject" in request:
+            self.bus.schedule.add(faults_from(request["inject"], self._now_s))
+            self.bus.run_faults(self._now_s)
+        elif "get" in request:
+            servo, item = request["get"]
+            return {"value": self.bus.servos[servo].memory.get(item)}
+        elif "put" in request:
+            servo, item, value = request["put"]
+            self.bus.servos[servo].memory.put(item, value)
+        elif "stand" in request:
+            self.stands_on_stand = request["stand"]
+        return None
 
     def _step(self) -> None:
         """One period of the servos' loops."""

@@ -3,16 +3,18 @@
 import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import ClassVar
 
 from sim_backend.dynamixel_bus.arm import MovedArm, Pendulums
 from sim_backend.dynamixel_bus.bus import EmulatedBus
-from sim_backend.dynamixel_bus.emulator import Emulator
+from sim_backend.dynamixel_bus.emulator import DynamixelEmulator
 from sim_backend.dynamixel_bus.servo import EmulatedServo
 from sim_backend.dynamixel_bus.specification import ServoSpecification
+from sim_backend.emulation.pseudo_terminal import PseudoTerminal
 
 
 @dataclass(frozen=True)
-class EmulatorOrder:
+class DynamixelOrder:
     """What to emulate.
 
     servos : tuple of ServoSpecification
@@ -37,10 +39,12 @@ class EmulatorOrder:
     port : str
         where the name of the pseudo terminal is linked to
     control : str
-        Unix socket for `EmulatorControl`
+        Unix socket for the test
     trace : str or None
         file that what the device does is appended to
     """
+
+    module: ClassVar[str] = "sim_backend.dynamixel_bus"
 
     servos: tuple[ServoSpecification, ...]
     start: tuple[float, ...]
@@ -60,7 +64,7 @@ class EmulatorOrder:
         return json.dumps(asdict(self))
 
     @staticmethod
-    def from_json(text: str) -> "EmulatorOrder":
+    def from_json(text: str) -> "DynamixelOrder":
         """The order in a text.
 
         Parameters
@@ -70,9 +74,13 @@ class EmulatorOrder:
         """
         document = json.loads(text)
         servos = tuple(ServoSpecification(**servo) for servo in document.pop("servos"))
-        return EmulatorOrder(servos=servos, **{**document, "start": tuple(document["start"])})
+        return DynamixelOrder(servos=servos, **{**document, "start": tuple(document["start"])})
 
-    def build(self, now_s: float) -> Emulator:
+    def open_port(self) -> PseudoTerminal:
+        """A pseudo terminal."""
+        return PseudoTerminal(self.port)
+
+    def build(self, now_s: float) -> DynamixelEmulator:
         """The emulator.
 
         Parameters
@@ -83,7 +91,7 @@ class EmulatorOrder:
         arm = self._arm()
         servos = [EmulatedServo(servo, seed=joint) for joint, servo in enumerate(self.servos)]
         bus = EmulatedBus(servos, fast_sync_read=self.fast_sync_read, paced=self.paced and not self.stepped)
-        return Emulator(bus, [servo.servo for servo in servos], arm, now_s, latency_s=self.latency_s)
+        return DynamixelEmulator(bus, [servo.servo for servo in servos], arm, now_s, latency_s=self.latency_s)
 
     def _arm(self) -> MovedArm:
         """What the servos move."""

@@ -21,6 +21,8 @@ _LONGEST_WATCHDOG = 127
 _TORQUE_ON_BY_GOAL = 0x08
 _Y_CODES = {OVERHEATING: 4, ENCODER: 13, ELECTRICAL: 7, OVERLOAD: 5}
 _Y_WATCHDOG_CODE = 18
+_Y_LASTING = (7, 9, 10, 11, 12, 13, 14, 15)
+_ERROR_TO_CLEAR = bytes.fromhex("02 45 52 43 4C")
 _TICKS = 32_768
 _FILTERED_STEPS = 5
 """Measurements are means of as many periods of the servo's loop: goals that come in steps make current ripple."""
@@ -48,7 +50,7 @@ class EmulatedServo:
         self.latched_s: float | None = None
         self._heard_s = 0.0
         self._motion: tuple[float, float] | None = None
-        self._seen: deque[tuple[float, float, float]] = deque(maxlen=_FILTERED_STEPS)
+        self._seen: deque[tuple[float, float, float]] = deque(maxlen=_FILTERED_STEPS + 1)
 
     @property
     def servo(self) -> int:
@@ -147,6 +149,28 @@ class EmulatedServo:
         self.memory.put("Registered Instruction", 0)
         self.write(*registered)
 
+    def clear(self, what: bytes) -> None:
+        """Carry out the instruction Clear: an error of the Y series, where its cause is gone.
+
+        Parameters
+        ----------
+        what : bytes
+            parameters of the instruction
+
+        Raises
+        ------
+        WriteRefusedError
+            the error stays, or this servo knows no such thing
+        """
+        code = self.memory.get("Error Code")
+        is_hot = self.memory.get("Present Motor Temperature") > self.memory.get("Motor Temperature Limit")
+        if "Error Code" not in self.memory or what != _ERROR_TO_CLEAR or code in _Y_LASTING or (code == 4 and is_hot):
+            raise WriteRefusedError(RESULT_FAIL)
+        if code == _Y_WATCHDOG_CODE:
+            self.memory.put("Bus Watchdog", 0)
+            self._loop.resume()
+        self.memory.put("Error Code", 0)
+
     def restart(self) -> None:
         """Reboot, or come back after a power dip: no torque, no watchdog, stale goals, errors forgotten."""
         self.memory.restart()
@@ -210,18 +234,19 @@ class EmulatedServo:
         self._seen.append((0.5 * (before + position), 0.5 * (speed_before + velocity), current))
         self._motion = (position, velocity)
 
-    def sense(self, now_s: float, age_s: float = 0.0) -> None:
-        """Show the present measurement in the control table.
+    def sense(self, now_s: float, part: float = 1.0) -> None:
+        """Show the present measurement in the control table: position, velocity and current of one instant.
 
         Parameters
         ----------
         now_s : float
             present instant [s]
-        age_s : float
-            since the joint was seen: less than a step, in which it moves on as it did [s]
+        part : float
+            of the present period of the servo's loop that is over, 0 to 1: between two periods' measurements it shows
+            what lies between them
         """
-        position, velocity, current = (sum(one) / len(self._seen) for one in zip(*self._seen, strict=True))
-        position += velocity * age_s
+        older, newer = self._means(0), self._means(1)
+        position, velocity, current = ((1.0 - part) * old + part * new for old, new in zip(older, newer, strict=True))
         figures = self.specification.figures
         counts = round(position * self.specification.counts_per_radian) + figures.zero_count
         horn_speed = velocity * self.specification.direction * self.specification.reduction
@@ -230,6 +255,12 @@ class EmulatedServo:
         self.memory.put("Present Velocity", round(horn_speed / figures.velocity_unit))
         self.memory.put("Present Current", round(current + noise))
         self.memory.put("Realtime Tick", int(now_s * 1e3) % _TICKS)
+
+    def _means(self, first: int) -> tuple[float, ...]:
+        """Means of what was seen in as many periods, without the first of them or without the last."""
+        seen = list(self._seen)
+        chosen = seen[first : first + _FILTERED_STEPS] or seen
+        return tuple(sum(one) / len(chosen) for one in zip(*chosen, strict=True))
 
     @property
     def _is_shut_down(self) -> bool:

@@ -27,6 +27,8 @@ class ModelFigures:
         whether Goal Current is the cap of mode 3 (P, Y); in mode 5 it always is
     eeprom : tuple of tuple of int
         stretches of the control table that cannot be written under torque: first address, first one after
+    gear_ratio : int
+        Electronic Gear Ratio as delivered (Y), by which the motor's counts and speeds are divided
     """
 
     counts_per_turn: int
@@ -39,6 +41,7 @@ class ModelFigures:
     modes: tuple[int, ...]
     goal_current_caps_position: bool
     eeprom: tuple[tuple[int, int], ...]
+    gear_ratio: int = 1
 
 
 _X = ModelFigures(
@@ -76,6 +79,7 @@ _Y = ModelFigures(
     modes=(0, 1, 3),
     goal_current_caps_position=True,
     eeprom=((0, 8), (10, 15), (32, 152), (256, 512)),
+    gear_ratio=99,
 )
 
 MODELS: dict[int, ModelFigures] = {

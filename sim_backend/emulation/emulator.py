@@ -1,6 +1,6 @@
 """What the server runs: anything that takes bytes of a master, lets time pass, and answers."""
 
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 
 class Emulator(Protocol):
@@ -68,18 +68,47 @@ class Emulator(Protocol):
         Parameters
         ----------
         request : dict
-            plain data
+            as `EmulatorProcess` writes it; ``advance_to`` and ``reset`` are the server's own, and done already
         """
+        ...
+
+
+class Port(Protocol):
+    """The devices' end of what a master opens."""
+
+    @property
+    def baud(self) -> int:
+        """What the master has set, or a rate that is understood where there is none to set [bit/s]."""
+        ...
+
+    def fileno(self) -> int:
+        """Descriptor to wait on."""
+        ...
+
+    def read(self) -> bytes | None:
+        """What a master sent; None where no master has it open."""
+        ...
+
+    def write(self, data: bytes) -> None:
+        """Send to the master; lost where there is none, or where it reads nothing.
+
+        Parameters
+        ----------
+        data : bytes
+            whole frames
+        """
+        ...
+
+    def close(self) -> None:
+        """Hang up."""
         ...
 
 
 class EmulatorOrder(Protocol):
     """What the server needs of the order that started it."""
 
-    @property
-    def port(self) -> str:
-        """Where the name of the pseudo terminal is linked to."""
-        ...
+    module: ClassVar[str]
+    """What runs as the process: the package of the bus."""
 
     @property
     def control(self) -> str:
@@ -91,8 +120,17 @@ class EmulatorOrder(Protocol):
         """File that what the devices do is appended to."""
         ...
 
+    @property
+    def stepped(self) -> bool:
+        """Whether time passes only when a test says so; else it is the machine's."""
+        ...
+
     def to_json(self) -> str:
         """The order as text, which the process is started with."""
+        ...
+
+    def open_port(self) -> Port:
+        """What the master opens."""
         ...
 
     def build(self, now_s: float) -> Emulator:

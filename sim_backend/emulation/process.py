@@ -1,47 +1,44 @@
 """Starts an emulator in a process of its own and talks to it."""
 
 import json
-import os
 import socket
 import subprocess
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Generic, Self, TypeVar
 
 from sim_backend.emulation.emulator import EmulatorOrder
+from sim_backend.emulation.fault_kit import InjectedFault
+from sim_backend.own_process import process_environment
 
 _ANSWER_TIMEOUT_S = 10.0
-_TREE = Path(__file__).resolve().parents[2]
 
 
-class EmulatorProcess:
+_Order = TypeVar("_Order", bound=EmulatorOrder)
+
+
+class EmulatorProcess(Generic[_Order]):
     """An emulator that lives as long as the ``with`` block, or as the process that started it."""
 
-    def __init__(self, module: str, order: EmulatorOrder) -> None:
+    def __init__(self, order: _Order) -> None:
         """Nothing is started yet.
 
         Parameters
         ----------
-        module : str
-            what runs as the process: the package of the bus
         order : EmulatorOrder
             what to emulate
         """
         self.order = order
-        self._module = module
         self._process: subprocess.Popen[bytes] | None = None
         self._socket: socket.socket | None = None
         self._received = b""
-        self._trace_start = 0
 
     def __enter__(self) -> Self:
-        command = [sys.executable, "-m", self._module, self.order.to_json()]
-        path = os.pathsep.join(filter(None, [str(_TREE), os.environ.get("PYTHONPATH")]))
-        # One thread: the matrices are small, and the control loop needs the other cores.
-        environment = {**os.environ, "PYTHONPATH": path, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+        command = [sys.executable, "-m", self.order.module, self.order.to_json()]
         self._process = subprocess.Popen(  # noqa: S603 (our own module with our own arguments)
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment, start_new_session=True
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=process_environment(), start_new_session=True
         )
         assert self._process.stdout is not None  # noqa: S101 (a pipe was asked for)
         if self._process.stdout.readline().strip() != b"ready":
@@ -101,28 +98,61 @@ class EmulatorProcess:
         """What the devices are doing; see `Emulator.describe`."""
         return self.ask({})
 
-    def inject(self, *faults: dict[str, Any]) -> None:
-        """Set faults off; their instants (``after_s``) count from now.
+    def inject(self, *faults: InjectedFault) -> None:
+        """Set faults off.
 
         Parameters
         ----------
-        *faults : dict
-            fields of `InjectedFault`
+        *faults : InjectedFault
+            their instants counted from now
         """
-        self.ask({"inject": list(faults)})
+        self.ask({"inject": [asdict(fault) for fault in faults]})
+
+    def get(self, device: int, place: str | tuple[int, int]) -> int:
+        """What a device holds.
+
+        Parameters
+        ----------
+        device : int
+            ID of a servo or of a node
+        place : str or tuple of int
+            item of a servo's control table as ROBOTIS calls it, or index and subindex of an object
+        """
+        return self.ask({"get": [device, place]})["value"]
+
+    def put(self, device: int, place: str | tuple[int, int], value: int) -> None:
+        """Set what a device holds, behind the master's back.
+
+        Parameters
+        ----------
+        device : int
+            ID of a servo or of a node
+        place : str or tuple of int
+            item of a servo's control table as ROBOTIS calls it, or index and subindex of an object
+        value : int
+            that fits it
+        """
+        self.ask({"put": [device, place, value]})
+
+    def advance_to(self, instant_s: float) -> None:
+        """Let the devices' time pass, where their order says that nothing else does.
+
+        Parameters
+        ----------
+        instant_s : float
+            by the devices' clock; nothing happens where that has passed [s]
+        """
+        self.ask({"advance_to": instant_s})
 
     def reset(self) -> None:
-        """Begin anew, as if it had just been started; the master's port stays."""
+        """Begin anew, with a new trace, as if it had just been started; the master's port stays."""
         self.ask({"reset": True})
-        if self.order.trace is not None:
-            self._trace_start = Path(self.order.trace).stat().st_size
 
     def trace(self) -> list[dict[str, Any]]:
-        """What the device has done so far, one entry about every two milliseconds."""
+        """What the devices have done so far, one entry about every two milliseconds."""
         if self.order.trace is None:
             return []
         with Path(self.order.trace).open(encoding="utf-8") as file:
-            file.seek(self._trace_start)
             # in one piece: the last line may be only half written
             *whole, _ = file.read().split("\n")
         return [json.loads(line) for line in whole]

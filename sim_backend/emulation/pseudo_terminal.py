@@ -12,16 +12,25 @@ _TERMIOS2 = "=4I20B2I"
 
 
 class PseudoTerminal:
-    """The near end; a master opens `path`.
+    """The near end, a `Port`; a master opens the far end by the name that was linked to it.
 
     The far end is not kept open here, so that whoever has it open is a master.
     """
 
-    def __init__(self) -> None:
-        """Open one in raw mode."""
+    def __init__(self, link: str) -> None:
+        """Open one in raw mode.
+
+        Parameters
+        ----------
+        link : str
+            path that shall point to the far end, in place of an older one
+        """
         self._near, far = os.openpty()
         tty.setraw(far)
-        self.path = os.ttyname(far)
+        self._link = link
+        temporary = f"{link}.{os.getpid()}"
+        os.symlink(os.ttyname(far), temporary)
+        os.replace(temporary, link)
         os.close(far)
         os.set_blocking(self._near, False)
 
@@ -60,3 +69,5 @@ class PseudoTerminal:
     def close(self) -> None:
         """Hang up."""
         os.close(self._near)
+        with contextlib.suppress(FileNotFoundError):
+            os.unlink(self._link)

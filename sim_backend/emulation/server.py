@@ -1,4 +1,4 @@
-"""An emulator as a process: a pseudo terminal for the master, a socket for the test, a trace of what was done."""
+"""An emulator as a process: a port for the master, a socket for the test, a trace of what was done."""
 
 import contextlib
 import json
@@ -11,16 +11,20 @@ from pathlib import Path
 from typing import Any
 
 from sim_backend.emulation.emulator import EmulatorOrder
-from sim_backend.emulation.pseudo_terminal import PseudoTerminal
 
 _PERIOD_S = 0.001
 _TRACE_PERIOD_S = 0.002
 _LONGEST_MESSAGE = 65_536
 _PRIORITY = 40
+_ROUNDING_S = 1e-9
+"""What is due is not put off because a sum of steps falls short of it by its rounding."""
+
+_AT_ONCE_S = 0.02
+"""Where time is stepped, a master that waits lets none pass: what is due so soon arrives at once."""
 
 
 class EmulatorServer:
-    """Runs an emulator against the machine's clock until its standard input ends."""
+    """Runs an emulator until its standard input ends, against the machine's clock or one that a test moves on."""
 
     def __init__(self, order: EmulatorOrder) -> None:
         """Open everything.
@@ -31,17 +35,16 @@ class EmulatorServer:
             what to emulate
         """
         self._order = order
-        self._begin()
-        self._terminal = PseudoTerminal()
+        self._port = order.open_port()
         self._tests = _listen(order.control)
         self._test: socket.socket | None = None
         self._pending = b""
         self._trace = (
             None if order.trace is None else os.open(order.trace, os.O_CREAT | os.O_APPEND | os.O_WRONLY, 0o644)
         )
+        self._begin()
         self._running = True
         self._master_is_there = True
-        _link(order.port, self._terminal.path)
 
     def run(self) -> None:
         """Serve."""
@@ -54,26 +57,29 @@ class EmulatorServer:
                 self._serve_test()
                 self._write_trace()
         finally:
-            self._terminal.close()
-            for path in (self._order.port, self._order.control):
-                Path(path).unlink(missing_ok=True)
+            self._port.close()
+            Path(self._order.control).unlink(missing_ok=True)
 
     def _begin(self) -> None:
-        """Devices as delivered, the arm where it stands at first, the clock at zero."""
+        """Devices as delivered, the arm where it stands at first, the clock at zero, and a trace of only that."""
         self._emulator = self._order.build(0.0)
         self._start_ns = time.monotonic_ns()
+        self._stepped_s = 0.0
         self._next_trace_s = 0.0
+        if self._trace is not None:
+            os.ftruncate(self._trace, 0)
+        self._write_trace()
 
     @property
     def _now_s(self) -> float:
-        return (time.monotonic_ns() - self._start_ns) * 1e-9
+        return self._stepped_s if self._order.stepped else (time.monotonic_ns() - self._start_ns) * 1e-9
 
     def _wait(self) -> None:
         """Until something comes, an answer is due, or the physics want their step."""
         wait_s = min(_PERIOD_S, max(0.0, self._emulator.next_due_s - self._now_s))
         sources: list[Any] = [self._tests, sys.stdin]
         if self._master_is_there:
-            sources.append(self._terminal)
+            sources.append(self._port)
         if self._test is not None:
             sources.append(self._test)
         ready = select.select(sources, [], [], wait_s)[0]
@@ -82,13 +88,13 @@ class EmulatorServer:
 
     def _serve_master(self) -> None:
         """Take what the master sent, let time pass, send what has arrived at the master."""
-        received = self._terminal.read()
+        received = self._port.read()
         self._master_is_there = received is not None
-        if received and self._emulator.hears(self._terminal.baud):
+        if received and self._emulator.hears(self._port.baud):
             self._emulator.receive(received, self._now_s)
         self._emulator.advance_to(self._now_s)
-        if arrived := self._emulator.due(self._now_s):
-            self._terminal.write(arrived)
+        if arrived := self._emulator.due(self._now_s + (_AT_ONCE_S if self._order.stepped else 0.0)):
+            self._port.write(arrived)
 
     def _serve_test(self) -> None:
         """Answer the test, a line of JSON each way."""
@@ -107,6 +113,8 @@ class EmulatorServer:
         *lines, self._pending = (self._pending + received).split(b"\n")
         for line in lines:
             request = json.loads(line)
+            if "advance_to" in request:
+                self._step_to(request["advance_to"])
             if "reset" in request:
                 self._begin()
             answer = self._emulator.answer(request) or self._describe()
@@ -114,13 +122,20 @@ class EmulatorServer:
             self._test.sendall(json.dumps(answer).encode() + b"\n")
             self._test.setblocking(False)
 
+    def _step_to(self, instant_s: float) -> None:
+        """Let time pass where only that makes it pass."""
+        while self._stepped_s < instant_s:
+            self._stepped_s = min(instant_s, self._stepped_s + _PERIOD_S)
+            self._emulator.advance_to(self._stepped_s + _ROUNDING_S)
+            self._write_trace()
+
     def _describe(self) -> dict[str, Any]:
         """What the devices are doing, and when, by the machine's clock."""
         return {**self._emulator.describe(), "monotonic_ns": time.monotonic_ns()}
 
     def _write_trace(self) -> None:
         """Append where the arm is, one JSON line at a time; a line is whole or not there."""
-        if self._trace is None or self._emulator.now_s < self._next_trace_s:
+        if self._trace is None or self._emulator.now_s + _ROUNDING_S < self._next_trace_s:
             return
         self._next_trace_s = self._emulator.now_s + _TRACE_PERIOD_S
         os.write(self._trace, json.dumps(self._describe()).encode() + b"\n")
@@ -139,10 +154,3 @@ def _listen(path: str) -> socket.socket:
     listener.listen(1)
     listener.setblocking(False)
     return listener
-
-
-def _link(path: str, target: str) -> None:
-    """Point a path at the pseudo terminal, in place of an older one."""
-    temporary = f"{path}.{os.getpid()}"
-    os.symlink(target, temporary)
-    os.replace(temporary, path)

@@ -73,7 +73,15 @@ class PointArm:
         self._call("acknowledge_faults")
         return self._state(np.zeros(self.joint_count))
 
-    def enable(self, mode: ControlMode, limits: DriveLimits, stop_policy: StopPolicy, watchdog_s: float) -> ArmState:
+    def enable(
+        self,
+        mode: ControlMode,
+        limits: DriveLimits,
+        stop_policy: StopPolicy,
+        watchdog_s: float,
+        cycle_s: float | None = None,
+    ) -> ArmState:
+        del cycle_s
         self._call("enable")
         self.mode, self.limits, self.enabled = mode, limits, True
         self.then = self.clock.now_ns()

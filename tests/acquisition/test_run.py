@@ -164,6 +164,19 @@ def test_a_joint_that_misses_now_and_then_is_counted_and_recorded_as_missing(tmp
     assert np.isnan(read_recording(tmp_path / "run" / "recording.csv").samples().position).sum() == 2
 
 
+@pytest.mark.parametrize(("late_ms", "lost"), [(0.9, 0), (1.1, 2)])
+def test_an_answer_of_which_nobody_knows_the_instant_is_no_sample(tmp_path: Path, late_ms: float, lost: int) -> None:
+    def tamper(arm: PointArm, state: ArmState) -> ArmState:
+        return replace(state, late_ns=round(late_ms * 1e6)) if 900 <= len(arm.sent) < 902 else state
+
+    arm = PointArm(position=START, tamper=tamper)
+    record, _, _ = run(tmp_path / "run", arm)
+    assert record.state is RunState.FINISHED, "the arm is seen all the same, and goes on"
+    assert record.timing is not None
+    assert record.timing.stale_samples == (lost, lost)
+    assert len(read_journal(tmp_path / "run" / "journal.mcap").rows) == len(arm.sent) - lost
+
+
 def test_a_loop_that_is_late_skips_and_says_so(tmp_path: Path) -> None:
     arm = PointArm(position=START)
     arm.clock.delay = lambda deadline: 7_500_000 if len(arm.sent) in (600, 800) else 0

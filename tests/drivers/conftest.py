@@ -1,7 +1,9 @@
 """The rigs of the conformance suite."""
 
+import os
 from collections.abc import Callable, Iterator
 from contextlib import nullcontext
+from functools import partial
 
 import pytest
 
@@ -13,6 +15,10 @@ from prompt_process import prompt_process
 
 ALL_RIGS = {**RIGS, "dynamixel": dynamixel_rigs, "canopen": canopen_rigs}
 """Makers of rigs by name; the emulated buses join here."""
+
+if SOCKETCAN := os.environ.get("TAUSCOPE_SOCKETCAN"):
+    # the name of an interface: few kernels have one, see tests/hardware_emulated/test_socketcan.py
+    ALL_RIGS["socketcan"] = partial(canopen_rigs, interface=SOCKETCAN)
 
 
 BY_THE_CLOCK = [pytest.param(name, marks=[] if name in RIGS else pytest.mark.realtime) for name in ALL_RIGS]

@@ -83,8 +83,7 @@ def test_an_arm_that_falls_is_caught_by_enabling_it(rig: Rig) -> None:
     caught = rig.look()
     seen = rig.watch(1.2)
     assert np.abs(seen.velocity[-1]).max() < AT_REST
-    # it fell on while its drives were commissioned
-    assert np.abs(seen.position[-1] - caught).max() < 0.3 + 0.1 * np.abs(seen.velocity[0]).max()
+    assert np.abs(seen.position[-1] - caught).max() < 0.3
 
 
 def test_a_moving_arm_that_is_stopped_comes_to_rest_where_it_was_going(rig: Rig) -> None:
@@ -108,15 +107,12 @@ def test_positions_beyond_the_range_are_not_reached(rig: Rig) -> None:
     np.testing.assert_allclose(place, high, atol=5e-3 + rig.swing)
 
 
-def test_a_far_target_is_approached_at_the_speed_limit(rig: Rig, request: pytest.FixtureRequest) -> None:
-    if "canopen" in request.node.name:
-        request.applymarker(
-            pytest.mark.xfail(reason="emulated CANopen drives overshoot to 2 rad/s: not understood yet")
-        )
+def test_a_far_target_is_approached_at_the_speed_limit(rig: Rig) -> None:
     enable(rig, velocity=0.5)
     states = drive(rig, lambda _: setpoint(START + 0.4), 0.6)
-    # once the drives' loops have answered the step with which it begins
-    speed = np.abs([state.velocity for state in states[len(states) // 4 :]])
+    # loops that swing answer the step with which it begins by more than the limit
+    begin = len(states) // 4 if rig.swing > 0.0 else 0
+    speed = np.abs([state.velocity for state in states[begin:]])
     assert np.nanmax(speed) < 1.3 * 0.5
     assert np.nanmax(speed) > 0.8 * 0.5
 

@@ -1,4 +1,4 @@
-"""Robot files of arms that emulated Dynamixel servos move: what is true of them, and what a campaign is told."""
+"""Arms that emulated drives move: what is true of them, what a campaign is told, and how far off it ends."""
 
 import json
 from pathlib import Path
@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from arms import random_link
+from service.identification import IdentificationDocument
 from service.robot import Robot
 
 MODEL = "PH54-200-S500"
@@ -86,3 +87,20 @@ def standard_parameters(robot: Robot) -> dict[str, float]:
         for number, link in enumerate(robot.model.links, 1)
         for name, value in zip(names, link.to_vector(), strict=True)
     }
+
+
+def deviations(found: IdentificationDocument, truth: Robot) -> dict[str, float]:
+    """Distance of every parameter from the truth, in its own standard errors."""
+    true, result = standard_parameters(truth), {}
+    for entry in found.base_parameters:
+        assert entry.std is not None
+        value = sum(factor * true[name] for name, factor in entry.terms.items())
+        result[entry.name] = (entry.value - value) / entry.std
+    assert truth.model is not None
+    assert truth.model.friction is not None
+    for friction, coefficients in zip(found.friction, truth.model.friction, strict=True):
+        for name in ("stiction", "stribeck", "viscous"):
+            std = friction.std[name]
+            assert std is not None
+            result[f"{name} of {friction.joint}"] = (getattr(friction, name) - getattr(coefficients, name)) / std
+    return result

@@ -1,6 +1,8 @@
 """Robot files with CiA 402 drives."""
 
+import json
 from pathlib import Path
+from typing import Any
 
 from ruamel.yaml import YAML
 
@@ -10,15 +12,33 @@ RATED_TORQUE_MNM = 400
 """Of the motors: three times as much, 60 Nm at the joint, is what a drive allows at most."""
 
 
-def write_canopen_robot(source: Path, folder: Path) -> Path:
-    """A robot file in a folder, its joints driven by nodes 1, 2 … behind the serial adapter ``port`` in that folder."""
+def write_canopen_robot(source: Path, folder: Path, interface: str | None = None) -> Path:
+    """A robot file in a folder, its joints driven by nodes 1, 2 … on an interface of SocketCAN.
+
+    Without one, the bus hangs on the serial adapter ``port`` in that folder.
+    """
+    serial = {"interface": "slcan", "channel": str(folder / "port")}
+    on_bus = serial if interface is None else {"interface": "socketcan", "channel": interface}
     yaml = YAML()
     document = yaml.load(source.read_text(encoding="utf-8"))
     for number, joint in enumerate(document["joints"], 1):
-        bus = {"interface": "slcan", "channel": str(folder / "port")} if number == 1 else {}
+        bus = on_bus if number == 1 else {}
         joint["gear_ratio"] = GEAR
         joint["drive"] = {"node_id": number, "counts_per_turn": COUNTS_PER_TURN, "stop_policy": "hold", **bus}
     robot = folder / "robot.yaml"
     with robot.open("w", encoding="utf-8") as file:
         yaml.dump(document, file)
     return robot
+
+
+def write_canopen_arm(arm: dict[str, Any], path: Path, port: Path, *, knows_model: bool = True) -> Path:
+    """The arm with a drive at every joint, with or without the truth about its links and friction."""
+    drives = [
+        {"node_id": number, "counts_per_turn": COUNTS_PER_TURN, "stop_policy": "hold"}
+        for number in range(1, len(arm["joints"]) + 1)
+    ]
+    drives[0] |= {"interface": "slcan", "channel": str(port)}
+    joints = [{**joint, "gear_ratio": GEAR, "drive": drive} for joint, drive in zip(arm["joints"], drives, strict=True)]
+    told = {key: value for key, value in arm.items() if knows_model or key != "model"}
+    path.write_text(json.dumps({**told, "joints": joints}), encoding="utf-8")
+    return path

@@ -12,7 +12,8 @@ import numpy as np
 from drivers import ArmState, ControlMode, DriveLimits, Setpoint, StopPolicy
 from drivers.dynamixel import DynamixelArm, DynamixelJoint
 from prompt_process import prompt_process
-from sim_backend.dynamixel_bus import EmulatorOrder, EmulatorProcess, ServoSpecification
+from sim_backend.dynamixel_bus import DynamixelOrder, ServoSpecification
+from sim_backend.emulation import EmulatorProcess
 
 TORQUE_PER_MILLIAMPERE = 0.01
 SLACK_S = 0.03
@@ -86,7 +87,7 @@ def bench(
         specification = ServoSpecification(1, torque_per_milliampere=TORQUE_PER_MILLIAMPERE)
         servos = tuple(replace(specification, servo=number) for number in range(1, servos + 1))
     port = str(folder / "port")
-    asked = EmulatorOrder(
+    asked = DynamixelOrder(
         servos=servos,
         start=(start,) * len(servos),
         port=port,

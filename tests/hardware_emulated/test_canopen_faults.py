@@ -11,21 +11,21 @@ import pytest
 from arm_rigs import START, drive, setpoint, wide_limits
 from drivers import ControlMode, DriverError, StopPolicy
 from hardware_emulated.canopen_rig import CanopenRig, canopen_rigs
-from sim_backend.dynamixel_bus.fault_kit import FaultKind
+from sim_backend.emulation.fault_kit import FaultKind, InjectedFault
 
 pytestmark = [pytest.mark.realtime, pytest.mark.timeout(600)]
 
 WATCHDOG_S = 0.4
 FAULTS: dict[FaultKind, dict[str, Any]] = {
-    FaultKind.LOSE: {"servo": 2, "count": 6},
-    FaultKind.CORRUPT: {"servo": 2, "count": 6},
-    FaultKind.LATE: {"servo": 2, "count": 6, "seconds": 0.06},
-    FaultKind.DUPLICATE: {"servo": 2, "count": 10},
-    FaultKind.SILENT: {"servo": 2, "seconds": 3.0},
-    FaultKind.OVER_TEMPERATURE: {"servo": 2, "seconds": 1.0},
-    FaultKind.OVERLOAD: {"servo": 2, "seconds": 1.0},
-    FaultKind.ENCODER_JUMP: {"servo": 2, "counts": 3000},
-    FaultKind.RESET: {"servo": 2, "seconds": 0.3},
+    FaultKind.LOSE: {"device": 2, "count": 6},
+    FaultKind.CORRUPT: {"device": 2, "count": 6},
+    FaultKind.LATE: {"device": 2, "count": 6, "seconds": 0.06},
+    FaultKind.DUPLICATE: {"device": 2, "count": 10},
+    FaultKind.SILENT: {"device": 2, "seconds": 3.0},
+    FaultKind.OVER_TEMPERATURE: {"device": 2, "seconds": 1.0},
+    FaultKind.OVERLOAD: {"device": 2, "seconds": 1.0},
+    FaultKind.ENCODER_JUMP: {"device": 2, "counts": 3000},
+    FaultKind.RESET: {"device": 2, "seconds": 0.3},
     FaultKind.POWER_DIP: {"seconds": 0.3},
 }
 HARDWARE = {FaultKind.OVERLOAD: "overload", FaultKind.OVER_TEMPERATURE: "over-temperature"}
@@ -53,7 +53,7 @@ def outcome(rig: CanopenRig, kind: FaultKind, phase: str) -> Outcome:
 
     def happen(at: str) -> None:
         if at == phase:
-            rig.disturb(kind=kind, **FAULTS[kind])
+            rig.disturb(InjectedFault(kind, **FAULTS[kind]))
 
     try:
         happen("connect")

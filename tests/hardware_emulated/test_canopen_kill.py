@@ -81,7 +81,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
         rated_torque_mnm=(RATED_TORQUE_MNM,) * 3,
         trace=str(folder / "trace"),
     )
-    with EmulatorProcess("sim_backend.canopen_bus", order) as emulator:
+    with EmulatorProcess(order) as emulator:
         yield Site(folder, emulator)
 
 

@@ -121,8 +121,28 @@ def test_joint_outside_its_limits_is_not_enabled(three: Bench) -> None:
     arm = three.arm()
     arm.connect()
     error = refusal(arm.enable, ControlMode.POSITION, limits(3, position_high=0.1), StopPolicy.HOLD, WATCHDOG_S)
-    assert "stands at 0.1994, outside -2.999 to 0.09971" in str(error)
+    assert "stands at 0.1994, outside its limits -3 to 0.1" in str(error)
     assert "by hand" in str(error)
+
+
+def test_a_joint_that_a_stop_carried_a_little_too_far_is_enabled_where_it_is(three: Bench) -> None:
+    arm = three.arm()
+    arm.connect()
+    arm.enable(ControlMode.POSITION, limits(3, position_high=START - 0.04), StopPolicy.HOLD, WATCHDOG_S)
+    np.testing.assert_allclose(three.position, START, atol=ONE_COUNT)
+    drive(arm, lambda _: setpoint(np.full(3, START)), 0.5)
+    assert three.position.max() < START - 0.04 + 2.0 * ONE_COUNT, "and it goes back into its range"
+
+
+def test_a_joint_outside_its_servos_own_position_limits_is_not_enabled(tmp_path: Path) -> None:
+    counts = round(0.1 * 1_003_846 / (2.0 * np.pi))
+    servo = ServoSpecification(1, 2020, torque_per_milliampere=0.001, registers={"Max Position Limit": counts})
+    with bench(tmp_path, (servo,)) as one:
+        arm = one.arm(torque_constant=0.001)
+        arm.connect()
+        error = refusal(arm.enable, ControlMode.POSITION, limits(1), StopPolicy.HOLD, WATCHDOG_S)
+        assert "stands at 0.2, its own Position Limits are -3.142 to 0.1" in str(error)
+        assert not any(one.emulator.state["enabled"])
 
 
 def test_torque_needs_a_torque_constant(three: Bench) -> None:

@@ -13,8 +13,9 @@ from service.excitation import ExcitationOptions, design_excitation, write_traje
 from service.recording import read_recording
 from service.recording.recording import EffortKind
 from service.robot import read_robot
-from sim_backend.dynamixel_bus import EmulatorOrder, EmulatorProcess, FaultKind, InjectedFault
+from sim_backend.dynamixel_bus import DynamixelOrder
 from sim_backend.dynamixel_bus.robot_servos import servos_of
+from sim_backend.emulation import EmulatorProcess, FaultKind, InjectedFault
 
 pytestmark = pytest.mark.realtime
 
@@ -42,7 +43,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def servos(folder: Path) -> Iterator[EmulatorProcess]:
-    order = EmulatorOrder(
+    order = DynamixelOrder(
         servos=servos_of(read_robot(folder / "arm.json")),
         start=(0.1, 0.1, 0.1),
         port=str(folder / "port"),
@@ -69,7 +70,7 @@ def test_doctor_finds_a_sound_arm_sound(tauscope: Tauscope, folder: Path, emulat
 
 
 def test_doctor_names_what_is_wrong_and_what_to_do(tauscope: Tauscope, folder: Path, emulator: EmulatorProcess) -> None:
-    emulator.inject([InjectedFault(FaultKind.OVERLOAD, 3)])
+    emulator.inject(InjectedFault(FaultKind.OVERLOAD, 3))
     status, out, err = tauscope("doctor", folder / "arm.json", "--backend", "dynamixel")
     assert status == 1
     (failure,) = [line for line in out.splitlines() if line.startswith("failure")]

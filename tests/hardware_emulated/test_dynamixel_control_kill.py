@@ -19,8 +19,9 @@ from service.acquisition import BackendOrder, RunOptions, RunOrder, RunProcess, 
 from service.acquisition.dynamixel_bus import dynamixel_joints
 from service.excitation import ExcitationOptions, design_excitation, write_trajectory
 from service.robot import Robot, read_robot
-from sim_backend.dynamixel_bus import EmulatorOrder, EmulatorProcess
+from sim_backend.dynamixel_bus import DynamixelOrder
 from sim_backend.dynamixel_bus.robot_servos import servos_of
+from sim_backend.emulation import EmulatorProcess
 
 pytestmark = pytest.mark.realtime
 
@@ -46,7 +47,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     design = ExcitationOptions(period_s=4.0, periods=8, starts=1, slow_postures=0, closing_period=False)
     motion = design_excitation(robot, design).trajectory
     write_trajectory(motion, folder / "motion.json")
-    start = EmulatorOrder(
+    start = DynamixelOrder(
         servos=servos_of(robot),
         start=tuple((motion.start + 0.05).tolist()),
         port=str(folder / "port"),

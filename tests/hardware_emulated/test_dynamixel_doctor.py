@@ -10,7 +10,8 @@ from drivers.dynamixel import DynamixelJoint, examine, plan_frames, scan_bus
 from drivers.dynamixel.packets import FrameParser
 from drivers.inspection import PHASES, FoundDevice, Severity
 from hardware_emulated.dynamixel_bench import SLACK_S, Bench, bench, limits
-from sim_backend.dynamixel_bus import FaultKind, InjectedFault, ServoSpecification
+from sim_backend.dynamixel_bus import ServoSpecification
+from sim_backend.emulation import FaultKind, InjectedFault
 
 
 def joints(one: Bench, torque_constant: float | None = 0.01) -> list[DynamixelJoint]:
@@ -39,7 +40,7 @@ def test_every_finding_comes_with_a_remedy(tmp_path: Path) -> None:
         ServoSpecification(3, model_number=1060),
     )
     with bench(tmp_path, servos) as one:
-        one.emulator.inject([InjectedFault(FaultKind.OVERLOAD, 2)])
+        one.emulator.inject(InjectedFault(FaultKind.OVERLOAD, 2))
         asked = [*joints(one, None), DynamixelJoint("joint4", {"id": 9}, None)]
         findings = examine(asked, slack_s=SLACK_S)
     troubles = [finding for finding in findings if finding.severity is not Severity.GOOD]

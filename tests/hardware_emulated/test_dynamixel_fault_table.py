@@ -23,8 +23,9 @@ from service.excitation import ExcitationOptions, Trajectory, design_excitation
 from service.recording.journal_reading import read_journal
 from service.robot import Robot, read_robot
 from shared_data import REPOSITORY
-from sim_backend.dynamixel_bus import EmulatorOrder, EmulatorProcess, FaultKind, InjectedFault
+from sim_backend.dynamixel_bus import DynamixelOrder
 from sim_backend.dynamixel_bus.robot_servos import servos_of
+from sim_backend.emulation import EmulatorProcess, FaultKind, InjectedFault
 
 TABLE = REPOSITORY / "docs" / "reference" / "dynamixel-faults.md"
 PHASES = ("connect", "enable", "ramp", "run", "stop")
@@ -64,9 +65,16 @@ class Disturbed(DynamixelArm):
         self._strike("connect")
         return super().connect()
 
-    def enable(self, mode: ControlMode, limits: DriveLimits, stop_policy: StopPolicy, watchdog_s: float) -> ArmState:
+    def enable(
+        self,
+        mode: ControlMode,
+        limits: DriveLimits,
+        stop_policy: StopPolicy,
+        watchdog_s: float,
+        cycle_s: float | None = None,
+    ) -> ArmState:
         self._strike("enable")
-        return super().enable(mode, limits, stop_policy, watchdog_s)
+        return super().enable(mode, limits, stop_policy, watchdog_s, cycle_s)
 
     def exchange(self, setpoint: Setpoint) -> ArmState:
         self._cycle += 1
@@ -100,7 +108,7 @@ def site(tmp_path_factory: pytest.TempPathFactory):
     robot = read_robot(write_robot(three_joints(), folder / "arm.json", str(folder / "port")))
     design = ExcitationOptions(period_s=2.0, periods=1, starts=1, slow_postures=0, closing_period=False)
     motion = design_excitation(robot, design).trajectory
-    order = EmulatorOrder(
+    order = DynamixelOrder(
         servos=servos_of(robot),
         start=tuple((motion.start + 0.1).tolist()),
         port=str(folder / "port"),
@@ -116,7 +124,7 @@ def run(site: Site, kind: FaultKind, phase: str) -> tuple[RunRecord, Path]:
     site.emulator.reset()
     arm = Disturbed(dynamixel_joints(site.robot), slack_s=0.1, clock=SteppedClock(site.emulator))
     arm.phase = phase
-    arm.happen = lambda: site.emulator.inject([FAULTS[kind][0]])
+    arm.happen = lambda: site.emulator.inject(FAULTS[kind][0])
     folder = site.folder / f"{len(list(site.folder.iterdir()))}-{kind}-{phase}"
     options = RunOptions(rate_hz=100.0, watchdog_s=0.2)
     connect = lambda: Connection(arm, is_real_time=False)  # noqa: E731

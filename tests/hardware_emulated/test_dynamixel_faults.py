@@ -9,7 +9,7 @@ import pytest
 from drivers import ArmState, ControlMode, DriverError, StopPolicy
 from drivers.dynamixel import DynamixelArm
 from hardware_emulated.dynamixel_bench import WATCHDOG_S, Bench, drive, limits, setpoint
-from sim_backend.dynamixel_bus import FaultKind, InjectedFault
+from sim_backend.emulation import FaultKind, InjectedFault
 
 pytestmark = pytest.mark.realtime
 
@@ -57,7 +57,7 @@ def states_until(arm: DynamixelArm, wanted: Callable[[ArmState], bool], seconds:
 @pytest.mark.parametrize("kind", [FaultKind.LOSE, FaultKind.CORRUPT, FaultKind.LATE])
 def test_answer_that_does_not_come_is_not_a_number(three: Bench, kind: FaultKind) -> None:
     arm = running(three)
-    three.emulator.inject([FAULTS[kind]])
+    three.emulator.inject(FAULTS[kind])
     states = drive(arm, still, 0.4)
     missed = [state for state in states if not state.fresh[1]]
     assert missed, "the missing samples are marked"
@@ -67,7 +67,7 @@ def test_answer_that_does_not_come_is_not_a_number(three: Bench, kind: FaultKind
 
 def test_duplicated_answers_do_no_harm(three: Bench) -> None:
     arm = running(three)
-    three.emulator.inject([FAULTS[FaultKind.DUPLICATE]])
+    three.emulator.inject(FAULTS[FaultKind.DUPLICATE])
     states = drive(arm, still, 0.3)
     for state in states:
         np.testing.assert_allclose(state.position[state.fresh], START, atol=0.05)
@@ -76,7 +76,7 @@ def test_duplicated_answers_do_no_harm(three: Bench) -> None:
 def test_late_answers_are_never_taken_for_new_ones(three: Bench) -> None:
     arm = three.enabled_arm()
     drive(arm, lambda t: setpoint(np.full(3, START)), 0.1)
-    three.emulator.inject([replace(FAULTS[FaultKind.LATE], at_s=0.05 * k, count=1) for k in range(1, 12)])
+    three.emulator.inject(*(replace(FAULTS[FaultKind.LATE], at_s=0.05 * k, count=1) for k in range(1, 12)))
     states = drive(arm, lambda t: setpoint(np.full(3, START + 0.8 * t)), 0.8)
     truth = {round(entry["monotonic_ns"] * 1e-6): entry["position"] for entry in three.emulator.trace()}
     instants = np.array(sorted(truth))
@@ -88,7 +88,7 @@ def test_late_answers_are_never_taken_for_new_ones(three: Bench) -> None:
 
 def test_silent_servo_costs_only_its_own_samples(three: Bench) -> None:
     arm = running(three)
-    three.emulator.inject([FAULTS[FaultKind.SILENT]])
+    three.emulator.inject(FAULTS[FaultKind.SILENT])
     states = drive(arm, still, 0.5)[2:]
     fresh = np.mean([state.fresh for state in states], axis=0)
     assert fresh[1] == 0.0
@@ -99,7 +99,7 @@ def test_silent_servo_costs_only_its_own_samples(three: Bench) -> None:
 @pytest.mark.parametrize("kind", list(HARDWARE))
 def test_hardware_error_is_decoded_within_a_few_cycles(three: Bench, kind: FaultKind) -> None:
     arm = running(three)
-    three.emulator.inject([FAULTS[kind]])
+    three.emulator.inject(FAULTS[kind])
     states = states_until(arm, lambda state: bool(state.faults) and state.faults[0].code != "hardware-error")
     assert codes(states[-1]) == [(HARDWARE[kind], 2)]
     fault = states[-1].faults[0]
@@ -113,7 +113,7 @@ def test_hardware_error_is_decoded_within_a_few_cycles(three: Bench, kind: Fault
 
 def test_servo_that_restarts_is_noticed(three: Bench) -> None:
     arm = running(three)
-    three.emulator.inject([FAULTS[FaultKind.RESET]])
+    three.emulator.inject(FAULTS[FaultKind.RESET])
     state = states_until(arm, lambda state: bool(state.faults))[-1]
     assert codes(state) == [("restarted", 2)]
     assert state.enabled.tolist() == [True, False, True]

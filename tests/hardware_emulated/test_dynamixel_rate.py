@@ -11,8 +11,9 @@ from service.acquisition import BackendOrder, RunOptions, RunOrder, RunProcess, 
 from service.excitation import ExcitationOptions, design_excitation, write_trajectory
 from service.recording.journal_reading import read_journal
 from service.robot import read_robot
-from sim_backend.dynamixel_bus import EmulatorOrder, EmulatorProcess
+from sim_backend.dynamixel_bus import DynamixelOrder
 from sim_backend.dynamixel_bus.robot_servos import servos_of
+from sim_backend.emulation import EmulatorProcess
 
 pytestmark = pytest.mark.realtime
 
@@ -26,7 +27,7 @@ def test_six_joints_at_200_hz(tmp_path: Path) -> None:
     motion = design_excitation(robot, design).trajectory
     write_trajectory(motion, tmp_path / "motion.json")
     # Pendulums in place of links: the physics of six links take a third of a processor.
-    order = EmulatorOrder(
+    order = DynamixelOrder(
         servos=servos_of(robot),
         start=tuple((motion.start + 0.05).tolist()),
         port=str(tmp_path / "port"),

@@ -75,6 +75,24 @@ def test_targets_are_followed_and_read_at_one_instant(bus: EmulatedBus, arm: Can
     assert np.abs(state.position - wanted).max() <= 0.002 + COUNT
 
 
+def test_drives_are_told_the_cycle_and_those_that_need_not_know_it_are_left_alone(
+    bus: EmulatedBus, arm: CanopenArm
+) -> None:
+    bus.drives[1].dictionary.put(0x60C2, -4, 2)
+    del bus.drives[2].dictionary.entries[0x60C2, 1]
+    arm.enable(ControlMode.POSITION, LIMITS, StopPolicy.HOLD, WATCHDOG_S, 0.004)
+    for drive in bus.drives[:2]:
+        assert (drive.dictionary.get(0x60C2, 1), drive.dictionary.get(0x60C2, 2)) == (4, -3)
+    assert all(state is PowerState.OPERATION_ENABLED for state in states(bus))
+
+
+def test_a_cycle_that_a_drive_does_not_take_is_refused_before_it_has_power(bus: EmulatedBus, arm: CanopenArm) -> None:
+    with pytest.raises(DriverError, match="choose another rate") as refusal:
+        arm.enable(ControlMode.POSITION, LIMITS, StopPolicy.HOLD, WATCHDOG_S, 0.5)
+    assert refusal.value.kind is DriverErrorKind.REFUSED
+    assert all(state is PowerState.SWITCH_ON_DISABLED for state in states(bus))
+
+
 def test_torque_mode_takes_torque_within_the_cap(bus: EmulatedBus, arm: CanopenArm) -> None:
     enabled(arm, ControlMode.TORQUE)
     arm.exchange(Setpoint(np.zeros(3), np.array([5.0, -5.0, 30.0])))

@@ -63,6 +63,7 @@ def test_planned_frames_are_those_of_the_standard() -> None:
     assert "601#2F60600008000000" in wires, "cyclic synchronous position"
     assert "601#2B5A600006000000" in wires, "quick stop, then hold"
     assert "602#2316100164007F00" in wires, "watch node 127 for 100 ms"
+    assert not any(wire.startswith("601#") and "C260" in wire for wire in wires), "nobody knows the cycle"
     assert "601#2B72600090010000" in wires, "10 Nm are 400 per mille of 0.5 Nm behind the gear"
     enabling = [frame.wire for frame in frames if frame.phase == "enable" and frame.wire.startswith("201#")]
     assert enabling == ["201#060000000000", "201#070000000000", "201#0F0000000000"]
@@ -78,6 +79,11 @@ def test_planned_frames_are_those_of_the_standard() -> None:
     ]
     assert frames[-3].wire == "201#020000800000"
     assert sorted({frame.phase for frame in frames}, key=PHASES.index) == list(PHASES)
+
+
+def test_drives_are_told_the_cycle() -> None:
+    frames = list(plan_frames(JOINTS, ControlMode.POSITION, LIMITS, 0.1, np.zeros((1, 2)), 0.005))
+    assert "602#2FC2600105000000" in [frame.wire for frame in frames], "5 units, of a millisecond as delivered"
 
 
 def test_a_dry_run_needs_the_rated_torque() -> None:

@@ -12,6 +12,8 @@ from drivers.dynamixel.packets import FrameParser, Status, checksum, decode_fast
 INSTRUCTIONS = {
     "ping": (packets.encode_ping(1), "FF FF FD 00 01 03 00 01 19 4E"),
     "ping all": (packets.encode_ping(), "FF FF FD 00 FE 03 00 01 31 42"),
+    # of the Y series: 'ERCL' behind a 2
+    "clear error": (packets.encode_clear_error(1), "FF FF FD 00 01 08 00 10 02 45 52 43 4C D5 EB"),
     "read": (packets.encode_read(1, 132, 4), "FF FF FD 00 01 07 00 02 84 00 04 00 1D 15"),
     "write": (packets.encode_write(1, 116, b"\x00\x02\x00\x00"), "FF FF FD 00 01 09 00 03 74 00 00 02 00 00 CA 89"),
     "sync read": (packets.encode_sync_read([1, 2], 132, 4), "FF FF FD 00 FE 09 00 82 84 00 04 00 01 02 CE FA"),

@@ -85,3 +85,19 @@ def test_it_starves_five_cycles_after_the_last_setpoint() -> None:
     feed(spline, float, [(4.0 * k, 0.0) for k in range(50)], range(197))
     assert not spline.starved(196.0 + 4.9 * 4.0)
     assert spline.starved(196.0 + 5.1 * 4.0)
+
+
+def test_a_period_that_was_told_is_kept_from_the_first_setpoint_on() -> None:
+    period, slope = 7.0, 0.01
+    arrivals = [(period * k, period * k) for k in range(60)]
+    targets = feed(SetpointSpline(np.zeros(1), period), lambda t: slope * t, arrivals, range(400))[35:]
+    np.testing.assert_allclose(targets[:, 0], slope * (np.arange(35, 400) - 2.0 * period), atol=1e-12)
+    np.testing.assert_allclose(targets[:, 1], slope, atol=1e-12)
+
+
+@pytest.mark.parametrize("late", [0.3, 0.6, 0.85])
+def test_a_late_setpoint_of_a_told_period_is_the_next_and_none_after_a_gap(late: float) -> None:
+    period, slope = 4.0, 0.01
+    arrivals = [(period * (k + (late if k == 40 else 0.0)), period * k) for k in range(80)]
+    targets = feed(SetpointSpline(np.zeros(1), period), lambda t: slope * t, arrivals, range(316))[60:]
+    np.testing.assert_allclose(targets[:, 1], slope, rtol=0.02)

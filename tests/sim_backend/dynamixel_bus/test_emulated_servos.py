@@ -5,10 +5,11 @@ import pytest
 
 from drivers.dynamixel import packets
 from drivers.dynamixel.packets import FrameParser, Status, decode_fast, decode_status
-from sim_backend.dynamixel_bus import Emulator, FaultKind, InjectedFault, ServoSpecification
+from sim_backend.dynamixel_bus import DynamixelEmulator, ServoSpecification
 from sim_backend.dynamixel_bus.arm import Pendulums
 from sim_backend.dynamixel_bus.bus import EmulatedBus
 from sim_backend.dynamixel_bus.servo import EmulatedServo
+from sim_backend.emulation import FaultKind, InjectedFault
 
 RETURN_DELAY, DRIVE_MODE, MODE, MAX_LIMIT = 9, 10, 11, 48
 TORQUE, HARDWARE_ERROR, WATCHDOG, GOAL_CURRENT, PROFILE_VELOCITY, GOAL_POSITION = 64, 70, 98, 102, 112, 116
@@ -23,7 +24,7 @@ class Master:
         specifications = [ServoSpecification(number, **specification) for number in range(1, count + 1)]  # pyright: ignore[reportArgumentType]
         arm = Pendulums([start] * count, weight=weight)
         servos = [EmulatedServo(one) for one in specifications]
-        self.emulator = Emulator(EmulatedBus(servos), [one.servo for one in specifications], arm, 0.0)
+        self.emulator = DynamixelEmulator(EmulatedBus(servos), [one.servo for one in specifications], arm, 0.0)
         self.time = 0.0
 
     def wait(self, seconds: float) -> bytes:

@@ -1,16 +1,17 @@
-"""What can go wrong on a bus of servos, to be set off by a test at an instant of its choice."""
+"""What can go wrong on a bus of drives, to be set off by a test at an instant of its choice."""
 
 import heapq
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import Any
 
 
 class FaultKind(StrEnum):
     """What happens."""
 
     LOSE = "lose"
-    """The servo's next answers do not arrive."""
+    """The device's next answers do not arrive."""
     CORRUPT = "corrupt"
     """One bit of them is wrong."""
     LATE = "late"
@@ -18,15 +19,15 @@ class FaultKind(StrEnum):
     DUPLICATE = "duplicate"
     """They arrive twice."""
     SILENT = "silent"
-    """The servo neither hears nor answers for `seconds`."""
+    """The device neither hears nor answers for `seconds`."""
     OVER_TEMPERATURE = "over-temperature"
     OVERLOAD = "overload"
     ENCODER_JUMP = "encoder-jump"
     """Its position jumps by `counts`."""
     RESET = "reset"
-    """The servo restarts and is away for `seconds`."""
+    """The device restarts and is away for `seconds`."""
     POWER_DIP = "power-dip"
-    """All servos restart and are away for `seconds`."""
+    """All devices restart and are away for `seconds`."""
 
 
 @dataclass(frozen=True)
@@ -35,10 +36,10 @@ class InjectedFault:
 
     kind : FaultKind
         what happens
-    servo : int
-        ID; of no matter for a power dip
+    device : int
+        ID of a servo or of a node; of no matter for a power dip
     at_s : float
-        when, in seconds of the device's clock; at once where that has passed [s]
+        when, by the emulator's clock, and in what a test asks for counted from then; at once where that has passed [s]
     count : int
         for how many answers
     seconds : float
@@ -48,49 +49,27 @@ class InjectedFault:
     """
 
     kind: FaultKind
-    servo: int = 0
+    device: int = 0
     at_s: float = 0.0
     count: int = 1
     seconds: float = 0.3
     counts: int = 0
 
 
-@dataclass
-class AnswerFaults:
-    """What is to happen to the next answers of one servo.
+def faults_from(documents: Iterable[dict[str, Any]], now_s: float) -> list[InjectedFault]:
+    """Faults that a test asks for, by the emulator's clock.
 
-    kind : FaultKind or None
-        None for nothing
-    count : int
-        how many answers are left
-    seconds : float
-        how late
+    Parameters
+    ----------
+    documents : iterable of dict
+        fields of `InjectedFault`, the instants counted from now
+    now_s : float
+        present instant [s]
     """
-
-    kind: FaultKind | None = None
-    count: int = 0
-    seconds: float = 0.0
-
-    def apply(self, frame: bytes, due_s: float) -> list[tuple[float, bytes]]:
-        """An answer as it arrives: not at all, once or twice.
-
-        Parameters
-        ----------
-        frame : bytes
-            as it was sent
-        due_s : float
-            when it would arrive [s]
-        """
-        if self.kind is None or self.count <= 0:
-            return [(due_s, frame)]
-        self.count -= 1
-        if self.kind is FaultKind.LOSE:
-            return []
-        if self.kind is FaultKind.CORRUPT:
-            return [(due_s, frame[:-3] + bytes([frame[-3] ^ 0x10]) + frame[-2:])]
-        if self.kind is FaultKind.LATE:
-            return [(due_s + self.seconds, frame)]
-        return [(due_s, frame), (due_s, frame)]
+    return [
+        InjectedFault(**{**document, "kind": FaultKind(document["kind"]), "at_s": now_s + document["at_s"]})
+        for document in documents
+    ]
 
 
 @dataclass(order=True)

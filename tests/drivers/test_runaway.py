@@ -1,21 +1,17 @@
-"""Limits that the driver keeps where servos are given current: by closed form, one joint at a time."""
+"""Limits that a driver keeps where drives are given torque: by closed form, one joint at a time."""
 
 import numpy as np
 import pytest
 
 from drivers import DriveLimits
-from drivers.dynamixel.configuration import ServoConfiguration
-from drivers.dynamixel.runaway import CATCH_S, PERSISTENCE, SPEED_MARGIN, RunawayWatch
-from drivers.dynamixel.servo import make_servo
+from drivers.limits import CATCH_S, PERSISTENCE, SPEED_MARGIN, RunawayWatch
 
-XM430 = (1020, 52)
 LIMITS = DriveLimits(np.full(2, -1.0), np.full(2, 1.0), np.full(2, 2.0), np.full(2, 5.0))
 
 
 @pytest.fixture
 def watch() -> RunawayWatch:
-    servos = [make_servo(number, ServoConfiguration(f"j{number}", number), XM430) for number in (1, 2)]
-    return RunawayWatch(servos, LIMITS)
+    return RunawayWatch(LIMITS)
 
 
 def look(watch: RunawayWatch, position: float, velocity: float):

@@ -1,0 +1,77 @@
+"""Targets that drives in cyclic synchronous position mode are sent."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from drivers import DriveLimits, Setpoint
+from drivers.canopen.target_limiter import TargetLimiter
+from drivers.limits import SPEED_MARGIN
+
+LOW, HIGH, SPEED, TORQUE = -1.0, 1.5, 0.8, 20.0
+BOUNDS = DriveLimits(*(np.full(2, value) for value in (LOW, HIGH, SPEED, TORQUE)))
+CYCLE_NS = 5_000_000
+CYCLE_S = 1e-9 * CYCLE_NS
+
+
+def setpoint(position: float, torque: float = 0.0) -> Setpoint:
+    return Setpoint(np.full(2, position), np.full(2, torque))
+
+
+def sent_towards(target: float, instants_ns: Sequence[int]) -> np.ndarray:
+    limiter = TargetLimiter(BOUNDS, np.zeros(2), CYCLE_S)
+    return np.array([limiter.limited(setpoint(target), now_ns).position[0] for now_ns in instants_ns])
+
+
+def test_targets_within_the_limits_are_passed_on_exactly() -> None:
+    limiter = TargetLimiter(BOUNDS, np.zeros(2), CYCLE_S)
+    for cycle in range(400):
+        wanted = 0.4 * (1.0 - np.cos(1.5 * cycle * CYCLE_S))
+        np.testing.assert_array_equal(limiter.limited(setpoint(wanted), cycle * CYCLE_NS).position, wanted)
+
+
+def test_a_leap_is_approached_at_the_speed_limit_and_not_overrun() -> None:
+    sent = sent_towards(1.0, range(0, 400 * CYCLE_NS, CYCLE_NS))
+    speed = np.diff(sent, prepend=0.0) / CYCLE_S
+    assert speed.max() <= SPEED * (1.0 + 1e-9)
+    assert speed.max() > 0.95 * SPEED
+    # also from rest, however long ago the arm was enabled
+    assert np.abs(np.diff(speed, prepend=0.0)).max() < 2.0 * SPEED * CYCLE_S / 0.1
+    assert sent.max() <= 1.0
+    assert sent[-1] == pytest.approx(1.0, abs=1e-9)
+
+
+@given(arrays(np.int64, 100, elements=st.integers(0, int(0.85 * CYCLE_NS))))
+def test_a_target_that_comes_late_goes_no_further_than_one_in_time(late_ns: np.ndarray) -> None:
+    """A drive interpolates over the cycle that it was told: the steps have to be those of whole cycles."""
+    late_ns[0] = 0
+    in_time = np.arange(100) * CYCLE_NS
+    np.testing.assert_array_equal(sent_towards(1.0, (in_time + late_ns).tolist()), sent_towards(1.0, in_time.tolist()))
+
+
+def test_cycles_that_were_skipped_are_made_up_for() -> None:
+    in_time = np.arange(100)
+    skipping = np.delete(in_time, [30, 31, 60])
+    whole, partly = (sent_towards(1.0, (cycles * CYCLE_NS).tolist()) for cycles in (in_time, skipping))
+    np.testing.assert_allclose(partly[30:50], whole[skipping[30:50]], atol=0.002)
+
+
+def test_after_a_stall_a_burst_of_targets_keeps_to_the_speed_limit() -> None:
+    instants = [*range(0, 60 * CYCLE_NS, CYCLE_NS), *(66 * CYCLE_NS + 100_000 * k for k in range(6))]
+    sent = sent_towards(1.0, instants)
+    assert sent[-1] - sent[59] <= SPEED * 7 * CYCLE_S * (1.0 + 1e-9)
+
+
+@given(arrays(np.float64, (30, 2), elements=st.floats(-1e6, 1e6)), st.floats(-1e6, 1e6))
+def test_whatever_is_asked_for_stays_within_range_speed_and_torque(asked: np.ndarray, torque: float) -> None:
+    limiter, before = TargetLimiter(BOUNDS, np.zeros(2), CYCLE_S), np.zeros(2)
+    for cycle, row in enumerate(asked):
+        sent = limiter.limited(Setpoint(row, np.full(2, torque)), cycle * CYCLE_NS)
+        assert ((sent.position >= LOW) & (sent.position <= HIGH)).all()
+        assert (np.abs(sent.torque) <= TORQUE).all()
+        assert (np.abs(sent.position - before) <= SPEED_MARGIN * SPEED * 0.007 + 1e-12).all()
+        before = sent.position
