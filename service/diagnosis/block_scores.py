@@ -8,8 +8,8 @@ import numpy as np
 
 from service.diagnosis.blocks import add_block_sums
 from service.diagnosis.fit import Fit
-from service.diagnosis.model import Term
 from service.diagnosis.screening import Screen, model_signals
+from service.diagnosis.term import Term
 
 
 def score_inflation(term: Term, before: Fit, after: Fit, screen: Screen) -> tuple[float, int]:

@@ -7,6 +7,7 @@ import numpy as np
 
 from service.diagnosis.confirmation import Confirmation
 from service.diagnosis.fit import Fit
+from service.diagnosis.observations import Observations
 from service.diagnosis.screening import Candidate
 
 CERTAIN = 3.0
@@ -99,17 +100,25 @@ def is_physical(option: Option, before: Fit) -> bool:
     term = option.fit.model.terms[-1]
     signs = zip(term.effect.coefficients, term.coefficients, strict=True)
     possible = all(abs(value) <= each.largest and (value >= 0.0 or not each.positive) for each, value in signs)
-    return option.gain > 0.0 and possible and not _driving(option.fit) - _driving(before)
+    return option.gain > 0.0 and possible and not driving(option.fit) - driving(before)
 
 
-def _driving(fit: Fit) -> set[tuple[int, str]]:
-    """Joints and coefficients at which the nominal friction would drive the motion, by `CERTAIN` standard errors."""
+def driving(fit: Fit, *, certain: float = CERTAIN) -> set[tuple[int, str]]:
+    """Joints and coefficients at which the nominal friction would drive the motion.
+
+    Parameters
+    ----------
+    fit : Fit
+        the model
+    certain : float
+        by how many standard errors
+    """
     model, std = fit.model, np.sqrt(np.maximum(np.diag(fit.covariance), 0.0) * fit.inflation())
     found = set()
     for joint in range(model.structure.robot.joint_count):
         for name in ("stiction", "viscous"):
             column = model.structure.coefficient(joint, name)
-            if column is not None and model.parameters[column] < -CERTAIN * std[column]:
+            if column is not None and model.parameters[column] < -certain * std[column]:
                 found.add((joint, name))
     return found
 
@@ -127,3 +136,25 @@ def distinct(options: Sequence[Option]) -> tuple[Option, ...]:
         if place_of(option.candidate) not in [place_of(other.candidate) for other in kept]:
             kept.append(option)
     return tuple(kept)
+
+
+def outsized(option: Option, observations: Observations) -> bool:
+    """Whether the last term's torque exceeds all that was measured at a joint: it then only cancels other columns.
+
+    Parameters
+    ----------
+    option : Option
+        the effect, fitted
+    observations : Observations
+        the recordings
+    """
+    term = option.fit.model.terms[-1]
+    if term.effect.swallows:
+        return False
+    touched = list(term.effect.touched(observations.robot.joint_count))
+    own, measured = np.zeros(len(touched)), np.zeros(len(touched))
+    for piece in observations:
+        rows = option.fit.model.term_torque(term, option.fit.model.signals(piece))
+        own += np.mean(rows**2, axis=tuple(range(1, rows.ndim))) * rows.shape[-1]
+        measured += np.mean(piece.prepared.motion.torque[..., touched] ** 2, axis=(0, 1)) * rows.shape[-1]
+    return bool((own > measured).any())

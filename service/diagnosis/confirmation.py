@@ -6,10 +6,11 @@ import numpy as np
 
 from service.diagnosis.blocks import add_block_sums
 from service.diagnosis.fit import Fitter
-from service.diagnosis.model import ExtendedModel, Term
+from service.diagnosis.model import ExtendedModel
 from service.diagnosis.observations import Observations
 from service.diagnosis.projection import moments
 from service.diagnosis.screening import Screen, model_signals
+from service.diagnosis.term import Term
 from service.recording.recording import Array
 
 CLEARLY_WORSE = -3.0
@@ -36,6 +37,9 @@ predicts still has to be better than what is predicted without it."""
 
 TELLS_NOTHING = 1.0
 """…and below which the held-out motion does not even do that."""
+
+PREDICTED = 4.0
+"""Energy of a joint's residual on held-out motion, noise variances a row, up to which that motion is predicted."""
 
 
 @dataclass(frozen=True)
@@ -73,8 +77,18 @@ class Confirmation:
             return not cautious or self.gain_z > CLEARLY_BETTER
         if self.seen_z > max(PLAINLY_SEEN, SAME_SIZE * self.expected_z):
             return True
+        if not cautious:
+            return self.favour > 0.0
         seen = self.expected_z < SHOULD_BE_SEEN or self.seen_z > SEEN_AGAIN
-        return seen and self.gain > 0.0 and (not cautious or self.gain_z > CLEARLY_BETTER)
+        return seen and self.gain > 0.0 and self.gain_z > CLEARLY_BETTER
+
+    @property
+    def favour(self) -> float:
+        """Logarithm of how much likelier the held-out recordings are with the finding as it is than without it.
+
+        Of its size, found anew with parameters of their own, z·E[z] - E[z]²/2; and of their prediction, half its gain.
+        """
+        return self.expected_z * self.seen_z - 0.5 * self.expected_z**2 + 0.5 * self.gain
 
 
 class HeldOut:
@@ -107,6 +121,16 @@ class HeldOut:
         expected, seen = self._seen_again(before, after, term)
         return Confirmation(total, total / max(spread, np.finfo(float).tiny), expected, seen)
 
+    def predicted_by(self, model: ExtendedModel) -> bool:
+        """Whether a model leaves no joint much more than noise; else the training motion was too poor to say anything.
+
+        Parameters
+        ----------
+        model : ExtendedModel
+            fitted to the training recordings
+        """
+        return all(float(row @ row) <= PREDICTED * len(row) for row in self.fitter.white_residual(model))
+
     def block_gains(self, before: ExtendedModel, after: ExtendedModel) -> Array:
         """Decrease of the whitened residual's energy in blocks of `BLOCK_S`, (b,).
 
@@ -116,10 +140,31 @@ class HeldOut:
             models to compare
         """
         gains: dict[tuple[int, int], float] = {}
-        rows = zip(self.fitter.white_residual(before), self.fitter.white_residual(after), strict=True)
-        for joint, (old, new) in enumerate(rows):
-            add_block_sums(gains, *self.observations.row_labels(joint), old**2 - new**2)
+        for joint, rows in enumerate(self._row_gains(before, after)):
+            add_block_sums(gains, *self.observations.row_labels(joint), rows)
         return np.array(list(gains.values()))
+
+    def joint_gains_z(self, before: ExtendedModel, after: ExtendedModel) -> Array:
+        """The same decrease joint by joint, each in its own standard errors, (n,).
+
+        Parameters
+        ----------
+        before, after : ExtendedModel
+            models to compare
+        """
+        found = []
+        for joint, rows in enumerate(self._row_gains(before, after)):
+            gains: dict[tuple[int, int], float] = {}
+            add_block_sums(gains, *self.observations.row_labels(joint), rows)
+            blocks = np.array(list(gains.values()))
+            spread = float(blocks.std(ddof=1) * np.sqrt(len(blocks))) if len(blocks) > 1 else np.inf
+            found.append(float(blocks.sum()) / max(spread, np.finfo(float).tiny))
+        return np.array(found)
+
+    def _row_gains(self, before: ExtendedModel, after: ExtendedModel) -> list[Array]:
+        """Decrease of every whitened row's square, (R_j,) a joint."""
+        rows = zip(self.fitter.white_residual(before), self.fitter.white_residual(after), strict=True)
+        return [old**2 - new**2 for old, new in rows]
 
     def _seen_again(self, before: ExtendedModel, after: ExtendedModel, term: Term) -> tuple[float, float]:
         """The term along its training coefficients: expected and found, in standard errors of these recordings."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 from service.diagnosis.catalogue import Setting
@@ -117,8 +118,14 @@ class Diagnosis:
                 any(self.misfit_before.significant),
                 any(self.misfit_after.significant),
                 self.constancy.holds,
+                self.predicts,
             )
         )
+
+    @cached_property
+    def predicts(self) -> bool:
+        """Whether the final model predicts the held-out recordings, where there are any."""
+        return self.held_out is None or self.held_out.predicted_by(self.selection.fit.model)
 
     @property
     def inflation(self) -> float:

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
+from service.diagnosis.admission import LEVEL
 from service.diagnosis.band import diagnosis_cutoff
 from service.diagnosis.catalogue import Effect, Setting, doubtful_effects, possible_effects
 from service.diagnosis.catalogue.payload import Payload
@@ -19,17 +20,18 @@ from service.diagnosis.diagnosed import Diagnosis
 from service.diagnosis.events import beside_events
 from service.diagnosis.findings import Finding, FitSizes, selected_findings, sizes
 from service.diagnosis.fit import Fitter
-from service.diagnosis.friction_slopes import open_slopes, with_fitting_slopes
+from service.diagnosis.friction_slopes import open_slopes, open_stribeck, with_fitting_slopes, with_fitting_stribeck
 from service.diagnosis.lack_of_fit import lack_of_fit
 from service.diagnosis.location import locate
-from service.diagnosis.model import ExtendedModel, Term
+from service.diagnosis.model import ExtendedModel
 from service.diagnosis.noise_floor import with_noise
 from service.diagnosis.nominal import delivered_model, identified_rotors, nominal_model, setting_of
 from service.diagnosis.observations import Observations
 from service.diagnosis.plain_findings import undeclared_offsets, with_plain_terms
 from service.diagnosis.regressor_noise import row_weights
 from service.diagnosis.screening import Candidate, Screen
-from service.diagnosis.selection import LEVEL, Selector
+from service.diagnosis.selection import Selector
+from service.diagnosis.term import Term
 from service.identification import Identification, Options, identify
 from service.recording.conditioning import Conditioner
 from service.recording.recording import Recording
@@ -38,6 +40,9 @@ from service.robot import Robot
 __all__ = ["Diagnosis", "Finding", "FitSizes", "diagnose"]
 
 Progress = Callable[[str], None]
+
+CLEARLY = 2.0
+"""Standard errors by which one of two models predicts a joint better."""
 
 DEFAULT = Options()
 """An identification as nobody asked otherwise."""
@@ -94,6 +99,7 @@ def diagnose(
     ]
     screen, fitter = Screen(rows, effects), Fitter(rows)
     model = with_fitting_slopes(model, fitter, open_slopes(identification), setting.speed)
+    model = with_fitting_stribeck(model, fitter, open_stribeck(identification), setting.speed)
     selection = Selector(screen, fitter, confirming, pure_error=pure_error).select(model, rotors, progress)
     if confirming is not None and identification.constrained:
         selection = _unless_plainer_is_better(selection, delivered_model(identification), confirming)
@@ -106,8 +112,13 @@ def _unless_plainer_is_better(selection: Selection, delivered: ExtendedModel, he
     """Nothing selected, where the plain model of a possible body predicts held-out motion better than all of it.
 
     Motion that excites an arm too poorly leaves free parameters that no body has; findings then explain their errors.
+    Joints are counted, not their energy: the one with the least noise would else speak for all.
     """
-    if not selection.choices or held_out.block_gains(delivered, selection.fit.model).sum() > 0.0:
+    if not selection.choices:
+        return selection
+    gains = held_out.joint_gains_z(delivered, selection.fit.model)
+    better, worse = (int((sign * gains > CLEARLY).sum()) for sign in (1.0, -1.0))
+    if better > worse or (better == worse and held_out.block_gains(delivered, selection.fit.model).sum() > 0.0):
         return selection
     return Selection(selection.nominal, selection.nominal, (), (*selection.rejected, *selection.choices))
 

@@ -265,9 +265,11 @@ def _open_question(diagnosis: Diagnosis, names: Sequence[str]) -> tuple[list[str
             return [effect.name(names) for effect in effects], "record " + "; and ".join(motions)
     if diagnosis.verdict is Verdict.INCONCLUSIVE:
         moved = sorted({parameter_names(diagnosis)[move.parameter] for move in diagnosis.constancy.moves})
-        why = "the parameters do not hold from one recording to the next" + (
-            f" ({', '.join(moved[:4])})" if moved else ""
-        )
+        if diagnosis.constancy.holds:
+            why = "the training motion does not say what held-out motion asks for"
+        else:
+            why = "the parameters do not hold from one recording to the next"
+        why += f" ({', '.join(moved[:4])})" if moved else ""
         why += ": record one motion through the whole range of positions and speeds, slow reversals included"
         return [], why
     if diagnosis.verdict is Verdict.UNEXPLAINED:

@@ -11,11 +11,13 @@ import numpy as np
 
 from service.diagnosis.catalogue import Effect, TimeLocalEffect
 from service.diagnosis.fit import Fit, Fitter
-from service.diagnosis.model import ExtendedModel, Term, residual_rows, with_terms
+from service.diagnosis.model import ExtendedModel, with_terms
 from service.diagnosis.noise_floor import with_noise
 from service.diagnosis.observations import Observations
 from service.diagnosis.refinement import refined
+from service.diagnosis.residual import residual_rows
 from service.diagnosis.screening import Candidate, Screen, model_signals
+from service.diagnosis.term import Term
 from service.diagnosis.whitening import JointNoise
 from service.identification.autocorrelation import Autoregression
 from service.recording.recording import Array

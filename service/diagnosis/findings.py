@@ -10,9 +10,11 @@ from service.diagnosis.choice import Choice, Option, Selection
 from service.diagnosis.confirmation import HeldOut
 from service.diagnosis.fit import Fit, Fitter
 from service.diagnosis.interleaved import interleaved_confirmation
-from service.diagnosis.model import ExtendedModel, Term, raw_squares, with_terms
+from service.diagnosis.model import ExtendedModel, with_terms
 from service.diagnosis.observations import Observations
+from service.diagnosis.residual import raw_squares
 from service.diagnosis.screening import Screen
+from service.diagnosis.term import Term
 from service.recording.recording import Array
 
 
@@ -109,7 +111,7 @@ def selected_findings(
         factor by which the residual exceeds the modelled noise
     """
     fit = selection.fit
-    covariance = fit.covariance * inflation
+    covariance = fitter.covariance(fit) * inflation
     groups: dict[tuple[str, int | None], list[int]] = {}
     for place, term in enumerate(fit.model.terms):
         groups.setdefault((term.effect.id, term.effect.joint), []).append(place)

@@ -4,9 +4,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from service.diagnosis.model import ExtendedModel, Term, residual_rows, with_terms
+from service.diagnosis.model import ExtendedModel, with_terms
 from service.diagnosis.observations import Observations
 from service.diagnosis.projection import JointColumns, Projection, project
+from service.diagnosis.residual import residual_rows
+from service.diagnosis.term import Term
 from service.recording.recording import Array
 
 STEPS = 8
@@ -111,7 +113,7 @@ class Fitter:
         residual, columns = self._linearised(model)
         linear = np.ones(model.size, dtype=bool)
         linear[model.structure.size : model.structure.size + len(model.constants)] = False
-        linear[list(model.held)] = False
+        linear[list(model.unmoved)] = False
         for term, place in zip(model.terms, model.term_places(), strict=True):
             linear[place.start + len(term.coefficients) : place.stop] = False
         kept = [linear[own.index] for own in columns]
@@ -137,6 +139,18 @@ class Fitter:
         """
         residual, columns = self._linearised(model)
         return Fit(model, self._project(columns, residual, model))
+
+    def covariance(self, fit: Fit) -> Array:
+        """Covariance of all parameters, those that a term displaced as uncertain as they would be without that, (p, p).
+
+        Parameters
+        ----------
+        fit : Fit
+            the model at its optimum
+        """
+        if not any(term.displaced for term in fit.model.terms):
+            return fit.covariance
+        return self.projected(with_terms(fit.model, [replace(t, displaced=()) for t in fit.model.terms])).covariance
 
     def white_residual(self, model: ExtendedModel) -> list[Array]:
         """Whitened residual of a model as it is, (R_j,) a joint.
@@ -250,7 +264,7 @@ def _stepped(model: ExtendedModel, step: Array, share: float, start: list[float]
         shape = term.shape.copy()
         for free, change in zip(term.free_shapes, own[count:], strict=True):
             shape[free] = _moved_shape(term, free, float(change))
-        moved.append(Term(term.effect, shape, term.coefficients + own[:count]))
+        moved.append(replace(term, shape=shape, coefficients=term.coefficients + own[:count]))
     stepped = replace(
         model, structure=model.structure.with_terms(tuple(terms)), parameters=model.parameters + share * step[:size]
     )

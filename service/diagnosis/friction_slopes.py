@@ -132,6 +132,7 @@ def _with_stribeck(model: ExtendedModel, joint: int, delta: float) -> ExtendedMo
     terms[joint] = replace(terms[joint], delta=delta)
     structure = model.structure.with_terms(tuple(terms))
     place = structure.coefficient(joint, "stribeck")
+    assert place is not None  # noqa: S101 (the term was just added)
     return replace(
         model,
         structure=structure,

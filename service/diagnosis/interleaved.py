@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from service.diagnosis.confirmation import CLEARLY_WORSE, Confirmation, HeldOut
 from service.diagnosis.fit import Fit
-from service.diagnosis.model import Term
 from service.diagnosis.observations import Observations
 from service.diagnosis.screening import Screen, model_signals
+from service.diagnosis.term import Term
 from service.recording.recording import Array
 
 NOT_THERE = Confirmation(0.0, -np.inf, np.inf, 0.0)

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from service.diagnosis.fit import Fit
-from service.diagnosis.model import residual_rows
 from service.diagnosis.observations import BoolArray, Observations
+from service.diagnosis.residual import residual_rows
 from service.recording.recording import Array
 
 BINS = 12

@@ -5,16 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from service.diagnosis.catalogue import Effect, Signals
-from service.diagnosis.observations import Observations, Piece
+from service.diagnosis.catalogue import Signals
+from service.diagnosis.observations import Piece
+from service.diagnosis.term import Term, shape_step
 from service.dynamics import smooth_sign, smooth_sign_slope
 from service.identification.shape_sensitivity import ShapeParameter
 from service.identification.structure import ModelStructure
 from service.recording.recording import Array
-
-DIFFERENCE = 1e-3
-"""Step of a shape parameter for its derivative, relative to its bounds or, where logarithmic, to itself."""
-
 
 HOLDING = 1e8
 """Inverse of the standard error [SI] of a parameter that no fit may move."""
@@ -24,33 +21,6 @@ SIGNALS_KEPT = 3
 
 STATED_ERROR = 0.15
 """Relative standard error of a constant of the friction curve that the robot file states: it may be a guess."""
-
-
-@dataclass(frozen=True, eq=False)
-class Term:
-    """An effect in the model.
-
-    effect : Effect
-        its form and place
-    shape : (k,) float64
-        values of its shape parameters
-    coefficients : (c,) float64
-        values of its coefficients
-    """
-
-    effect: Effect
-    shape: Array
-    coefficients: Array
-
-    @property
-    def free_shapes(self) -> list[int]:
-        """Places of the shape parameters that are estimated, not merely chosen."""
-        return [place for place in range(len(self.shape)) if self.effect.is_free(place)]
-
-    @property
-    def size(self) -> int:
-        """Number of its parameters: coefficients, then free shapes."""
-        return len(self.coefficients) + len(self.free_shapes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +61,11 @@ class ExtendedModel:
         """K_v of every joint's friction, (n,) [s/rad or s/m]."""
         return np.array([terms.k_v for terms in self.structure.terms])
 
+    @property
+    def unmoved(self) -> tuple[int, ...]:
+        """Places among Θ that no fit moves: those held, and those that a term displaces."""
+        return tuple({*self.held, *(place for term in self.terms for place in term.displaced)})
+
     def constant(self, place: int) -> float:
         """Present value of an estimated constant of the friction curve.
 
@@ -110,7 +85,7 @@ class ExtendedModel:
         is held, as measured `HOLDING` times better than any data can.
         """
         rows, left = [], []
-        for place in self.held:
+        for place in self.unmoved:
             row = np.zeros(self.size)
             row[place] = HOLDING
             rows.append(row)
@@ -190,6 +165,7 @@ class ExtendedModel:
         motion = prepared.motion
         bodies = np.where(np.arange(structure.size) < structure.base_count, self.parameters, 0.0)
         whole, rigid = prepared.predicted_torque(structure, np.stack([self.parameters, bodies]))
+        load, acceleration = (piece.without_noise_of_inertia(rows) for rows in (rigid, motion.acceleration.T))
         steepness = self.steepness
         velocity = np.ascontiguousarray(motion.velocity.T)
         return Signals(
@@ -199,9 +175,9 @@ class ExtendedModel:
             recording=prepared.recording,
             position=np.ascontiguousarray(motion.position.T),
             velocity=velocity,
-            acceleration=np.ascontiguousarray(motion.acceleration.T),
-            load=rigid,
-            torque=whole,
+            acceleration=acceleration,
+            load=load,
+            torque=whole - rigid + load,
             step=smooth_sign(velocity, steepness[:, None]),
             steepness=steepness,
             bodies=self.standard_parameters(),
@@ -246,87 +222,6 @@ class ExtendedModel:
             ahead, behind = columns[1 + 2 * number], columns[2 + 2 * number]
             rows.append(np.tensordot(term.coefficients, ahead - behind, axes=1) / (2.0 * step))
         return np.stack(rows)
-
-
-def shape_step(term: Term, place: int) -> float:
-    """Step of a shape parameter for its derivative.
-
-    Parameters
-    ----------
-    term : Term
-        the effect in the model
-    place : int
-        which of its shape parameters
-    """
-    effect = term.effect
-    if effect.shapes[place].logarithmic:
-        return DIFFERENCE * abs(float(term.shape[place]))
-    return DIFFERENCE * 0.1 * float(effect.upper[place] - effect.lower[place]) + 1e-12
-
-
-def predicted_rows(model: ExtendedModel, piece: Piece) -> Array:
-    """The model's torque in the common band, all repetitions, (n, P M).
-
-    Parameters
-    ----------
-    model : ExtendedModel
-        the model
-    piece : Piece
-        from the observations
-    """
-    signals = model.signals(piece)
-    total = piece.repeated(piece.prepared.motion.band.reduce(signals.torque))
-    if model.terms:
-        total = total.copy()
-    for term in model.terms:
-        touched = list(term.effect.touched(len(total)))
-        total[touched] += piece.reduced(model.term_torque(term, signals))
-    return total
-
-
-def residual_rows(model: ExtendedModel, observations: Observations) -> list[list[Array]]:
-    """Measured less modelled torque in the common band: per joint, per piece, (1, P M).
-
-    Parameters
-    ----------
-    model : ExtendedModel
-        the model
-    observations : Observations
-        the data
-    """
-    predicted = [predicted_rows(model, piece) for piece in observations]
-    joints = range(observations.robot.joint_count)
-    return [
-        [measured - rows[joint] for measured, rows in zip(observations.torque(joint), predicted, strict=True)]
-        for joint in joints
-    ]
-
-
-def raw_squares(model: ExtendedModel, observations: Observations) -> tuple[Array, Array]:
-    """Σ e² and number of samples of every joint at the recorded rate, no filter, (n,) each.
-
-    Parameters
-    ----------
-    model : ExtendedModel
-        the model
-    observations : Observations
-        the data
-    """
-    count = observations.robot.joint_count
-    squares, samples = np.zeros(count), np.zeros(count)
-    for piece in observations:
-        signals, motion = model.signals(piece), piece.prepared.motion
-        predicted = np.repeat(signals.torque[:, None], piece.repetitions, axis=1)
-        for term in model.terms:
-            torque = term.effect.torque_of(signals, term.coefficients, term.shape)
-            predicted[list(term.effect.touched(count))] += torque if torque.ndim == 3 else torque[:, None]
-        own = motion.own
-        measured = motion.torque[:, own].transpose(2, 0, 1)
-        known = motion.measured[:, own].transpose(2, 0, 1)
-        error = np.where(known, measured - predicted[..., own], 0.0)
-        squares += np.einsum("jpt,jpt->j", error, error)
-        samples += known.sum(axis=(1, 2))
-    return squares, samples
 
 
 def with_terms(model: ExtendedModel, terms: Sequence[Term]) -> ExtendedModel:

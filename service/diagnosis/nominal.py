@@ -113,6 +113,7 @@ def setting_of(
         top_torque=np.abs(torque).max(axis=1),
         durations=_durations(observations),
         cutoff_hz=nyquist if cutoff_hz is None else cutoff_hz,
+        position_std=np.max([conditioner.position_noise_std for conditioner in conditioners], axis=0),
     )
 
 

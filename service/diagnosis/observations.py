@@ -12,18 +12,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from service.diagnosis.spikes import without_spikes
 from service.diagnosis.whitening import JointNoise
 from service.dynamics.base_parameters import BaseParameters
 from service.identification.dataset import Dataset, PreparedMotion
 from service.recording.conditioning import Conditioner
+from service.recording.conditioning.filters import smooth
 from service.recording.recording import Array
 from service.robot import Robot
 
 BoolArray = NDArray[np.bool_]
 
-BLURRED = 0.4
-"""Noise of the velocity, relative to the width 1/K_v of friction's step, up to which the motion's own band is opened:
-narrower it rounds off how a joint sticks at its reversals, wider its noise blurs the step."""
+BLURRED = 2.0
+"""Noise of the velocity, relative to the width 1/K_v of friction's step, up to which the motion's own band is opened.
+Narrower it rounds off how a joint sticks at its reversals, always to the same side, which looks like a delay or like
+bristles; wider its noise blurs the step to either side, which the rows' weights know of."""
+
+QUIET = 0.4
+"""…and up to which it is opened for what the torque is at single samples, where no band takes that noise out again."""
 
 STATE_BANDS = (2.0, 8.0)
 """Narrowest and widest band of the motion relative to the common one."""
@@ -62,6 +68,8 @@ class Piece:
         band of the motion itself [Hz]
     velocity_std : (n,) float64
         noise of its velocity in that band [rad/s or m/s]
+    quiet_hz, rigid_hz : float or None
+        bands in which the velocities say most of single samples, and the accelerations [Hz]; None for no filter
     memory : dict
         what others have made of this piece and may need again
     """
@@ -72,6 +80,8 @@ class Piece:
     time: Array
     state_hz: float
     velocity_std: Array
+    quiet_hz: float | None = None
+    rigid_hz: float | None = None
     memory: dict[str, Any] = field(default_factory=dict, repr=False)
 
     @property
@@ -104,6 +114,21 @@ class Piece:
             in the common band
         """
         return rows if self.repetitions == 1 else np.tile(rows, (1, self.repetitions))
+
+    def without_noise_of_inertia(self, values: Array) -> Array:
+        """Accelerations, or torque of the links (n, N), without what lies far above the common band.
+
+        Friction's step needs the motion's whole band; inertia does not, and multiplies that band's noise by the square
+        of its frequency, which a column that is not linear in it would fold back.
+
+        Parameters
+        ----------
+        values : (n, N) float64
+            at the recorded rate
+        """
+        if self.rigid_hz is None:
+            return np.ascontiguousarray(values)
+        return np.ascontiguousarray(smooth(values.T, self.prepared.motion.rate_hz, self.rigid_hz).T)
 
     def row_times(self) -> Array:
         """Instant of every row, (P M,) [s]."""
@@ -163,13 +188,18 @@ class Observations:
             K_v of every joint's friction, for the band of the motion itself [s/rad or s/m]
         """
         starts = [float(c.recording.samples(0, 1).time[0]) for c in conditioners]
-        bands = [_state_cutoff(c, cutoff_hz, steepness) for c in conditioners]
+        bands = [_state_cutoff(c, cutoff_hz, steepness, BLURRED) for c in conditioners]
+        quiet = [_state_cutoff(c, cutoff_hz, steepness, QUIET) for c in conditioners]
         apart = [c.as_one_motion(band) for c, band in zip(conditioners, bands, strict=True)]
         prepared = Dataset(apart, robot, base, cutoff_hz)
         return Observations(
             robot,
             pieces=tuple(
-                _piece(each, starts[each.recording], conditioners[each.recording], bands[each.recording])
+                replace(
+                    _piece(each, starts[each.recording], conditioners[each.recording], bands[each.recording]),
+                    quiet_hz=quiet[each.recording],
+                    rigid_hz=None if cutoff_hz is None else STATE_BANDS[0] * cutoff_hz,
+                )
                 for each in prepared
             ),
             names=tuple(c.recording.name for c in conditioners),
@@ -257,15 +287,17 @@ class Observations:
         return iter(self.pieces)
 
 
-def _state_cutoff(conditioner: Conditioner, cutoff_hz: float | None, steepness: Array | None) -> float | None:
-    """Band of the motion [Hz] in which noise of density D makes K_v √(D (2π)² f³/3) of `BLURRED` at the worst joint."""
+def _state_cutoff(
+    conditioner: Conditioner, cutoff_hz: float | None, steepness: Array | None, blurred: float
+) -> float | None:
+    """Band of the motion [Hz] in which noise of density D makes K_v √(D (2π)² f³/3) of `blurred` at the worst joint."""
     if cutoff_hz is None:
         return None
     if steepness is None:
         return STATE_BANDS[0] * cutoff_hz
     density = conditioner.noise.density
     moving = conditioner.moving & (density > 0.0)
-    widths = 3.0 * (BLURRED / np.maximum(steepness, 1e-9)) ** 2 / (4.0 * np.pi**2)
+    widths = 3.0 * (blurred / np.maximum(steepness, 1e-9)) ** 2 / (4.0 * np.pi**2)
     bands = np.cbrt(widths[moving] / density[moving])
     narrowest, widest = (ratio * cutoff_hz for ratio in STATE_BANDS)
     return float(np.clip(bands.min(initial=np.inf), narrowest, widest))
@@ -278,7 +310,7 @@ def _piece(prepared: PreparedMotion, start_s: float, conditioner: Conditioner, s
     time = motion.time - start_s + length * np.arange(motion.repetitions)[:, None]
     reduce, reduce_mask = motion.band.reduce, motion.band.reduce_mask
     used = np.stack([reduce_mask(np.ascontiguousarray(measured.T)) for measured in motion.measured], axis=1)
-    torque = np.stack([reduce(np.ascontiguousarray(each.T)) for each in motion.torque], axis=1)
+    torque = np.stack([reduce(without_spikes(np.ascontiguousarray(each.T))) for each in motion.torque], axis=1)
     width = motion.rate_hz / 2.0 if state_hz is None else min(state_hz, motion.rate_hz / 2.0)
     velocity_std = 2.0 * np.pi * np.sqrt(conditioner.noise.density * width**3 / 3.0)
     return Piece(prepared, torque, used, time, width, velocity_std)

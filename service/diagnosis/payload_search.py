@@ -12,12 +12,12 @@ from dataclasses import replace
 import numpy as np
 from scipy import optimize, stats
 
+from service.diagnosis.admission import LEVEL
 from service.diagnosis.catalogue.carried_body import FARTHEST_M, unit_body
 from service.diagnosis.catalogue.payload import Payload
 from service.diagnosis.diagnosed import Diagnosis
 from service.diagnosis.findings import Finding, sizes
-from service.diagnosis.model import Term
-from service.diagnosis.selection import LEVEL
+from service.diagnosis.term import Term
 from service.recording.recording import Array
 from service.robot.robot import STANDARD_PARAMETERS
 

@@ -11,6 +11,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 from scipy import stats
 
+from service.diagnosis.admission import LEVEL, SMALLEST_SHARE
 from service.diagnosis.catalogue import TimeLocalEffect
 from service.diagnosis.catalogue.plain_terms import (
     CoulombFriction,
@@ -21,12 +22,14 @@ from service.diagnosis.catalogue.plain_terms import (
 )
 from service.diagnosis.choice import Option, distinct, is_physical
 from service.diagnosis.diagnosed import Diagnosis
+from service.diagnosis.equivalence import EQUIVALENT
 from service.diagnosis.findings import Finding, probability_among, sizes, without_nominal
 from service.diagnosis.fit import Fit
-from service.diagnosis.model import Term, with_terms
+from service.diagnosis.model import with_terms
 from service.diagnosis.refinement import refined
 from service.diagnosis.screening import Screen, model_signals
-from service.diagnosis.selection import EQUIVALENT, LEVEL, MOST_FITTED, SMALLEST_SHARE
+from service.diagnosis.selection import MOST_FITTED
+from service.diagnosis.term import Term
 
 PLAIN: tuple[type[PlainTerm], ...] = (CoulombFriction, StribeckTerm, ViscousFriction, TorqueOffset)
 
@@ -84,6 +87,9 @@ def _finding(effect: PlainTerm, diagnosis: Diagnosis) -> Finding | None:
         return None
     without = without_nominal(fit, place, diagnosis.fitter)
     gain = without.energy - fit.energy
+    # Beside an effect whose columns change with the parameters, the linear standard error may be too small: both count.
+    if stats.chi2.sf(max(gain, 0.0) / inflation, 1) >= level:
+        return None
     residual = fit.projection.residual[joint]
     if not diagnosis.pure_error and gain < SMALLEST_SHARE * float(residual @ residual):
         return None

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from service.diagnosis.diagnosed import Diagnosis
-from service.diagnosis.model import residual_rows
+from service.diagnosis.residual import residual_rows
 from service.diagnosis.result import Document
 from service.recording.recording import Array
 

@@ -50,7 +50,7 @@ def proxies(
     for place, choice in enumerate(choices):
         effect = choice.options[0].candidate.effect
         joints = set(effect.touched(len(after.excess)))
-        if effect.joint is None:  # the whole arm: where anything was wrong
+        if len(joints) > 1:  # where anything was wrong: a likeness may spare the others
             joints = {joint for joint in joints if before.significant[joint]} or joints
         if joints <= weak or (isinstance(effect, TimeLocalEffect) and joints & unexplained):
             found.append(place)

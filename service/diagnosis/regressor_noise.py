@@ -7,6 +7,9 @@ creeps within ±1/K_v. No position sensor shows that. With a velocity known to �
 
 which is zero but near reversals. Rows that such an instant enters count less: taken at full weight, thirty reversals
 of rounded corners look like a delay, a rotor, or bristles.
+
+An encoder of step s makes white noise of a joint that crosses many steps within the motion's time constant. Slower than
+v = s f, with f the band of the motion, single steps are followed, and the velocity is uncertain by v itself.
 """
 
 from collections.abc import Sequence
@@ -55,8 +58,9 @@ def _uncertain_power(piece: Piece, model: ExtendedModel, joint: int) -> Array:
     """Variance of a row's friction, (M,) [Nm² or N²]."""
     motion = piece.prepared.motion
     velocity = motion.velocity[:, joint]
-    noise = np.full_like(velocity, piece.velocity_std[joint])
     rate, state_hz = motion.rate_hz, piece.state_hz
+    crawl = _step_of(piece, joint) * state_hz
+    noise = np.hypot(piece.velocity_std[joint], np.where(np.abs(velocity) < crawl, crawl, 0.0))
     narrow = smooth(velocity[:, None], rate, HALF_BAND * state_hz)[:, 0]
     at_random = _step_error(model, joint, velocity, noise)
     rounded = _step_error(model, joint, velocity, np.abs(velocity - narrow))
@@ -67,6 +71,12 @@ def _uncertain_power(piece: Piece, model: ExtendedModel, joint: int) -> Array:
     whole = Decimator(np.abs(band.kernel), band.factor, band.rate_hz)
     together = max(rate / (2.0 * state_hz), 1.0)  # samples that share one error of the velocity
     return together * squared.reduce(at_random**2) + whole.reduce(rounded) ** 2
+
+
+def _step_of(piece: Piece, joint: int) -> float:
+    """Step of an encoder whose rounding is the noise of a joint's velocity: σ_v² = s²/(6 f_s) · (2π)² f³/3."""
+    gain = (2.0 * np.pi) ** 2 * piece.state_hz**3 / 3.0 / (6.0 * piece.prepared.motion.rate_hz)
+    return float(piece.velocity_std[joint] / np.sqrt(gain))
 
 
 def _step_error(model: ExtendedModel, joint: int, velocity: Array, error: Array) -> Array:

@@ -8,11 +8,12 @@ import numpy as np
 from service.diagnosis.catalogue import TimeLocalEffect
 from service.diagnosis.diagnosed import Diagnosis, ParameterDifference
 from service.diagnosis.fit import Fit, Fitter
-from service.diagnosis.model import ExtendedModel, Term, with_terms
+from service.diagnosis.model import ExtendedModel, with_terms
 from service.diagnosis.noise_floor import with_noise
 from service.diagnosis.nominal import nominal_model
 from service.diagnosis.observations import Observations
 from service.diagnosis.regressor_noise import row_weights
+from service.diagnosis.term import Term
 from service.identification import Options, identify
 from service.recording.conditioning import Conditioner
 from service.recording.recording import Array, Recording

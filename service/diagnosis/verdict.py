@@ -24,12 +24,15 @@ class Evidence:
         whether more than noise is left without and with them
     parameters_hold : bool
         whether the parameters are the same from one recording to the next
+    predicts : bool
+        whether the model says of held-out motion what there is, to within a little more than the noise
     """
 
     findings: int
     misfit_before: bool
     misfit_after: bool
     parameters_hold: bool
+    predicts: bool = True
 
 
 def verdict(evidence: Evidence) -> Verdict:
@@ -44,4 +47,4 @@ def verdict(evidence: Evidence) -> Verdict:
         return Verdict.PARTLY_EXPLAINED if evidence.misfit_after else Verdict.EXPLAINED
     if evidence.misfit_before:
         return Verdict.UNEXPLAINED
-    return Verdict.CONSISTENT if evidence.parameters_hold else Verdict.INCONCLUSIVE
+    return Verdict.CONSISTENT if evidence.parameters_hold and evidence.predicts else Verdict.INCONCLUSIVE

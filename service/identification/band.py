@@ -4,8 +4,9 @@ Three bounds, the lowest holds. (1) Noise of the positions, differentiated twice
 biases the inertial parameters (`service.recording.conditioning.position_noise`). (2) The torque that this noise makes
 in the regressor must stay small beside what the fit leaves, or the bias exceeds the standard errors. (3) Beyond the
 frequency where the unexplained part of the torque first outgrows the explained one, more band adds more disturbance
-than motion; an octave beyond it is kept, because the edges of friction's steps lie there. Positions so clean that (1)
-never binds are not filtered at all: nothing would be gained.
+than motion; an octave beyond it is kept, because the edges of friction's steps lie there. Neither (2) nor (3) cuts into
+the motion itself: a model of half a motion is no model. Positions so clean that (1) never binds are not filtered at
+all: nothing would be gained.
 """
 
 from collections.abc import Sequence
@@ -32,6 +33,19 @@ KEPT_BEYOND = 2.0
 NOISE_TORQUE_SHARE = 0.15
 """Largest torque that noise of the positions may make in the regressor, relative to what the fit leaves."""
 
+MOTION_SHARE = 0.95
+"""Share of the power of every joint's velocity that makes its motion's own band…"""
+
+MOTION_MARGIN = 2.0
+"""…and the width of the band over it that is kept at least."""
+
+ROWS_A_PARAMETER = 3.0
+"""Rows of every joint's equations for each of its parameters that a band leaves at least."""
+
+INDEPENDENT = 0.5
+"""Share of the positions' noise that differs from period to period, below which what torque does not repeat says
+nothing of what that noise makes in the regressor: it is the same in every period."""
+
 SMALLEST_OWN_SHARE = 0.01
 """Part of the residual that is the torque's own at least, however much the noise of the positions made of it."""
 
@@ -48,6 +62,9 @@ ENOUGH_ROWS = 1 << 17
 
 ENOUGH_PIECES = 8
 """Pieces of motion that tell the joints' typical speeds."""
+
+SPECTRUM_SEGMENT = 4096
+"""Samples in one segment of the motion's spectrum."""
 
 SPECTRUM_POINTS = 200
 SMOOTHING = np.sqrt(2.0)
@@ -82,12 +99,34 @@ def choose_cutoff(conditioners: Sequence[Conditioner], robot: Robot, base: BaseP
     )
     floor = SMALLEST_CYCLES / longest
     limit = cutoff = max(min(bounds), floor)
+    widest = Dataset(conditioners, robot, base, limit)
+    floor = max(floor, MOTION_MARGIN * _motion_band(widest), _least_band(widest, robot, base, limit))
     for _ in range(ROUNDS):
         bounds = _bounds(conditioners, robot, base, cutoff)
         if not bounds:
             break
         cutoff = min(max(min(bounds), floor), limit)
     return cutoff
+
+
+def _motion_band(motions: Dataset) -> float:
+    """Frequency below which `MOTION_SHARE` of the power of every joint's velocity lies [Hz]."""
+    frequency, power = np.zeros(1), np.zeros(1)
+    for prepared in motions:
+        motion = prepared.motion
+        segment = min(SPECTRUM_SEGMENT, len(motion.velocity))
+        frequency, own = signal.welch(motion.velocity, motion.rate_hz, nperseg=segment, axis=0)
+        power = own if power.shape != own.shape else power + own
+    below = np.cumsum(power, axis=0) / np.maximum(power.sum(axis=0), np.finfo(float).tiny)
+    return float(frequency[np.argmax(below >= MOTION_SHARE, axis=0)].max())
+
+
+def _least_band(motions: Dataset, robot: Robot, base: BaseParameters, cutoff_hz: float) -> float:
+    """Band that leaves `ROWS_A_PARAMETER`: rows become fewer in proportion to it [Hz]."""
+    structure = ModelStructure(robot, base, preliminary_terms(motions, robot))
+    rows = sum(prepared.used.sum(axis=1) for prepared in motions)
+    columns = np.array([len(structure.joint_columns(joint)) for joint in range(robot.joint_count)])
+    return float(cutoff_hz * (ROWS_A_PARAMETER * columns / np.maximum(rows, 1)).max())
 
 
 def _beginning(conditioner: Conditioner) -> Conditioner:
@@ -131,11 +170,12 @@ def _quiet_band(
     inertia = _inertia(structure, parameters, prepared.motion.position[chosen])
     from_position = np.array([[name == Source.POSITION for name in c.source.names] for c in conditioners])
     density = np.mean([c.noise.density for c in conditioners] * from_position, axis=0)
-    density *= _repeated_noise(prepared.motion, conditioners[0].position_noise_std)
+    independent = _independent_share(prepared.motion, conditioners[0].position_noise_std)
+    density *= independent + (1.0 - independent) * prepared.motion.repetitions
     growth = (inertia**2).mean(axis=0) @ density * (2.0 * np.pi) ** 4 / 5.0
     cutoff = motions.cutoff_hz or np.inf
     own = np.maximum(residual_std**2 - growth * cutoff**5, SMALLEST_OWN_SHARE * residual_std**2)
-    own = np.minimum(own, _unrepeated_power(prepared))
+    own = np.minimum(own, np.where(independent >= INDEPENDENT, _unrepeated_power(prepared), np.inf))
     with np.errstate(divide="ignore"):
         return float(((NOISE_TORQUE_SHARE**2 * own / cutoff / growth) ** 0.25).min())
 
@@ -153,16 +193,16 @@ def _unrepeated_power(prepared: PreparedMotion) -> Array:
     return np.sum(np.mean(in_band**2, axis=2), axis=0) / (motion.repetitions - 1)
 
 
-def _repeated_noise(motion: Motion, noise_std: Array) -> Array:
-    """Power of the positions' noise in rows that stand for P periods, per noise of one period, (n,).
+def _independent_share(motion: Motion, noise_std: Array) -> Array:
+    """Share of the positions' noise that is another in every period, (n,); 1 where nothing was averaged.
 
-    Such rows are weighted by √P, so that independent noise counts as in one period. Rounding that is the same in every
-    period, as where the motion repeats to the sample, is not averaged: it counts P times.
+    Rows that stand for P periods are weighted by √P, so that independent noise counts in them as in one period.
+    Rounding that is the same in every period, as where the motion repeats to the sample, is not averaged: it counts P
+    times.
     """
     if motion.scatter is None:
         return np.ones(len(noise_std))
-    independent = np.minimum(motion.scatter**2 / np.maximum(noise_std**2, np.finfo(float).tiny), 1.0)
-    return independent + (1.0 - independent) * motion.repetitions
+    return np.minimum(motion.scatter**2 / np.maximum(noise_std**2, np.finfo(float).tiny), 1.0)
 
 
 def _inertia(structure: ModelStructure, parameters: Array, position: Array) -> Array:

@@ -1,9 +1,11 @@
 """A few trials of each kind, on the arm's motion under its own drives: fixed seeds of the development range."""
 
+from typing import Any
+
 import pytest
 
 from concealed.score import Score, diagnosed, scored
-from concealed.trial import effect_trial, null_trial, unknown_trial
+from concealed.trial import effect_trial, null_trial, pair_trial, unknown_trial
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
@@ -40,16 +42,32 @@ def test_nothing_is_named_where_nothing_is_concealed() -> None:
     assert sum(found.verdict == "consistent" for found in verdicts) >= len(trials) - 1
 
 
-MISNAMED = ("cogging", "torque_saturation")
-"""Of these draws; they are named friction_coupling, and why is not understood yet."""
-
-CASES = [
-    pytest.param(effect, marks=pytest.mark.xfail(reason="named friction_coupling") if effect in MISNAMED else ())
-    for effect in AT_40
-]
+@pytest.mark.parametrize("noise", [{"position_std": 2e-4}, {"encoder_step": 5e-4}])
+def test_poor_encoders_make_nothing_of_nothing(noise: dict[str, Any]) -> None:
+    """Friction's step blurred or rounded at every reversal is no delay and no bristle."""
+    verdicts = [diagnosed(null_trial("paper", motion, 10 + motion, **noise))[0] for motion in (0, 1, 2)]
+    assert [found.findings for found in verdicts] == [[]] * 3
 
 
-@pytest.mark.parametrize("effect", CASES)
+PAIRS = [(("joint_spring", 2), ("cogging", 2), 1), (("cogging", 1), ("torque_saturation", 0), 10)]
+
+
+@pytest.mark.parametrize(("first", "second", "draw"), PAIRS)
+def test_two_effects_at_once_are_both_named(first: tuple[str, int], second: tuple[str, int], draw: int) -> None:
+    trial = pair_trial("paper", first, second, 40.0, motion_seed=draw % 4, seed=4000 + draw)
+    score = scored(trial, *diagnosed(trial))
+    assert score.named, score.told
+    assert score.first, score.told
+    assert not score.extra
+
+
+def test_motion_that_predicts_nothing_is_not_called_consistent() -> None:
+    trial = effect_trial("paper", "stribeck_friction", 1, 40.0, motion_seed=0, seed=4, kind="slow")
+    found, _ = diagnosed(trial)
+    assert found.verdict != "consistent"
+
+
+@pytest.mark.parametrize("effect", AT_40)
 def test_a_strong_effect_is_named_at_its_joint(effect: str) -> None:
     score = outcome(effect, AT_40[effect], 40.0, list(AT_40).index(effect))
     assert score.named, score.told

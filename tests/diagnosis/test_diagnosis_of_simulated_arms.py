@@ -10,6 +10,8 @@ from identification.simulated import Array, SimulatedArm, paper_robot
 from service.diagnosis import Diagnosis, DiagnosisDocument, Verdict, diagnose, document
 
 TRAIN, HELD_OUT = (1, 2, 3), (11, 12)
+FEW = 4.2
+CLIP = 1.4
 
 
 def spring(arm: SimulatedArm, rigid: Array) -> Array:
@@ -37,6 +39,18 @@ def teeth(arm: SimulatedArm, rigid: Array) -> Array:
     return at_joint(0, 0.25 * np.sin(17.0 * arm.exact.exact.position[:, 0] + 0.4))
 
 
+def few_teeth(arm: SimulatedArm, rigid: Array) -> Array:
+    """Hardly two waves over the range of the motion."""
+    q = arm.exact.exact.position[:, 0]
+    return at_joint(0, 0.5 * np.sin(FEW * q + 0.4))
+
+
+def clipped(arm: SimulatedArm, rigid: Array) -> Array:
+    """A sensor that ends at half of what the joint's torque mostly is: more is missing than was measured."""
+    torque = arm.exact.torque_exact[:, 0]
+    return at_joint(0, np.clip(torque, -CLIP, CLIP) - torque)
+
+
 def wrist(arm: SimulatedArm, rigid: Array) -> Array:
     common = arm.exact.exact.velocity[:, 1] + arm.exact.exact.velocity[:, 2]
     friction = 0.6 * np.sign(common)
@@ -54,6 +68,8 @@ CASES: dict[str, tuple[EffectTorque, str, str, dict[str, float]]] = {
     "load": (loaded, "load_dependent_friction", "joint2", {"mu": 0.08}),
     "bristles": (bristles, "presliding_hysteresis", "joint3", {"F": 1.7, "x_s": 0.03}),
     "teeth": (teeth, "cogging", "joint1", {"order": 17.0, "amplitude": 0.25, "phase": 0.4}),
+    "few teeth": (few_teeth, "cogging", "joint1", {"order": FEW, "amplitude": 0.5, "phase": 0.4}),
+    "clipped": (clipped, "torque_saturation", "joint1", {"c": CLIP, "a": 1.0}),
     "wrist": (wrist, "friction_coupling", "joint3", {"f": 0.6}),
 }
 

@@ -257,3 +257,15 @@ def test_ids_are_those_of_the_contract_and_each_is_described() -> None:
     assert sorted(ids) == sorted(CONTRACT_IDS)
     for effect in catalogue():
         assert all([effect.equation, effect.meaning, effect.remedy, effect.revealing_motion, effect.coefficients])
+
+
+def test_bristles_shorter_than_the_encoder_s_noise_are_not_looked_for() -> None:
+    given = setting()
+    noise = 1e-3 * (given.highest - given.lowest)
+    (fine,), (coarse,) = (
+        [each for each in possible_effects(one) if each.id == "presliding_hysteresis" and each.joint == 2]
+        for one in (given, replace(given, position_std=noise))
+    )
+    assert fine.lower[0] < noise[2]
+    assert coarse.lower[0] >= 4.0 * noise[2]
+    assert set(coarse.grid[:, 0]) == {length for length in fine.grid[:, 0] if length > 4.0 * noise[2]}

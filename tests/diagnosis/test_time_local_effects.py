@@ -149,3 +149,13 @@ def test_what_is_missing_in_one_part_is_carried_in_the_rest(
 ) -> None:
     shape = np.array([*window, 0.0, 0.0, 0.0, 0.0])
     assert carried(mass, shape, (20.0, 20.0)) == (sign, edges)
+
+
+def test_a_half_sine_of_no_length_is_nothing() -> None:
+    """Not the rounding error of sin π, which a fit would multiply by whatever it takes."""
+    time = np.arange(0.0, 2.0, 0.005)
+    for start in (0.0, 0.7):
+        assert not open_share(np.array([0.0, start, start, HALF_SINE]), 0, time, 0.005).any()
+    window = open_share(np.array([0.0, 0.5, 1.0, HALF_SINE]), 0, time, 0.005)
+    assert np.flatnonzero(window).tolist() == list(range(101, 200))
+    assert window[150] == pytest.approx(1.0)

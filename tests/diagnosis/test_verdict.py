@@ -53,3 +53,9 @@ def test_what_lies_within_the_nominal_columns_is_not_visible() -> None:
     (size,) = detectable([candidate(0.0, visible=False)], 1e-4, 1.0)
     assert not size.visible
     assert size.minimum is None
+
+
+def test_a_model_that_predicts_nothing_is_not_consistent() -> None:
+    """However little it leaves of slow training motion, and however well its parameters hold there."""
+    quiet = Evidence(0, misfit_before=False, misfit_after=False, parameters_hold=True, predicts=False)
+    assert verdict(quiet) is Verdict.INCONCLUSIVE

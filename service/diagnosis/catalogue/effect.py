@@ -100,6 +100,7 @@ class Effect(ABC):
         bounds of the shape parameters
 
     Columns of an effect `of_motion_alone` are the same beside every model, and are made once.
+    What a sensor does not pass on, `swallows`, may be more than what was measured; no other effect's torque can be.
     An effect that is `screened` is looked for beside the nominal model, one that is `doubtful` only where its columns
     have `least_share` of their energy outside it; any other becomes a finding by comparison with a given model.
     """
@@ -113,6 +114,7 @@ class Effect(ABC):
     shapes: ClassVar[tuple[Shape, ...]] = ()
     repeats: ClassVar[bool] = False
     of_motion_alone: ClassVar[bool] = False
+    swallows: ClassVar[bool] = False
     screened: ClassVar[bool] = True
     doubtful: ClassVar[bool] = False
     least_share: ClassVar[float] = 0.0

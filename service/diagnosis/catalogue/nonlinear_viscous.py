@@ -10,8 +10,12 @@ from service.diagnosis.catalogue.setting import Setting
 from service.diagnosis.catalogue.signals import Signals
 from service.recording.recording import Array
 
-POWERS = np.array([0.35, 0.5, 0.65, 0.8, 1.25, 1.6, 2.0, 2.4, 3.0])
-"""Powers looked at; near one the column is the nominal model's own."""
+POWERS = (np.array([0.35, 0.5, 0.65, 0.8]), np.array([1.25, 1.6, 2.0, 2.4, 3.0]))
+"""Powers looked at, below one and above."""
+
+BOUNDS = ((0.3, 0.85), (1.15, 3.5))
+"""Powers that are estimated. Nearer to one the column is the nominal model's own, and a coefficient of any size only
+cancels that."""
 
 
 class NonlinearViscous(Effect):
@@ -28,15 +32,18 @@ class NonlinearViscous(Effect):
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """One a joint that moves.
+        """Two a joint that moves: less than in proportion to speed, and more.
 
         Parameters
         ----------
         setting : Setting
             the arm
         """
-        bounds = {"lower": np.array([0.3]), "upper": np.array([3.5])}
-        return [cls(joint, POWERS[:, None], **bounds) for joint in setting.joints if setting.moves(joint)]
+        sides = [
+            (powers[:, None], np.array([low]), np.array([high]))
+            for powers, (low, high) in zip(POWERS, BOUNDS, strict=True)
+        ]
+        return [cls(joint, *side) for joint in setting.joints if setting.moves(joint) for side in sides]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """sgn(q̇) |q̇|ᵖ.

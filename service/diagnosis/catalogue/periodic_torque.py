@@ -16,7 +16,7 @@ from service.diagnosis.catalogue.signals import Signals
 from service.recording.recording import Array
 from service.robot import JointType
 
-FEWEST_CYCLES = 3.0
+FEWEST_CYCLES = 1.5
 """Cycles over the range of motion below which a periodic torque is a spring or a bump by another name."""
 
 CYCLES_A_STEP = 0.35
@@ -176,8 +176,8 @@ class TorqueRipple(_Periodic):
     remedy: ClassVar[str] = "correct the torque constant over the motor's angle"
     revealing_motion: ClassVar[str] = "the same angles under other loads: other poses of the other joints"
     coefficients: ClassVar[tuple[Coefficient, ...]] = (
-        Coefficient("sine", "1", largest=0.5),
-        Coefficient("cosine", "1", largest=0.5),
+        Coefficient("sine", "1", largest=1.0),
+        Coefficient("cosine", "1", largest=1.0),
     )
 
     @classmethod

@@ -18,6 +18,9 @@ from service.recording.recording import Array
 DISTANCES = np.array([5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 1.6e-2, 3.2e-2])
 """Bristle lengths looked at, relative to the joint's range of motion."""
 
+RESOLVED = 4.0
+"""Bristle length, in standard deviations of the position's noise, below which it is a step like any other."""
+
 
 def bristle_deflection(position: Array, lengths: Array, start: Array) -> Array:
     """Deflection z of Dahl bristles along a motion, -1 … 1.
@@ -75,8 +78,12 @@ class PreslidingHysteresis(Effect):
         made = []
         for joint in setting.joints:
             if setting.reverses(joint):
+                noise = 0.0 if setting.position_std is None else setting.position_std[joint]
                 lengths = DISTANCES * (setting.highest[joint] - setting.lowest[joint])
-                made.append(cls(joint, lengths[:, None], 0.3 * lengths[:1], 3.0 * lengths[-1:]))
+                lengths = lengths[lengths > RESOLVED * noise]
+                if len(lengths):
+                    shortest = np.maximum(0.3 * lengths[:1], RESOLVED * noise)
+                    made.append(cls(joint, lengths[:, None], shortest, 3.0 * lengths[-1:]))
         return made
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
@@ -90,7 +97,7 @@ class PreslidingHysteresis(Effect):
             x_s [rad or m]
         """
         position, lengths = signals.position[self.joint], shapes[:, 0]
-        start = np.zeros(len(lengths))
+        start = np.full(len(lengths), signals.step[self.joint, 0])  # sliding where it moves, relaxed where it rests
         if signals.periodic:  # a period later the bristles stand as they stood
             start = bristle_deflection(position, lengths, start)[:, -1]
         deflection = bristle_deflection(position, lengths, start)

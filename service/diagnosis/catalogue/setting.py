@@ -30,6 +30,8 @@ class Setting:
         length of every training recording [s]
     cutoff_hz : float
         highest frequency that torque and columns share [Hz]
+    position_std : (n,) float64 or None
+        noise of every joint's position, its encoder's steps included [rad or m]; None where it is negligible
     """
 
     robot: Robot
@@ -43,6 +45,7 @@ class Setting:
     top_torque: Array
     durations: tuple[float, ...]
     cutoff_hz: float
+    position_std: Array | None = None
 
     @property
     def joints(self) -> range:

@@ -133,5 +133,6 @@ def open_share(shape: Array, recording: int, time: Array, interval_s: float) -> 
     if scope < EVERY:
         return np.clip(after, 0.0, 1.0)
     if profile == HALF_SINE:
-        return np.sin(np.pi * np.clip((time - start) / max(end - start, interval_s), 0.0, 1.0))
+        length = max(end - start, interval_s)
+        return np.where((time > start) & (time < end), np.sin(np.pi * (time - start) / length), 0.0)
     return np.clip(after, 0.0, 1.0) * np.clip((end - time) / interval_s + 0.5, 0.0, 1.0)

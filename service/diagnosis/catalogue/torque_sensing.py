@@ -27,6 +27,7 @@ class TorqueGainError(Effect):
     remedy: ClassVar[str] = "correct the joint's torque_constant by 1 + g"
     revealing_motion: ClassVar[str] = "fast motion of neighbouring joints that share inertia, or a known added mass"
     coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("g", "1"),)
+    swallows: ClassVar[bool] = True
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
@@ -67,6 +68,7 @@ class TorqueSaturation(Effect):
     revealing_motion: ClassVar[str] = "the same motion slower and without payload, well below the level"
     coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("a", "1", positive=True, largest=2.0),)
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("c", "{tau}", logarithmic=True),)
+    swallows: ClassVar[bool] = True
 
     clips: bool = False
 

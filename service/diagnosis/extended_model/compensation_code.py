@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from datetime import datetime
 
 from service.diagnosis.diagnosed import Diagnosis
-from service.diagnosis.model import Term
+from service.diagnosis.term import Term
 from service.errors import ExportError
 from service.identification.compensation import (
     CompensationModel,

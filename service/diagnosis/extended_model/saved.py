@@ -10,8 +10,9 @@ from pydantic import Field, ValidationError
 from service.diagnosis.catalogue import Effect, catalogue
 from service.diagnosis.diagnosed import Diagnosis
 from service.diagnosis.extended_model.consistent_links import consistent_links
-from service.diagnosis.model import ExtendedModel, Term
+from service.diagnosis.model import ExtendedModel
 from service.diagnosis.result import Document
+from service.diagnosis.term import Term
 from service.dynamics import base_parameters
 from service.errors import IdentificationError
 from service.identification.structure import JointTerms, ModelStructure

@@ -16,7 +16,7 @@ from ruamel.yaml import YAML
 from service.diagnosis.catalogue.time_local import EVERY
 from service.diagnosis.diagnosed import Diagnosis
 from service.diagnosis.extended_model.consistent_links import consistent_links
-from service.diagnosis.model import Term
+from service.diagnosis.term import Term
 from service.robot import LinkInertia
 
 Entry = dict[str, Any]

@@ -1,0 +1,103 @@
+"""Whether an effect that was fitted may enter a model: significant, large enough, no larger than what was measured."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from scipy import stats
+
+from service.diagnosis.block_scores import score_inflation
+from service.diagnosis.choice import Choice, Option
+from service.diagnosis.fit import Fit
+from service.diagnosis.screening import Screen
+
+LEVEL = 0.01
+"""Family-wise chance of naming anything where nothing is missing."""
+
+SMALLEST_SHARE = 0.01
+"""Share of the residual's energy at the joints it touches that an effect explains at least, where the noise is not
+known from repetitions."""
+
+SHARE_OF_LARGEST = 0.01
+"""…and the share of what the largest effect explained: columns that are a little off leave as much."""
+
+GUESSED = 0.01
+"""Power of the noise, relative to what a saturated fit makes of it, that a better fit may find."""
+
+
+class Admission:
+    """What is asked of an effect on given observations.
+
+    Parameters
+    ----------
+    screen : Screen
+        of the training recordings
+    pure_error : bool
+        whether the noise is known from repetitions
+    """
+
+    def __init__(self, screen: Screen, *, pure_error: bool) -> None:
+        self.screen = screen
+        self.pure_error = pure_error
+
+    @property
+    def level(self) -> float:
+        """Chance of a false name that each form is given."""
+        return LEVEL / max(len(self.screen.effects), 1)
+
+    def inflation(self, fit: Fit) -> float:
+        """By how much the residual exceeds the modelled noise; where nothing repeats, the residual itself is right.
+
+        Parameters
+        ----------
+        fit : Fit
+            the model
+        """
+        return fit.inflation(at_least=1.0 if self.pure_error else GUESSED)
+
+    def p_value(self, option: Option, fit: Fit, *, blocks: bool) -> float:
+        """Chance of the gain; without pure error its variance is taken from blocks of a second where that is larger.
+
+        A further order of what was found before needs no such care: the orders still missing are what the blocks see.
+
+        Parameters
+        ----------
+        option : Option
+            the effect, fitted
+        fit : Fit
+            the model without it
+        blocks : bool
+            whether blocks are asked
+        """
+        candidate = replace(option.candidate, gain=max(option.gain, 0.0))
+        inflation = self.inflation(option.fit)
+        plain = candidate.p_value(inflation, refined=True)
+        if self.pure_error or not blocks:
+            return plain
+        ratio, pieces = score_inflation(option.fit.model.terms[-1], fit, option.fit, self.screen)
+        if ratio <= inflation or pieces <= candidate.count + 2:
+            return plain
+        tail = float(stats.f.sf(candidate.gain / ratio / candidate.count, candidate.count, pieces - candidate.count))
+        return max(plain, min(1.0, candidate.shapes_tried * tail))
+
+    def large_enough(self, option: Option, fit: Fit, choices: Sequence[Choice], *, known: bool) -> bool:
+        """Whether it explains a worthwhile share of what is left at its joints, and of what the largest effect did.
+
+        Parameters
+        ----------
+        option : Option
+            the effect, fitted
+        fit : Fit
+            the model without it
+        choices : sequence of Choice
+            what that model has
+        known : bool
+            whether it is one more term of an effect that the model has
+        """
+        if self.pure_error:
+            return True
+        largest = max((choice.options[0].gain for choice in choices), default=0.0)
+        if not known and option.gain < SHARE_OF_LARGEST * largest:
+            return False
+        touched = option.candidate.effect.touched(len(fit.projection.residual))
+        energy = sum(float(fit.projection.residual[j] @ fit.projection.residual[j]) for j in touched)
+        return option.gain > SMALLEST_SHARE * energy

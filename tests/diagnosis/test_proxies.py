@@ -1,0 +1,39 @@
+"""Findings that only stand in for something else, where the tests of what is left say so."""
+
+import numpy as np
+import pytest
+
+from diagnosis.diagnosed_arm import at_joint, recordings
+from identification.simulated import Array, SimulatedArm, paper_robot
+from service.diagnosis import diagnose
+from service.diagnosis.choice import Choice
+from service.diagnosis.diagnosed import Diagnosis
+from service.diagnosis.proxies import proxies
+from service.diagnosis.table import fitted_option
+
+
+def crossed(arm: SimulatedArm, rigid: Array) -> Array:
+    """Nothing of the catalogue, at the second joint alone."""
+    q = arm.exact.exact.position
+    return at_joint(1, 1.5 * np.sin(2.5 * q[:, 2]) * np.cos(1.7 * q[:, 0]))
+
+
+@pytest.fixture(scope="module")
+def diagnosis() -> Diagnosis:
+    rng = np.random.default_rng(5)
+    return diagnose(paper_robot(), recordings((1, 2), crossed, rng), recordings((11,), crossed, rng))
+
+
+@pytest.mark.parametrize("effect", ["friction_coupling", "base_tilt"])
+def test_a_likeness_that_leaves_most_of_what_is_wrong_is_none(diagnosis: Diagnosis, effect: str) -> None:
+    """Also one that touches joints at which nothing was wrong: it spares them, and explains nothing there either."""
+    nominal = diagnosis.selection.nominal
+    assert diagnosis.misfit_before.significant == [False, True, False]
+    likeness, *_ = [
+        each
+        for each in diagnosis.screen.candidates(nominal)
+        if each.effect.id == effect and 1 in each.effect.touched(3) and each.effect.joint in (1, None)
+    ]
+    option = fitted_option(likeness, nominal, diagnosis.fitter)
+    choice = Choice((option,), None, 0.0)
+    assert proxies(nominal, option.fit, [choice], diagnosis.fitter.observations, pure_error=True) == [0]
