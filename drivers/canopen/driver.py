@@ -45,6 +45,8 @@ SETTLING_CYCLE_S = 0.01
 PATIENCE_S = 0.002
 """Time that drives and adapter may take to answer SYNC, beyond twice that of the frames on the wire."""
 
+_SILENT_REMEDY = "support the arm, check the drive's cable and power, then acknowledge"
+_RESTART_REMEDY = "support the arm, look for a dip of its supply, then acknowledge"
 _UNDER_POWER = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
 _POLICY_GOALS = {StopPolicy.HOLD: Goal.QUICK_STOP, StopPolicy.TORQUE_OFF: Goal.SWITCH_ON_DISABLED}
 
@@ -142,6 +144,8 @@ class CanopenArm:
                 node.dictionary.write(objects.CONTROLWORD, FAULT_RESET)
                 node.dictionary.write(objects.CONTROLWORD, DISABLE_VOLTAGE)
             node.error_code, node.acknowledged_code = 0, node.values[objects.ERROR_CODE]
+        # a drive whose cause persists needs a moment to be back in its fault
+        self.clock.wait_until_ns(self.clock.now_ns() + self._settling_ns)
         state = self._await(self._is_sound, self._read_by_service_data, RESET_S)
         if state.faults:
             raise DriverError(DriverErrorKind.FAULT, f"still in fault: {_listed(state.faults)}", state.faults)
@@ -230,13 +234,15 @@ class CanopenArm:
             return self._unknown()
         goal = _POLICY_GOALS.get(policy, Goal.QUICK_STOP)
         mode = self._mode
+        was_enabled = mode is not None
         self._mode, self._limiter, self._runaway = None, None, None
         if mode is not None and not self._stop_in_cycle(mode, goal):
             mode = None
-        if mode is None:
-            self._stop_by_service_data(goal)
-        self._end_watch()
-        return self._read_by_service_data()
+        silent = self._stop_one_by_one(goal, is_stopped=mode is not None)
+        self._require_bus().start_heartbeat(0.0)
+        state = self._state(self.clock.now_ns())
+        dropped = self._dropped() if was_enabled and goal is Goal.QUICK_STOP and self._policy is policy else []
+        return replace(state, faults=(*state.faults, *silent, *dropped))
 
     def disconnect(self) -> None:
         """Let go of the bus; drives under power are stopped by their policy first."""
@@ -329,13 +335,34 @@ class CanopenArm:
         """Time for an answer while drives change state: no motion waits for the next cycle [ns]."""
         return max(self._answer_ns, self._settling_ns)
 
-    def _stop_by_service_data(self, goal: Goal) -> None:
-        """Stop drives that no longer take process data, one by one; one that holds already stays as it is."""
+    def _stop_one_by_one(self, goal: Goal, *, is_stopped: bool) -> list[Fault]:
+        """Stop drives that no longer take process data, let all forget the master, and read them.
+
+        One that holds already stays as it is. A fault for each drive that does not answer: the others are stopped all
+        the same.
+        """
+        silent: list[Fault] = []
         for node in self._nodes:
-            node.read_now()
-            word = next_controlword(node.state, goal)
-            if goal is not Goal.QUICK_STOP or node.state is DriveState.OPERATION_ENABLED:
-                node.dictionary.write(objects.CONTROLWORD, word)
+            try:
+                node.read_now()
+                if not is_stopped and (goal is not Goal.QUICK_STOP or node.state is DriveState.OPERATION_ENABLED):
+                    node.dictionary.write(objects.CONTROLWORD, next_controlword(node.state, goal))
+                node.dictionary.write(objects.CONSUMER_HEARTBEAT, 0)
+                node.read_now()
+            except DriverError as error:
+                if error.kind is DriverErrorKind.LOST:
+                    raise
+                node.values = {}
+                silent.append(Fault("silent", node.joint, "did not answer while it was stopped", _SILENT_REMEDY))
+        return silent
+
+    def _dropped(self) -> list[Fault]:
+        """Drives that should hold and have no power, and do not say why: they were restarted."""
+        return [
+            Fault("not-held", node.joint, f"is without power ({node.state}) after a stop that holds", _RESTART_REMEDY)
+            for node in self._nodes
+            if node.state in (DriveState.SWITCH_ON_DISABLED, DriveState.READY, DriveState.SWITCHED_ON)
+        ]
 
     def _cycle(self, mode: ControlMode, goal: Goal, setpoint: Setpoint, answer_ns: int) -> ArmState:
         """One cycle on the bus."""
@@ -403,15 +430,6 @@ class CanopenArm:
             self.clock.wait_until_ns(state.time_ns + self._settling_ns)
             state = step()
         return state
-
-    def _end_watch(self) -> None:
-        """Let the drives no longer expect the master, and end its heartbeat: they keep their state without it."""
-        bus = self._require_bus()
-        try:
-            for node in self._nodes:
-                node.dictionary.write(objects.CONSUMER_HEARTBEAT, 0)
-        finally:
-            bus.start_heartbeat(0.0)
 
     def _require_bus(self) -> CanBus:
         if self._bus is None:

@@ -47,12 +47,16 @@ class _PlannedDictionary:
 
     def write(self, entry: DriveObject, value: int) -> None:
         """Keep a value, and read it back as the driver does."""
+        self.send(entry, value)
+        self.read(entry)
+
+    def send(self, entry: DriveObject, value: int) -> None:
+        """Keep a value."""
         size = entry.bits // 8
         data = value.to_bytes(size, "little", signed=entry.signed)
         command = _DOWNLOAD | (4 - size) << 2
         self._values[entry] = value
         self._add(f"{entry} := {value}", bytes([command]) + _place(entry) + data.ljust(4, b"\0"))
-        self.read(entry)
 
     def _add(self, meaning: str, payload: bytes) -> None:
         self.frames.append(_frame("enable", f"{self._label}: {meaning}", 0x600 + self.node_id, payload))

@@ -279,9 +279,13 @@ class DriveNode:
         write(kind, _EVERY_SYNC)
         write(count, 0)
         entries = mapping_entries(layout.objects)
-        for subindex, entry in enumerate(entries, 1):
-            write(DriveObject("PDO entry", mapping, subindex, 32), entry)
+        places = [DriveObject("PDO entry", mapping, subindex, 32) for subindex in range(1, len(entries) + 1)]
+        for place, entry in zip(places, entries, strict=True):
+            self.dictionary.send(place, entry)
         write(count, len(entries))
+        for place, entry in zip(places, entries, strict=True):  # some drives show them only when they count
+            if self.dictionary.read(place) != entry:
+                raise DriverError(DriverErrorKind.REFUSED, f"{self.place}: {place} is not kept; its PDOs are fixed")
         write(cob_id, identifier + number)
 
     def _take(self, layout: PdoLayout, data: bytes) -> None:

@@ -114,13 +114,9 @@ class NodeDictionary:
         DriverError
             ``refused``: the drive keeps another value; ``cannot-connect``: it does not answer or forbids the write
         """
-        data = value.to_bytes(entry.bits // 8, "little", signed=entry.signed)
         kept = None
         for _ in range(_WRITES):
-            try:
-                self._client.download(entry.index, entry.subindex, data)
-            except (SdoError, can.CanError, OSError) as error:
-                raise self._failure(f"{entry} = {value} cannot be written", error) from error
+            self.send(entry, value)
             kept = self.read(entry)
             if kept == value:
                 return
@@ -128,6 +124,27 @@ class NodeDictionary:
             DriverErrorKind.REFUSED,
             f"node {self.node_id}: {entry} was written as {value} and reads {kept}; the drive limits or forbids it",
         )
+
+    def send(self, entry: DriveObject, value: int) -> None:
+        """Write an entry that cannot be read back yet.
+
+        Parameters
+        ----------
+        entry : DriveObject
+            what to write
+        value : int
+            that fits the entry
+
+        Raises
+        ------
+        DriverError
+            ``cannot-connect``: the drive does not answer or forbids the write
+        """
+        data = value.to_bytes(entry.bits // 8, "little", signed=entry.signed)
+        try:
+            self._client.download(entry.index, entry.subindex, data)
+        except (SdoError, can.CanError, OSError) as error:
+            raise self._failure(f"{entry} = {value} cannot be written", error) from error
 
     def _failure(self, what: str, error: Exception) -> DriverError:
         return DriverError(

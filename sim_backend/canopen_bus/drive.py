@@ -17,6 +17,7 @@ CYCLIC_POSITION = 8
 CYCLIC_TORQUE = 10
 
 HEARTBEAT_LOST = 0x8130
+_BUS_OFF_RECOVERED = 0x8140
 
 _SYNC, _NMT = 0x080, 0x000
 _PRE_OPERATIONAL, _OPERATIONAL, _STOPPED = 0x7F, 0x05, 0x04
@@ -54,6 +55,7 @@ class EmulatedDrive:
         self.dictionary = self._dictionary()
         self.process_data = ProcessData(self.dictionary, self.node_id)
         self._nmt = _PRE_OPERATIONAL
+        self._is_off_bus = False
         self._mode_taken = 0
         self._next_heartbeat_s = 0.0
         self._last_master_s: float | None = None
@@ -143,6 +145,18 @@ class EmulatedDrive:
         self.power.fail()
         self._report(error_code)
 
+    def leave_bus(self) -> None:
+        """Its controller has seen too many errors: the drive does what 0x6007 says, and nobody hears of it yet."""
+        self._is_off_bus = True
+        self._nmt = _PRE_OPERATIONAL
+        self._abort_connection()
+
+    def return_to_bus(self) -> None:
+        """Its controller was restarted: the drive tells that it was away."""
+        if self._is_off_bus:
+            self._is_off_bus = False
+            self._report(_BUS_OFF_RECOVERED)
+
     @property
     def _watched_node(self) -> int:
         """Node whose heartbeat is watched; -1 for none."""
@@ -168,20 +182,26 @@ class EmulatedDrive:
             return
         self._last_master_s = now_s
         if self.power.state is PowerState.OPERATION_ENABLED:
-            match self.dictionary.get(0x6007):
-                case value if value == _ABORT_QUICK_STOP:
-                    self.power.quick_stop()
-                case value if value == _ABORT_DISABLE:
-                    self.power.disable()
-                case value if value == _ABORT_FAULT:
-                    self.power.fail()
+            self._abort_connection()
             self._report(HEARTBEAT_LOST)
         self._nmt = _PRE_OPERATIONAL
+
+    def _abort_connection(self) -> None:
+        """Do what 0x6007 says of a connection that is gone."""
+        if self.power.state is not PowerState.OPERATION_ENABLED:
+            return
+        match self.dictionary.get(0x6007):
+            case value if value == _ABORT_QUICK_STOP:
+                self.power.quick_stop()
+            case value if value == _ABORT_DISABLE:
+                self.power.disable()
+            case value if value == _ABORT_FAULT:
+                self.power.fail()
 
     def _report(self, error_code: int) -> None:
         """Keep the error code and send an emergency."""
         self.dictionary.put(0x603F, error_code)
-        register = 0x11 if error_code == HEARTBEAT_LOST else 0x01
+        register = 0x11 if error_code in (HEARTBEAT_LOST, _BUS_OFF_RECOVERED) else 0x01
         self.dictionary.put(0x1001, register)
         payload = error_code.to_bytes(2, "little") + bytes([register]) + bytes(5)
         self._outbox.append((0x080 + self.node_id, payload))
@@ -215,6 +235,10 @@ class EmulatedDrive:
             self.dictionary.put(0x1001, 0)
         self._show_status()
 
+    def _take_consumer(self, _: int) -> None:
+        """The time of silence is counted anew from here."""
+        self._last_master_s = None
+
     def _take_mode(self, mode: int) -> None:
         if mode not in (CYCLIC_POSITION, CYCLIC_TORQUE):
             raise AbortError(Abort.VALUE_RANGE)
@@ -245,7 +269,7 @@ class EmulatedDrive:
         yield from (
             (0x1000, 0, 4, 0x00020192, False, False, None),
             (0x1001, 0, 1, 0, False, False, None),
-            (0x1016, 1, 4, 0, False, True, None),
+            (0x1016, 1, 4, 0, False, True, self._take_consumer),
             (0x1017, 0, 2, 0, False, True, None),
             (0x1018, 1, 4, 0x00000000, False, False, None),
             (0x6007, 0, 2, 1, True, True, None),

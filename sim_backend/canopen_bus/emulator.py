@@ -160,6 +160,9 @@ class CanEmulator:
         """
         if "inject" in request:
             self.schedule.add(faults_from(request["inject"], self.now_s))
+            self.schedule.run(self.now_s, self._carry_out)
+            for drive in self.drives:
+                self._let_ail(drive)
         elif "get" in request:
             node, (index, subindex) = request["get"]
             return {"value": self._drive(node).dictionary.get(index, subindex)}
@@ -178,6 +181,8 @@ class CanEmulator:
         for place, drive in enumerate(self.drives):
             was_enabled = drive.power.state is PowerState.OPERATION_ENABLED
             self._let_ail(drive)
+            if self._is_there(drive, self.now_s):
+                drive.return_to_bus()
             frames = drive.tick(self.now_s)
             if was_enabled and drive.power.state is not PowerState.OPERATION_ENABLED:
                 self._stopped_s[place] = self.now_s
@@ -191,6 +196,10 @@ class CanEmulator:
         match fault.kind:
             case FaultKind.SILENT:
                 for drive in concerned:
+                    self._away_until_s[drive.node_id] = until_s
+            case FaultKind.BUS_OFF:
+                for drive in concerned:
+                    drive.leave_bus()
                     self._away_until_s[drive.node_id] = until_s
             case FaultKind.RESET | FaultKind.POWER_DIP:
                 for drive in self.drives if fault.kind is FaultKind.POWER_DIP else concerned:

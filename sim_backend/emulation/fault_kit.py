@@ -20,6 +20,8 @@ class FaultKind(StrEnum):
     """They arrive twice."""
     SILENT = "silent"
     """The device neither hears nor answers for `seconds`."""
+    BUS_OFF = "bus-off"
+    """Its CAN controller has seen too many errors and leaves the bus for `seconds`; on CAN alone."""
     OVER_TEMPERATURE = "over-temperature"
     OVERLOAD = "overload"
     ENCODER_JUMP = "encoder-jump"

@@ -13,18 +13,23 @@ from hardware_emulated.canopen_rig import canopen_rigs
 from hardware_emulated.dynamixel_rig import dynamixel_rigs
 from prompt_process import prompt_process
 
-ALL_RIGS = {**RIGS, "dynamixel": dynamixel_rigs, "canopen": canopen_rigs}
+ALL_RIGS = {
+    **RIGS,
+    "dynamixel": dynamixel_rigs,
+    "canopen": canopen_rigs,
+    "canopen-stepped": partial(canopen_rigs, stepped=True),
+}
 """Makers of rigs by name; the emulated buses join here."""
 
 if SOCKETCAN := os.environ.get("TAUSCOPE_SOCKETCAN"):
     # the name of an interface: few kernels have one, see tests/hardware_emulated/test_socketcan.py
-    ALL_RIGS["socketcan"] = partial(canopen_rigs, interface=SOCKETCAN)
+    ALL_RIGS["socketcan"] = partial(canopen_rigs, interface=SOCKETCAN, stepped=True)
+
+MARKS = {"dynamixel": [pytest.mark.realtime], "canopen": [pytest.mark.realtime], "canopen-stepped": [pytest.mark.slow]}
+MAKERS = [pytest.param(name, marks=MARKS.get(name, [])) for name in ALL_RIGS]
 
 
-BY_THE_CLOCK = [pytest.param(name, marks=[] if name in RIGS else pytest.mark.realtime) for name in ALL_RIGS]
-
-
-@pytest.fixture(scope="session", params=BY_THE_CLOCK)
+@pytest.fixture(scope="session", params=MAKERS)
 def make_rig(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[], Rig]]:
     with ALL_RIGS[request.param](tmp_path_factory.mktemp("rig")) as maker:
         yield maker

@@ -77,7 +77,7 @@ class SteppedCanopenRig(CanopenRig):
     def watch(self, duration_s: float) -> Watched:
         begin = self._clock.now_ns()
         self._clock.wait_until_ns(begin + round(duration_s * 1e9))
-        rows = [entry for entry in self._emulator.trace() if entry["time"] * 1e9 >= begin]
+        rows = [entry for entry in self._emulator.trace() if entry["time"] * 1e9 > begin]
         return Watched(
             np.array([round(entry["time"] * 1e9) for entry in rows]),
             np.array([entry["position"] for entry in rows]),
@@ -93,11 +93,10 @@ class SteppedCanopenRig(CanopenRig):
 
 
 @contextmanager
-def canopen_rigs(folder: Path, interface: str | None = None) -> Iterator[Callable[[], Rig]]:
+def canopen_rigs(folder: Path, interface: str | None = None, *, stepped: bool = False) -> Iterator[Callable[[], Rig]]:
     """Rigs of one emulator process; its drives are as delivered before each of them.
 
-    They are behind a serial adapter by the machine's clock, or on an interface of SocketCAN in stepped time: kernels
-    that have one run in slow virtual machines here.
+    They are behind a serial adapter, or on an interface of SocketCAN; time is the machine's, or stepped.
     """
     robot = write_canopen_robot(Path(sim_backend.examples.__file__).with_name("paper_arm.yaml"), folder, interface)
     order = CanOrder(
@@ -107,9 +106,9 @@ def canopen_rigs(folder: Path, interface: str | None = None) -> Iterator[Callabl
         control=str(folder / "control"),
         rated_torque_mnm=(RATED_TORQUE_MNM,) * len(START),
         trace=str(folder / "trace"),
-        stepped=interface is not None,
+        stepped=stepped,
     )
-    kind = CanopenRig if interface is None else SteppedCanopenRig
+    kind = SteppedCanopenRig if stepped else CanopenRig
     rigs: list[CanopenRig] = []
     with EmulatorProcess(order) as emulator:
 

@@ -185,3 +185,13 @@ def test_a_lost_answer_neither_drops_the_arm_nor_is_replaced_by_an_old_one(bus: 
     bus.deaf = False
     arm.stop(StopPolicy.HOLD)
     assert all(power is PowerState.QUICK_STOP_ACTIVE for power in states(bus))
+
+
+def test_a_drive_that_is_gone_does_not_keep_the_others_from_being_stopped(bus: EmulatedBus, arm: CanopenArm) -> None:
+    enabled(arm)
+    node_id = 2
+    bus.swallows = lambda message: message.arbitration_id in (0x200 + node_id, 0x600 + node_id)
+    state = arm.stop(StopPolicy.HOLD)
+    assert ("silent", 2) in [(fault.code, fault.joint) for fault in state.faults]
+    assert states(bus)[0] is states(bus)[2] is PowerState.QUICK_STOP_ACTIVE
+    assert np.isnan(state.position).tolist() == [False, True, False]

@@ -387,3 +387,37 @@ def test_other_families_answer_where_their_tables_say(model: int) -> None:
     master = Master(1, model_number=model)
     (status,) = master.ask(packets.encode_ping(1))
     assert int.from_bytes(status.data[:2], "little") == model
+
+
+@pytest.mark.parametrize("part", [0.0, 0.25, 1.0])
+def test_position_velocity_and_current_are_of_one_instant(part: float) -> None:
+    servo = EmulatedServo(ServoSpecification(1, 2020, torque_per_milliampere=0.001, current_noise_ma=0.0))
+    # all three rise by the same share in every period: whatever is shown, it is of one instant
+    for period in range(40):
+        servo.take_motion(0.01 * period, 0.5 * period, 0.1 * (period + 0.5))
+    servo.sense(0.04, part)
+    shown = [
+        servo.memory.get("Present Position") / servo.specification.counts_per_radian / 0.01,
+        servo.memory.get("Present Velocity") * servo.specification.figures.velocity_unit / 0.5,
+        servo.memory.get("Present Current") * servo.specification.torque_per_unit / 0.1 - 1.0,
+    ]
+    # the middle of the last five periods, whose last ends now, or that much earlier
+    np.testing.assert_allclose(shown, 39.0 - 2.5 - (1.0 - part), atol=0.02)
+
+
+CLEAR_ERROR = bytes.fromhex("FF FF FD 00 01 08 00 10 02 45 52 43 4C D5 EB")
+ERROR_CODE = 153
+
+
+def test_a_y_servo_forgets_what_can_be_cleared_and_nothing_else() -> None:
+    master = Master(1, model_number=4030)
+    servo = master.emulator.bus.servos[1]
+    for code, error, left in ((5, 0, 0), (18, 0, 0), (13, 1, 13)):
+        servo.memory.put("Error Code", code)
+        (status,) = master.ask(CLEAR_ERROR)
+        assert (status.error & 0x7F, master.read(1, ERROR_CODE)) == (error, left)
+
+
+def test_an_x_servo_knows_no_clear() -> None:
+    (status,) = Master(1).ask(CLEAR_ERROR)
+    assert status.error == 1

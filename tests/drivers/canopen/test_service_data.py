@@ -1,0 +1,70 @@
+"""Service data on a bus that loses, delays and doubles frames; the node's side is written here, byte by byte."""
+
+from collections import deque
+
+import pytest
+
+from drivers.canopen import objects
+from drivers.canopen.service_data import ATTEMPTS, NodeDictionary, PumpedSdoClient
+from drivers.errors import DriverError, DriverErrorKind
+
+STATUSWORD_ANSWER = bytes.fromhex("4B41600037020000")
+POSITION_ANSWER = bytes.fromhex("43646000D0070000")
+
+
+class ScriptedNode:
+    """A node whose answers to each request are given; stands in for the network and for the bus."""
+
+    def __init__(self, *answers: list[bytes]) -> None:
+        self.requests: list[bytes] = []
+        self._answers, self._arriving = list(answers), deque[bytes]()
+        client = PumpedSdoClient(self, 5)
+        client.network = self  # pyright: ignore[reportAttributeAccessIssue]
+        self._client = client
+        self.dictionary = NodeDictionary(client, 5)
+
+    def send_message(self, identifier: int, data: bytes) -> None:
+        assert identifier == 0x605
+        self.requests.append(bytes(data))
+        self._arriving.extend(self._answers.pop(0) if self._answers else [])
+
+    def receive(self, deadline_ns: int) -> bool:
+        del deadline_ns
+        if not self._arriving:
+            return False
+        self._client.on_response(0x585, self._arriving.popleft(), 0.0)
+        return True
+
+
+@pytest.fixture(autouse=True)
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("drivers.canopen.service_data.SDO_TIMEOUT_S", 0.001)
+
+
+def test_a_lost_answer_is_asked_for_again() -> None:
+    node = ScriptedNode([], [STATUSWORD_ANSWER])
+    assert node.dictionary.read(objects.STATUSWORD) == 0x0237
+    assert node.requests == [bytes.fromhex("4041600000000000")] * 2
+
+
+def test_a_late_answer_is_not_taken_for_the_next_question() -> None:
+    node = ScriptedNode([], [STATUSWORD_ANSWER, STATUSWORD_ANSWER], [POSITION_ANSWER])
+    assert node.dictionary.read(objects.STATUSWORD) == 0x0237
+    assert node.dictionary.read(objects.POSITION_ACTUAL) == 2000
+
+
+def test_a_written_value_is_written_again_where_another_one_is_kept() -> None:
+    done, kept, zero = (bytes.fromhex(text) for text in ("6040600000000000", "4B40600006000000", "4B40600000000000"))
+    node = ScriptedNode([done], [zero], [done], [kept])
+    node.dictionary.write(objects.CONTROLWORD, 6)
+    stubborn = ScriptedNode(*[[done], [zero]] * 2)
+    with pytest.raises(DriverError, match="written as 6 and reads 0") as refusal:
+        stubborn.dictionary.write(objects.CONTROLWORD, 6)
+    assert refusal.value.kind is DriverErrorKind.REFUSED
+
+
+def test_a_silent_node_is_given_up_after_some_attempts() -> None:
+    node = ScriptedNode()
+    with pytest.raises(DriverError, match="check node number"):
+        node.dictionary.read(objects.STATUSWORD)
+    assert sum(request[0] == 0x40 for request in node.requests) == ATTEMPTS
