@@ -3,11 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
 from scipy import stats
 
 from service.diagnosis.block_scores import score_inflation
 from service.diagnosis.choice import Choice, Option
-from service.diagnosis.fit import Fit
+from service.diagnosis.fit import Fit, Fitter
 from service.diagnosis.screening import Screen
 
 LEVEL = 0.01
@@ -19,6 +20,9 @@ known from repetitions."""
 
 SHARE_OF_LARGEST = 0.01
 """…and the share of what the largest effect explained: columns that are a little off leave as much."""
+
+DETERMINED = 3.5
+"""Standard errors, of the joint covariance with shapes and all parameters, that coefficients differ from zero."""
 
 GUESSED = 0.01
 """Power of the noise, relative to what a saturated fit makes of it, that a better fit may find."""
@@ -78,6 +82,24 @@ class Admission:
             return plain
         tail = float(stats.f.sf(candidate.gain / ratio / candidate.count, candidate.count, pieces - candidate.count))
         return max(plain, min(1.0, candidate.shapes_tried * tail))
+
+    def determined(self, fit: Fit, fitter: Fitter) -> bool:
+        """Whether the last term's coefficients differ from zero with everything else open, its own shapes included.
+
+        cᵀ C⁻¹ c, C of the joint covariance: a shape that the data leave open makes a gain out of other columns' errors.
+
+        Parameters
+        ----------
+        fit : Fit
+            the model with it
+        fitter : Fitter
+            of the recordings
+        """
+        place, count = fit.model.term_places()[-1], len(fit.model.terms[-1].coefficients)
+        own = slice(place.start, place.start + count)
+        coefficients = fit.model.terms[-1].coefficients
+        covariance = fitter.covariance(fit)[own, own] * self.inflation(fit)
+        return float(coefficients @ np.linalg.pinv(covariance, hermitian=True) @ coefficients) > DETERMINED**2
 
     def large_enough(self, option: Option, fit: Fit, choices: Sequence[Choice], *, known: bool) -> bool:
         """Whether it explains a worthwhile share of what is left at its joints, and of what the largest effect did.

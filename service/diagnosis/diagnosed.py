@@ -115,12 +115,18 @@ class Diagnosis:
         return verdict(
             Evidence(
                 len(self.findings),
-                any(self.misfit_before.significant),
+                any(self.mismatched),
                 any(self.misfit_after.significant),
                 self.constancy.holds,
                 self.predicts,
             )
         )
+
+    @property
+    def mismatched(self) -> list[bool]:
+        """Per joint, whether there is something to explain: what cannot be measured counts where predictions fail."""
+        agreed = self.constancy.holds and self.predicts
+        return self.misfit_before.mismatch if agreed else self.misfit_before.significant
 
     @cached_property
     def predicts(self) -> bool:

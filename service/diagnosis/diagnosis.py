@@ -27,7 +27,7 @@ from service.diagnosis.model import ExtendedModel
 from service.diagnosis.noise_floor import with_noise
 from service.diagnosis.nominal import delivered_model, identified_rotors, nominal_model, setting_of
 from service.diagnosis.observations import Observations
-from service.diagnosis.plain_findings import undeclared_offsets, with_plain_terms
+from service.diagnosis.plain_findings import states_friction, undeclared_offsets, with_plain_terms
 from service.diagnosis.regressor_noise import row_weights
 from service.diagnosis.screening import Candidate, Screen
 from service.diagnosis.selection import Selector
@@ -183,7 +183,7 @@ def _concluded(
         constancy=constancy(fitter, selection.fit, None if held_out is None else held_out.fitter, inflation),
         detectable=(
             *detectable(candidates, level, inflation),
-            *detectable_parameters(selection.fit, (TorqueOffset,), level, inflation),
+            *_detectable_constants(identification.robot, selection, level, inflation),
             Detectable(Payload.id, None, None, Payload.coefficients[0].unit, False),  # it is one with the last link
         ),
         before=sizes(selection.nominal.model, fitter, held_out),
@@ -195,6 +195,12 @@ def _concluded(
         fitter=fitter,
         held_out=held_out,
     )
+
+
+def _detectable_constants(robot: Robot, selection: Selection, level: float, inflation: float) -> tuple[Detectable, ...]:
+    """Constants as far as one would be named: without stated friction the identified model has them."""
+    found = detectable_parameters(selection.fit, (TorqueOffset,), level, inflation)
+    return found if states_friction(robot) else tuple(replace(each, minimum=None, visible=False) for each in found)
 
 
 def _doubtful(setting: Setting, observations: Observations, selection: Selection) -> list[Candidate]:

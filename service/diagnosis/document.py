@@ -66,7 +66,7 @@ def document(
         cutoff_hz=diagnosis.cutoff_hz,
         mismatch=[
             _mismatch(each, names, significant=significant)
-            for each, significant in zip(diagnosis.mismatch, diagnosis.misfit_before.significant, strict=True)
+            for each, significant in zip(diagnosis.mismatch, diagnosis.mismatched, strict=True)
         ],
         findings=[*(_finding(each, diagnosis, names) for each in diagnosis.findings), *_unknown(diagnosis, names)],
         fit=FitChangesEntry(
@@ -219,7 +219,7 @@ def _unknown(diagnosis: Diagnosis, names: Sequence[str]) -> list[FindingEntry]:
             held_out_rms_before=held_out,
             held_out_rms_after=held_out,
         )
-        for found, significant in zip(diagnosis.mismatch, diagnosis.misfit_before.significant, strict=True)
+        for found, significant in zip(diagnosis.mismatch, diagnosis.mismatched, strict=True)
         if significant
     ]
 

@@ -18,6 +18,9 @@ FEATURES = 60
 HATS = 12
 """Hat functions of time in every recording."""
 
+MEASURABLE = 1.0
+"""Standard errors of the noise's power, as repetitions tell it, that a mismatch exceeds it by."""
+
 LEVEL = 1e-3
 """Chance, over all joints and both tests, at which a mismatch is called significant."""
 
@@ -30,17 +33,26 @@ class LackOfFit:
         p-values; 1 where the test could not be made
     excess : (n,) float64
         Σ r² beyond the noise's, in noise variances, never negative
+    measurable : (n,) float64
+        the excess from which it exceeds what the noise's own power is uncertain by [noise variances]
     """
 
     omnibus: Array
     pure_error: Array
     excess: Array
+    measurable: Array
 
     @property
     def significant(self) -> list[bool]:
         """Per joint, whether more than noise is left."""
         level = LEVEL / (2 * len(self.omnibus))
         return [bool(min(a, b) < level) for a, b in zip(self.omnibus, self.pure_error, strict=True)]
+
+    @property
+    def mismatch(self) -> list[bool]:
+        """Per joint, whether it is significant and an excess that can be measured: less is nothing to look for."""
+        pairs = zip(self.significant, self.excess, self.measurable, strict=True)
+        return [significant and bool(excess > least) for significant, excess, least in pairs]
 
 
 def lack_of_fit(fit: Fit, observations: Observations, *, pure_error: bool, seed: int = 0) -> LackOfFit:
@@ -58,7 +70,7 @@ def lack_of_fit(fit: Fit, observations: Observations, *, pure_error: bool, seed:
         of the random features
     """
     joints = observations.robot.joint_count
-    omnibus, pure, excess = np.ones(joints), np.ones(joints), np.zeros(joints)
+    omnibus, pure, excess, measurable = np.ones(joints), np.ones(joints), np.zeros(joints), np.zeros(joints)
     rows = sum(own.share * len(row) for own, row in zip(observations.noise, fit.projection.residual, strict=True))
     share = fit.projection.spread.shape[1] / max(rows, 1.0)
     repeated = pure_error_rows(observations)
@@ -71,11 +83,13 @@ def lack_of_fit(fit: Fit, observations: Observations, *, pure_error: bool, seed:
         omnibus[joint] = _f_test(outside, residual, freedom)
         energy = float(residual @ residual)
         excess[joint] = max(energy - freedom, 0.0)
+        if pure_error and repeated[joint] > 0:  # else a saturated fit of the same rows says what noise is: any excess
+            measurable[joint] = MEASURABLE * np.sqrt(2.0 * freedom * (1.0 + freedom / repeated[joint]))
         means = freedom - repeated[joint]
         if pure_error and repeated[joint] > 0 and means > 1.0:
             ratio = max(energy - repeated[joint], 0.0) / means
             pure[joint] = float(stats.f.sf(ratio, means, repeated[joint]))
-    return LackOfFit(omnibus, pure, excess)
+    return LackOfFit(omnibus, pure, excess, measurable)
 
 
 def pure_error_rows(observations: Observations) -> Array:

@@ -30,6 +30,7 @@ from service.diagnosis.refinement import refined
 from service.diagnosis.screening import Screen, model_signals
 from service.diagnosis.selection import MOST_FITTED
 from service.diagnosis.term import Term
+from service.robot import Robot
 
 PLAIN: tuple[type[PlainTerm], ...] = (CoulombFriction, StribeckTerm, ViscousFriction, TorqueOffset)
 
@@ -49,8 +50,18 @@ def undeclared_offsets(diagnosis: Diagnosis) -> Lacking:
         of the recordings
     """
     robot = diagnosis.robot
-    states_friction = robot.model.friction is not None and robot.urdf is None
-    return [(joint, "offset") for joint in range(robot.joint_count)] if states_friction else ()
+    return [(joint, "offset") for joint in range(robot.joint_count)] if states_friction(robot) else ()
+
+
+def states_friction(robot: Robot) -> bool:
+    """Whether a robot file states friction of its own; that of a URDF is often a placeholder.
+
+    Parameters
+    ----------
+    robot : Robot
+        the arm
+    """
+    return robot.model.friction is not None and robot.urdf is None
 
 
 def with_plain_terms(diagnosis: Diagnosis, lacking: Lacking) -> Diagnosis:

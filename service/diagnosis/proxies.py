@@ -3,7 +3,7 @@
 Several weak likenesses of an unknown effect each take a part of it and pass every test but one: together they leave
 most of it, where a finding that is what it says leaves nothing but noise; how much is left can only be told where the
 noise is known from repetitions. A window in time can stand in for anything that is strong for a while: what happens
-once explains its joints wholly, or it is taken for something else.
+once explains its joints wholly, or more than all that it leaves, noise included; else it is something else.
 """
 
 from collections.abc import Sequence
@@ -52,6 +52,12 @@ def proxies(
         joints = set(effect.touched(len(after.excess)))
         if len(joints) > 1:  # where anything was wrong: a likeness may spare the others
             joints = {joint for joint in joints if before.significant[joint]} or joints
-        if joints <= weak or (isinstance(effect, TimeLocalEffect) and joints & unexplained):
+        doubtful = isinstance(effect, TimeLocalEffect) and joints & unexplained
+        if joints <= weak or (doubtful and choice.options[0].gain < _left(fit, joints)):
             found.append(place)
     return found
+
+
+def _left(fit: Fit, joints: set[int]) -> float:
+    """All that a model leaves at some joints, noise included: what explains more is there, whatever else is."""
+    return sum(float(fit.projection.residual[joint] @ fit.projection.residual[joint]) for joint in joints)

@@ -13,6 +13,7 @@ from service.diagnosis.equivalence import equivalents
 from service.diagnosis.fit import Fit, Fitter
 from service.diagnosis.interleaved import interleaved_confirmation
 from service.diagnosis.model import ExtendedModel, with_terms
+from service.diagnosis.outside import where_held_out_shows
 from service.diagnosis.proxies import proxies
 from service.diagnosis.screening import Candidate, Screen, model_signals
 from service.diagnosis.table import Table, fitted_option
@@ -144,12 +145,15 @@ class Selector:
             if p_value < (level if self.pure_error else LIKELY) and self.admission.large_enough(
                 option, fit, choices, known=known
             ):
-                confirmation = self._confirmation(fit, option)
-                if p_value >= level and (confirmation is None or confirmation.gain_z < CLEARLY_PREDICTED):
+                if not known and not self.admission.determined(option.fit, self.fitter):
                     continue
                 below = [each for each in fitted if each.score <= option.score]
-                alike = equivalents(option, below, fit, self.screen, self.admission.inflation(option.fit))
-                return Choice(distinct([option, *alike]), confirmation, p_value / level)
+                chosen = where_held_out_shows(option, fit, self.fitter, self.held_out)
+                confirmation = self._confirmation(fit, chosen)
+                if p_value >= level and (confirmation is None or confirmation.gain_z < CLEARLY_PREDICTED):
+                    continue
+                alike = equivalents(chosen, below, fit, self.screen, self.admission.inflation(chosen.fit))
+                return Choice(distinct([chosen, *alike]), confirmation, p_value / level)
         for each in closest:  # none of the largest is significant by the stricter measure: look below
             table.refuse(place_of(each))
         return self._best(table, choices)

@@ -151,6 +151,24 @@ def test_what_is_missing_in_one_part_is_carried_in_the_rest(
     assert carried(mass, shape, (20.0, 20.0)) == (sign, edges)
 
 
+@pytest.mark.parametrize("window", [(0.0, 6.0, 9.0), (since(0), 7.0, 0.0)])
+def test_what_is_let_go_is_the_opposite_outside_the_window_and_not_there_later(
+    window: tuple[float, float, float],
+) -> None:
+    """Outside and inside make the whole of the training recordings; held-out ones are without."""
+    effect = form(PayloadChange)
+    inside = np.array([*window, 0.0, 0.1, 0.2, 0.3])
+    outside = effect.outside(inside) if isinstance(effect, PayloadChange) else None
+    assert outside is not None
+    time = np.arange(0.0, 20.0, 0.005)
+    for recording in (0, 1):
+        both = [open_share(shape, recording, time, 0.005) for shape in (inside, outside)]
+        assert both[0] + both[1] == pytest.approx(1.0)
+    assert not open_share(outside, -1, time, 0.005).any()
+    sign, edges = carried(-0.3, inside, (20.0, 20.0))
+    assert carried(0.3, outside, (20.0, 20.0)) == (-sign, edges)
+
+
 def test_a_half_sine_of_no_length_is_nothing() -> None:
     """Not the rounding error of sin π, which a fit would multiply by whatever it takes."""
     time = np.arange(0.0, 2.0, 0.005)

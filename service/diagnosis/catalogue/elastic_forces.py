@@ -24,7 +24,7 @@ CLEARLY_BETTER = 10.0
 
 
 class JointSpring(Effect):
-    """τ = k (q - q_0); the constant part is in the nominal model's offset."""
+    """τ = k (q - q_0), k < 0 where a counterbalance pushes away; the constant is in the nominal model's offset."""
 
     of_motion_alone: ClassVar[bool] = True
     id: ClassVar[str] = "joint_spring"
@@ -32,7 +32,7 @@ class JointSpring(Effect):
     meaning: ClassVar[str] = "an elastic torque grows linearly with the angle"
     remedy: ClassVar[str] = "add a spring to the joint"
     revealing_motion: ClassVar[str] = "the joint's whole range, in several poses of the other joints"
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("k", "{tau}/{q}", positive=True),)
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("k", "{tau}/{q}"),)
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:

@@ -16,7 +16,7 @@ from service.diagnosis.catalogue.carried_body import (
 from service.diagnosis.catalogue.effect import Coefficient, Effect, Quantity, Shape
 from service.diagnosis.catalogue.setting import Setting
 from service.diagnosis.catalogue.signals import Signals
-from service.diagnosis.catalogue.time_local import EVERY, TimeLocalEffect, since
+from service.diagnosis.catalogue.time_local import EVERY, OUTSIDE, TimeLocalEffect, since
 from service.recording.recording import Array
 
 NEAR_EDGE = 0.03
@@ -54,9 +54,23 @@ class PayloadChange(TimeLocalEffect):
         """
         grid = payload_windows(setting.durations)
         longest = max(setting.durations)
-        lower = np.array([since(len(setting.durations) - 1), 0.0, 0.0, 0.0, *(-FARTHEST_M,) * 3])
+        lower = np.array([since(len(setting.durations) - 1), 0.0, 0.0, OUTSIDE, *(-FARTHEST_M,) * 3])
         upper = np.array([len(setting.durations) - 1.0, longest, 1.1 * longest, 0.0, *(FARTHEST_M,) * 3])
         return [cls(None, grid, lower, upper)] if len(grid) else []
+
+    def outside(self, shape: Array) -> Array | None:
+        """What is missing within a window is carried outside it: which of the two, training recordings cannot say.
+
+        Parameters
+        ----------
+        shape : (7,) float64
+            the window, r [m]
+        """
+        if shape[0] == EVERY:  # held-out recordings have it at the same instants
+            return None
+        other = shape.copy()
+        other[3] = 0.0 if shape[3] == OUTSIDE else OUTSIDE
+        return other
 
     def torque(self, signals: Signals, shape: Array) -> Array:
         """Torque of one kilogramme at r, (1, n, N).
@@ -134,6 +148,9 @@ def carried(mass: float, shape: Array, durations: Sequence[float]) -> tuple[floa
         ±1, and places among the shapes of ``t_on`` and ``t_off``
     """
     scope, start, end = shape[:3]
+    if shape[3] == OUTSIDE:
+        sign, edges = carried(-mass, np.array([scope, start, end, 0.0]), durations)
+        return -sign, edges
     if scope < EVERY:
         return (1.0, {"t_on": 1}) if mass > 0.0 else (-1.0, {"t_off": 1})
     length = min(durations) if scope == EVERY else durations[int(scope)]

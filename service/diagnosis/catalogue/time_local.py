@@ -17,7 +17,10 @@ EVERY = -1.0
 """Scope of a window that lies at the same instants of every recording, held-out ones included."""
 
 HALF_SINE = 1.0
-"""Profile of a window that rises and falls as half a sine; any other is rectangular."""
+"""Profile of a window that rises and falls as half a sine."""
+
+OUTSIDE = -1.0
+"""…of one that is open wherever the rectangular one is shut, in the training recordings; any other is rectangular."""
 
 
 ROUGHLY = 40
@@ -52,6 +55,16 @@ class TimeLocalEffect(Effect):
         shape : (k,) float64
             values of the shape parameters; those of the window do not matter
         """
+
+    def outside(self, shape: Array) -> Array | None:
+        """Shape of the same effect wherever else in the training recordings, where that may be meant; else None.
+
+        Parameters
+        ----------
+        shape : (k,) float64
+            values of the shape parameters
+        """
+        return None
 
     def rough_grid(self) -> Array:
         """Few of the many windows, (g, k)."""
@@ -124,6 +137,9 @@ def open_share(shape: Array, recording: int, time: Array, interval_s: float) -> 
         what one instant stands for [s]
     """
     scope, start, end, profile = shape[:4]
+    if profile == OUTSIDE:
+        inside = open_share(np.array([scope, start, end, 0.0]), recording, time, interval_s)
+        return 1.0 - inside if recording >= 0 else np.zeros_like(time)
     opened = recording >= 0 and scope < EVERY and recording > -2.0 - scope
     if opened:
         return np.ones_like(time)

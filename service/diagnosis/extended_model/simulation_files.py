@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from ruamel.yaml import YAML
 
-from service.diagnosis.catalogue.time_local import EVERY
+from service.diagnosis.catalogue.time_local import EVERY, HALF_SINE
 from service.diagnosis.diagnosed import Diagnosis
 from service.diagnosis.extended_model.consistent_links import consistent_links
 from service.diagnosis.term import Term
@@ -132,7 +132,7 @@ def _contact(term: Term, shape: Sequence[float], own: Sequence[float], diagnosis
     """Only what happens in every recording: a scenario is played from its beginning each time."""
     if shape[0] != EVERY:
         return []
-    profile = "half_sine" if shape[3] else "rectangular"
+    profile = "half_sine" if shape[3] == HALF_SINE else "rectangular"
     window = {"start": max(shape[1], 0.0), "duration": shape[2] - shape[1], "profile": profile}
     return [{"force": list(own), **window} if term.effect.joint is None else {"torque": own[0], **window}]
 
