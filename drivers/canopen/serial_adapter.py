@@ -6,7 +6,7 @@ At a byte a call the answers of six drives take longer than a control cycle; rea
 import contextlib
 import time
 
-from can import CanInitializationError
+from can import CanInitializationError, CanOperationError
 from can.interfaces.slcan import slcanBus
 
 from drivers.port_holder import find_holder
@@ -47,6 +47,12 @@ class SerialAdapterBus(slcanBus):
             raise CanInitializationError(f"{find_holder(path) or 'another program'} has it") from error
         self._await_adapter()
         self.set_bitrate(bit_rate)
+
+    def shutdown(self) -> None:
+        """Close the channel and the port; of an adapter that is gone only the port is left to close."""
+        with contextlib.suppress(CanOperationError):
+            super().shutdown()
+        self.serialPortOrig.close()
 
     def _await_adapter(self) -> None:
         """Until it tells its version: some restart when they are opened, and some never tell."""
