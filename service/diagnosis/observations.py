@@ -68,6 +68,8 @@ class Piece:
         band of the motion itself [Hz]
     velocity_std : (n,) float64
         noise of its velocity in that band [rad/s or m/s]
+    encoder_step : (n,) float64
+        step that its positions are rounded to [rad or m]; zero where they show none
     quiet_hz, rigid_hz : float or None
         bands in which the velocities say most of single samples, and the accelerations [Hz]; None for no filter
     memory : dict
@@ -80,6 +82,7 @@ class Piece:
     time: Array
     state_hz: float
     velocity_std: Array
+    encoder_step: Array
     quiet_hz: float | None = None
     rigid_hz: float | None = None
     memory: dict[str, Any] = field(default_factory=dict, repr=False)
@@ -313,4 +316,4 @@ def _piece(prepared: PreparedMotion, start_s: float, conditioner: Conditioner, s
     torque = np.stack([reduce(without_spikes(np.ascontiguousarray(each.T))) for each in motion.torque], axis=1)
     width = motion.rate_hz / 2.0 if state_hz is None else min(state_hz, motion.rate_hz / 2.0)
     velocity_std = 2.0 * np.pi * np.sqrt(conditioner.noise.density * width**3 / 3.0)
-    return Piece(prepared, torque, used, time, width, velocity_std)
+    return Piece(prepared, torque, used, time, width, velocity_std, conditioner.noise.step)

@@ -59,7 +59,7 @@ def _uncertain_power(piece: Piece, model: ExtendedModel, joint: int) -> Array:
     motion = piece.prepared.motion
     velocity = motion.velocity[:, joint]
     rate, state_hz = motion.rate_hz, piece.state_hz
-    crawl = _step_of(piece, joint) * state_hz
+    crawl = piece.encoder_step[joint] * state_hz
     noise = np.hypot(piece.velocity_std[joint], np.where(np.abs(velocity) < crawl, crawl, 0.0))
     narrow = smooth(velocity[:, None], rate, HALF_BAND * state_hz)[:, 0]
     at_random = _step_error(model, joint, velocity, noise)
@@ -71,12 +71,6 @@ def _uncertain_power(piece: Piece, model: ExtendedModel, joint: int) -> Array:
     whole = Decimator(np.abs(band.kernel), band.factor, band.rate_hz)
     together = max(rate / (2.0 * state_hz), 1.0)  # samples that share one error of the velocity
     return together * squared.reduce(at_random**2) + whole.reduce(rounded) ** 2
-
-
-def _step_of(piece: Piece, joint: int) -> float:
-    """Step of an encoder whose rounding is the noise of a joint's velocity: σ_v² = s²/(6 f_s) · (2π)² f³/3."""
-    gain = (2.0 * np.pi) ** 2 * piece.state_hz**3 / 3.0 / (6.0 * piece.prepared.motion.rate_hz)
-    return float(piece.velocity_std[joint] / np.sqrt(gain))
 
 
 def _step_error(model: ExtendedModel, joint: int, velocity: Array, error: Array) -> Array:

@@ -1,5 +1,7 @@
 """Rows count less where a joint's velocity is smaller than its own error, and nowhere else."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -38,6 +40,18 @@ def test_the_step_is_known_as_well_as_the_velocity() -> None:
     expected = [0.5 * abs(curve(v + 0.001) - curve(v - 0.001)) for v in velocity]
     assert _step_error(model, 0, velocity, error) == pytest.approx(expected)
     assert expected[2] < 1e-3 * expected[0]
+
+
+def test_an_encoder_that_rounds_leaves_slow_motion_uncertain_and_one_that_is_merely_noisy_does_not() -> None:
+    observations, model = observed()
+    known, _ = with_noise(observations, model, ())
+    (piece,) = known.pieces
+    assert (piece.encoder_step < 1e-6).all(), "these positions are not rounded"
+    coarse = replace(known, pieces=(replace(piece, encoder_step=np.full(3, 0.01 / piece.state_hz)),))
+    for fine, rounded in zip(row_weights(known, model), row_weights(coarse, model), strict=True):
+        assert (rounded <= fine + 1e-12).all()
+        assert rounded.min() < fine.min()
+        assert np.mean(rounded < 0.99 * fine) < 0.5, "fast motion crosses steps quickly: that is noise"
 
 
 def test_a_model_that_leaves_nearly_everything_is_no_guide() -> None:

@@ -45,11 +45,14 @@ class PositionNoise:
         widest band in which the q̈ that is used keeps to `NOISE_SHARE`; None where the whole spectrum does
     joint_limits_hz : (n,) float64
         the same joint by joint; infinite where the whole spectrum does, or where the joint stands still
+    step : (n,) float64
+        step that the encoder rounds to [rad or m]; zero where it shows none
     """
 
     density: Array
     limit_hz: float | None
     joint_limits_hz: Array
+    step: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +120,8 @@ def position_noise(stretches: Stretch | Sequence[Stretch], step: Array | None = 
     reach = np.max([np.ptp(np.ascontiguousarray(stretch.position.T), axis=1) for stretch in stretches], axis=0)
     moving = reach > STANDING_STILL * np.sqrt(spectrum.density * rate / 2.0)
     limits = np.where(moving, spectrum.widest_band(rate), np.inf)
-    return PositionNoise(spectrum.density, lowest_limit(limits), limits)
+    known = np.zeros(len(limits)) if step is None else step
+    return PositionNoise(spectrum.density, lowest_limit(limits), limits, known)
 
 
 def lowest_limit(limits_hz: Array) -> float | None:
