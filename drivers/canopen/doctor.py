@@ -6,10 +6,9 @@ from pathlib import Path
 
 from drivers.canopen import objects
 from drivers.canopen.bus import CanBus
-from drivers.canopen.bus_budget import largest_rate_hz
 from drivers.canopen.configuration import BusConfiguration, DriveJoint, read_configuration
-from drivers.canopen.driver import CYCLE_FRAMES
 from drivers.canopen.node import MODES, DriveNode
+from drivers.canopen.session import possible_rate_hz
 from drivers.canopen.state_machine import DriveState
 from drivers.errors import DriverError
 from drivers.inspection import Finding, Severity, split_remedy
@@ -113,7 +112,7 @@ def _loop_rate(configuration: BusConfiguration, nodes: Sequence[DriveNode], subj
     for read in range(MEASURED_READS):
         nodes[read % len(nodes)].dictionary.read(objects.STATUSWORD)
     round_trip_ms = (time.monotonic_ns() - begin_ns) * 1e-6 / MEASURED_READS
-    possible = largest_rate_hz(len(nodes), CYCLE_FRAMES, configuration.bit_rate, configuration.serial_baud)
+    possible = possible_rate_hz(configuration)
     detail = f"a question is answered in {round_trip_ms:.2f} ms; a whole cycle gets {possible:.0f} Hz at most"
     return Finding(Severity.GOOD, subject, detail)
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from drivers.backend import ControlMode, DriveLimits, StopPolicy
 from drivers.canopen import objects
 from drivers.canopen.bus import HEARTBEAT_ID, MASTER_NODE, NMT_ID, NMT_PRE_OPERATIONAL, NMT_START, SYNC_ID
+from drivers.canopen.commissioning import commission_drive
 from drivers.canopen.configuration import DriveJoint, NodeConfiguration, read_configuration
 from drivers.canopen.node import RECEIVED_ID, DriveNode
 from drivers.canopen.objects import DriveObject
@@ -102,10 +103,8 @@ def plan_frames(
     nodes = [_planned_node(number, wanted) for number, wanted in enumerate(read_configuration(joints).nodes, 1)]
     require_sensible(limits, targets[0], [node.place for node, _ in nodes])
     yield _frame("connect", "all nodes: pre-operational", NMT_ID, bytes([NMT_PRE_OPERATIONAL, 0]))
-    for joint, (node, dictionary) in enumerate(nodes):
-        low, high = float(limits.position_low[joint]), float(limits.position_high[joint])
-        torque, ms = float(limits.torque[joint]), round(watchdog_s * 1e3)
-        node.commission(mode, StopPolicy.HOLD, torque, low, high, ms, cycle_s)
+    for node, dictionary in nodes:
+        commission_drive(node, mode, limits, StopPolicy.HOLD, watchdog_s, cycle_s)
         yield from dictionary.frames
     yield _frame("enable", "master: alive", HEARTBEAT_ID + MASTER_NODE, bytes([0x05]))
     yield _frame("enable", "all nodes: operational", NMT_ID, bytes([NMT_START, 0]))

@@ -1,16 +1,16 @@
-"""One drive: how it is commissioned, what it is told in each cycle and what it answered."""
+"""One drive: what it is, what it is told in each cycle and what it answered."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from drivers.backend import ControlMode, StopPolicy
+from drivers.backend import ControlMode
 from drivers.canopen import objects
-from drivers.canopen.bus import EMERGENCY_ID, HEARTBEAT_ID, MASTER_NODE, CanBus
+from drivers.canopen.bus import EMERGENCY_ID, HEARTBEAT_ID, CanBus
 from drivers.canopen.configuration import NodeConfiguration
 from drivers.canopen.emergency import decode_emergency, describe_error
-from drivers.canopen.interpolation import interpolation_period
 from drivers.canopen.objects import DriveObject
-from drivers.canopen.pdo import PdoLayout, decode_pdo, encode_pdo, mapping_entries
+from drivers.canopen.pdo import PdoLayout, decode_pdo, encode_pdo
 from drivers.canopen.service_data import NodeDictionary
 from drivers.canopen.state_machine import DriveState, Goal, decode_state, next_controlword
 from drivers.canopen.units import DriveUnits, drive_units
@@ -27,16 +27,24 @@ TARGET_PDOS = {
 }
 MODES = {ControlMode.POSITION: objects.CYCLIC_POSITION, ControlMode.TORQUE: objects.CYCLIC_TORQUE}
 
-PRODUCER_HEARTBEAT_MS = 100
-
 _CIA_402 = 402
-_PDO_OFF = 1 << 31
-_EVERY_SYNC = 1
-_QUICK_STOP_AND_HOLD = 6
-_RAMP_AND_LET_GO = 2
-_ABORT_BY_QUICK_STOP = 3
-_ABORT_BY_DISABLING = 2
-_FAULT_BY_QUICK_STOP = 2
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """Of a joint, by its drive; NaN where it did not come.
+
+    position : float
+        [rad or m]
+    velocity : float
+        [rad/s or m/s]
+    effort : float
+        torque at the joint [Nm or N]
+    """
+
+    position: float
+    velocity: float
+    effort: float
 
 
 @dataclass(eq=False)
@@ -123,70 +131,24 @@ class DriveNode:
         supported = self.dictionary.read(objects.SUPPORTED_MODES)
         return frozenset(mode for mode, number in MODES.items() if supported >> (number - 1) & 1)
 
-    def commission(
-        self,
-        mode: ControlMode,
-        policy: StopPolicy,
-        torque: float,
-        low: float,
-        high: float,
-        ms: int,
-        cycle_s: float | None,
-    ) -> None:
-        """Set mode, limits, what it does when the host is gone, and process data; each value is read back.
+    def measured(self) -> Measurement:
+        """What it measured of the joint in this cycle."""
 
-        Parameters
-        ----------
-        mode : ControlMode
-            who closes the loop
-        policy : StopPolicy
-            ``hold`` or ``torque_off``
-        torque : float
-            largest torque of the joint, infinite where there is no limit [Nm or N]
-        low, high : float
-            range of the joint, infinite where there is no limit [rad or m]
-        ms : int
-            time without the master's heartbeat after which the drive stops [ms]
-        cycle_s : float or None
-            time between two SYNCs; the drive keeps the one that it knows where None [s]
-        """
-        write = self.dictionary.write
-        holds = policy is StopPolicy.HOLD
-        write(objects.MODE_OF_OPERATION, MODES[mode])
-        write(objects.QUICK_STOP_OPTION, _QUICK_STOP_AND_HOLD if holds else _RAMP_AND_LET_GO)
-        write(objects.ABORT_CONNECTION, _ABORT_BY_QUICK_STOP if holds else _ABORT_BY_DISABLING)
-        write(objects.FAULT_REACTION_OPTION, _FAULT_BY_QUICK_STOP)
-        if math.isfinite(torque):
-            write(
-                objects.LARGEST_TORQUE, min(self.units.torque_cap(torque), self.dictionary.read(objects.LARGEST_TORQUE))
-            )
-        if math.isfinite(low) and math.isfinite(high):
-            counts = sorted((self.units.counts(low), self.units.counts(high)))
-            write(objects.LOWEST_POSITION, counts[0])
-            write(objects.HIGHEST_POSITION, counts[1])
-        if cycle_s is not None:
-            self._tell_cycle(cycle_s)
-        write(objects.CONSUMER_HEARTBEAT, MASTER_NODE << 16 | ms)
-        write(objects.PRODUCER_HEARTBEAT, PRODUCER_HEARTBEAT_MS)
-        self._map(0x1400, 0x1600, RECEIVED_ID, TARGET_PDOS[mode])
-        for number, (identifier, layout) in enumerate(zip(SENT_IDS, (STATE_PDO, MOTION_PDO), strict=True)):
-            self._map(0x1800 + number, 0x1A00 + number, identifier, layout)
+        def converted(entry: DriveObject, to_joint: Callable[[int], float]) -> float:
+            return to_joint(self.values[entry]) if entry in self.values else math.nan
 
-    def measured(self) -> dict[str, float]:
-        """Position, velocity and effort of the joint in this cycle; NaN where they did not come."""
-        convert = {
-            "position": (objects.POSITION_ACTUAL, self.units.position),
-            "velocity": (objects.VELOCITY_ACTUAL, self.units.velocity),
-            "effort": (objects.TORQUE_ACTUAL, self.units.torque),
-        }
-        values = {
-            name: to_joint(self.values[entry]) if entry in self.values else math.nan
-            for name, (entry, to_joint) in convert.items()
-        }
-        if not math.isnan(values["position"]):
-            self.last_position = values["position"]
+        return Measurement(
+            position=converted(objects.POSITION_ACTUAL, self.units.position),
+            velocity=converted(objects.VELOCITY_ACTUAL, self.units.velocity),
+            effort=converted(objects.TORQUE_ACTUAL, self.units.torque),
+        )
+
+    def remember(self) -> None:
+        """Keep state and place of this cycle for cycles whose answer is lost."""
+        position = self.measured().position
+        if not math.isnan(position):
+            self.last_position = position
         self.last_state = self.state or self.last_state
-        return values
 
     def read_now(self) -> None:
         """Fill `values` by service data: for an arm that is not in its cycle."""
@@ -246,18 +208,6 @@ class DriveNode:
         """Joint and node, for messages."""
         return f"joint {self.joint} (node {self.configuration.node_id})"
 
-    def _tell_cycle(self, cycle_s: float) -> None:
-        """Tell the time between two targets; a drive without this object finds it from SYNC."""
-        if self.dictionary.read_optional(objects.INTERPOLATION_VALUE) is None:
-            return
-        try:
-            value, exponent = interpolation_period(cycle_s)
-        except ValueError as error:
-            raise DriverError(DriverErrorKind.REFUSED, f"{self.place}: {error}; choose another rate") from error
-        if self.dictionary.read(objects.INTERPOLATION_EXPONENT) != exponent:
-            self.dictionary.write(objects.INTERPOLATION_EXPONENT, exponent)
-        self.dictionary.write(objects.INTERPOLATION_VALUE, value)
-
     def _learn_units(self) -> DriveUnits:
         configuration = self.configuration
         rated = configuration.rated_torque_nm or self.dictionary.read(objects.RATED_TORQUE) / 1000.0
@@ -267,26 +217,6 @@ class DriveNode:
                 f"{self.place}: its rated torque (0x6076) reads 0; give drive.rated_torque_nm",
             )
         return drive_units(configuration, rated)
-
-    def _map(self, communication: int, mapping: int, identifier: int, layout: PdoLayout) -> None:
-        """Write a PDO's parameters by explicit service data, in the order that CiA 301 asks for."""
-        number = self.configuration.node_id
-        cob_id = DriveObject("PDO COB-ID", communication, 1, 32)
-        kind = DriveObject("PDO transmission type", communication, 2, 8)
-        count = DriveObject("PDO number of entries", mapping, 0, 8)
-        write = self.dictionary.write
-        write(cob_id, _PDO_OFF | identifier + number)
-        write(kind, _EVERY_SYNC)
-        write(count, 0)
-        entries = mapping_entries(layout.objects)
-        places = [DriveObject("PDO entry", mapping, subindex, 32) for subindex in range(1, len(entries) + 1)]
-        for place, entry in zip(places, entries, strict=True):
-            self.dictionary.send(place, entry)
-        write(count, len(entries))
-        for place, entry in zip(places, entries, strict=True):  # some drives show them only when they count
-            if self.dictionary.read(place) != entry:
-                raise DriverError(DriverErrorKind.REFUSED, f"{self.place}: {place} is not kept; its PDOs are fixed")
-        write(cob_id, identifier + number)
 
     def _take(self, layout: PdoLayout, data: bytes) -> None:
         values = decode_pdo(layout, data)

@@ -8,16 +8,8 @@ from sim_backend.canopen_bus.driven_arm import DrivenArm
 from sim_backend.canopen_bus.line import Line
 from sim_backend.canopen_bus.power_state import PowerState
 from sim_backend.canopen_bus.wire import Wire
+from sim_backend.emulation.device_clock import DeviceClock
 from sim_backend.emulation.fault_kit import FaultKind, FaultSchedule, InjectedFault, faults_from
-
-STEP_S = 1e-3
-"""Period of the drives' own loops and of the physics [s]."""
-
-MOST_STEPS = 10
-"""Steps that are taken in a row while nothing is asked."""
-
-LONGEST_CATCH_UP_S = 0.25
-"""Where the machine stood still for longer than this, the device's clock has lost the rest [s]."""
 
 _TICKS_PER_MEASUREMENT = 10
 """While nobody asks: a drive that has stopped has to see that it stands."""
@@ -39,7 +31,7 @@ class CanEmulator:
         drives : sequence of EmulatedDrive
             in the order of the joints
         driven : DrivenArm
-            what they move, in periods of `STEP_S`
+            what they move, in periods of `STEP_S` of the device clock
         now_s : float
             present instant [s]
         bit_rate : float
@@ -50,11 +42,10 @@ class CanEmulator:
         self.drives = tuple(drives)
         self.driven = driven
         self.schedule = FaultSchedule()
-        self.lost_s = 0.0
         self._wire = Wire(bit_rate)
         self._line = line
         self._answers = b""
-        self._tick = round(now_s / STEP_S)
+        self._clock = DeviceClock(now_s)
         self._away_until_s = {drive.node_id: 0.0 for drive in drives}
         self._ailing: dict[int, tuple[int, float]] = {}
         self._stopped_s: list[float | None] = [None for _ in drives]
@@ -62,7 +53,7 @@ class CanEmulator:
     @property
     def now_s(self) -> float:
         """Instant up to which the devices have come [s]."""
-        return self._tick * STEP_S + self.lost_s
+        return self._clock.now_s
 
     @property
     def next_due_s(self) -> float:
@@ -101,27 +92,18 @@ class CanEmulator:
                 if self._is_there(drive, self.now_s):
                     self._wire.carry(drive.receive(frame, self.now_s), now_s)
             if frame[0] == _SYNC:
-                self.driven.take_targets(now_s - self.lost_s)
-        self.advance_to(now_s, most_steps=MOST_STEPS)
+                self.driven.take_targets(now_s - self._clock.lost_s)
+        self.advance_to(now_s)
 
-    def advance_to(self, now_s: float, most_steps: int = MOST_STEPS) -> None:
+    def advance_to(self, now_s: float) -> None:
         """Let time pass: not all at once where the machine stood still, so that the master is heard in between.
 
         Parameters
         ----------
         now_s : float
             present instant [s]
-        most_steps : int
-            how many steps are taken
         """
-        if now_s - self.now_s > LONGEST_CATCH_UP_S:
-            self.lost_s += now_s - self.now_s - LONGEST_CATCH_UP_S
-        for _ in range(most_steps):
-            if self.now_s + STEP_S > now_s:
-                return
-            self._tick += 1
-            self.schedule.run(self.now_s, self._carry_out)
-            self._step()
+        self._clock.catch_up(now_s, self._step)
 
     def due(self, now_s: float) -> bytes:
         """Text that has reached the host by now.
@@ -146,7 +128,7 @@ class CanEmulator:
             "commanded": [drive.power.state is PowerState.OPERATION_ENABLED for drive in self.drives],
             "stopped_at": self._stopped_s,
             "on_stand": self.driven.stands_on_stand,
-            "lost": self.lost_s,
+            "lost": self._clock.lost_s,
         }
 
     def answer(self, request: dict[str, Any]) -> dict[str, int] | None:
@@ -175,8 +157,9 @@ class CanEmulator:
 
     def _step(self) -> None:
         """One period of the drives' loops."""
-        self.driven.step(self._tick)
-        if self._tick % _TICKS_PER_MEASUREMENT == 0:
+        self.schedule.run(self.now_s, self._carry_out)
+        self.driven.step(self._clock.tick)
+        if self._clock.tick % _TICKS_PER_MEASUREMENT == 0:
             self.driven.measure()
         for place, drive in enumerate(self.drives):
             was_enabled = drive.power.state is PowerState.OPERATION_ENABLED

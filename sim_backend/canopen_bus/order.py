@@ -11,8 +11,9 @@ from sim_backend.canopen_bus.axis import AxisScale
 from sim_backend.canopen_bus.can_socket import CanSocket, SocketLine
 from sim_backend.canopen_bus.drive import EmulatedDrive
 from sim_backend.canopen_bus.driven_arm import DrivenArm
-from sim_backend.canopen_bus.emulator import STEP_S, CanEmulator
+from sim_backend.canopen_bus.emulator import CanEmulator
 from sim_backend.canopen_bus.serial_line import SerialLine
+from sim_backend.emulation.device_clock import STEP_S
 from sim_backend.emulation.emulator import Port
 from sim_backend.emulation.pseudo_terminal import PseudoTerminal
 from sim_backend.scenario import Scenario

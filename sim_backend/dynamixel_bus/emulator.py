@@ -2,7 +2,6 @@
 
 import heapq
 from collections.abc import Sequence
-from math import ceil
 from typing import Any
 
 import numpy as np
@@ -11,18 +10,10 @@ from numpy.typing import NDArray
 from sim_backend.dynamixel_bus.arm import MovedArm
 from sim_backend.dynamixel_bus.bus import EmulatedBus
 from sim_backend.dynamixel_bus.servo import EmulatedServo
+from sim_backend.emulation.device_clock import ALL_STEPS, STEP_S, DeviceClock
 from sim_backend.emulation.fault_kit import faults_from
 
 Array = NDArray[np.float64]
-
-STEP_S = 1e-3
-"""Period of the servos' own loops and of the physics [s]."""
-
-MOST_STEPS = 10
-"""Steps that are taken in a row while nothing is asked."""
-
-LONGEST_CATCH_UP_S = 0.25
-"""Where the machine stood still for longer than this, the device's clock has lost the rest [s]."""
 
 
 class DynamixelEmulator:
@@ -50,11 +41,10 @@ class DynamixelEmulator:
         self.arm = arm
         self.torque = np.zeros(arm.joint_count)
         self.stands_on_stand = True
-        self.lost_s = 0.0
         self._servos = [bus.servos[servo] for servo in order]
         self._bauds = {servo.specification.baud for servo in self._servos}
         self._latency_s = latency_s
-        self._now_s = now_s
+        self._clock = DeviceClock(now_s)
         self._outgoing: list[tuple[float, int, bytes]] = []
         self._count = 0
         self._look()
@@ -67,7 +57,7 @@ class DynamixelEmulator:
     @property
     def now_s(self) -> float:
         """Instant up to which the device has come [s]."""
-        return self._now_s
+        return self._clock.now_s
 
     def hears(self, baud: int) -> bool:
         """Whether a master that has set this baud rate is understood.
@@ -93,9 +83,9 @@ class DynamixelEmulator:
             when [s]
         """
         instructions = self.bus.hear(data, now_s)
-        self.advance_to(now_s, most_steps=ceil(LONGEST_CATCH_UP_S / STEP_S))
+        self._clock.catch_up(now_s, self._step, ALL_STEPS)
         for servo in self._servos:
-            servo.sense(self._now_s, min(1.0, max(0.0, now_s - self._now_s) / STEP_S))
+            servo.sense(self.now_s, min(1.0, max(0.0, now_s - self.now_s) / STEP_S))
         for due_s, frame in self.bus.answer(instructions, now_s):
             self._count += 1
             heapq.heappush(self._outgoing, (due_s + self._latency_s, self._count, frame))
@@ -118,31 +108,21 @@ class DynamixelEmulator:
         """When the next bytes reach the master; infinite where none are under way [s]."""
         return self._outgoing[0][0] if self._outgoing else float("inf")
 
-    def advance_to(self, now_s: float, most_steps: int = MOST_STEPS) -> None:
+    def advance_to(self, now_s: float) -> None:
         """Let time pass: not all at once where the machine stood still, so that the master is heard in between.
 
         Parameters
         ----------
         now_s : float
             present instant [s]
-        most_steps : int
-            how many steps are taken
         """
-        if now_s - self._now_s > LONGEST_CATCH_UP_S:
-            self.lost_s += now_s - self._now_s - LONGEST_CATCH_UP_S
-            self._now_s = now_s - LONGEST_CATCH_UP_S
-        for _ in range(most_steps):
-            if self._now_s + STEP_S > now_s:
-                return
-            self._now_s += STEP_S
-            self.bus.run_faults(self._now_s)
-            self._step()
+        self._clock.catch_up(now_s, self._step)
 
     def describe(self) -> dict[str, Any]:
         """Where the arm is and what its servos do."""
         position, velocity = self.arm.motion
         return {
-            "time": self._now_s,
+            "time": self.now_s,
             "position": position.tolist(),
             "velocity": velocity.tolist(),
             "torque": self.torque.tolist(),
@@ -152,7 +132,7 @@ class DynamixelEmulator:
             "latched_at": [servo.latched_s for servo in self._servos],
             "error": [servo.hardware_error for servo in self._servos],
             "on_stand": self.stands_on_stand,
-            "lost": self.lost_s,
+            "lost": self._clock.lost_s,
         }
 
     def answer(self, request: dict[str, Any]) -> dict[str, int] | None:
@@ -165,8 +145,8 @@ class DynamixelEmulator:
             bool}`` (put the stand under it, or take it away), or nothing of these
         """
         if "inject" in request:
-            self.bus.schedule.add(faults_from(request["inject"], self._now_s))
-            self.bus.run_faults(self._now_s)
+            self.bus.schedule.add(faults_from(request["inject"], self.now_s))
+            self.bus.run_faults(self.now_s)
         elif "get" in request:
             servo, item = request["get"]
             return {"value": self.bus.servos[servo].memory.get(item)}
@@ -179,9 +159,10 @@ class DynamixelEmulator:
 
     def _step(self) -> None:
         """One period of the servos' loops."""
+        self.bus.run_faults(self.now_s)
         position, _ = self.arm.motion
         demands = [
-            servo.demand(float(place), self._now_s, STEP_S) for servo, place in zip(self._servos, position, strict=True)
+            servo.demand(float(place), self.now_s, STEP_S) for servo, place in zip(self._servos, position, strict=True)
         ]
         self.torque = self.arm.torque(demands)
         if self.stands_on_stand:

@@ -3,8 +3,7 @@
 Only the power states and the motion of a drive, which durand leaves to its user, are written here.
 """
 
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from uuid import uuid4
 
 import can
@@ -13,6 +12,7 @@ import pytest
 
 from drivers import ControlMode, DriveLimits, Setpoint, StopPolicy
 from drivers.canopen import CanopenArm, DriveJoint, scan_bus
+from patience import eventually
 
 durand = pytest.importorskip("durand")
 
@@ -89,13 +89,6 @@ def arm(channel: str, drives: list[ForeignDrive]) -> Iterator[CanopenArm]:
     one = CanopenArm(joints, patience_s=0.1)
     yield one
     one.disconnect()
-
-
-def eventually(is_so: Callable[[], bool], within_s: float = 5.0) -> bool:
-    deadline = time.monotonic() + within_s
-    while not is_so() and time.monotonic() < deadline:
-        time.sleep(0.002)
-    return is_so()
 
 
 def test_foreign_drives_are_found_and_read(channel: str, drives: list[ForeignDrive], arm: CanopenArm) -> None:
