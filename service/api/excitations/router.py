@@ -9,13 +9,14 @@ from service.api.excitations.models import EXAMPLES, ExcitationAnswer, Excitatio
 from service.api.excitations.status import describe, find_excitation, finished_excitation
 from service.api.excitations.submission import submit_excitation
 from service.api.jobs.answers import require_document
+from service.api.jobs.collection import add_collection_routes
+from service.api.jobs.documents import JobDocument, add_document_routes
 from service.api.jobs.events import add_events_route
-from service.api.jobs.removal import add_removal_route
-from service.api.jobs.routes import ENDINGS, SUBMISSION, Identifier, Limit, collection
+from service.api.jobs.routes import ENDINGS, SUBMISSION, Identifier
 from service.api.jobs.submission import request_body
 from service.api.problems import problem_responses
 from service.api.services import Offered
-from service.jobs import read_designed_trajectory
+from service.jobs import ExcitationWorkspace, read_designed_trajectory
 
 router = APIRouter(prefix="/excitations", tags=["excitations"], responses=problem_responses("invalid-request"))
 
@@ -42,34 +43,18 @@ async def hand_in(request: Request, response: Response, services: Offered) -> Ex
     return answer
 
 
-@router.get("", summary="List excitations")
-def list_excitations(request: Request, services: Offered, limit: Limit = 100) -> ExcitationListAnswer:
-    """The newest first."""
-    identifiers = services.excitations.items.identifiers()[:limit]
-    return ExcitationListAnswer(
-        excitations=[describe(services, identifier, request.url.path) for identifier in identifiers]
-    )
-
-
-@router.get("/{identifier}", summary="Follow an excitation", responses=problem_responses("not-found"))
-def get_excitation(request: Request, identifier: Identifier, services: Offered) -> ExcitationAnswer:
-    """Its state, and where to go on from there."""
-    return describe(services, identifier, collection(request, 1))
-
-
-@router.get(
-    "/{identifier}/result",
-    summary="Fetch the design",
-    response_class=Response,
-    responses={
-        200: {"content": {"application/json": {}}, "description": "the same document as `tauscope excite --json`"},
-        **problem_responses("not-found", *ENDINGS, "excitation", "robot-file", "worker-lost", "internal"),
-    },
+_RESULT = JobDocument(
+    "result",
+    ExcitationWorkspace.read_result,
+    "Fetch the design",
+    "Criterion, its history, and what is left to every limit; else the problem that the job ended in.",
+    {"content": {"application/json": {}}, "description": "the same document as `tauscope excite --json`"},
 )
-def get_result(identifier: Identifier, services: Offered) -> Response:
-    """Criterion, its history, and what is left to every limit; else the problem that the job ended in."""
-    content = finished_excitation(services, identifier).read_result()
-    return Response(require_document(content, identifier), media_type="application/json")
+
+add_collection_routes(
+    router, "an excitation", lambda services: services.excitations, (ExcitationAnswer, ExcitationListAnswer), describe
+)
+add_document_routes(router, finished_excitation, [_RESULT], "excitation", "robot-file")
 
 
 @router.get(
@@ -92,5 +77,4 @@ def get_trajectory(
     return Response(require_document(content, identifier), headers=disposition, media_type=media_type)
 
 
-add_removal_route(router, "an excitation", lambda services: services.excitations, ExcitationAnswer, describe)
 add_events_route(router, "an excitation", find_excitation)

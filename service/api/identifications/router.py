@@ -13,16 +13,16 @@ from service.api.identifications.models import (
 )
 from service.api.identifications.status import describe, find_identification, finished_identification
 from service.api.identifications.submission import submit_identification
-from service.api.jobs.answers import require_document
+from service.api.jobs.collection import add_collection_routes
+from service.api.jobs.documents import JobDocument, add_document_routes
 from service.api.jobs.events import add_events_route
-from service.api.jobs.removal import add_removal_route
-from service.api.jobs.routes import ENDINGS, SUBMISSION, Identifier, Limit, collection
+from service.api.jobs.routes import ENDINGS, SUBMISSION, Identifier
 from service.api.jobs.submission import request_body
 from service.api.problems import problem_responses
 from service.api.services import Offered
 from service.errors import ExportError, NotFoundError
 from service.identification import IdentificationDocument
-from service.jobs import EXPORT_FILES, ExportFormat
+from service.jobs import EXPORT_FILES, ExportFormat, IdentificationWorkspace
 from service.robot.messages import nearest, one_line, shown
 
 router = APIRouter(prefix="/identifications", tags=["identifications"], responses=problem_responses("invalid-request"))
@@ -58,44 +58,31 @@ async def hand_in(request: Request, response: Response, services: Offered) -> Id
     return answer
 
 
-@router.get("", summary="List identifications")
-def list_identifications(request: Request, services: Offered, limit: Limit = 100) -> IdentificationListAnswer:
-    """The newest first."""
-    identifiers = services.identifications.items.identifiers()[:limit]
-    return IdentificationListAnswer(
-        identifications=[describe(services, identifier, request.url.path) for identifier in identifiers]
-    )
-
-
-@router.get("/{identifier}", summary="Follow an identification", responses=problem_responses("not-found"))
-def get_identification(request: Request, identifier: Identifier, services: Offered) -> IdentificationAnswer:
-    """Its state, and where to go on from there."""
-    return describe(services, identifier, collection(request, 1))
-
-
-@router.get(
-    "/{identifier}/result",
-    summary="Fetch the result",
-    response_class=Response,
-    responses={
-        200: {"model": IdentificationDocument, "description": "the same document as `tauscope identify --json`"},
-        **problem_responses(
-            "not-found",
-            *ENDINGS,
-            "robot-file",
-            "recording",
-            "recording-mismatch",
-            "identification",
-            "invalid-request",
-            "worker-lost",
-            "internal",
-        ),
-    },
+_RESULT = JobDocument(
+    "result",
+    IdentificationWorkspace.read_result,
+    "Fetch the result",
+    "The result of an identification that succeeded; else the problem that it ended in.",
+    {"model": IdentificationDocument, "description": "the same document as `tauscope identify --json`"},
 )
-def get_result(identifier: Identifier, services: Offered) -> Response:
-    """The result of an identification that succeeded; else the problem that it ended in."""
-    content = finished_identification(services, identifier).read_result()
-    return Response(require_document(content, identifier), media_type="application/json")
+
+add_collection_routes(
+    router,
+    "an identification",
+    lambda services: services.identifications,
+    (IdentificationAnswer, IdentificationListAnswer),
+    describe,
+)
+add_document_routes(
+    router,
+    finished_identification,
+    [_RESULT],
+    "robot-file",
+    "recording",
+    "recording-mismatch",
+    "identification",
+    "invalid-request",
+)
 
 
 @router.get(
@@ -120,7 +107,4 @@ def get_export(identifier: Identifier, format_: Format, services: Offered) -> Re
     return Response(workspace.read_export(file.name), headers=disposition, media_type=file.media_type)
 
 
-add_removal_route(
-    router, "an identification", lambda services: services.identifications, IdentificationAnswer, describe
-)
 add_events_route(router, "an identification", find_identification)
