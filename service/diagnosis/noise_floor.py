@@ -6,7 +6,6 @@ left-out effect is not taken for the noise's colour and whitened away.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +14,7 @@ from service.diagnosis.catalogue import Effect
 from service.diagnosis.fit import Fitter
 from service.diagnosis.model import ExtendedModel
 from service.diagnosis.observations import BoolArray, Observations, Piece
+from service.diagnosis.period_pairs import period_pairs, rounding_repeats
 from service.diagnosis.residual import residual_rows
 from service.diagnosis.screening import Screen, model_signals
 from service.diagnosis.whitening import JointNoise, fitted_noise
@@ -22,18 +22,8 @@ from service.identification.autocorrelation import Autoregression
 from service.recording.conditioning.common_band import Decimator
 from service.recording.recording import Array
 
-REPEATED_NOISE = 0.4
-"""Part of the noise of a joint's velocity that must differ between periods: where the motion repeats to the sample, an
-encoder rounds alike in each, and what that makes of the model's columns does not show between them."""
-
 FEWEST_ROWS = 150
 """Rows of pure error that a joint's noise model needs."""
-
-STANDING = 10.0
-"""Largest velocity of a joint that stands, in standard deviations of its noise."""
-
-FEWEST_SAMPLES = 64
-"""Samples of a difference between periods below which it tells nothing."""
 
 MOST_ADDED = 40
 """Columns of the catalogue in a saturated fit at most, and not more than one in `ROWS_A_COLUMN` rows."""
@@ -69,25 +59,6 @@ def with_noise(
     return observations.with_noise(_saturated_noise(observations, model, effects)), False
 
 
-def rounding_repeats(observations: Observations) -> bool:
-    """Whether the positions' noise is the same in every period at some joint that moves.
-
-    Parameters
-    ----------
-    observations : Observations
-        the data
-    """
-    for piece in observations:
-        velocity = piece.prepared.motion.velocity.T
-        moves = np.abs(velocity).max(axis=1) > STANDING * piece.velocity_std
-        for pair in _period_pairs(observations, piece):
-            change = pair.later(velocity) - velocity[:, pair.earlier]
-            differing = np.sqrt(np.mean(change**2, axis=1) * pair.factor)
-            if (moves & (differing < REPEATED_NOISE * piece.velocity_std)).any():
-                return True
-    return False
-
-
 def repeated_differences(
     observations: Observations, model: ExtendedModel
 ) -> Iterator[tuple[Array, NDArray[np.bool_], float]]:
@@ -108,7 +79,7 @@ def repeated_differences(
     """
     for piece in observations:
         motion = piece.prepared.motion
-        pairs = list(_period_pairs(observations, piece))
+        pairs = list(period_pairs(observations, piece))
         if not pairs:
             continue
         residual = motion.torque[0].T - _full_torque(model, piece)
@@ -117,47 +88,6 @@ def repeated_differences(
             rows = motion.band.reduce(np.ascontiguousarray(pair.later(residual) - residual[:, pair.earlier]))
             used = motion.band.reduce_mask(measured[:, pair.earlier] & measured[:, pair.near])
             yield rows, used, pair.factor
-
-
-@dataclass(frozen=True)
-class _PeriodPair:
-    """Samples of all periods but the last of a run, and those a period later, between two samples each.
-
-    earlier, near, far : slice
-        samples of the piece
-    part : float
-        how far the later instants lie from `near` to `far`, 0 to 1
-    """
-
-    earlier: slice
-    near: slice
-    far: slice
-    part: float
-
-    def later(self, values: Array) -> Array:
-        """Signals (k, N) a period later, (k, L)."""
-        return (1.0 - self.part) * values[:, self.near] + self.part * values[:, self.far]
-
-    @property
-    def factor(self) -> float:
-        """What turns the power of a difference into the noise's."""
-        return 1.0 / (1.0 + self.part**2 + (1.0 - self.part) ** 2)
-
-
-def _period_pairs(observations: Observations, piece: Piece) -> Iterator[_PeriodPair]:
-    """The repeated parts of a piece."""
-    number, motion = piece.prepared.recording, piece.prepared.motion
-    runs = observations.repetitions[number] if 0 <= number < len(observations.repetitions) else ()
-    for run in runs:
-        instants, half = piece.time[0], 0.5 / motion.rate_hz
-        first = int(np.searchsorted(instants, run.start_s - half))
-        stop = int(np.searchsorted(instants, run.start_s + (run.count - 1) * run.length_s - half))
-        shift = run.length_s * motion.rate_hz
-        whole = int(np.floor(shift + 1e-6))
-        stop = min(stop, len(motion.velocity) - whole - 1)
-        if run.count > 1 and stop - first >= FEWEST_SAMPLES:
-            near, far = (slice(first + whole + step, stop + whole + step) for step in (0, 1))
-            yield _PeriodPair(slice(first, stop), near, far, float(np.clip(shift - whole, 0.0, 1.0)))
 
 
 def _full_torque(model: ExtendedModel, piece: Piece) -> Array:

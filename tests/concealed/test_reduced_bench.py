@@ -42,7 +42,21 @@ def test_nothing_is_named_where_nothing_is_concealed() -> None:
     assert sum(found.verdict == "consistent" for found in verdicts) >= len(trials) - 1
 
 
-@pytest.mark.parametrize("noise", [{"position_std": 2e-4}, {"encoder_step": 5e-4}])
+POOR = [
+    {"position_std": 2e-4},
+    {"encoder_step": 5e-4},
+    pytest.param(
+        {"encoder_step": 1e-3},
+        marks=pytest.mark.xfail(
+            strict=True,
+            reason="seed 10: an excursion of joint1's torque noise is named external_contact, because one scale is"
+            " taken for the noise of all joints once rows near reversals weigh less, and joint1's own is larger",
+        ),
+    ),
+]
+
+
+@pytest.mark.parametrize("noise", POOR)
 def test_poor_encoders_make_nothing_of_nothing(noise: dict[str, Any]) -> None:
     """Friction's step blurred or rounded at every reversal is no delay and no bristle."""
     verdicts = [diagnosed(null_trial("paper", motion, 10 + motion, **noise))[0] for motion in (0, 1, 2)]

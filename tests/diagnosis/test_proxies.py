@@ -1,11 +1,14 @@
 """Findings that only stand in for something else, where the tests of what is left say so."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from diagnosis.diagnosed_arm import at_joint, recordings
 from identification.simulated import Array, SimulatedArm, paper_robot
 from service.diagnosis import diagnose
+from service.diagnosis.catalogue.external_contact import JointContact
 from service.diagnosis.choice import Choice
 from service.diagnosis.diagnosed import Diagnosis
 from service.diagnosis.proxies import proxies
@@ -37,3 +40,19 @@ def test_a_likeness_that_leaves_most_of_what_is_wrong_is_none(diagnosis: Diagnos
     option = fitted_option(likeness, nominal, diagnosis.fitter)
     choice = Choice((option,), None, 0.0)
     assert proxies(nominal, option.fit, [choice], diagnosis.fitter.observations, pure_error=True) == [0]
+
+
+def test_a_contact_that_explains_more_than_all_that_is_left_is_there_whatever_else_is(diagnosis: Diagnosis) -> None:
+    """Where the noise is not known from repetitions, and the joint keeps more than noise besides."""
+    nominal, rows = diagnosis.selection.nominal, diagnosis.fitter.observations
+    contacts = [each for each in diagnosis.screen.candidates(nominal) if isinstance(each.effect, JointContact)]
+    (contact,) = [each for each in contacts if each.effect.joint == 1]
+    option = fitted_option(contact, nominal, diagnosis.fitter)
+    left = float(np.sum(option.fit.projection.residual[1] ** 2))
+
+    def dropped(gain: float) -> list[int]:
+        choice = Choice((replace(option, gain=gain),), None, 0.0)
+        return proxies(nominal, option.fit, [choice], rows, pure_error=False)
+
+    assert dropped(0.99 * left) == [0]
+    assert dropped(1.01 * left) == []

@@ -11,11 +11,16 @@ from service.recording.conditioning import Conditioner
 
 TORQUE_NOISE = 0.02
 STEP = 2.0 * np.pi / 2**16
+PERIOD_S = 10.0
+
+LEAST_HZ = 3.0 * (15 + 4) / (2.0 * PERIOD_S)
+"""Band with three rows for each of joint 1's parameters, 15 of the links and 4 of its friction, in the one period that
+is left where the motion repeats: no narrower one is chosen, whatever the positions allow."""
 
 
-@pytest.fixture(scope="module")
-def arm() -> SimulatedArm:
-    return simulate(paper_robot(), seed=5, period_s=10.0)
+def motion(seed: int) -> SimulatedArm:
+    """Three periods of the paper's arm."""
+    return simulate(paper_robot(), seed=seed, period_s=PERIOD_S)
 
 
 def cutoff(arm: SimulatedArm, position_noise: NDArray[np.float64], *, periods: bool) -> float:
@@ -33,12 +38,26 @@ def rounding(arm: SimulatedArm) -> NDArray[np.float64]:
     return np.round(exact / STEP) * STEP - exact
 
 
-def test_rounding_that_repeats_is_not_averaged_away(arm: SimulatedArm) -> None:
-    """To say that the motion repeats makes the torque better known, not the positions: the band hardly changes."""
-    assert cutoff(arm, rounding(arm), periods=True) <= 1.25 * cutoff(arm, rounding(arm), periods=False)
+DECIMATED = pytest.mark.xfail(
+    strict=True,
+    reason="without periods the band is too narrow: its filter passes 0.75 of the noise of q̈ that a sharp edge at the"
+    " cut-off would, and the bound counts all of it",
+)
 
 
-def test_noise_that_does_not_repeat_is_averaged_in_positions_and_torque_alike(arm: SimulatedArm) -> None:
+@pytest.mark.parametrize("seed", [5, 6, 10, *(pytest.param(seed, marks=DECIMATED) for seed in (7, 8, 9))])
+def test_rounding_that_repeats_is_not_averaged_away(seed: int) -> None:
+    """To say that the motion repeats makes the torque better known, not the positions: the band must not be wider.
+
+    Taken for noise that periods average, such rounding made it two to three and a half times as wide.
+    """
+    arm = motion(seed)
+    plain = max(cutoff(arm, rounding(arm), periods=False), LEAST_HZ)
+    assert cutoff(arm, rounding(arm), periods=True) <= 1.05 * plain
+
+
+def test_noise_that_does_not_repeat_is_averaged_in_positions_and_torque_alike() -> None:
+    arm = motion(5)
     noise = STEP / np.sqrt(12.0) * np.random.default_rng(2).standard_normal(arm.exact.exact.position.shape)
     ratio = cutoff(arm, noise, periods=True) / cutoff(arm, noise, periods=False)
     assert 0.6 < ratio < 1.3
