@@ -15,6 +15,7 @@ from service.diagnosis.catalogue.rotor_inertia import RotorInertia
 from service.diagnosis.choice import Selection
 from service.diagnosis.confirmation import HeldOut
 from service.diagnosis.constancy import constancy
+from service.diagnosis.constant_torque import with_better_than_constants
 from service.diagnosis.detectability import Detectable, detectable, detectable_parameters
 from service.diagnosis.diagnosed import Diagnosis
 from service.diagnosis.events import beside_events
@@ -100,7 +101,10 @@ def diagnose(
     screen, fitter = Screen(rows, effects), Fitter(rows)
     model = with_fitting_slopes(model, fitter, open_slopes(identification), setting.speed)
     model = with_fitting_stribeck(model, fitter, open_stribeck(identification), setting.speed)
-    selection = Selector(screen, fitter, confirming, pure_error=pure_error).select(model, rotors, progress)
+    selector = Selector(screen, fitter, confirming, pure_error=pure_error)
+    selection = selector.select(model, rotors, progress)
+    if states_friction(robot):
+        selection = with_better_than_constants(selection, screen, confirming, selector.admission)
     if confirming is not None and identification.constrained:
         selection = _unless_plainer_is_better(selection, delivered_model(identification), confirming)
     progress("weigh the evidence")

@@ -18,15 +18,17 @@ from service.dynamics.base_parameters import BaseParameters
 from service.identification.dataset import Dataset, PreparedMotion
 from service.recording.conditioning import Conditioner
 from service.recording.conditioning.filters import smooth
+from service.recording.conditioning.position_noise import PositionNoise
 from service.recording.recording import Array
 from service.robot import Robot
 
 BoolArray = NDArray[np.bool_]
 
-BLURRED = 2.0
+BLURRED = 1.0
 """Noise of the velocity, relative to the width 1/K_v of friction's step, up to which the motion's own band is opened.
 Narrower it rounds off how a joint sticks at its reversals, always to the same side, which looks like a delay or like
-bristles; wider its noise blurs the step to either side, which the rows' weights know of."""
+bristles; wider its noise blurs the step to either side: the rows' weights know of that, but what tells asymmetric
+friction from a constant is lost in it."""
 
 QUIET = 0.4
 """…and up to which it is opened for what the torque is at single samples, where no band takes that noise out again."""
@@ -66,10 +68,8 @@ class Piece:
         instants at the recorded rate, from the beginning of the recording [s]
     state_hz : float
         band of the motion itself [Hz]
-    velocity_std : (n,) float64
-        noise of its velocity in that band [rad/s or m/s]
-    encoder_step : (n,) float64
-        step that its positions are rounded to [rad or m]; zero where they show none
+    position_noise : PositionNoise
+        noise and rounding of the measured positions
     quiet_hz, rigid_hz : float or None
         bands in which the velocities say most of single samples, and the accelerations [Hz]; None for no filter
     memory : dict
@@ -81,11 +81,15 @@ class Piece:
     used: BoolArray
     time: Array
     state_hz: float
-    velocity_std: Array
-    encoder_step: Array
+    position_noise: PositionNoise
     quiet_hz: float | None = None
     rigid_hz: float | None = None
     memory: dict[str, Any] = field(default_factory=dict, repr=False)
+
+    @property
+    def velocity_std(self) -> Array:
+        """Noise of the velocity in the motion's own band, (n,) [rad/s or m/s]: σ² = D (2π)² f³/3."""
+        return 2.0 * np.pi * np.sqrt(self.position_noise.density * self.state_hz**3 / 3.0)
 
     @property
     def repetitions(self) -> int:
@@ -315,5 +319,4 @@ def _piece(prepared: PreparedMotion, start_s: float, conditioner: Conditioner, s
     used = np.stack([reduce_mask(np.ascontiguousarray(measured.T)) for measured in motion.measured], axis=1)
     torque = np.stack([reduce(without_spikes(np.ascontiguousarray(each.T))) for each in motion.torque], axis=1)
     width = motion.rate_hz / 2.0 if state_hz is None else min(state_hz, motion.rate_hz / 2.0)
-    velocity_std = 2.0 * np.pi * np.sqrt(conditioner.noise.density * width**3 / 3.0)
-    return Piece(prepared, torque, used, time, width, velocity_std, conditioner.noise.step)
+    return Piece(prepared, torque, used, time, width, conditioner.noise)

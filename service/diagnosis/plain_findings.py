@@ -6,13 +6,12 @@ there, a constant that the recordings show is a finding whatever they are compar
 says nothing, nor does a URDF: its <dynamics> are often placeholders.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 
 import numpy as np
 from scipy import stats
 
 from service.diagnosis.admission import LEVEL, SMALLEST_SHARE
-from service.diagnosis.catalogue import TimeLocalEffect
 from service.diagnosis.catalogue.plain_terms import (
     CoulombFriction,
     PlainTerm,
@@ -20,15 +19,9 @@ from service.diagnosis.catalogue.plain_terms import (
     TorqueOffset,
     ViscousFriction,
 )
-from service.diagnosis.choice import Option, distinct, is_physical
+from service.diagnosis.constant_torque import instead_of_a_constant
 from service.diagnosis.diagnosed import Diagnosis
-from service.diagnosis.equivalence import EQUIVALENT
 from service.diagnosis.findings import Finding, probability_among, sizes, without_nominal
-from service.diagnosis.fit import Fit
-from service.diagnosis.model import with_terms
-from service.diagnosis.refinement import refined
-from service.diagnosis.screening import Screen, model_signals
-from service.diagnosis.selection import MOST_FITTED
 from service.diagnosis.term import Term
 from service.robot import Robot
 
@@ -106,7 +99,7 @@ def _finding(effect: PlainTerm, diagnosis: Diagnosis) -> Finding | None:
         return None
     delta = fit.model.structure.terms[joint].delta
     shape = np.array([delta] if isinstance(effect, StribeckTerm) and delta is not None else [])
-    others = _alternatives(effect, without, gain, diagnosis) if isinstance(effect, TorqueOffset) else ()
+    others = instead_of_a_constant(effect, without, gain, diagnosis.screen) if isinstance(effect, TorqueOffset) else ()
     score = gain - 1.0
     return Finding(
         terms=(Term(effect, shape, np.array([value])),),
@@ -128,29 +121,3 @@ def _seen_again(place: int, value: float, diagnosis: Diagnosis) -> bool | None:
     again = diagnosis.held_out.fitter.projected(diagnosis.selection.fit.model)
     found = diagnosis.selection.fit.model.parameters[place] + again.projection.step[place]
     return bool(np.sign(found) == np.sign(value))
-
-
-def _alternatives(effect: PlainTerm, without: Fit, gain: float, diagnosis: Diagnosis) -> tuple[Option, ...]:
-    """Effects that explain nearly as much as a constant does, in its place."""
-    inflation = without.inflation()
-    enough = gain - EQUIVALENT * inflation
-    near = [e for e in diagnosis.screen.effects if e.joint in (effect.joint, None)]
-    lasting = [each for each in near if not isinstance(each, TimeLocalEffect)]
-    screen = Screen(diagnosis.fitter.observations, lasting)
-    touching = [each for each in screen.candidates(without) if each.gain > 0.5 * enough]
-    signals = model_signals(without.model, screen.observations)
-    closest = sorted((refined(each, without, screen, signals) for each in touching), key=lambda each: -each.score)
-    options = []
-    for candidate in closest[:MOST_FITTED]:
-        start = with_terms(
-            without.model, [*without.model.terms, Term(candidate.effect, candidate.shape, candidate.coefficients)]
-        )
-        found = diagnosis.fitter.fit(start)
-        option = Option(candidate, found, without.energy - found.energy)
-        if option.score > enough - 1.0 and is_physical(option, without):
-            options.append(option)
-    return distinct(_by_score(options))
-
-
-def _by_score(options: Sequence[Option]) -> list[Option]:
-    return sorted(options, key=lambda each: -each.score)

@@ -44,7 +44,20 @@ def row_weights(observations: Observations, model: ExtendedModel) -> tuple[Array
     fit = Fitter(observations).fit(model)  # an identification leaves alone what it cannot tell, however large it is
     if fit.inflation() > FAR_OFF:
         return tuple(np.ones(int(observations.kept(joint).sum())) for joint in range(len(observations.noise)))
-    model, weights = fit.model, []
+    return weights_of_motion(observations, fit.model)
+
+
+def weights_of_motion(observations: Observations, model: ExtendedModel) -> tuple[Array, ...]:
+    """The same by a model that is right about friction, whatever torque was measured, (R_j,) a joint.
+
+    Parameters
+    ----------
+    observations : Observations
+        the data, noise known
+    model : ExtendedModel
+        the model
+    """
+    weights = []
     for joint, noise in enumerate(observations.noise):
         power = noise.model.variance
         parts = [
@@ -59,7 +72,7 @@ def _uncertain_power(piece: Piece, model: ExtendedModel, joint: int) -> Array:
     motion = piece.prepared.motion
     velocity = motion.velocity[:, joint]
     rate, state_hz = motion.rate_hz, piece.state_hz
-    crawl = piece.encoder_step[joint] * state_hz
+    crawl = piece.position_noise.step[joint] * state_hz
     noise = np.hypot(piece.velocity_std[joint], np.where(np.abs(velocity) < crawl, crawl, 0.0))
     narrow = smooth(velocity[:, None], rate, HALF_BAND * state_hz)[:, 0]
     at_random = _step_error(model, joint, velocity, noise)

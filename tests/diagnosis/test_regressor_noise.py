@@ -46,8 +46,9 @@ def test_an_encoder_that_rounds_leaves_slow_motion_uncertain_and_one_that_is_mer
     observations, model = observed()
     known, _ = with_noise(observations, model, ())
     (piece,) = known.pieces
-    assert (piece.encoder_step < 1e-6).all(), "these positions are not rounded"
-    coarse = replace(known, pieces=(replace(piece, encoder_step=np.full(3, 0.01 / piece.state_hz)),))
+    assert (piece.position_noise.step < 1e-6).all(), "these positions are not rounded"
+    rounded_noise = replace(piece.position_noise, step=np.full(3, 0.01 / piece.state_hz))
+    coarse = replace(known, pieces=(replace(piece, position_noise=rounded_noise),))
     for fine, rounded in zip(row_weights(known, model), row_weights(coarse, model), strict=True):
         assert (rounded <= fine + 1e-12).all()
         assert rounded.min() < fine.min()

@@ -15,10 +15,11 @@ import numpy as np
 from service.diagnosis.fit import Fitter
 from service.diagnosis.model import ExtendedModel
 from service.diagnosis.observations import Observations
-from service.diagnosis.regressor_noise import row_weights
+from service.diagnosis.regressor_noise import weights_of_motion
 from service.excitation import Trajectory
 from service.recording import Recording
 from service.recording.conditioning import Conditioner
+from service.recording.conditioning.position_noise import PositionNoise
 from service.recording.recording import Array
 
 UNKNOWN = 1e-9
@@ -52,13 +53,22 @@ def played(trajectory: Trajectory, observations: Observations, model: ExtendedMo
     """
     robot, rate = observations.robot, observations.pieces[0].prepared.motion.rate_hz
     samples = trajectory.samples(rate)
-    recording = Recording.from_arrays("planned", samples.time, samples.position, np.zeros_like(samples.position))
+    position = _measured(samples.position, observations.pieces[0].position_noise, rate)
+    recording = Recording.from_arrays("planned", samples.time, position, np.zeros_like(position))
     conditioner = Conditioner.survey(recording, robot)
     rows = Observations.prepare([conditioner], robot, model.structure.base, cutoff_hz, model.steepness)
     number = len(observations.names)  # later than all that were recorded
     pieces = tuple(replace(piece, prepared=replace(piece.prepared, recording=number)) for piece in rows)
     rows = replace(rows, pieces=pieces).with_noise(observations.noise)
-    return Played(Fitter(rows.with_weights(row_weights(rows, model))))
+    return Played(Fitter(rows.with_weights(weights_of_motion(rows, model))))
+
+
+def _measured(position: Array, noise: PositionNoise, rate_hz: float) -> Array:
+    """Positions as the arm's encoders would tell them, (N, n): what exact ones could show, these need not."""
+    std = np.sqrt(np.maximum(noise.density * rate_hz / 2.0 - np.square(noise.step) / 12.0, 0.0))
+    noisy = position + std * np.random.default_rng(0).standard_normal(position.shape)
+    step = np.where(noise.step > 0.0, noise.step, 1.0)
+    return np.where(noise.step > 0.0, np.rint(noisy / step) * step, noisy)
 
 
 def equations(model: ExtendedModel, fitter: Fitter, others: Sequence[ExtendedModel] = ()) -> Array:
