@@ -24,6 +24,7 @@ from service.identification.friction_shape import ORDINARY
 from service.identification.least_squares import factorise
 from service.identification.structure import JointTerms, ModelStructure
 from service.recording.conditioning import Conditioner, Motion, Source
+from service.recording.conditioning.common_band import Decimator
 from service.recording.recording import Array
 from service.robot import Robot
 
@@ -65,6 +66,9 @@ ENOUGH_PIECES = 8
 
 SPECTRUM_SEGMENT = 4096
 """Samples in one segment of the motion's spectrum."""
+
+FILTER_POINTS = 1 << 14
+"""Points of a filter's frequency response, both halves."""
 
 SPECTRUM_POINTS = 200
 SMOOTHING = np.sqrt(2.0)
@@ -160,7 +164,9 @@ def _quiet_band(
     parameters: Array,
     residual_std: Array,
 ) -> float:
-    """Widest band in which noise of q̈ makes little torque, by joint j: Σ_k H_jk² S_k (2π)⁴ f⁵/5 ≤ share² · residual.
+    """Widest band in which noise of q̈ makes little torque, by joint j: Σ_k H_jk² S_k (2π)⁴ g f⁵/5 ≤ share² · residual.
+
+    Of that noise the band's filter passes the share g.
 
     The residual, less what that noise put into it, counts as white in the present band. Where torque was measured in
     several periods, what it does not repeat bounds it: a model that is wrong as yet is no reason for a wider band.
@@ -172,12 +178,21 @@ def _quiet_band(
     density = np.mean([c.noise.density for c in conditioners] * from_position, axis=0)
     independent = _independent_share(prepared.motion, conditioners[0].position_noise_std)
     density *= independent + (1.0 - independent) * prepared.motion.repetitions
-    growth = (inertia**2).mean(axis=0) @ density * (2.0 * np.pi) ** 4 / 5.0
+    growth = (inertia**2).mean(axis=0) @ density * (2.0 * np.pi) ** 4 * _passed_share(prepared.motion, motions) / 5.0
     cutoff = motions.cutoff_hz or np.inf
     own = np.maximum(residual_std**2 - growth * cutoff**5, SMALLEST_OWN_SHARE * residual_std**2)
     own = np.minimum(own, np.where(independent >= INDEPENDENT, _unrepeated_power(prepared), np.inf))
     with np.errstate(divide="ignore"):
         return float(((NOISE_TORQUE_SHARE**2 * own / cutoff / growth) ** 0.25).min())
+
+
+def _passed_share(motion: Motion, motions: Dataset) -> float:
+    """Share of the noise of q̈ below the cut-off that passes a filter without an edge there: ∫ f⁴ |H|² df / (f_c⁵/5)."""
+    if motions.cutoff_hz is None or not isinstance(motion.band, Decimator):
+        return 1.0
+    frequency = np.fft.rfftfreq(FILTER_POINTS, 1.0 / motion.rate_hz)
+    passed = frequency**4 * np.abs(np.fft.rfft(motion.band.kernel, FILTER_POINTS)) ** 2
+    return float(np.sum(passed) * frequency[1] / (motions.cutoff_hz**5 / 5.0))
 
 
 def _unrepeated_power(prepared: PreparedMotion) -> Array:
