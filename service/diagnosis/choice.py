@@ -49,11 +49,14 @@ class Choice:
         what held-out recordings say of the chosen one; None where there are none
     p_value : float
         of the chosen one, family-wise
+    was_given : bool
+        whether others had found it, so that nothing else was looked at in its place
     """
 
     options: tuple[Option, ...]
     confirmation: Confirmation | None
     p_value: float
+    was_given: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -92,7 +92,7 @@ class Selector:
             confirmation = self._confirmation(fit, option)
             confirmed = confirmation is None or confirmation.confirmed(cautious=not self.pure_error)
             if p_value < self.admission.level and confirmed:
-                choices.append(Choice((option,), confirmation, 0.0))
+                choices.append(Choice((option,), confirmation, p_value, was_given=True))
                 fit = option.fit
         rejected: list[Choice] = []
         while len(choices) < MOST_TERMS:
@@ -238,7 +238,7 @@ class Selector:
         """Whether a choice was made before something else at its joints, or without looking for others at all."""
         count = self.screen.observations.robot.joint_count
         own, *later = [set(choice.options[0].candidate.effect.touched(count)) for choice in choices[place:]]
-        return choices[place].p_value == 0.0 or any(own & each for each in later)
+        return choices[place].was_given or any(own & each for each in later)
 
     def _confirmation(self, fit: Fit, option: Option) -> Confirmation | None:
         term = option.fit.model.terms[-1]
