@@ -1,15 +1,15 @@
-"""What happens once differs from one repetition to the next, as noise does, and is none.
+"""What happens once, or changes with time, differs from one repetition to the next, as noise does, and is none.
 
-Left in the differences between repetitions, a payload that is dropped would be taken for noise of its own size and
-colour, and whitened away. So before the noise is settled, the windows are screened as if it were white, and a term that
-makes the repetitions agree better is taken out of their differences, for that purpose only.
+Left in the differences between repetitions, a payload that is dropped or friction that falls would be taken for noise
+of its own size and colour, and whitened away. So before the noise is settled, such effects are screened as if it were
+white, and a term that makes the repetitions agree better is taken out of their differences, for that purpose only.
 """
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from service.diagnosis.catalogue import Effect, TimeLocalEffect
+from service.diagnosis.catalogue import Effect
 from service.diagnosis.fit import Fit, Fitter
 from service.diagnosis.model import ExtendedModel, with_terms
 from service.diagnosis.noise_floor import with_noise
@@ -52,10 +52,10 @@ def beside_events(
     effects : sequence of Effect
         the catalogue
     """
-    windowed = [effect for effect in effects if isinstance(effect, TimeLocalEffect)]
+    passing = [effect for effect in effects if not effect.repeats_with_motion]
     best, pure_error = known, True
     rows = observations.with_noise(_white(observations, model))
-    screen, fitter = Screen(rows, windowed, count_all=True), Fitter(rows)
+    screen, fitter = Screen(rows, passing, count_all=True), Fitter(rows)
     fit = fitter.projected(model)
     for _ in range(MOST_EVENTS):
         signals = model_signals(fit.model, rows)

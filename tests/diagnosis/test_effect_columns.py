@@ -162,11 +162,28 @@ def test_coupled_friction_acts_on_both_joints_with_the_power_of_the_common_speed
         assert power == pytest.approx(friction * common)
 
 
-def test_drift_decays_from_repetition_to_repetition() -> None:
+def test_drift_goes_on_from_repetition_to_repetition() -> None:
     found = columns("friction_drift", 2, (5.0,))
+    time = np.arange(8000).reshape(2, 4000) / RATE
+    course = (1.0 - np.exp(-time / 5.0)) / (1.0 - np.exp(-setting().durations[0] / 5.0))
     assert found.shape == (2, 1, 2, len(V))
-    assert found[1, 0, 0] == pytest.approx(V * np.exp(-np.arange(4000) / RATE / 5.0))
-    assert found[0, 0, 1] == pytest.approx(S * np.exp(-(4.0 + np.arange(4000) / RATE) / 5.0))
+    assert found[1, 0] == pytest.approx(V * course)
+    assert found[0, 0] == pytest.approx(S * course)
+
+
+def test_a_joint_warms_as_fast_as_its_friction_dissipates() -> None:
+    """Against the equation of heat, integrated sample by sample; a joint that rests stays cold."""
+    by_heat = form("friction_drift", 2, 1)
+    (found,) = by_heat.columns(SIGNALS, np.array([[2.0]]))
+    power = (2.0 * S + 0.5 * V) * V / (setting().top_torque[2] * setting().speed[2])
+    warmth, course = 0.0, []
+    for each in np.tile(power, 2):
+        warmth = each + (warmth - each) * np.exp(-1.0 / (2.0 * RATE))
+        course.append(warmth)
+    scale = 1.0 - np.exp(-setting().durations[0] / 2.0)
+    assert found[1, 0] * scale == pytest.approx(V * np.reshape(course, (2, 4000)), abs=1e-9)
+    resting = replace(SIGNALS, velocity=np.zeros_like(SIGNALS.velocity))
+    assert not by_heat.columns(resting, np.array([[2.0]])).any()
 
 
 def test_a_late_torque_is_the_shifted_torque_to_first_order() -> None:

@@ -103,6 +103,7 @@ class Effect(ABC):
     What a sensor does not pass on, `swallows`, may be more than what was measured; no other effect's torque can be.
     An effect that is `screened` is looked for beside the nominal model, one that is `doubtful` only where its columns
     have `least_share` of their energy outside it; any other becomes a finding by comparison with a given model.
+    One that does not do the same whenever the motion does, that does not `repeats_with_motion`, passes for noise there.
     """
 
     id: ClassVar[str]
@@ -117,6 +118,7 @@ class Effect(ABC):
     swallows: ClassVar[bool] = False
     screened: ClassVar[bool] = True
     doubtful: ClassVar[bool] = False
+    repeats_with_motion: ClassVar[bool] = True
     least_share: ClassVar[float] = 0.0
 
     joint: int | None

@@ -1,9 +1,11 @@
-"""Friction that changes over time, as grease warms up: an exponential approach to the warm state."""
+"""Friction that changes over time: grease that warms up, by the clock or by the heat that friction itself makes."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from scipy import signal
 
 from service.diagnosis.catalogue.effect import Coefficient, Effect, Shape
 from service.diagnosis.catalogue.setting import Setting
@@ -14,32 +16,52 @@ TIMES = np.array([0.08, 0.2, 0.5, 1.2, 3.0])
 """Time constants looked at, relative to the longest recording."""
 
 
+@dataclass(frozen=True, eq=False)
 class FrictionDrift(Effect):
-    """τ = (f A(q̇) + w q̇) exp(-t/T), t from the beginning of each recording."""
+    """τ = (f A(q̇) + w q̇) h(t), T ḣ = p / (1 - e^{-D/T}) - h, h = 0 when recording begins.
 
+    f and w are what friction changes by until D under p = 1, however slowly it does: a T far beyond the recordings
+    would else leave them open. By the clock p is 1. By heat it is the power that the model's friction dissipates,
+    relative to that of the largest torque at the rms speed: a joint that rests or creeps cools.
+
+    duration_s : float
+        D, of the longest recording [s]
+    full_power : float or None
+        at which p is 1 [W]; None for a change by the clock
+    """
+
+    repeats_with_motion: ClassVar[bool] = False
     id: ClassVar[str] = "friction_drift"
-    equation: ClassVar[str] = "tau = (f sgn(qd) + w qd) exp(-t/T)"
+    equation: ClassVar[str] = (
+        "tau = (f sgn(qd) + w qd) h, T dh/dt = p / (1 - exp(-D/T)) - h, p = 1 or friction's own power / P0"
+    )
     meaning: ClassVar[str] = "friction changes over time, as in a warm-up"
     remedy: ClassVar[str] = "warm the joint up before recording, or let friction depend on temperature"
     revealing_motion: ClassVar[str] = "the first motion once more at the end"
     coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("f", "{tau}"), Coefficient("w", "{tau} s/{q}"))
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("T", "s", logarithmic=True),)
 
+    duration_s: float = 1.0
+    full_power: float | None = None
+
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """One a joint that moves.
+        """Both ways, a joint that moves.
 
         Parameters
         ----------
         setting : Setting
             the arm
         """
-        times = TIMES * max(setting.durations)
+        longest = max(setting.durations)
+        times = TIMES * longest
         grid = times[:, None], 0.5 * times[:1], 1.5 * times[-1:]
-        return [cls(joint, *grid) for joint in setting.joints if setting.moves(joint)]
+        moving = [joint for joint in setting.joints if setting.moves(joint)]
+        power = setting.top_torque * setting.speed
+        return [cls(joint, *grid, longest, each) for joint in moving for each in (None, float(power[joint]))]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """A(q̇) exp(-t/T), q̇ exp(-t/T), repetition by repetition.
+        """A(q̇) h, q̇ h, repetition by repetition.
 
         Parameters
         ----------
@@ -48,6 +70,24 @@ class FrictionDrift(Effect):
         shapes : (g, 1) float64
             T [s]
         """
-        decay = np.exp(-signals.time[None] / shapes[:, :, None])
+        constants = shapes[:, 0]
+        if self.full_power is None:
+            course = 1.0 - np.exp(-signals.time[None] / constants[:, None, None])
+        else:
+            course = self._temperature(signals, constants, self.full_power)
+        course = course / (1.0 - np.exp(-self.duration_s / constants))[:, None, None]
         own = np.stack([signals.step[self.joint], signals.velocity[self.joint]])
-        return (own[None, :, None, :] * decay[:, None])[:, :, None]
+        return (own[None, :, None, :] * course[:, None])[:, :, None]
+
+    def _temperature(self, signals: Signals, constants: Array, full_power: float) -> Array:
+        """T ϑ̇ = p - ϑ of a joint that its friction warms, (g, P, N); before the piece it did so as within it."""
+        friction = signals.torque[self.joint] - signals.load[self.joint]
+        power = np.maximum(friction * signals.velocity[self.joint], 0.0) / full_power
+        power = np.tile(power, signals.time.shape[0])
+        before = max(float(signals.time[0, 0]), 0.0)
+        found = []
+        for constant in constants:
+            kept = np.exp(-1.0 / (signals.rate_hz * constant))
+            start = kept * power.mean() * (1.0 - np.exp(-before / constant))
+            found.append(signal.lfilter([1.0 - kept], [1.0, -kept], power, zi=[start])[0].reshape(signals.time.shape))
+        return np.stack(found)

@@ -6,6 +6,7 @@ windows: a screening needs that torque once (`service.diagnosis.windows`), and t
 
 from abc import abstractmethod
 from collections.abc import Sequence
+from typing import ClassVar
 
 import numpy as np
 
@@ -43,6 +44,8 @@ class TimeLocalEffect(Effect):
 
     The scope is the index of the one recording that the window belongs to, `EVERY`, or `since` a recording.
     """
+
+    repeats_with_motion: ClassVar[bool] = False
 
     @abstractmethod
     def torque(self, signals: Signals, shape: Array) -> Array:
