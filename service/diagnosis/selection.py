@@ -145,7 +145,7 @@ class Selector:
             if p_value < (level if self.pure_error else LIKELY) and self.admission.large_enough(
                 option, fit, choices, known=known
             ):
-                if not known and not self.admission.determined(option.fit, self.fitter):
+                if not known and not self.pure_error and not self.admission.determined(option.fit, self.fitter):
                     continue
                 below = [each for each in fitted if each.score <= option.score]
                 chosen = where_held_out_shows(option, fit, self.fitter, self.held_out)
