@@ -1,14 +1,30 @@
-"""What a drive is told before it gets power: mode, limits, what it does when the host is gone, and its process data."""
+"""What a drive is told before it gets power: the values of its DCF file, mode, limits, watchdog, process data."""
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from canopen.sdo.exceptions import SdoAbortedError
 
 from drivers.backend import ControlMode, DriveLimits, StopPolicy
 from drivers.canopen import objects
 from drivers.canopen.bus import MASTER_NODE
+from drivers.canopen.device_file import DeviceFile
+from drivers.canopen.device_settings import Setting, settings_of
 from drivers.canopen.interpolation import interpolation_period
-from drivers.canopen.node import MODES, MOTION_PDO, RECEIVED_ID, SENT_IDS, STATE_PDO, TARGET_PDOS, DriveNode
-from drivers.canopen.objects import DriveObject
+from drivers.canopen.node import MODES, DriveNode
 from drivers.canopen.pdo import PdoLayout, mapping_entries
+from drivers.canopen.process_data import (
+    MOTION_PDO,
+    RECEIVED_ID,
+    SENT_IDS,
+    STATE_PDO,
+    TARGET_PDOS,
+    PdoParameters,
+    received_parameters,
+    sent_parameters,
+)
+from drivers.canopen.state_machine import POWERED, decode_state
 from drivers.errors import DriverError, DriverErrorKind
 
 PRODUCER_HEARTBEAT_MS = 100
@@ -20,6 +36,69 @@ _RAMP_AND_LET_GO = 2
 _ABORT_BY_QUICK_STOP = 3
 _ABORT_BY_DISABLING = 2
 _FAULT_BY_QUICK_STOP = 2
+
+
+def write_settings(node: DriveNode) -> bool:
+    """Give a drive those values of its DCF file that it does not have yet; whether there was any.
+
+    They may change what its positions and torques mean, so that nothing that was read before holds any more.
+
+    Parameters
+    ----------
+    node : DriveNode
+        with or without such a file
+
+    Raises
+    ------
+    DriverError
+        ``refused``: the drive does not take a value, or is under power; ``cannot-connect``: it does not answer
+    """
+    file = node.configuration.device_file
+    if file is None:
+        return False
+    missing = [one for one in settings_of(file).written if _kept(node, file, one) != one.data]
+    if missing and decode_state(node.dictionary.read(objects.STATUSWORD)) in POWERED:
+        raise DriverError(
+            DriverErrorKind.REFUSED,
+            f"{node.place}: is under power, and {missing[0].entry} is not yet {missing[0].text} as {file.name} has it; "
+            "support the arm and let go of it first",
+        )
+    for setting in missing:
+        _give(node, file, setting)
+    return bool(missing)
+
+
+def _kept(node: DriveNode, file: DeviceFile, setting: Setting) -> bytes:
+    """What the drive has where a setting goes."""
+    with _refusals_named(node, file, setting):
+        return node.dictionary.read_data(setting.entry)
+
+
+def _give(node: DriveNode, file: DeviceFile, setting: Setting) -> None:
+    """Write one value and read it back."""
+    with _refusals_named(node, file, setting):
+        node.dictionary.send_data(setting.entry, setting.data, setting.text)
+    if (kept := _kept(node, file, setting)) != setting.data:
+        raise DriverError(
+            DriverErrorKind.REFUSED,
+            f"{node.place}: {setting.entry} was written as {setting.text}, as {file.name} has it, and reads back as "
+            f"0x{kept[::-1].hex().upper()}; correct its ParameterValue",
+        )
+
+
+@contextmanager
+def _refusals_named(node: DriveNode, file: DeviceFile, setting: Setting) -> Iterator[None]:
+    """What a drive says against a value names the value and the file; its silence is told as always."""
+    try:
+        yield
+    except DriverError as error:
+        if not isinstance(error.__cause__, SdoAbortedError):
+            raise
+        raise DriverError(
+            DriverErrorKind.REFUSED,
+            f"{node.place}: {setting.entry} = {setting.text} of {file.name} cannot be written ({error.__cause__}); "
+            "correct its ParameterValue, or remove it",
+        ) from error
 
 
 def commission_drive(
@@ -63,19 +142,23 @@ def commission_drive(
         _tell_cycle(node, cycle_s)
     write(objects.CONSUMER_HEARTBEAT, MASTER_NODE << 16 | round(watchdog_s * 1e3))
     write(objects.PRODUCER_HEARTBEAT, PRODUCER_HEARTBEAT_MS)
-    _map(node, 0x1400, 0x1600, RECEIVED_ID, TARGET_PDOS[mode])
+    _map(node, received_parameters(TARGET_PDOS[mode]), RECEIVED_ID, TARGET_PDOS[mode])
     for number, (identifier, layout) in enumerate(zip(SENT_IDS, (STATE_PDO, MOTION_PDO), strict=True)):
-        _map(node, 0x1800 + number, 0x1A00 + number, identifier, layout)
+        _map(node, sent_parameters(number, layout), identifier, layout)
 
 
 def _write_limits(node: DriveNode, limits: DriveLimits) -> None:
-    """Torque, never more than the drive allows already, and range; nothing where there is no limit."""
+    """Torque, never more than the drive or its DCF file allows already, and range; nothing where there is no limit."""
     joint, write = node.joint - 1, node.dictionary.write
     low, high = float(limits.position_low[joint]), float(limits.position_high[joint])
     torque = float(limits.torque[joint])
+    file = node.configuration.device_file
+    stated = None if file is None else settings_of(file).torque_cap
+    caps = [] if stated is None else [stated]
     if math.isfinite(torque):
-        allowed = node.dictionary.read(objects.LARGEST_TORQUE)
-        write(objects.LARGEST_TORQUE, min(node.units.torque_cap(torque), allowed))
+        caps.append(node.units.torque_cap(torque))
+    if caps:
+        write(objects.LARGEST_TORQUE, min(*caps, node.dictionary.read(objects.LARGEST_TORQUE)))
     if math.isfinite(low) and math.isfinite(high):
         counts = sorted((node.units.counts(low), node.units.counts(high)))
         write(objects.LOWEST_POSITION, counts[0])
@@ -95,22 +178,17 @@ def _tell_cycle(node: DriveNode, cycle_s: float) -> None:
     node.dictionary.write(objects.INTERPOLATION_VALUE, value)
 
 
-def _map(node: DriveNode, communication: int, mapping: int, identifier: int, layout: PdoLayout) -> None:
+def _map(node: DriveNode, places: PdoParameters, identifier: int, layout: PdoLayout) -> None:
     """Write a PDO's parameters by explicit service data, in the order that CiA 301 asks for."""
-    number = node.configuration.node_id
-    cob_id = DriveObject("PDO COB-ID", communication, 1, 32)
-    kind = DriveObject("PDO transmission type", communication, 2, 8)
-    count = DriveObject("PDO number of entries", mapping, 0, 8)
-    write = node.dictionary.write
-    write(cob_id, _PDO_OFF | identifier + number)
-    write(kind, _EVERY_SYNC)
-    write(count, 0)
+    number, write = node.configuration.node_id, node.dictionary.write
+    write(places.identifier, _PDO_OFF | identifier + number)
+    write(places.kind, _EVERY_SYNC)
+    write(places.count, 0)
     entries = mapping_entries(layout.objects)
-    places = [DriveObject("PDO entry", mapping, subindex, 32) for subindex in range(1, len(entries) + 1)]
-    for place, entry in zip(places, entries, strict=True):
+    for place, entry in zip(places.entries, entries, strict=True):
         node.dictionary.send(place, entry)
-    write(count, len(entries))
-    for place, entry in zip(places, entries, strict=True):  # some drives show them only when they count
+    write(places.count, len(entries))
+    for place, entry in zip(places.entries, entries, strict=True):  # some drives show them only when they count
         if node.dictionary.read(place) != entry:
             raise DriverError(DriverErrorKind.REFUSED, f"{node.place}: {place} is not kept; its PDOs are fixed")
-    write(cob_id, identifier + number)
+    write(places.identifier, identifier + number)

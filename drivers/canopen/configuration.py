@@ -1,14 +1,20 @@
 """What the driver needs to know of each joint's drive, from the robot file's ``drive`` blocks.
 
 On each joint: ``{node_id: 3, counts_per_turn: 65536}`` and, where they differ from the defaults, the other keys of
-`NodeConfiguration`. The bus is the same for all joints and stands on the first: ``interface`` and ``channel`` as
-python-can takes them, ``bit_rate``.
+`NodeConfiguration`; ``eds`` is the path of the drive's EDS or DCF file. The bus is the same for all joints and stands
+on the first: ``interface`` and ``channel`` as python-can takes them, ``bit_rate``.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
+from drivers.backend import ControlMode
+from drivers.canopen.data_sheet_text import DataSheetError
+from drivers.canopen.device_file import DeviceFile, read_device_file
+from drivers.canopen.device_needs import require_needed, require_target
+from drivers.canopen.device_settings import settings_of
 from drivers.drive_block import (
     read_direction,
     read_positive,
@@ -18,10 +24,11 @@ from drivers.drive_block import (
     require_distinct,
     require_known_keys,
 )
+from drivers.errors import DriverError, DriverErrorKind
 
 _HIGHEST_NODE = 127
-_BUS_KEYS = ("interface", "channel", "bit_rate", "serial_baud", "eds")
-_NODE_KEYS = ("node_id", "counts_per_turn", "zero_count", "direction", "rated_torque_nm")
+_BUS_KEYS = ("interface", "channel", "bit_rate", "serial_baud")
+_NODE_KEYS = ("node_id", "counts_per_turn", "zero_count", "direction", "rated_torque_nm", "eds")
 
 
 @dataclass(frozen=True)
@@ -57,6 +64,8 @@ class NodeConfiguration:
         -1 where the drive counts against the joint, else 1
     rated_torque_nm : float or None
         at the motor shaft, in place of what the drive states (0x6076): makers scale it differently [Nm]
+    device_file : DeviceFile or None
+        the drive's EDS or DCF file, which describes what the driver needs
     """
 
     node_id: int
@@ -65,6 +74,7 @@ class NodeConfiguration:
     zero_count: int = 0
     direction: int = 1
     rated_torque_nm: float | None = None
+    device_file: DeviceFile | None = None
 
 
 @dataclass(frozen=True)
@@ -101,7 +111,8 @@ def read_configuration(joints: Sequence[DriveJoint]) -> BusConfiguration:
     Raises
     ------
     DriverError
-        ``refused``: a key is missing, unknown or not usable; names the joint and the key
+        ``refused``: a key is missing, unknown or not usable, or the EDS or DCF file describes no drive that the driver
+        can use; names the joint and the key
     """
     first = joints[0]
     require_known_keys(joints, _BUS_KEYS, _NODE_KEYS)
@@ -116,16 +127,64 @@ def read_configuration(joints: Sequence[DriveJoint]) -> BusConfiguration:
     )
 
 
+def require_targets(configuration: BusConfiguration, mode: ControlMode) -> None:
+    """Refuse a mode whose targets a drive does not take, by its EDS or DCF file.
+
+    Parameters
+    ----------
+    configuration : BusConfiguration
+        bus and drives
+    mode : ControlMode
+        who closes the loop
+
+    Raises
+    ------
+    DriverError
+        ``refused``: names joint, file and object
+    """
+    for joint, node in enumerate(configuration.nodes, 1):
+        if node.device_file is None:
+            continue
+        try:
+            require_target(node.device_file, mode)
+        except DataSheetError as error:
+            text = f"joint {joint} (node {node.node_id}): {node.device_file.name}: {error}"
+            raise DriverError(DriverErrorKind.REFUSED, text) from error
+
+
 def _node(joint: DriveJoint) -> NodeConfiguration:
     """The drive of a joint."""
     counts_per_turn = read_positive(joint, "counts_per_turn")
     if counts_per_turn is None:
         raise refusal(joint, "counts_per_turn", "is missing; give the position counts of a motor turn")
+    node_id = read_whole(joint, "node_id", None, least=1, most=_HIGHEST_NODE)
+    rated_torque_nm = read_positive(joint, "rated_torque_nm")
     return NodeConfiguration(
-        node_id=read_whole(joint, "node_id", None, least=1, most=_HIGHEST_NODE),
+        node_id=node_id,
         counts_per_turn=counts_per_turn,
         gear_ratio=joint.gear_ratio,
         zero_count=read_whole(joint, "zero_count", 0, least=-(2**31), most=2**31 - 1),
         direction=read_direction(joint),
-        rated_torque_nm=read_positive(joint, "rated_torque_nm"),
+        rated_torque_nm=rated_torque_nm,
+        device_file=_device_file(joint, node_id, reads_rated_torque=rated_torque_nm is None),
     )
+
+
+def _device_file(joint: DriveJoint, node_id: int, *, reads_rated_torque: bool) -> DeviceFile | None:
+    """The EDS or DCF file of a joint's drive, which describes one that the driver can use; None where none is given."""
+    path = joint.drive.get("eds")
+    if path is None:
+        return None
+    if not isinstance(path, str) or not path:
+        raise refusal(joint, "eds", f"= {path!r}; give the path of the drive's EDS or DCF file")
+    try:
+        file = read_device_file(Path(path), node_id)
+        if file.node_id not in (None, node_id):
+            raise DataSheetError(
+                f"is made for node {file.node_id}; correct drive.node_id, or give the file of this node"
+            )
+        require_needed(file, reads_rated_torque=reads_rated_torque)
+        settings_of(file)
+    except DataSheetError as error:
+        raise refusal(joint, "eds", f"= {path!r}: {error}") from error
+    return file

@@ -7,9 +7,11 @@ from pathlib import Path
 from drivers.canopen import objects
 from drivers.canopen.bus import CanBus
 from drivers.canopen.configuration import BusConfiguration, DriveJoint, read_configuration
+from drivers.canopen.device_file import DescribedObject, DeviceFile
+from drivers.canopen.device_settings import settings_of
 from drivers.canopen.node import MODES, DriveNode
 from drivers.canopen.session import possible_rate_hz
-from drivers.canopen.state_machine import DriveState
+from drivers.canopen.state_machine import POWERED
 from drivers.errors import DriverError
 from drivers.inspection import Finding, Severity, split_remedy
 
@@ -89,6 +91,8 @@ def _examine_drive(node: DriveNode) -> list[Finding]:
     version = dictionary.read_text(objects.SOFTWARE_VERSION) or "unknown"
     torque = abs(node.units.torque_per_permille)
     findings = [Finding(Severity.GOOD, node.place, f"{name}, firmware {version}, {torque:.4g} Nm a per mille")]
+    if node.configuration.device_file is not None:
+        findings += _examine_file(node.configuration.device_file, node.place)
     missing = [str(mode) for mode in MODES if mode not in modes]
     if missing:
         detail = f"has no cyclic synchronous {' and '.join(missing)} mode (0x6502)"
@@ -97,13 +101,37 @@ def _examine_drive(node: DriveNode) -> list[Finding]:
     node.read_now()
     for fault in node.faults():
         findings.append(Finding(Severity.FAILURE, node.place, fault.detail, fault.remedy))
-    if node.state in (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE):
+    if node.state in POWERED:
         remedy = "none where it holds the arm; else support the arm and switch it off"
         findings.append(Finding(Severity.WARNING, node.place, f"is under power: {node.state}", remedy))
     if dictionary.read_optional(objects.ABORT_CONNECTION) is None:
         detail = "has no abort connection option (0x6007): it does not stop by itself when the host is gone"
         findings.append(Finding(Severity.FAILURE, node.place, detail, "use a drive that has one, or an emergency stop"))
     return findings
+
+
+def _examine_file(file: DeviceFile, place: str) -> list[Finding]:
+    """What the EDS or DCF file is good for; that it describes the drive on the bus has been made sure of."""
+    stated = (("vendor", file.vendor), ("product", file.product), ("revision", file.revision))
+    identity = ", ".join(f"{name} 0x{number:X}" for name, number in stated if number is not None)
+    describes = f"{file.name} describes all that the driver needs; {identity or 'it states no identity'}"
+    findings = [Finding(Severity.GOOD, place, describes)]
+    settings = settings_of(file)
+    if settings.written:
+        given = ", ".join(f"{one.entry} = {one.text}" for one in settings.written)
+        findings.append(Finding(Severity.GOOD, place, f"{file.name} gives it, before each run: {given}"))
+    for reason, described in settings.left_out.items():
+        detail = f"{file.name} has values that are not written ({reason}): {_listed_places(described)}"
+        findings.append(Finding(Severity.GOOD, place, detail))
+    return findings
+
+
+def _listed_places(described: Sequence[DescribedObject]) -> str:
+    """Places in the object dictionary, the subindices of an index together."""
+    subindices: dict[int, list[str]] = {}
+    for one in described:
+        subindices.setdefault(one.index, []).append(f"{one.subindex:02X}")
+    return ", ".join(f"0x{index:04X}:{'/'.join(found)}" for index, found in subindices.items())
 
 
 def _loop_rate(configuration: BusConfiguration, nodes: Sequence[DriveNode], subject: str) -> Finding:

@@ -7,8 +7,8 @@ import can
 
 from drivers.backend import Capabilities, ControlMode, DriveLimits, StopPolicy
 from drivers.canopen.bus import NMT_PRE_OPERATIONAL, NMT_START, CanBus
-from drivers.canopen.commissioning import commission_drive
-from drivers.canopen.configuration import BusConfiguration, DriveJoint, read_configuration
+from drivers.canopen.commissioning import commission_drive, write_settings
+from drivers.canopen.configuration import BusConfiguration, DriveJoint, read_configuration, require_targets
 from drivers.canopen.emergency import HEARTBEAT_LOST
 from drivers.canopen.enabling import power_up
 from drivers.canopen.node import DriveNode
@@ -123,7 +123,7 @@ class CanopenArm:
         watchdog_s: float,
         cycle_s: float | None = None,
     ) -> ArmState:
-        """Commission every drive, arm its heartbeat consumer, and take all to *operation enabled* together.
+        """Configure and commission every drive, arm its heartbeat consumer, take all to *operation enabled* together.
 
         Parameters
         ----------
@@ -142,6 +142,9 @@ class CanopenArm:
         if self._mode is not None:
             raise DriverError(DriverErrorKind.REFUSED, "the arm is enabled already; stop it first")
         self._refuse_impossible(mode, stop_policy, watchdog_s)
+        for node in session.nodes:
+            if write_settings(node):
+                node.identify()
         state = session.read_by_service_data()
         require_sensible(limits, state.position, [node.place for node in session.nodes])
         if state.faults:
@@ -236,6 +239,8 @@ class CanopenArm:
             reason = f"drives cannot {policy} by themselves; choose hold or torque_off"
         elif not WATCHDOG_RANGE_S[0] <= watchdog_s <= WATCHDOG_RANGE_S[1]:
             reason = f"a watchdog of {watchdog_s:g} s is outside {WATCHDOG_RANGE_S[0]:g} to {WATCHDOG_RANGE_S[1]:g} s"
+        else:
+            require_targets(self._configuration, mode)
         if reason is not None:
             raise DriverError(DriverErrorKind.REFUSED, reason)
 

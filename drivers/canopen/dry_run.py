@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 from drivers.backend import ControlMode, DriveLimits, StopPolicy
 from drivers.canopen import objects
 from drivers.canopen.bus import HEARTBEAT_ID, MASTER_NODE, NMT_ID, NMT_PRE_OPERATIONAL, NMT_START, SYNC_ID
-from drivers.canopen.commissioning import commission_drive
-from drivers.canopen.configuration import DriveJoint, NodeConfiguration, read_configuration
-from drivers.canopen.node import RECEIVED_ID, DriveNode
+from drivers.canopen.commissioning import commission_drive, write_settings
+from drivers.canopen.configuration import DriveJoint, NodeConfiguration, read_configuration, require_targets
+from drivers.canopen.node import DriveNode
 from drivers.canopen.objects import DriveObject
+from drivers.canopen.process_data import RECEIVED_ID
 from drivers.canopen.state_machine import DriveState, Goal, next_controlword
 from drivers.canopen.units import drive_units
 from drivers.errors import DriverError, DriverErrorKind
@@ -19,7 +20,7 @@ from drivers.inspection import PlannedFrame
 from drivers.limits import require_sensible
 
 _TO_POWER = (DriveState.SWITCH_ON_DISABLED, DriveState.READY, DriveState.SWITCHED_ON)
-_DOWNLOAD, _UPLOAD = 0x23, 0x40
+_DOWNLOAD, _LONG_DOWNLOAD, _UPLOAD = 0x23, 0x21, 0x40
 _AS_DELIVERED = {
     objects.LARGEST_TORQUE: 0xFFFF,
     objects.INTERPOLATION_VALUE: 1,
@@ -35,12 +36,18 @@ class _PlannedDictionary:
         self.node_id = configuration.node_id
         self._label = label
         self._values = dict(_AS_DELIVERED)
+        self._data: dict[DriveObject, bytes] = {}
 
     def read(self, entry: DriveObject) -> int:
         """What was written, or what drives have as delivered."""
         request = bytes([_UPLOAD]) + _place(entry) + bytes(4)
         self._add(f"{entry}?", request)
         return self._values.get(entry, 0)
+
+    def read_data(self, entry: DriveObject) -> bytes:
+        """Nothing that a drive was not given yet."""
+        self.read(entry)
+        return self._data.get(entry, b"")
 
     def read_optional(self, entry: DriveObject) -> int:
         """As `read`: the drive has everything."""
@@ -53,11 +60,18 @@ class _PlannedDictionary:
 
     def send(self, entry: DriveObject, value: int) -> None:
         """Keep a value."""
-        size = entry.bits // 8
-        data = value.to_bytes(size, "little", signed=entry.signed)
-        command = _DOWNLOAD | (4 - size) << 2
         self._values[entry] = value
-        self._add(f"{entry} := {value}", bytes([command]) + _place(entry) + data.ljust(4, b"\0"))
+        self.send_data(entry, value.to_bytes(entry.bits // 8, "little", signed=entry.signed), str(value))
+
+    def send_data(self, entry: DriveObject, data: bytes, text: str) -> None:
+        """Keep a value as transferred; a long one is announced by its size, and follows in segments."""
+        self._data[entry] = data
+        if len(data) > 4:
+            payload = bytes([_LONG_DOWNLOAD]) + _place(entry) + len(data).to_bytes(4, "little")
+            self._add(f"{entry} := {text}, {len(data)} bytes in segments", payload)
+            return
+        command = _DOWNLOAD | (4 - len(data)) << 2
+        self._add(f"{entry} := {text}", bytes([command]) + _place(entry) + data.ljust(4, b"\0"))
 
     def _add(self, meaning: str, payload: bytes) -> None:
         self.frames.append(_frame("enable", f"{self._label}: {meaning}", 0x600 + self.node_id, payload))
@@ -73,7 +87,8 @@ def plan_frames(
 ) -> Iterator[PlannedFrame]:
     """Frames of a connection, of enabling, of some cycles and of a stop, for drives that answer as they should.
 
-    Service data is shown as expedited transfers; heartbeats, which are sent as time passes, are shown once.
+    Service data is shown as expedited transfers, and of more than four bytes by its first frame alone; heartbeats,
+    which are sent as time passes, are shown once.
 
     Parameters
     ----------
@@ -100,9 +115,13 @@ def plan_frames(
     DriverError
         ``refused``: a ``drive`` block or a limit is not possible
     """
-    nodes = [_planned_node(number, wanted) for number, wanted in enumerate(read_configuration(joints).nodes, 1)]
+    configuration = read_configuration(joints)
+    require_targets(configuration, mode)
+    nodes = [_planned_node(number, wanted) for number, wanted in enumerate(configuration.nodes, 1)]
     require_sensible(limits, targets[0], [node.place for node, _ in nodes])
     yield _frame("connect", "all nodes: pre-operational", NMT_ID, bytes([NMT_PRE_OPERATIONAL, 0]))
+    for node, _ in nodes:
+        write_settings(node)
     for node, dictionary in nodes:
         commission_drive(node, mode, limits, StopPolicy.HOLD, watchdog_s, cycle_s)
         yield from dictionary.frames

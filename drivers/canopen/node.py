@@ -8,23 +8,16 @@ from drivers.backend import ControlMode
 from drivers.canopen import objects
 from drivers.canopen.bus import EMERGENCY_ID, HEARTBEAT_ID, CanBus
 from drivers.canopen.configuration import NodeConfiguration
+from drivers.canopen.device_identity import require_identity
 from drivers.canopen.emergency import decode_emergency, describe_error
 from drivers.canopen.objects import DriveObject
 from drivers.canopen.pdo import PdoLayout, decode_pdo, encode_pdo
+from drivers.canopen.process_data import MOTION_PDO, SENT_IDS, STATE_PDO, TARGET_PDOS
 from drivers.canopen.service_data import NodeDictionary
 from drivers.canopen.state_machine import DriveState, Goal, decode_state, next_controlword
 from drivers.canopen.units import DriveUnits, drive_units
 from drivers.errors import DriverError, DriverErrorKind, Fault
 
-RECEIVED_ID = 0x200
-SENT_IDS = (0x180, 0x280)
-
-STATE_PDO = PdoLayout((objects.STATUSWORD, objects.TORQUE_ACTUAL, objects.POSITION_ACTUAL))
-MOTION_PDO = PdoLayout((objects.VELOCITY_ACTUAL, objects.ERROR_CODE))
-TARGET_PDOS = {
-    ControlMode.POSITION: PdoLayout((objects.CONTROLWORD, objects.TARGET_POSITION)),
-    ControlMode.TORQUE: PdoLayout((objects.CONTROLWORD, objects.TARGET_TORQUE)),
-}
 MODES = {ControlMode.POSITION: objects.CYCLIC_POSITION, ControlMode.TORQUE: objects.CYCLIC_TORQUE}
 
 _CIA_402 = 402
@@ -114,12 +107,13 @@ class DriveNode:
         return objects.STATUSWORD in self.values and objects.VELOCITY_ACTUAL in self.values
 
     def identify(self) -> frozenset[ControlMode]:
-        """Make sure that it is a drive, learn its units, and return the modes that it has.
+        """Make sure that it is the drive that is meant, learn its units, and return the modes that it has.
 
         Raises
         ------
         DriverError
-            ``cannot-connect``: it does not answer or is no CiA 402 drive; ``refused``: its rated torque is not usable
+            ``cannot-connect``: it does not answer or is no CiA 402 drive; ``refused``: its rated torque is not usable,
+            or it is not the drive of its EDS or DCF file
         """
         kind = self.dictionary.read(objects.DEVICE_TYPE) & 0xFFFF
         if kind != _CIA_402:
@@ -127,6 +121,8 @@ class DriveNode:
                 DriverErrorKind.CANNOT_CONNECT,
                 f"{self.place}: its device profile is {kind}, not 402 (drives); check drive.node_id",
             )
+        if self.configuration.device_file is not None:
+            require_identity(self.configuration.device_file, self.dictionary, self.place)
         self.units = self._learn_units()
         supported = self.dictionary.read(objects.SUPPORTED_MODES)
         return frozenset(mode for mode, number in MODES.items() if supported >> (number - 1) & 1)

@@ -10,7 +10,7 @@ class DriveObject:
     name : str
         as CiA calls it
     index : int
-        0x1000 … 0x6FFF
+        0x1000 … 0xFFFF
     subindex : int
         0 for a variable
     bits : int
@@ -42,6 +42,8 @@ SOFTWARE_VERSION = DriveObject("Software version", 0x100A, 0, 0)
 CONSUMER_HEARTBEAT = DriveObject("Consumer heartbeat time", 0x1016, 1, 32)
 PRODUCER_HEARTBEAT = DriveObject("Producer heartbeat time", 0x1017, 0, 16)
 VENDOR = DriveObject("Vendor-ID", 0x1018, 1, 32)
+PRODUCT = DriveObject("Product code", 0x1018, 2, 32)
+REVISION = DriveObject("Revision number", 0x1018, 3, 32)
 
 ABORT_CONNECTION = DriveObject("Abort connection option code", 0x6007, 0, 16, signed=True)
 ERROR_CODE = DriveObject("Error code", 0x603F, 0, 16)

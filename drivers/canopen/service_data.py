@@ -65,11 +65,26 @@ class NodeDictionary:
         DriverError
             ``cannot-connect``: the node does not answer, or has no such entry
         """
+        return int.from_bytes(self.read_data(entry), "little", signed=entry.signed)
+
+    def read_data(self, entry: DriveObject) -> bytes:
+        """Value of an entry as transferred, cut to its size; of a text without the zeros that end it.
+
+        Parameters
+        ----------
+        entry : DriveObject
+            what to read
+
+        Raises
+        ------
+        DriverError
+            ``cannot-connect``: the node does not answer, or has no such entry
+        """
         try:
-            data = self._client.upload(entry.index, entry.subindex)
+            data = bytes(self._client.upload(entry.index, entry.subindex))
         except (SdoError, can.CanError, OSError) as error:
             raise self._failure(f"{entry} cannot be read", error) from error
-        return int.from_bytes(data[: entry.bits // 8], "little", signed=entry.signed)
+        return data[: entry.bits // 8] if entry.bits else data.rstrip(b"\0")
 
     def read_optional(self, entry: DriveObject) -> int | None:
         """Value of an entry that not every drive has; None where the drive has none.
@@ -140,11 +155,29 @@ class NodeDictionary:
         DriverError
             ``cannot-connect``: the drive does not answer or forbids the write
         """
-        data = value.to_bytes(entry.bits // 8, "little", signed=entry.signed)
+        self.send_data(entry, value.to_bytes(entry.bits // 8, "little", signed=entry.signed), str(value))
+
+    def send_data(self, entry: DriveObject, data: bytes, text: str) -> None:
+        """Write an entry as transferred.
+
+        Parameters
+        ----------
+        entry : DriveObject
+            what to write
+        data : bytes
+            little end first
+        text : str
+            the value, for messages
+
+        Raises
+        ------
+        DriverError
+            ``cannot-connect``: the drive does not answer or forbids the write
+        """
         try:
             self._client.download(entry.index, entry.subindex, data)
         except (SdoError, can.CanError, OSError) as error:
-            raise self._failure(f"{entry} = {value} cannot be written", error) from error
+            raise self._failure(f"{entry} = {text} cannot be written", error) from error
 
     def _failure(self, what: str, error: Exception) -> DriverError:
         return DriverError(

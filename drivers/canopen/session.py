@@ -10,8 +10,9 @@ from drivers.backend import ControlMode
 from drivers.canopen.bus import SYNC_ID, CanBus
 from drivers.canopen.bus_budget import CycleFrames, largest_rate_hz
 from drivers.canopen.configuration import BusConfiguration
-from drivers.canopen.node import MOTION_PDO, RECEIVED_ID, STATE_PDO, TARGET_PDOS, DriveNode
+from drivers.canopen.node import DriveNode
 from drivers.canopen.observation import arm_faults, arm_state
+from drivers.canopen.process_data import MOTION_PDO, RECEIVED_ID, STATE_PDO, TARGET_PDOS
 from drivers.canopen.state_machine import Goal
 from drivers.clock import Clock
 from drivers.errors import Fault

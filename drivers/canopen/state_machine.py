@@ -19,6 +19,10 @@ class DriveState(StrEnum):
     FAULT = "fault"
 
 
+POWERED = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
+"""States in which a drive holds or moves its joint."""
+
+
 class Goal(StrEnum):
     """Where a drive shall be taken; a fault is never reset on the way."""
 

@@ -114,4 +114,12 @@ def _joints(robot: Robot, settings: Mapping[str, Any] = MappingProxyType({})) ->
 
     bus = {key: settings[key] for key in _BUS_SETTINGS if key in settings}
     blocks = drive_blocks(robot, "{node_id: 1, ...}", bus)
-    return [DriveJoint(joint.name, joint.gear_ratio or 1.0, drive) for joint, drive in blocks]
+    return [DriveJoint(joint.name, joint.gear_ratio or 1.0, _beside(robot, drive)) for joint, drive in blocks]
+
+
+def _beside(robot: Robot, drive: dict[str, Any]) -> dict[str, Any]:
+    """A ``drive`` block whose EDS or DCF file is looked up beside the robot file, as other files that it names."""
+    file = drive.get("eds")
+    if robot.source is None or not isinstance(file, str) or not file:
+        return drive
+    return {**drive, "eds": str(robot.source.parent / file)}

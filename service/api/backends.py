@@ -7,8 +7,10 @@ from pydantic import Field, FiniteFloat
 from service.api.documents import to_json_text
 from service.api.models import StrictModel
 from service.api.settings import Settings
-from service.errors import ScenarioError
+from service.errors import RobotFileError, ScenarioError
 from service.jobs import BackendChoice
+from service.robot import Robot
+from service.robot.messages import one_line
 
 
 class BackendRequest(StrictModel):
@@ -31,7 +33,7 @@ class BackendRequest(StrictModel):
     )
 
 
-def chosen_backend(settings: Settings, request: BackendRequest) -> BackendChoice:
+def chosen_backend(settings: Settings, request: BackendRequest, robot: Robot) -> BackendChoice:
     """The backend of a request.
 
     Parameters
@@ -40,17 +42,32 @@ def chosen_backend(settings: Settings, request: BackendRequest) -> BackendChoice
         of the operator
     request : BackendRequest
         what was asked for
+    robot : Robot
+        the arm
 
     Raises
     ------
     ScenarioError
         if the scenario is no plain data
+    RobotFileError
+        if a drive block names a file that the driver would open: no path of the server is opened for a client
     """
     if request.scenario is not None and to_json_text(request.scenario) is None:
         raise ScenarioError("scenario: holds NaN, infinity or text that is not Unicode; write plain numbers and text")
+    name = request.name or settings.backend
+    if name == "canopen":
+        _refuse_data_sheets(robot)
     return BackendChoice(
-        name=request.name or settings.backend,
+        name=name,
         time=request.time or settings.sim_time,
         scenario=request.scenario,
         start=request.start,
     )
+
+
+def _refuse_data_sheets(robot: Robot) -> None:
+    """Refuse drives' EDS or DCF files: nothing in a request would bring them."""
+    for joint in robot.joints:
+        if (joint.drive or {}).get("eds") is not None:
+            hint = "leave it out, or run this arm with tauscope run"
+            raise RobotFileError(one_line(f"{joint.name}: drive.eds names a file, which cannot be sent; {hint}"))

@@ -1,6 +1,7 @@
 """Field buses from a robot file: which one is meant, what of it reaches the driver, what is refused."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 
 from arms import paper_arm
 from drivers import Capabilities, ControlMode, DriveLimits, StopPolicy
+from emulated_data_sheet import GAIN, sections, write_file
 from service.acquisition import RunOptions
 from service.acquisition.backends import make_backend
 from service.acquisition.dynamixel_bus import dynamixel_joints
@@ -30,6 +32,16 @@ def servo_arm(**first: Any) -> Robot:
         replace(robot.joints[2], drive=drives[2]),
     )
     return replace(robot, joints=joints)
+
+
+def drive_arm(folder: Path, **second: Any) -> Robot:
+    """The robot file is said to be in a folder."""
+    robot = paper_arm()
+    bus = {"interface": "nobody opens it", "channel": "none"}
+    drives = [{"node_id": number, "counts_per_turn": 4096, "rated_torque_nm": 0.5} for number in (1, 2, 3)]
+    drives = [{**drives[0], **bus}, {**drives[1], **second}, drives[2]]
+    joints = tuple(replace(joint, drive=drive) for joint, drive in zip(robot.joints, drives, strict=True))
+    return replace(robot, joints=joints, source=folder / "arm.yaml")
 
 
 def refusal(call, *arguments: Any) -> str:
@@ -85,6 +97,26 @@ def test_frames_of_a_dry_run_come_without_a_port() -> None:
     robot = servo_arm()
     robot = replace(robot, joints=(nameless, *robot.joints[1:]))
     assert "drive.model is missing" in refusal(list, find_bus("dynamixel").planned_frames(robot, request))
+
+
+def test_a_drives_data_sheet_is_looked_up_beside_the_robot_file(tmp_path: Path) -> None:
+    content = sections()
+    content[GAIN]["ParameterValue"] = "250"
+    (tmp_path / "files").mkdir()
+    path = write_file(tmp_path / "files", content, "drive.dcf")
+    robot = drive_arm(tmp_path, eds="files/drive.dcf")
+    make_backend("canopen", robot, {})
+    limits = DriveLimits(np.full(3, -2.0), np.full(3, 2.0), np.full(3, 1.0), np.full(3, 1.0))
+    request = FrameRequest(ControlMode.POSITION, limits, 0.1, np.zeros((1, 3)))
+    meanings = [frame.meaning for frame in find_bus("canopen").planned_frames(robot, request)]
+    assert "joint 2 (node 2): Gain (0x2001:00) := 250" in meanings
+    del content["6064"]
+    assert write_file(tmp_path / "files", content, "drive.dcf") == path
+    words = f"joint2: drive.eds = {path!r}: Position actual value (0x6064:00) is missing"
+    assert words in refusal(make_backend, "canopen", robot, {})
+    assert words in refusal(find_bus("canopen").examine, robot)
+    assert "there is no such file" in refusal(make_backend, "canopen", drive_arm(tmp_path / "files", eds="arm.eds"), {})
+    assert "drive.eds = 3; give the path" in refusal(make_backend, "canopen", drive_arm(tmp_path, eds=3), {})
 
 
 def test_a_missing_port_is_named_by_scan() -> None:

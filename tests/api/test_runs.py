@@ -256,6 +256,9 @@ def with_nan(document: dict[str, Any]) -> dict[str, Any]:
     return document
 
 
+WITH_DATA_SHEET = {**ROBOT, "joints": [{"name": "joint1"}, {"name": "joint2", "drive": {"eds": "/etc/hosts"}}]}
+
+
 @pytest.mark.parametrize(
     ("body", "code", "words"),
     [
@@ -272,6 +275,7 @@ def with_nan(document: dict[str, Any]) -> dict[str, Any]:
         ({"robot": ROBOT, "backend": {"scenario": []}}, "invalid-request", "body.backend.scenario"),
         ({"robot": ROBOT, "speed": 1}, "invalid-request", "body.speed"),
         ({"robot": {**ROBOT, "name": 7}}, "robot-file", "robot: name"),
+        ({"robot": WITH_DATA_SHEET, "backend": {"name": "canopen"}}, "robot-file", "joint2: drive.eds names a file"),
     ],
 )
 def test_requests_that_are_refused(

@@ -52,7 +52,7 @@ def _hand_in(received: Received[CampaignRequest], services: Services, workspace:
         CampaignOrder(
             robot_file=robot_file,
             robot_name=robot.name,
-            backend=chosen_backend(services.settings, document.backend),
+            backend=chosen_backend(services.settings, document.backend, robot),
             excitation=document.excitation,
             held_out=document.held_out,
             run=document.run,

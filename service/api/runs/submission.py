@@ -114,7 +114,7 @@ def _prepare(received: Received[RunRequest], services: Services, workspace: RunW
 def _hand_in(wanted: _Wanted, services: Services, workspace: RunWorkspace) -> str:
     """Settle what is moved, and how, and begin."""
     document = wanted.document
-    backend = chosen_backend(services.settings, document.backend)
+    backend = chosen_backend(services.settings, document.backend, wanted.robot)
     device = backend.device(wanted.robot.name)
     services.runs.claims.require_free(device)
     excitation, motion = _motion(wanted, services, workspace)

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.canopen import objects
-from drivers.canopen.node import MOTION_PDO, STATE_PDO, TARGET_PDOS
 from drivers.canopen.pdo import PdoLayout, decode_pdo, encode_pdo, mapping_entries
+from drivers.canopen.process_data import MOTION_PDO, STATE_PDO, TARGET_PDOS
 from drivers.canopen.units import DriveUnits
 
 UNITS = DriveUnits(2.0 * math.pi / (65536 * 50), zero_count=1000, torque_per_permille=0.025)

@@ -5,9 +5,10 @@ import pytest
 from drivers.canopen import objects
 from drivers.canopen.configuration import NodeConfiguration
 from drivers.canopen.emergency import HEARTBEAT_LOST
-from drivers.canopen.node import MOTION_PDO, STATE_PDO, DriveNode
+from drivers.canopen.node import DriveNode
 from drivers.canopen.objects import DriveObject
 from drivers.canopen.observation import arm_faults
+from drivers.canopen.process_data import MOTION_PDO, STATE_PDO
 from drivers.canopen.state_machine import Goal
 from drivers.canopen.stopping import dropped_faults, has_stopped, stop_one_by_one
 from drivers.errors import DriverError, DriverErrorKind, Fault

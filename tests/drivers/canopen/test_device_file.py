@@ -1,0 +1,239 @@
+"""EDS and DCF files, right, wrong and damaged, before any bus is opened."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from drivers import ControlMode
+from drivers.canopen.configuration import (
+    BusConfiguration,
+    DriveJoint,
+    NodeConfiguration,
+    read_configuration,
+    require_targets,
+)
+from drivers.canopen.data_sheet_text import DataSheetError
+from drivers.canopen.device_file import DeviceFile, read_device_file
+from drivers.errors import DriverError, DriverErrorKind
+from emulated_data_sheet import GAIN, LABEL, OFFSET, Sections, sections, text_of, write_file
+
+WHOLE = text_of(sections(VendorNumber="0x3A1", ProductNumber="", RevisionNumber="0x20005"))
+
+
+def configured(path: object, **block: Any) -> BusConfiguration:
+    bus = {"interface": "nobody opens it", "channel": "none", "node_id": 5, "counts_per_turn": 4096}
+    return read_configuration([DriveJoint("elbow", 50.0, {**bus, "eds": path, **block})])
+
+
+def refusal(path: object, **block: Any) -> str:
+    with pytest.raises(DriverError) as caught:
+        configured(path, **block)
+    assert caught.value.kind is DriverErrorKind.REFUSED
+    message = str(caught.value)
+    assert "\n" not in message
+    assert message.startswith("joint elbow: drive.eds ")
+    return message
+
+
+def read(folder: Path, content: Sections, node_id: int = 5) -> DeviceFile:
+    return read_device_file(Path(write_file(folder, content)), node_id)
+
+
+def test_the_file_of_the_emulated_drive_is_what_the_driver_needs(tmp_path: Path) -> None:
+    """Empty numbers, an empty default and lower case are as makers' tools leave them."""
+    path = tmp_path / "drive.eds"
+    path.write_text(WHOLE.replace("[607A]", "[607a]").replace("sub1]", "SUB1]").replace("=rw\n", "=RW\n"))
+    (node,) = configured(str(path)).nodes
+    assert node.device_file is not None
+    file = node.device_file
+    assert (file.vendor, file.product, file.revision, file.node_id) == (0x3A1, None, 0x20005, None)
+    target = file.objects[0x607A, 0]
+    assert (target.type_name, target.access, target.is_mappable) == ("INTEGER32", "rw", True)
+    assert (0x607D, 3) not in file.objects
+
+
+def test_no_file_is_needed() -> None:
+    assert configured(None).nodes[0].device_file is None
+
+
+@pytest.mark.parametrize(
+    "section",
+    [
+        *("1000", "1016", "1016sub1", "1017", "1400sub1", "1400sub2", "1600sub0", "1600sub2", "1801sub1", "1A00sub3"),
+        *("6007", "603F", "6040", "6041", "605A", "605E", "6060", "6064", "606C", "6072", "6076", "6077", "607A"),
+        *("607D", "607Dsub2", "6502"),
+    ],
+)
+def test_a_missing_object_is_named(tmp_path: Path, section: str) -> None:
+    content = sections()
+    for name in [name for name in content if name == section or name.startswith(section + "sub")]:
+        del content[name]
+    path = write_file(tmp_path, content)
+    index, _, subindex = section.partition("sub")
+    named = f"(0x{index}:0{subindex or '1' if index in ('1016', '607D') else subindex or '0'}) is missing"
+    message = refusal(path)
+    assert repr(path) in message
+    assert named in message
+
+
+@pytest.mark.parametrize(
+    ("section", "changes", "words"),
+    [
+        ("607A", {"PDOMapping": "0"}, "Target position (0x607A:00) cannot be mapped to a PDO"),
+        ("6041", {"PDOMapping": ""}, "Statusword (0x6041:00) cannot be mapped"),
+        ("6071", {"PDOMapping": "0"}, "Target torque (0x6071:00) cannot be mapped"),
+        ("6064", {"DataType": "0x0003"}, "Position actual value (0x6064:00) is INTEGER16, not INTEGER32"),
+        ("6077", {"DataType": "0x0006"}, "Torque actual value (0x6077:00) is UNSIGNED16, not INTEGER16"),
+        ("6072", {"DataType": "0x20"}, "Max torque (0x6072:00) is DOMAIN, not UNSIGNED16"),
+        ("60C2sub1", {"DataType": "0x0006"}, "Interpolation time period, value (0x60C2:01) is UNSIGNED16"),
+        ("1600sub1", {"AccessType": "ro"}, "PDO entry (0x1600:01) cannot be written (AccessType 'ro')"),
+        ("6040", {"DataType": "word"}, "DataType in [6040] is 'word', which is no number"),
+        ("6064", {"ParameterName": ""}, "is no whole EDS or DCF file"),
+        ("DeviceInfo", {"VendorNumber": "many"}, "VendorNumber in [DeviceInfo] is 'many'"),
+        ("DeviceComissioning", {"NodeID": "6"}, "is made for node 6; correct drive.node_id"),
+        (GAIN, {"ParameterValue": "70000"}, "ParameterValue '70000' of Gain (0x2001:00) is no UNSIGNED16"),
+        (GAIN, {"ParameterValue": "$NODEID*2"}, "ParameterValue '$NODEID*2' of Gain (0x2001:00)"),
+        ("6072", {"ParameterValue": "-1"}, "ParameterValue '-1' of object 6072 (0x6072:00) is no UNSIGNED16"),
+        (LABEL, {"ParameterValue": "Arm Ω"}, "of Label (0x2003:00) is no VISIBLE_STRING"),
+        ("2001Value", {"NrOfEntries": "1", "1": "4"}, "[2001Value] belongs to no array with CompactSubObj"),
+    ],
+)
+def test_what_the_driver_cannot_use_is_named(tmp_path: Path, section: str, changes: dict[str, str], words: str) -> None:
+    content = sections()
+    content[section] = {**content.get(section, {}), **changes}
+    assert words in refusal(write_file(tmp_path, content))
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", "Device type (0x1000:00) is missing"),
+        (b"name: arm\n", "line 1 stands before any [section]"),
+        (b"[6040]\nDataType\n", "line 2 is neither [section] nor keyword=value"),
+        (b"[6040]\n[6040]\n", "line 2 begins a section that was there already"),
+        (b"[6040]\n[6041]\nDataType=6\nDATATYPE=6\n", "line 4 states 'datatype' again"),
+        (b"[607a]\n[607A]\n", "[607A] stands twice"),
+        (b"[1016sub1]\nParameterName=x\nDataType=7\nAccessType=rw\n", "0x1016 was not found"),
+        (
+            b"[1016]\nObjectType=8\nParameterName=x\nCompactSubObj=999\n",
+            "CompactSubObj in [1016] is 999; give 1 to 254",
+        ),
+        (b"\x89PNG\r\n\x1a\n\0\0\xff", "line 1 stands before any [section]"),
+    ],
+)
+def test_a_file_that_is_none_is_told_with_the_line(tmp_path: Path, content: bytes, words: str) -> None:
+    path = tmp_path / "file.eds"
+    path.write_bytes(content)
+    assert words in refusal(str(path))
+
+
+def test_a_file_that_cannot_be_read_is_told(tmp_path: Path) -> None:
+    assert "there is no such file" in refusal(str(tmp_path / "none.eds"))
+    assert "there is no such file" in refusal(str(tmp_path)), "a folder, and no device that never ends"
+    assert "there is no such file" in refusal("/dev/zero")
+    assert "give the path" in refusal(3)
+    (tmp_path / "large.eds").write_bytes(bytes(8 * 1024 * 1024 + 1))
+    assert "is larger than 8 MiB" in refusal(str(tmp_path / "large.eds"))
+
+
+def test_a_drive_without_what_nobody_reads_is_taken(tmp_path: Path) -> None:
+    """Its rated torque where the robot file states it, the cycle, and targets of torque until they are asked for."""
+    content = sections()
+    for name in ("6076", "6071", "60C2", "60C2sub0", "60C2sub1", "60C2sub2"):
+        del content[name]
+    configuration = configured(write_file(tmp_path, content), rated_torque_nm=0.4)
+    require_targets(configuration, ControlMode.POSITION)
+    with pytest.raises(DriverError, match=re.escape("drive.eds: Target torque (0x6071:00) is missing")) as caught:
+        require_targets(configuration, ControlMode.TORQUE)
+    assert str(caught.value).startswith("joint 1 (node 5): ")
+
+
+def test_compact_arrays_are_written_out(tmp_path: Path) -> None:
+    """Names and values of single subindices stand in sections of their own; the library drops the values."""
+    content = sections()
+    del content["1016sub0"], content["1016sub1"]
+    common = {"ObjectType": "0x8", "AccessType": "rw", "CompactSubObj": "3"}
+    content["1016"] = {"ParameterName": "Heartbeats", "DataType": "0x0007", **common}
+    content["2010"] = {"ParameterName": "Filter", "DataType": "0x0003", **common}
+    content["2010Name"] = {"NrOfEntries": "1", "2": "Second filter"}
+    content["2010Value"] = {"NrOfEntries": "2", "2": "-7", "3": "0xFFF0"}
+    (node,) = configured(write_file(tmp_path, content)).nodes
+    assert node.device_file is not None
+    filters = [node.device_file.objects[0x2010, subindex] for subindex in (1, 2, 3)]
+    assert [one.name for one in filters] == ["Filter 1", "Second filter", "Filter 3"]
+    assert [one.value for one in filters] == [None, bytes([0xF9, 0xFF]), bytes([0xF0, 0xFF])]
+    content["2010Value"]["4"] = "1"
+    assert "[2010Value] has a value 4 of 3" in refusal(write_file(tmp_path, content))
+
+
+def test_values_are_those_of_their_type_and_node(tmp_path: Path) -> None:
+    content = sections()
+    content[GAIN]["ParameterValue"] = "$NODEID + 0x180"
+    content[OFFSET]["ParameterValue"] = "0xFFFE"
+    content[LABEL]["ParameterValue"] = "Arm 1"
+    content["2005"] = {"ParameterName": "Ratio", "DataType": "0x8", "AccessType": "rw", "ParameterValue": "-0.5"}
+    file = read(tmp_path, content)
+    values = [file.objects[index, 0].value for index in (0x2001, 0x2002, 0x2003, 0x2005)]
+    assert values == [bytes.fromhex("8501"), bytes.fromhex("FEFF"), b"Arm 1", bytes.fromhex("000000BF")]
+
+
+def test_the_identity_is_that_of_the_device_or_of_its_object(tmp_path: Path) -> None:
+    content = sections(ProductNumber="7")
+    content["1018sub1"]["DefaultValue"] = "0x3A1"
+    file = read(tmp_path, content)
+    assert (file.vendor, file.product, file.revision) == (0x3A1, 7, None)
+
+
+def is_told(path: Path) -> None:
+    """A file is taken, or refused in one line; nothing else is raised."""
+    told: str | None = None
+    try:
+        (node,) = configured(str(path)).nodes
+        assert isinstance(node, NodeConfiguration)
+    except DriverError as error:
+        told = str(error)
+    assert told is None or (told.startswith("joint elbow: drive.eds ") and len(told.splitlines()) == 1)
+
+
+SCRAPS = ["", "$NODEID", "0x", "-1", "1e9", "0x1C", "99999999999", "ro", "\0", "é\u2028", "%(x)s", "9" * 5000]
+
+
+def damages(line: str, other: str, scrap: str) -> list[list[str]]:
+    """What may stand in place of a line."""
+    key, _, value = line.partition("=")
+    return [
+        *([], [line, line], [other], [line.swapcase()], [line[: len(line) // 2]], [f" {line}{scrap}"]),
+        *([f"{key}={scrap}"], [f"{scrap}={value}"], [f"ParameterValue={scrap}", line]),
+        *([f"CompactSubObj={scrap}", line], ["[1000Value]", f"1={scrap}"], ["[DeviceComissioning]", f"NodeID={scrap}"]),
+    ]
+
+
+@given(data=st.data())
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_no_damage_to_a_file_crashes_the_driver(tmp_path: Path, data: st.DataObject) -> None:
+    lines = WHOLE.splitlines()
+    for _ in range(data.draw(st.integers(1, 4))):
+        at, other = (data.draw(st.integers(0, len(lines) - 1)) for _ in range(2))
+        scrap = data.draw(st.sampled_from(SCRAPS))
+        lines[at : at + 1] = data.draw(st.sampled_from(damages(lines[at], lines[other], scrap)))
+    path = tmp_path / "damaged.eds"
+    path.write_text("\n".join(lines), encoding="utf-8")
+    is_told(path)
+
+
+@given(content=st.binary(max_size=200) | st.text(max_size=200).map(str.encode))
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_no_other_file_crashes_the_driver(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "any.eds"
+    path.write_bytes(b"[607A]\n" + content)
+    is_told(path)
+
+
+def test_a_sheet_with_a_mistake_is_no_sheet(tmp_path: Path) -> None:
+    (tmp_path / "x.dcf").write_text("[")
+    with pytest.raises(DataSheetError, match="line 1"):
+        read_device_file(tmp_path / "x.dcf", 1)
