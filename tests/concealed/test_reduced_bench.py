@@ -96,6 +96,14 @@ def test_most_effects_of_moderate_strength_are_named() -> None:
     assert sum(bool(score.extra) for score in scores) <= 1
 
 
+def test_nine_of_ten_weak_effects_are_detected() -> None:
+    scores = [outcome(effect, joint, 8.0, 900 + place) for place, (effect, joint) in enumerate(AT_40.items())]
+    missed = [
+        (effect, score.told) for effect, score in zip(AT_40, scores, strict=True) if score.verdict == "consistent"
+    ]
+    assert len(missed) <= 0.1 * len(scores), missed
+
+
 @pytest.mark.parametrize(("law", "joint"), [("vibration", 1), ("slipstream", 0), ("bump", 2)])
 def test_what_no_catalogue_has_is_located_and_not_explained_away(law: str, joint: int) -> None:
     found, _ = diagnosed(unknown_trial("paper", law, joint, 40.0, motion_seed=joint % 2, seed=60 + joint))
