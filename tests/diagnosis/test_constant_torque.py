@@ -1,0 +1,41 @@
+"""A constant torque, and friction that is larger one way: what explains the torque better takes the other's place."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from diagnosis.diagnosed_arm import EffectTorque, at_joint, recordings
+from identification.simulated import Array, SimulatedArm, paper_robot
+from service.diagnosis import diagnose, document
+from service.robot import FrictionCoefficients, Robot
+
+
+def stating_friction() -> Robot:
+    """The paper's arm with a file that states friction, and with it no constant."""
+    robot = paper_robot()
+    return replace(robot, model=replace(robot.model, friction=(FrictionCoefficients(),) * robot.joint_count))
+
+
+def one_way(arm: SimulatedArm, _: Array) -> Array:
+    """Coulomb friction of joint 1, larger one way: its step is at rest only where no friction is."""
+    return at_joint(0, 0.9 * np.abs(2.0 / np.pi * np.arctan(500.0 * arm.exact.exact.velocity[:, 0])))
+
+
+def constant(arm: SimulatedArm, _: Array) -> Array:
+    return at_joint(0, np.full(len(arm.exact.exact.velocity), 0.9))
+
+
+@pytest.mark.parametrize(
+    ("effect", "name"), [(one_way, "asymmetric_coulomb"), (constant, "torque_offset")], ids=["one way", "constant"]
+)
+def test_the_likelier_of_the_two_is_the_finding(effect: EffectTorque, name: str) -> None:
+    found = diagnose(stating_friction(), recordings((1, 2, 3), effect, np.random.default_rng(3)))
+    (finding,) = document(found).findings
+    told = {finding.effect, *(each.partition("@")[0] for each in finding.equivalent)}
+    assert name in told
+    assert told <= {"asymmetric_coulomb", "torque_offset"}
+    assert finding.probability > 0.5
+    assert finding.effect == name
+    size = {each.name: each.value for each in finding.parameters}
+    assert next(iter(size.values())) == pytest.approx(0.9, abs=0.1)
