@@ -103,7 +103,7 @@ def test_followers_that_are_gone_leave_nothing_behind(service: Served) -> None:
         during = open_files()
         assert during > 20
     wait_until(lambda: open_files() <= during - 20)
-    assert client.post(run["links"]["stop"]).json()["state"] == "running"
+    assert client.post(run["links"]["stop"]).status_code == 202  # the arm may be stopping by the time it is answered
     (*_, last) = follow(client, run)
     assert last.data["state"] == "stopped"
 
