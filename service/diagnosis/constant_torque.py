@@ -21,8 +21,13 @@ from service.diagnosis.screening import Candidate, Screen, model_signals
 from service.diagnosis.selection import MOST_FITTED
 from service.diagnosis.term import Term
 
+WITH_A_CONSTANT = ("joint_spring",)
+"""Effects whose own constant is the nominal model's offset: beside one, the offset is no finding of its own."""
 
-def instead_of_a_constant(effect: TorqueOffset, without: Fit, gain: float, screen: Screen) -> tuple[Option, ...]:
+
+def instead_of_a_constant(
+    effect: TorqueOffset, without: Fit, gain: float, screen: Screen, fitter: Fitter
+) -> tuple[Option, ...]:
     """Effects that explain nearly as much as a constant does, in its place, best first.
 
     Parameters
@@ -35,6 +40,8 @@ def instead_of_a_constant(effect: TorqueOffset, without: Fit, gain: float, scree
         what the constant takes off that model's residual [noise variances]
     screen : Screen
         of the training recordings
+    fitter : Fitter
+        of the same
     """
     enough = gain - EQUIVALENT * without.inflation()
     near = [each for each in screen.effects if each.joint in (effect.joint, None)]
@@ -42,7 +49,7 @@ def instead_of_a_constant(effect: TorqueOffset, without: Fit, gain: float, scree
     touching = [each for each in lasting.candidates(without) if each.gain > 0.5 * enough]
     signals = model_signals(without.model, screen.observations)
     closest = sorted((refined(each, without, lasting, signals) for each in touching), key=lambda each: -each.score)
-    fitter, options = Fitter(screen.observations), []
+    options = []
     for candidate in closest[:MOST_FITTED]:
         term = Term(candidate.effect, candidate.shape, candidate.coefficients)
         found = fitter.fit(with_terms(without.model, [*without.model.terms, term]))
@@ -53,7 +60,7 @@ def instead_of_a_constant(effect: TorqueOffset, without: Fit, gain: float, scree
 
 
 def with_better_than_constants(
-    selection: Selection, screen: Screen, held_out: HeldOut | None, admission: Admission
+    selection: Selection, screen: Screen, fitter: Fitter, held_out: HeldOut | None, admission: Admission
 ) -> Selection:
     """The selection with what explains a joint's torque better than its constant in the constant's place.
 
@@ -63,15 +70,18 @@ def with_better_than_constants(
         what was selected beside a model that has constants
     screen : Screen
         of the training recordings
+    fitter : Fitter
+        of the same
     held_out : HeldOut or None
         what findings are confirmed by
     admission : Admission
         what is asked of an effect
     """
+    constants = {term.effect.joint for term in selection.fit.model.terms if term.effect.id in WITH_A_CONSTANT}
     for joint in range(screen.observations.robot.joint_count):
         place = selection.nominal.model.structure.coefficient(joint, TorqueOffset.term)
-        if place is not None:
-            selection = _exchanged(selection, TorqueOffset(joint), place, screen, held_out, admission)
+        if place is not None and joint not in constants:
+            selection = _exchanged(selection, TorqueOffset(joint), place, screen, fitter, held_out, admission)
     return selection
 
 
@@ -80,17 +90,18 @@ def _exchanged(
     effect: TorqueOffset,
     place: int,
     screen: Screen,
+    fitter: Fitter,
     held_out: HeldOut | None,
     admission: Admission,
 ) -> Selection:
     """The selection with the best effect in the place of one constant, where that explains more and is confirmed."""
     fit = selection.fit
-    without = without_nominal(fit, place, Fitter(screen.observations))
+    without = without_nominal(fit, place, fitter)
     constant = _constant(effect, fit, place, without.energy - fit.energy)
     inflation = admission.inflation(fit)
     if constant.candidate.p_value(inflation) >= admission.level:
         return selection
-    options = instead_of_a_constant(effect, without, constant.gain, screen)
+    options = instead_of_a_constant(effect, without, constant.gain, screen, fitter)
     if not options or options[0].score <= constant.score:
         return selection
     best = options[0]

@@ -104,7 +104,7 @@ def diagnose(
     selector = Selector(screen, fitter, confirming, pure_error=pure_error)
     selection = selector.select(model, rotors, progress)
     if states_friction(robot):
-        selection = with_better_than_constants(selection, screen, confirming, selector.admission)
+        selection = with_better_than_constants(selection, screen, fitter, confirming, selector.admission)
     if confirming is not None and identification.constrained:
         selection = _unless_plainer_is_better(selection, delivered_model(identification), confirming)
     progress("weigh the evidence")

@@ -19,16 +19,13 @@ from service.diagnosis.catalogue.plain_terms import (
     TorqueOffset,
     ViscousFriction,
 )
-from service.diagnosis.constant_torque import instead_of_a_constant
+from service.diagnosis.constant_torque import WITH_A_CONSTANT, instead_of_a_constant
 from service.diagnosis.diagnosed import Diagnosis
 from service.diagnosis.findings import Finding, probability_among, sizes, without_nominal
 from service.diagnosis.term import Term
 from service.robot import Robot
 
 PLAIN: tuple[type[PlainTerm], ...] = (CoulombFriction, StribeckTerm, ViscousFriction, TorqueOffset)
-
-WITH_A_CONSTANT = ("joint_spring",)
-"""Effects whose own constant is the nominal model's offset: beside one, the offset is no finding of its own."""
 
 Lacking = Collection[tuple[int, str]]
 """Joint indices and names of the nominal terms that the given model does not have."""
@@ -99,7 +96,9 @@ def _finding(effect: PlainTerm, diagnosis: Diagnosis) -> Finding | None:
         return None
     delta = fit.model.structure.terms[joint].delta
     shape = np.array([delta] if isinstance(effect, StribeckTerm) and delta is not None else [])
-    others = instead_of_a_constant(effect, without, gain, diagnosis.screen) if isinstance(effect, TorqueOffset) else ()
+    others = ()
+    if isinstance(effect, TorqueOffset):
+        others = instead_of_a_constant(effect, without, gain, diagnosis.screen, diagnosis.fitter)
     score = gain - 1.0
     return Finding(
         terms=(Term(effect, shape, np.array([value])),),

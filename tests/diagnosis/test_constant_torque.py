@@ -39,3 +39,13 @@ def test_the_likelier_of_the_two_is_the_finding(effect: EffectTorque, name: str)
     assert finding.effect == name
     size = {each.name: each.value for each in finding.parameters}
     assert next(iter(size.values())) == pytest.approx(0.9, abs=0.1)
+
+
+def test_the_constant_of_a_spring_is_the_springs_own() -> None:
+    """A spring at rest at 0.8 rad pushes at zero; nothing else may take that push for itself."""
+
+    def spring(arm: SimulatedArm, _: Array) -> Array:
+        return at_joint(0, 0.6 * (arm.exact.exact.position[:, 0] - 0.8))
+
+    found = document(diagnose(stating_friction(), recordings((1, 2, 3), spring, np.random.default_rng(3))))
+    assert [(each.effect, each.joint) for each in found.findings] == [("joint_spring", "joint1")]
