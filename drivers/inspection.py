@@ -73,6 +73,23 @@ PHASES = ("connect", "enable", "cycle", "stop")
 """In the order in which a run goes through them."""
 
 
+def failure(place: str, message: str, device: str = "") -> Finding:
+    """A failure by a driver's message, without the place at its beginning: that stands before it.
+
+    Parameters
+    ----------
+    place : str
+        the port, or the joint with its drive
+    message : str
+        of a `drivers.DriverError`
+    device : str
+        what else the place is called in messages; empty for nothing
+    """
+    for name in filter(None, (place, device)):
+        message = message.removeprefix(f"{name}: ").removeprefix(f"{name} ")
+    return Finding(Severity.FAILURE, place, *split_remedy(message))
+
+
 def split_remedy(message: str) -> tuple[str, str]:
     """Detail and remedy of a driver's message: what follows the last semicolon is what to do.
 

@@ -25,7 +25,7 @@ MASTER_NODE = 127
 
 NMT_START = 0x01
 NMT_PRE_OPERATIONAL = 0x80
-_NMT_OPERATIONAL_STATE = 0x05
+NMT_OPERATIONAL_STATE = 0x05
 
 SEND_TIMEOUT_S = 0.5
 """Time in which the bus has to take a frame; the drives' own watchdog is what stops the arm meanwhile."""
@@ -182,7 +182,7 @@ class CanBus:
         now = self._clock.now_ns()
         if self._heartbeat_period_ns and now >= self._next_heartbeat_ns:
             self._next_heartbeat_ns = now + self._heartbeat_period_ns
-            self.send(HEARTBEAT_ID + MASTER_NODE, bytes([_NMT_OPERATIONAL_STATE]))
+            self.send(HEARTBEAT_ID + MASTER_NODE, bytes([NMT_OPERATIONAL_STATE]))
 
     def command_nodes(self, command: int, node_id: int = 0) -> None:
         """Send a network-management command.

@@ -9,8 +9,8 @@ from canopen.sdo.exceptions import SdoAbortedError
 from drivers.backend import ControlMode, DriveLimits, StopPolicy
 from drivers.canopen import objects
 from drivers.canopen.bus import MASTER_NODE
-from drivers.canopen.device_file import DeviceFile
-from drivers.canopen.device_settings import Setting, settings_of
+from drivers.canopen.data_sheet.device_file import DeviceFile
+from drivers.canopen.data_sheet.settings import Setting, settings_of
 from drivers.canopen.interpolation import interpolation_period
 from drivers.canopen.node import MODES, DriveNode
 from drivers.canopen.pdo import PdoLayout, mapping_entries
@@ -30,6 +30,9 @@ from drivers.errors import DriverError, DriverErrorKind
 PRODUCER_HEARTBEAT_MS = 100
 
 _PDO_OFF = 1 << 31
+_MAPPINGS = 2
+"""What is not kept the first time may have been altered on its way."""
+
 _EVERY_SYNC = 1
 _QUICK_STOP_AND_HOLD = 6
 _RAMP_AND_LET_GO = 2
@@ -183,12 +186,16 @@ def _map(node: DriveNode, places: PdoParameters, identifier: int, layout: PdoLay
     number, write = node.configuration.node_id, node.dictionary.write
     write(places.identifier, _PDO_OFF | identifier + number)
     write(places.kind, _EVERY_SYNC)
-    write(places.count, 0)
-    entries = mapping_entries(layout.objects)
-    for place, entry in zip(places.entries, entries, strict=True):
-        node.dictionary.send(place, entry)
-    write(places.count, len(entries))
-    for place, entry in zip(places.entries, entries, strict=True):  # some drives show them only when they count
-        if node.dictionary.read(place) != entry:
-            raise DriverError(DriverErrorKind.REFUSED, f"{node.place}: {place} is not kept; its PDOs are fixed")
+    entries = dict(zip(places.entries, mapping_entries(layout.objects), strict=True))
+    for _ in range(_MAPPINGS):
+        write(places.count, 0)
+        for place, entry in entries.items():
+            node.dictionary.send(place, entry)
+        write(places.count, len(entries))
+        # some drives show them only when they count
+        strange = [place for place, entry in entries.items() if node.dictionary.read(place) != entry]
+        if not strange:
+            break
+    else:
+        raise DriverError(DriverErrorKind.REFUSED, f"{node.place}: {strange[0]} is not kept; its PDOs are fixed")
     write(places.identifier, identifier + number)

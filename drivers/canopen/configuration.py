@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from drivers.backend import ControlMode
-from drivers.canopen.data_sheet_text import DataSheetError
-from drivers.canopen.device_file import DeviceFile, read_device_file
-from drivers.canopen.device_needs import require_needed, require_target
-from drivers.canopen.device_settings import settings_of
+from drivers.canopen.data_sheet.device_file import DeviceFile, read_device_file
+from drivers.canopen.data_sheet.needs import require_needed, require_target
+from drivers.canopen.data_sheet.settings import settings_of
+from drivers.canopen.data_sheet.text import DataSheetError
 from drivers.drive_block import (
     read_direction,
     read_positive,

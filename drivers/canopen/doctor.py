@@ -7,13 +7,13 @@ from pathlib import Path
 from drivers.canopen import objects
 from drivers.canopen.bus import CanBus
 from drivers.canopen.configuration import BusConfiguration, DriveJoint, read_configuration
-from drivers.canopen.device_file import DescribedObject, DeviceFile
-from drivers.canopen.device_settings import settings_of
+from drivers.canopen.data_sheet.device_file import DescribedObject, DeviceFile
+from drivers.canopen.data_sheet.settings import settings_of
 from drivers.canopen.node import MODES, DriveNode
 from drivers.canopen.session import possible_rate_hz
 from drivers.canopen.state_machine import POWERED
 from drivers.errors import DriverError
-from drivers.inspection import Finding, Severity, split_remedy
+from drivers.inspection import Finding, Severity, failure
 
 MEASURED_READS = 50
 """Reads by which the round trip is measured."""
@@ -57,12 +57,12 @@ def examine(joints: Sequence[DriveJoint]) -> list[Finding]:
     try:
         bus = CanBus(configuration)
     except DriverError as error:
-        return [Finding(Severity.FAILURE, subject, *split_remedy(str(error)))]
+        return [failure(subject, str(error))]
     try:
         findings = [Finding(Severity.GOOD, subject, f"open, {configuration.bit_rate / 1e3:g} kbit/s")]
         return findings + _examine_drives(bus, configuration, subject)
     except DriverError as error:
-        return [Finding(Severity.FAILURE, subject, *split_remedy(str(error)))]
+        return [failure(subject, str(error))]
     finally:
         bus.close()
 
@@ -75,7 +75,7 @@ def _examine_drives(bus: CanBus, configuration: BusConfiguration, subject: str) 
         try:
             findings += _examine_drive(node)
         except DriverError as error:
-            findings.append(Finding(Severity.FAILURE, node.place, *split_remedy(str(error))))
+            findings.append(failure(node.place, str(error), f"node {wanted.node_id}"))
             continue
         sound.append(node)
     if len(sound) == len(configuration.nodes):

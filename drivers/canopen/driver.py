@@ -1,5 +1,6 @@
 """An arm of CiA 402 drives on one CAN bus, as a backend: the order of calls, and what a cycle is made of."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -15,7 +16,14 @@ from drivers.canopen.node import DriveNode
 from drivers.canopen.observation import blind_state, listed
 from drivers.canopen.session import Session, possible_rate_hz
 from drivers.canopen.state_machine import Goal
-from drivers.canopen.stopping import POLICY_GOALS, dropped_faults, reset_faults, stop_in_cycle, stop_one_by_one
+from drivers.canopen.stopping import (
+    POLICY_GOALS,
+    dropped_faults,
+    reset_faults,
+    stop_in_cycle,
+    stop_one_by_one,
+    stop_promptly,
+)
 from drivers.canopen.target_limiter import TargetLimiter
 from drivers.clock import Clock, MonotonicClock
 from drivers.errors import DriverError, DriverErrorKind, Fault
@@ -160,6 +168,8 @@ class CanopenArm:
         except DriverError:
             self.stop(stop_policy)
             raise
+        for node in session.nodes:
+            node.leaps.limit = float(limits.velocity[node.joint - 1])
         self._limiter = TargetLimiter(limits, place, session.settling_ns * 1e-9)
         self._runaway = RunawayWatch(limits) if mode is ControlMode.TORQUE else None
         return state
@@ -186,7 +196,7 @@ class CanopenArm:
             session.caught = self._runaway.look(state.position, state.velocity)
         if goal is Goal.OPERATION_ENABLED and (session.caught is not None or state.faults):
             # one drive's trouble becomes that of all: they stop together
-            return session.cycle(mode, POLICY_GOALS[self._policy], session.standstill(), session.answer_ns)
+            return stop_promptly(session, mode, POLICY_GOALS[self._policy])
         return state
 
     def stop(self, policy: StopPolicy) -> ArmState:
@@ -201,6 +211,8 @@ class CanopenArm:
         if session is None:
             return blind_state(self.clock.now_ns(), len(self._configuration.nodes))
         goal = POLICY_GOALS.get(policy, Goal.QUICK_STOP)
+        for node in session.nodes:
+            node.leaps.limit = math.inf
         self._mode, self._limiter, self._runaway = None, None, None
         is_stopped = mode is not None and stop_in_cycle(session, mode, goal)
         silent = stop_one_by_one(session.nodes, goal, is_stopped=is_stopped)

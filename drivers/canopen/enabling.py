@@ -50,6 +50,9 @@ def power_up(session: Session, mode: ControlMode) -> tuple[ArmState, Array]:
     for _ in range(STILL_CYCLES):
         session.wait_for_next(state)
         state = cycle()
+    if not state.fresh.all():
+        session.wait_for_next(state)
+        state = session.step_until(lambda: all(node.has_answered for node in session.nodes), cycle, TRANSITION_S)
     _require_up(session, state)
     return state, place
 

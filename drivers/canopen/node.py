@@ -6,10 +6,11 @@ from dataclasses import dataclass, field
 
 from drivers.backend import ControlMode
 from drivers.canopen import objects
-from drivers.canopen.bus import EMERGENCY_ID, HEARTBEAT_ID, CanBus
+from drivers.canopen.bus import EMERGENCY_ID, HEARTBEAT_ID, NMT_OPERATIONAL_STATE, CanBus
 from drivers.canopen.configuration import NodeConfiguration
-from drivers.canopen.device_identity import require_identity
-from drivers.canopen.emergency import decode_emergency, describe_error
+from drivers.canopen.data_sheet.identity import require_identity
+from drivers.canopen.emergency import HEARTBEAT_LOST, decode_emergency, describe_error
+from drivers.canopen.leap_filter import LeapFilter
 from drivers.canopen.objects import DriveObject
 from drivers.canopen.pdo import PdoLayout, decode_pdo, encode_pdo
 from drivers.canopen.process_data import MOTION_PDO, SENT_IDS, STATE_PDO, TARGET_PDOS
@@ -62,6 +63,10 @@ class DriveNode:
         power state as it told when it last answered: what it is told next when an answer is lost
     last_position : float
         of the joint when it last answered: the place to stay at, never a measurement [rad or m]
+    is_deaf : bool
+        whether it said, after its last process data, that it takes none any more: it missed the master, or restarted
+    leaps : LeapFilter
+        knows where the joint can be
     """
 
     configuration: NodeConfiguration
@@ -73,6 +78,8 @@ class DriveNode:
     acknowledged_code: int = 0
     last_state: DriveState | None = None
     last_position: float = math.nan
+    is_deaf: bool = False
+    leaps: LeapFilter = field(default_factory=LeapFilter)
 
     @staticmethod
     def on_bus(bus: CanBus, configuration: NodeConfiguration, joint: int) -> "DriveNode":
@@ -92,7 +99,7 @@ class DriveNode:
         for identifier, layout in zip(SENT_IDS, (STATE_PDO, MOTION_PDO), strict=True):
             bus.subscribe(identifier + node_id, lambda _, data, layout=layout: node._take(layout, data))
         bus.subscribe(EMERGENCY_ID + node_id, lambda _, data: node._take_emergency(data))
-        bus.subscribe(HEARTBEAT_ID + node_id, lambda _, data: None)
+        bus.subscribe(HEARTBEAT_ID + node_id, lambda _, data: node._take_heartbeat(data))
         return node
 
     @property
@@ -139,8 +146,19 @@ class DriveNode:
             effort=converted(objects.TORQUE_ACTUAL, self.units.torque),
         )
 
-    def remember(self) -> None:
-        """Keep state and place of this cycle for cycles whose answer is lost."""
+    def remember(self, time_ns: int) -> None:
+        """Keep state and place of this cycle for cycles whose answer is lost; a frame that cannot be true is lost too.
+
+        Parameters
+        ----------
+        time_ns : int
+            when the drive was asked [ns]
+        """
+        measured = self.measured()
+        if not self.leaps.believes_place(measured.position, time_ns):
+            self._forget(STATE_PDO)
+        if not self.leaps.believes_speed(measured.velocity):
+            self._forget(MOTION_PDO)
         position = self.measured().position
         if not math.isnan(position):
             self.last_position = position
@@ -206,7 +224,7 @@ class DriveNode:
 
     def _learn_units(self) -> DriveUnits:
         configuration = self.configuration
-        rated = configuration.rated_torque_nm or self.dictionary.read(objects.RATED_TORQUE) / 1000.0
+        rated = configuration.rated_torque_nm or self.dictionary.read_surely(objects.RATED_TORQUE) / 1000.0
         if rated <= 0.0:
             raise DriverError(
                 DriverErrorKind.REFUSED,
@@ -218,8 +236,16 @@ class DriveNode:
         values = decode_pdo(layout, data)
         if values is not None:
             self.values.update(values)
+            self.is_deaf = False
+
+    def _forget(self, layout: PdoLayout) -> None:
+        self.values = {entry: value for entry, value in self.values.items() if entry not in layout.objects}
+
+    def _take_heartbeat(self, data: bytes) -> None:
+        self.is_deaf = len(data) == 1 and data[0] & 0x7F != NMT_OPERATIONAL_STATE
 
     def _take_emergency(self, data: bytes) -> None:
         code = decode_emergency(data)
         if code is not None and code & 0xFF00:
             self.error_code, self.acknowledged_code = code, 0
+            self.is_deaf |= code == HEARTBEAT_LOST

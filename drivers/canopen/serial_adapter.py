@@ -4,6 +4,7 @@ At a byte a call the answers of six drives take longer than a control cycle; rea
 """
 
 import contextlib
+import re
 import time
 
 from can import CanInitializationError, CanOperationError
@@ -16,6 +17,10 @@ RESTART_S = 2.0
 
 _VERSION_S = 0.1
 _ACKNOWLEDGEMENTS = ("\r", "z\r", "Z\r")
+_FRAME_LETTERS = "tTrRxdDbB"
+_FRAME = re.compile(r"(?:t[0-7][0-9A-F]{2}|T[01][0-9A-F]{7})(?P<bytes>[0-8])(?P<data>[0-9A-F]*)\r", re.IGNORECASE)
+_STAMP_DIGITS = 4
+"""Of the time that some adapters write behind a frame."""
 
 
 class SerialAdapterBus(slcanBus):
@@ -77,11 +82,22 @@ class SerialAdapterBus(slcanBus):
         return line
 
     def _next_line(self) -> str | None:
-        """The first whole line that says something, taken out of the buffer; not what only acknowledges a command."""
+        """The first whole line that says something, taken out of the buffer.
+
+        What only acknowledges a command says nothing, and a frame that lacks characters is lost.
+        """
         while ends := [place for mark in (self._OK, self._ERROR) if (place := self._buffer.find(mark)) >= 0]:
             end = min(ends) + 1
             line = self._buffer[:end].decode("ascii", "replace")
             del self._buffer[:end]
-            if line not in _ACKNOWLEDGEMENTS:
+            if line not in _ACKNOWLEDGEMENTS and _is_sound(line):
                 return line
         return None
+
+
+def _is_sound(line: str) -> bool:
+    """Whether a line is no frame, or a whole data frame: an adapter whose buffer overflows leaves characters out."""
+    if line[0] not in _FRAME_LETTERS:
+        return True
+    frame = _FRAME.fullmatch(line)
+    return frame is not None and len(frame["data"]) - 2 * int(frame["bytes"]) in (0, _STAMP_DIGITS)

@@ -1,7 +1,8 @@
 """Service data: a node's object dictionary, read and written; lost, late and doubled answers are made up for."""
 
 import time
-from typing import Protocol
+from collections.abc import Callable
+from typing import Protocol, TypeVar
 
 import can
 from canopen.objectdictionary import ObjectDictionary
@@ -12,14 +13,21 @@ from drivers.canopen.objects import DriveObject
 from drivers.errors import DriverError, DriverErrorKind
 
 SDO_TIMEOUT_S = 0.3
-ATTEMPTS = 4
-"""A question is asked so many times; each answer is waited for as long as `SDO_TIMEOUT_S`."""
+ATTEMPTS = 2
+"""A question is asked so many times in a transfer; each answer is waited for as long as `SDO_TIMEOUT_S`."""
+
+TRANSFERS = 2
+"""A transfer that does not succeed is begun so many times: a request or an answer may have been altered on its way."""
 
 _INITIATE = {1: 3, 2: 2}
 """Command of a request that begins a download or an upload, and of its answer (CiA 301)."""
 
 _ABORT = 4
 _WRITES = 2
+_READINGS = 3
+
+
+_Answer = TypeVar("_Answer")
 
 
 class Pump(Protocol):
@@ -67,6 +75,29 @@ class NodeDictionary:
         """
         return int.from_bytes(self.read_data(entry), "little", signed=entry.signed)
 
+    def read_surely(self, entry: DriveObject) -> int:
+        """Value of an entry that every measurement hangs on: as two readings in a row have it.
+
+        Parameters
+        ----------
+        entry : DriveObject
+            what to read
+
+        Raises
+        ------
+        DriverError
+            ``cannot-connect``: the node does not answer, has no such entry, or gives another value each time
+        """
+        values = [self.read(entry)]
+        for _ in range(_READINGS):
+            values.append(self.read(entry))
+            if values[-1] == values[-2]:
+                return values[-1]
+        raise DriverError(
+            DriverErrorKind.CANNOT_CONNECT,
+            f"node {self.node_id}: {entry} reads {', '.join(map(str, values))}; check the wiring and the adapter",
+        )
+
     def read_data(self, entry: DriveObject) -> bytes:
         """Value of an entry as transferred, cut to its size; of a text without the zeros that end it.
 
@@ -81,7 +112,7 @@ class NodeDictionary:
             ``cannot-connect``: the node does not answer, or has no such entry
         """
         try:
-            data = bytes(self._client.upload(entry.index, entry.subindex))
+            data = bytes(_transferred(lambda: self._client.upload(entry.index, entry.subindex)))
         except (SdoError, can.CanError, OSError) as error:
             raise self._failure(f"{entry} cannot be read", error) from error
         return data[: entry.bits // 8] if entry.bits else data.rstrip(b"\0")
@@ -175,7 +206,7 @@ class NodeDictionary:
             ``cannot-connect``: the drive does not answer or forbids the write
         """
         try:
-            self._client.download(entry.index, entry.subindex, data)
+            _transferred(lambda: self._client.download(entry.index, entry.subindex, data))
         except (SdoError, can.CanError, OSError) as error:
             raise self._failure(f"{entry} = {text} cannot be written", error) from error
 
@@ -184,6 +215,16 @@ class NodeDictionary:
             DriverErrorKind.CANNOT_CONNECT,
             f"node {self.node_id}: {what} ({' '.join(str(error).split())}); check node number, power and wiring",
         )
+
+
+def _transferred(transfer: Callable[[], _Answer]) -> _Answer:
+    """What a transfer comes to, which is begun again where it fails."""
+    for _ in range(TRANSFERS - 1):
+        try:
+            return transfer()
+        except SdoError:
+            continue
+    return transfer()
 
 
 class PumpedSdoClient(SdoClient):

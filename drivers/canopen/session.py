@@ -2,11 +2,12 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from drivers.backend import ControlMode
+from drivers.canopen.answer_time import AnswerTime
 from drivers.canopen.bus import SYNC_ID, CanBus
 from drivers.canopen.bus_budget import CycleFrames, largest_rate_hz
 from drivers.canopen.configuration import BusConfiguration
@@ -51,6 +52,8 @@ class Session:
         what the driver itself has found and nobody has acknowledged
     settling_ns : int
         cycle while drives change state: that of the control loop, once it is known [ns]
+    answer_time : AnswerTime
+        what is usual on this bus
     """
 
     bus: CanBus
@@ -59,6 +62,7 @@ class Session:
     answer_ns: int
     caught: Fault | None = None
     settling_ns: int = round(SETTLING_CYCLE_S * 1e9)
+    answer_time: AnswerTime = field(default_factory=AnswerTime)
 
     @property
     def unhurried_ns(self) -> int:
@@ -106,11 +110,14 @@ class Session:
             self.bus.send(RECEIVED_ID + node.configuration.node_id, frame)
         self.bus.send(SYNC_ID, b"")
         stamp, deadline = self.clock.now_ns(), time.monotonic_ns() + answer_ns
+        answered = stamp
         while not all(node.has_answered for node in self.nodes):
-            if not self.bus.receive(deadline) and time.monotonic_ns() >= deadline:
+            if self.bus.receive(deadline):
+                answered = self.clock.now_ns()
+            elif time.monotonic_ns() >= deadline:
                 break
         self.bus.beat()
-        return self.observe(stamp)
+        return replace(self.observe(stamp), late_ns=self.answer_time.late_ns(answered - stamp))
 
     def read_by_service_data(self) -> ArmState:
         """The arm as it stands, outside the cycle."""
@@ -127,7 +134,7 @@ class Session:
             when they were asked [ns]
         """
         for node in self.nodes:
-            node.remember()
+            node.remember(time_ns)
         return arm_state(self.nodes, time_ns, self.caught)
 
     def step_until(self, is_reached: Callable[[], bool], step: Callable[[], ArmState], within_s: float) -> ArmState:

@@ -19,12 +19,17 @@ STOP_S = 0.5
 RESET_S = 0.1
 """Time in which a drive leaves its fault, or is back in it because the cause persists."""
 
+PROMPT_CYCLES = 3
+"""A frame that tells a drive to stop may be lost, and the answer that it has stopped comes a cycle later."""
+
 _SILENT_REMEDY = "support the arm, check the drive's cable and power, then acknowledge"
 _RESTART_REMEDY = "support the arm, look for a dip of its supply, then acknowledge"
 
 
 def stop_in_cycle(session: Session, mode: ControlMode, goal: Goal) -> bool:
     """Stop by process data, all drives together; False where not all got there.
+
+    Nobody waits for a drive that takes no process data any more: it has stopped by itself.
 
     Parameters
     ----------
@@ -37,11 +42,34 @@ def stop_in_cycle(session: Session, mode: ControlMode, goal: Goal) -> bool:
     """
     still = session.standstill()
 
-    def have_stopped() -> bool:
-        return all(has_stopped(node, goal) for node in session.nodes)
+    def is_nothing_left_to_wait_for() -> bool:
+        return all(has_stopped(node, goal) or node.is_deaf for node in session.nodes)
 
-    session.step_until(have_stopped, lambda: session.cycle(mode, goal, still, session.unhurried_ns), STOP_S)
-    return have_stopped()
+    def cycle() -> ArmState:
+        return session.cycle(mode, goal, still, session.unhurried_ns)
+
+    session.step_until(is_nothing_left_to_wait_for, cycle, STOP_S)
+    return all(has_stopped(node, goal) for node in session.nodes)
+
+
+def stop_promptly(session: Session, mode: ControlMode, goal: Goal) -> ArmState:
+    """Tell all drives to stop within a cycle of the control loop, and again where one may not have heard it.
+
+    Parameters
+    ----------
+    session : Session
+        of drives that take process data
+    mode : ControlMode
+        that they are enabled in
+    goal : Goal
+        where the stop takes them
+    """
+    still = session.standstill()
+    for _ in range(PROMPT_CYCLES):
+        state = session.cycle(mode, goal, still, session.answer_ns)
+        if all(has_stopped(node, goal) for node in session.nodes):
+            break
+    return state
 
 
 def stop_one_by_one(nodes: Sequence[DriveNode], goal: Goal, *, is_stopped: bool) -> list[Fault]:

@@ -14,7 +14,7 @@ from drivers.dynamixel.preparation import drive_mode
 from drivers.dynamixel.servo import JointServo, make_servo
 from drivers.dynamixel.session import read_items
 from drivers.errors import DriverError
-from drivers.inspection import Finding, Severity, split_remedy
+from drivers.inspection import Finding, Severity, failure
 
 MEASURED_CYCLES = 50
 """Reads of which the loop rate is measured."""
@@ -44,13 +44,13 @@ def examine(joints: Sequence[DynamixelJoint], *, slack_s: float = 0.002) -> list
     try:
         port.open()
     except DriverError as error:
-        return [Finding(Severity.FAILURE, configuration.port, *split_remedy(str(error)))]
+        return [failure(configuration.port, str(error))]
     try:
         findings = [Finding(Severity.GOOD, port.path, f"open at {port.baudrate} baud, locked for this program")]
         findings.append(latency_finding(port.path))
         return findings + _examine_servos(ServoBus(port), configuration)
     except DriverError as error:
-        return [Finding(Severity.FAILURE, configuration.port, *split_remedy(str(error)))]
+        return [failure(configuration.port, str(error))]
     finally:
         port.close()
 
@@ -70,7 +70,7 @@ def _examine_servos(bus: ServoBus, configuration: BusConfiguration) -> list[Find
             servo = make_servo(number, wanted, identity)
             settings = read_items(bus, servo, (*_EXAMINED, servo.model.error_item.name))
         except DriverError as error:
-            findings.append(Finding(Severity.FAILURE, subject, *split_remedy(str(error).removeprefix(f"{subject} "))))
+            findings.append(failure(subject, str(error)))
             continue
         findings += _examine_servo(servo, settings)
         servos.append(servo)

@@ -73,7 +73,7 @@ class DrivenArm:
         self._kinds: list[Kind] = [(AxisMode.RELEASED, 0.0)] * count
         self._targets: dict[Kind, tuple[list[int], Target]] = {}
         self._goal, self._goal_rate = (values.copy() for values in self.motion)
-        self._measured_torque, self._measured_motion = self.torque, self.motion
+        self._seen = self._seen_before = np.array([*self.motion, self.torque])
         self.measure()
 
     @property
@@ -109,17 +109,26 @@ class DrivenArm:
             self._goal[joints], self._goal_rate[joints] = target.position, target.velocity
         torque = self._torque_of(demands)
         # torque is constant between two ticks: at the tick itself, the mean of both sides
-        self._measured_torque, self._measured_motion = 0.5 * (self.torque + torque), self.motion
+        self._seen, self._seen_before = np.array([*self.motion, 0.5 * (self.torque + torque)]), self._seen
         self.torque = torque
         if self.stands_on_stand:
             self.stands_on_stand = any(mode is AxisMode.RELEASED for mode, _ in self._kinds)
         if not self.stands_on_stand:
             self._plant.advance(torque, self._period_s)
 
-    def measure(self) -> None:
-        """Let the drives see their joints as they were at the last tick."""
-        position, velocity = self._measured_motion
-        torque = self._measured_torque + self._torque_noise * self._rng.standard_normal(len(self._drives))
+    def measure(self, part: float = 0.0) -> None:
+        """Let the drives see their joints: real ones sample at SYNC, and their loops are faster than the steps here.
+
+        Parameters
+        ----------
+        part : float
+            of a period that has passed since the last tick, 0 to 1: what is seen has gone on as in the period before,
+            torque no farther than to what it has been since the tick
+        """
+        position, velocity, torque = self._seen + part * (self._seen - self._seen_before)
+        at_tick = self._seen[2]
+        torque = np.clip(torque, np.minimum(at_tick, self.torque), np.maximum(at_tick, self.torque))
+        torque = torque + self._torque_noise * self._rng.standard_normal(len(self._drives))
         seen = zip(position + self.encoder_offset, velocity, torque, strict=True)
         for drive, (q, v, tau) in zip(self._drives, seen, strict=True):
             drive.measure(AxisMeasurement(float(q), float(v), float(tau)))

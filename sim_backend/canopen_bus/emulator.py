@@ -8,7 +8,7 @@ from sim_backend.canopen_bus.driven_arm import DrivenArm
 from sim_backend.canopen_bus.line import Line
 from sim_backend.canopen_bus.power_state import PowerState
 from sim_backend.canopen_bus.wire import Wire
-from sim_backend.emulation.device_clock import DeviceClock
+from sim_backend.emulation.device_clock import STEP_S, DeviceClock
 from sim_backend.emulation.fault_kit import FaultKind, FaultSchedule, InjectedFault, faults_from
 
 _TICKS_PER_MEASUREMENT = 10
@@ -74,7 +74,7 @@ class CanEmulator:
         """Take text of the host.
 
         Drives hear it before they catch up: it may have waited while this process slept, and its sleep is no silence of
-        the master. SYNC is different: the time of interpolation is counted from when it came.
+        the master. SYNC is different: they sample when it comes, and the time of interpolation is counted from then.
 
         Parameters
         ----------
@@ -88,6 +88,9 @@ class CanEmulator:
         self.driven.measure()
         for frame in frames:
             self._wire.occupy(frame, now_s)
+            if frame[0] == _SYNC:
+                self.advance_to(now_s)
+                self.driven.measure(min(1.0, max(0.0, (now_s - self.now_s) / STEP_S)))
             for drive in self.drives:
                 if self._is_there(drive, self.now_s):
                     self._wire.carry(drive.receive(frame, self.now_s), now_s)

@@ -1,11 +1,14 @@
 """Process data of an emulated drive: frames laid out as the mapping parameters say, exchanged at SYNC."""
 
-from sim_backend.canopen_bus.object_dictionary import AbortError, ObjectDictionary
+from functools import partial
+
+from sim_backend.canopen_bus.object_dictionary import Abort, AbortError, ObjectDictionary
 
 RECEIVED = (0x1400, 0x1600)
 SENT = (0x1800, 0x1A00)
 PDOS = 4
 ENTRIES = 8
+_FRAME_BYTES = 8
 _OFF = 1 << 31
 _HIGHEST_SYNCHRONOUS = 240
 
@@ -31,9 +34,10 @@ class ProcessData:
                 dictionary.add(communication + number, 0, 1, 2, writable=False)
                 dictionary.add(communication + number, 1, 4, _OFF | first_id + 0x100 * number + node_id)
                 dictionary.add(communication + number, 2, 1, 255)
-                dictionary.add(mapping + number, 0, 1)
+                dictionary.add(mapping + number, 0, 1, hook=partial(self._require_fit, mapping + number))
+                require_mappable = partial(self._require_mappable, mapping + number)
                 for subindex in range(1, ENTRIES + 1):
-                    dictionary.add(mapping + number, subindex, 4)
+                    dictionary.add(mapping + number, subindex, 4, hook=require_mappable)
 
     def take(self, identifier: int, payload: bytes) -> bool:
         """Keep a frame for the next SYNC; False where it is no RPDO of this node.
@@ -75,9 +79,30 @@ class ProcessData:
 
     def _entries(self, mapping: int) -> list[tuple[int, int, int]]:
         """Index, subindex and bytes of what a PDO holds."""
-        count = self._dictionary.get(mapping, 0)
-        words = [self._dictionary.get(mapping, subindex) for subindex in range(1, count + 1)]
+        words = self._words(mapping, self._dictionary.get(mapping, 0))
         return [(word >> 16, word >> 8 & 0xFF, (word & 0xFF) // 8) for word in words]
+
+    def _words(self, mapping: int, count: int) -> list[int]:
+        """The first entries of a mapping, as they were written."""
+        return [self._dictionary.get(mapping, subindex) for subindex in range(1, count + 1)]
+
+    def _require_mappable(self, mapping: int, word: int) -> None:
+        """An entry is changed while none counts, and names an object of the node with its length."""
+        if self._dictionary.get(mapping, 0) != 0:
+            raise AbortError(Abort.DEVICE_STATE)
+        entry = self._dictionary.entries.get((word >> 16, word >> 8 & 0xFF))
+        if entry is None or 8 * entry.bytes != word & 0xFF:
+            raise AbortError(Abort.NOT_MAPPABLE)
+
+    def _require_fit(self, mapping: int, count: int) -> None:
+        """As many entries as there are, which together fit into a frame."""
+        if count > ENTRIES:
+            raise AbortError(Abort.VALUE_RANGE)
+        words = self._words(mapping, count)
+        if 0 in words:
+            raise AbortError(Abort.NOT_MAPPABLE)
+        if sum(word & 0xFF for word in words) > 8 * _FRAME_BYTES:
+            raise AbortError(Abort.TOO_MUCH_MAPPED)
 
     def _apply(self, number: int, payload: bytes) -> None:
         """Write what a frame holds, as a master would; one of the wrong length is dropped."""

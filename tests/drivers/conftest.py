@@ -23,7 +23,8 @@ ALL_RIGS = {
 
 if SOCKETCAN := os.environ.get("TAUSCOPE_SOCKETCAN"):
     # the name of an interface: few kernels have one, see tests/hardware_emulated/test_socketcan.py
-    ALL_RIGS["socketcan"] = partial(canopen_rigs, interface=SOCKETCAN, stepped=True)
+    answers_within = int(os.environ.get("TAUSCOPE_ANSWERS_WITHIN", "1"))
+    ALL_RIGS["socketcan"] = partial(canopen_rigs, interface=SOCKETCAN, stepped=True, answers_within=answers_within)
 
 MARKS = {"dynamixel": [pytest.mark.realtime], "canopen": [pytest.mark.realtime], "canopen-stepped": [pytest.mark.slow]}
 MAKERS = [pytest.param(name, marks=MARKS.get(name, [])) for name in ALL_RIGS]

@@ -7,13 +7,16 @@ import pytest
 
 from arm_rigs import (
     AT_REST,
+    RATE_HZ,
     START,
     Rig,
     allowed,
+    ask,
     drive,
     enable,
     require_policy,
     setpoint,
+    settled,
     slide,
     wide_limits,
 )
@@ -30,7 +33,7 @@ def test_enabling_never_moves_the_arm(rig: Rig, mode: ControlMode) -> None:
         seen = rig.watch(0.2)
         assert np.abs(seen.position - START).max() < 1e-6 + step, "also while the host has not said anything yet"
     else:
-        carried = rig.torque(rig.backend.exchange(setpoint(rig.look())).effort)
+        carried = rig.torque(ask(rig, setpoint(rig.look())).effort)
         assert np.abs(carried).max() <= 2.0 * rig.torque_resolution, "it exerts nothing that nobody has asked for"
 
 
@@ -40,22 +43,22 @@ def test_a_target_from_before_is_forgotten(rig: Rig, mode: ControlMode) -> None:
     drive(rig, slide(START, 0.3), 0.2)
     rig.backend.exchange(setpoint(START + 2.0, np.array([5.0, 5.0, 5.0])))
     rig.backend.stop(StopPolicy.HOLD)
-    place = rig.watch(0.4).position[-1]
+    place = settled(rig)
     if mode is ControlMode.POSITION or rig.backend.capabilities.holds_before_torque:
         rig.backend.enable(mode, wide_limits(rig.robot), allowed(rig, mode, StopPolicy.HOLD), 2.5)
-        # what is left of the stop settles; the target of old is 2 rad away
+        # the target of old is 2 rad away
         assert np.abs(rig.watch(0.2).position - place).max() < 5e-3
     else:
         rig.backend.stop(StopPolicy.TORQUE_OFF)
         rig.backend.enable(mode, wide_limits(rig.robot), allowed(rig, mode, StopPolicy.HOLD), 2.5)
-        state = rig.backend.exchange(setpoint(place))
+        state = ask(rig, setpoint(place))
         assert np.abs(rig.torque(state.effort)).max() <= 2.0 * rig.torque_resolution
 
 
 def test_it_keeps_its_place_under_gravity(rig: Rig) -> None:
     enable(rig)
-    states = drive(rig, lambda _: setpoint(START), 0.3)
-    assert np.abs(rig.torque(states[-1].effort)[1:]).min() > 1.0, "gravity is carried"
+    drive(rig, lambda _: setpoint(START), 0.3)
+    assert np.abs(rig.torque(ask(rig, setpoint(START)).effort)[1:]).min() > 1.0, "gravity is carried"
     rig.backend.stop(StopPolicy.HOLD)
     assert np.abs(rig.watch(0.4).position - START).max() < 1e-4
 
@@ -112,7 +115,12 @@ def test_a_far_target_is_approached_at_the_speed_limit(rig: Rig) -> None:
     states = drive(rig, lambda _: setpoint(START + 0.4), 0.6)
     # loops that swing answer the step with which it begins by more than the limit
     begin = len(states) // 4 if rig.swing > 0.0 else 0
-    speed = np.abs([state.velocity for state in states[begin:]])
+    velocity = np.array([state.velocity for state in states[begin:]])
+    # a drive that misses a target, or gets it late, makes good for it with the next: as fast as allowed in the mean
+    # over a few of them
+    waited = np.diff([state.time_ns for state in states])
+    span = 1 if rig.answers_within == 1 and waited.max() < 1.5e9 / RATE_HZ else 10
+    speed = np.abs([np.nanmean(velocity[k : k + span], axis=0) for k in range(len(velocity) - span + 1)])
     assert np.nanmax(speed) < 1.3 * 0.5
     assert np.nanmax(speed) > 0.8 * 0.5
 
@@ -123,7 +131,7 @@ def test_torque_stays_below_the_cap(rig: Rig) -> None:
     states = drive(rig, lambda _: setpoint(START + 0.8, np.array([30.0, 30.0, 30.0])), 0.4)
     torque = np.abs([rig.torque(state.effort) for state in states])
     noise = 4.0 * rig.torque_resolution
-    assert np.all(torque <= cap + 1e-9 + noise)
+    assert np.all(np.nanmax(torque, axis=0) <= cap + 1e-9 + noise)
     assert np.all(np.nanmax(torque, axis=0) > 0.99 * cap - noise), "the cap was reached"
 
 
@@ -131,11 +139,13 @@ def test_torque_control_gives_the_torque_that_is_asked_for(rig: Rig) -> None:
     enable(rig, ControlMode.TORQUE, torque=10.0)
     # joint 2 leans: what carries it within its friction
     asked = np.array([0.3, -6.0, -1.5])
-    states = drive(rig, lambda _: setpoint(START, asked), 0.05)
+    drive(rig, lambda _: setpoint(START, asked), 0.05)
     noise = 4.0 * rig.torque_resolution
-    np.testing.assert_allclose(rig.torque(states[-1].effort), asked, atol=1e-9 + noise)
-    states = drive(rig, lambda _: setpoint(START, np.array([0.0, -30.0, 0.0])), 0.02)
-    assert rig.torque(states[-1].effort)[1] == pytest.approx(-10.0, abs=1e-5 + noise)
+    state = ask(rig, setpoint(START, asked))
+    np.testing.assert_allclose(rig.torque(state.effort), asked, atol=1e-9 + noise)
+    too_much = setpoint(START, np.array([0.0, -30.0, 0.0]))
+    drive(rig, lambda _: too_much, 0.02)
+    assert rig.torque(ask(rig, too_much).effort)[1] == pytest.approx(-10.0, abs=1e-5 + noise)
 
 
 @pytest.mark.parametrize(

@@ -77,7 +77,7 @@ class SteppedCanopenRig(CanopenRig):
     def watch(self, duration_s: float) -> Watched:
         begin = self._clock.now_ns()
         self._clock.wait_until_ns(begin + round(duration_s * 1e9))
-        rows = [entry for entry in self._emulator.trace() if entry["time"] * 1e9 > begin]
+        rows = [entry for entry in self._emulator.trace() if round(entry["time"] * 1e9) > begin]
         return Watched(
             np.array([round(entry["time"] * 1e9) for entry in rows]),
             np.array([entry["position"] for entry in rows]),
@@ -93,7 +93,9 @@ class SteppedCanopenRig(CanopenRig):
 
 
 @contextmanager
-def canopen_rigs(folder: Path, interface: str | None = None, *, stepped: bool = False) -> Iterator[Callable[[], Rig]]:
+def canopen_rigs(
+    folder: Path, interface: str | None = None, *, stepped: bool = False, answers_within: int = 1
+) -> Iterator[Callable[[], Rig]]:
     """Rigs of one emulator process; its drives are as delivered before each of them.
 
     They are behind a serial adapter, or on an interface of SocketCAN; time is the machine's, or stepped.
@@ -117,6 +119,7 @@ def canopen_rigs(folder: Path, interface: str | None = None, *, stepped: bool = 
                 rigs.pop().backend.disconnect()
             emulator.reset()
             rigs.append(kind(emulator, robot))
+            rigs[-1].answers_within = answers_within
             return rigs[-1]
 
         yield rig

@@ -31,13 +31,18 @@ def write_canopen_robot(source: Path, folder: Path, interface: str | None = None
     return robot
 
 
-def write_canopen_arm(arm: dict[str, Any], path: Path, port: Path, *, knows_model: bool = True) -> Path:
-    """The arm with a drive at every joint, with or without the truth about its links and friction."""
+def write_canopen_arm(
+    arm: dict[str, Any], path: Path, bus: Path | str, *, knows_model: bool = True, **keys: Any
+) -> Path:
+    """The arm with a drive at every joint, with or without the truth about its links and friction.
+
+    The bus is a serial adapter by its path, or an interface of SocketCAN by its name; keys are further ones of drives.
+    """
     drives = [
-        {"node_id": number, "counts_per_turn": COUNTS_PER_TURN, "stop_policy": "hold"}
+        {"node_id": number, "counts_per_turn": COUNTS_PER_TURN, "stop_policy": "hold", **keys}
         for number in range(1, len(arm["joints"]) + 1)
     ]
-    drives[0] |= {"interface": "slcan", "channel": str(port)}
+    drives[0] |= {"interface": "slcan" if isinstance(bus, Path) else "socketcan", "channel": str(bus)}
     joints = [{**joint, "gear_ratio": GEAR, "drive": drive} for joint, drive in zip(arm["joints"], drives, strict=True)]
     told = {key: value for key, value in arm.items() if knows_model or key != "model"}
     path.write_text(json.dumps({**told, "joints": joints}), encoding="utf-8")

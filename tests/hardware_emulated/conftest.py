@@ -1,9 +1,10 @@
-"""Emulated servos that several tests use one after the other, each of them as delivered."""
+"""Emulated servos that several tests use one after the other, each of them as delivered; and the program itself."""
 
 from collections.abc import Iterator
 
 import pytest
 
+from hardware_emulated.commands import Tauscope, called_with
 from hardware_emulated.dynamixel_bench import Bench, bench
 from prompt_process import prompt_process
 
@@ -32,3 +33,8 @@ def weightless(weightless_servos: Bench) -> Iterator[Bench]:
     with prompt_process():
         yield weightless_servos.anew()
         weightless_servos.clear()
+
+
+@pytest.fixture
+def tauscope(capfd: pytest.CaptureFixture[str]) -> Tauscope:
+    return called_with(capfd)

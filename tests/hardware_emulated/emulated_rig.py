@@ -25,6 +25,7 @@ class EmulatedRig:
     """An arm of emulated drives in a process of its own; the backend is the subclass's matter."""
 
     is_real_time = True
+    answers_within = 1
     backend: Backend
 
     def __init__(self, emulator: EmulatorProcess) -> None:

@@ -40,6 +40,8 @@ class FaultTable:
     """counts of its encoder"""
     names: Mapping[FaultKind, str]
     """faults that the bus has, in words"""
+    absent: frozenset[FaultKind] = frozenset()
+    """faults that it cannot have"""
 
     def run(self, site: Site, kind: FaultKind, phase: str) -> tuple[RunRecord, Path]:
         """A run with a fault at the beginning of a phase, with devices as delivered."""
@@ -56,6 +58,7 @@ class FaultTable:
 
     def require_documented(self, site: Site) -> None:
         """Whatever happens when is definite, and as docs/ has it; ``TAUSCOPE_WRITE_DOCS=1`` renews that."""
+        assert {*self.names, *self.absent} == {*FaultKind}, "no fault of the kit is left out"
         outcomes = {
             name: {phase: require_definite(kind, phase, *self.run(site, kind, phase)) for phase in PHASES}
             for kind, name in self.names.items()

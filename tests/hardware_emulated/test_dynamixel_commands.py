@@ -1,6 +1,6 @@
 """``tauscope doctor``, ``bus scan``, ``run`` and ``run --dry-run`` on emulated servos."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -8,8 +8,7 @@ import pytest
 from drivers.dynamixel.packets import FrameParser
 from drivers.inspection import PHASES
 from hardware_emulated.campaign_arms import three_joints, write_robot
-from service.cli import main
-from service.excitation import ExcitationOptions, design_excitation, write_trajectory
+from hardware_emulated.commands import Tauscope, write_short_motion
 from service.recording import read_recording
 from service.recording.recording import EffortKind
 from service.robot import read_robot
@@ -19,25 +18,12 @@ from sim_backend.emulation import EmulatorProcess, FaultKind, InjectedFault
 
 pytestmark = pytest.mark.realtime
 
-Tauscope = Callable[..., tuple[int, str, str]]
-
-
-@pytest.fixture
-def tauscope(capfd: pytest.CaptureFixture[str]) -> Tauscope:
-    def run(*arguments: str | Path) -> tuple[int, str, str]:
-        status = main([str(argument) for argument in arguments])
-        seen = capfd.readouterr()
-        return int(status), seen.out, seen.err
-
-    return run
-
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("commands")
     path = write_robot(three_joints(), folder / "arm.json", str(folder / "port"))
-    design = ExcitationOptions(period_s=2.0, periods=1, starts=1, slow_postures=0, closing_period=False)
-    write_trajectory(design_excitation(read_robot(path), design).trajectory, folder / "motion.json")
+    write_short_motion(path, folder / "motion.json")
     return folder
 
 

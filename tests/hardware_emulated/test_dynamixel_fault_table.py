@@ -56,6 +56,7 @@ TABLE = FaultTable(
         FaultKind.RESET: "the servo restarts",
         FaultKind.POWER_DIP: "the power of all dips",
     },
+    absent=frozenset({FaultKind.BUS_OFF}),
 )
 
 

@@ -42,6 +42,7 @@ def test_a_missing_drive_and_one_in_fault_are_told_with_a_remedy() -> None:
     assert [finding.subject for finding in failures] == ["joint 2 (node 2)", "joint 3 (node 9)"]
     assert "0x4310" in failures[0].detail
     assert "check node number" in failures[1].remedy
+    assert failures[1].detail.startswith("Device type (0x1000:00) cannot be read"), "the place is told once"
 
 
 def test_doctor_and_scan_move_nothing_and_leave_every_state() -> None:

@@ -5,7 +5,7 @@ from collections import deque
 import pytest
 
 from drivers.canopen import objects
-from drivers.canopen.service_data import ATTEMPTS, NodeDictionary, PumpedSdoClient
+from drivers.canopen.service_data import ATTEMPTS, TRANSFERS, NodeDictionary, PumpedSdoClient
 from drivers.errors import DriverError, DriverErrorKind
 
 STATUSWORD_ANSWER = bytes.fromhex("4B41600037020000")
@@ -67,4 +67,27 @@ def test_a_silent_node_is_given_up_after_some_attempts() -> None:
     node = ScriptedNode()
     with pytest.raises(DriverError, match="check node number"):
         node.dictionary.read(objects.STATUSWORD)
-    assert sum(request[0] == 0x40 for request in node.requests) == ATTEMPTS
+    assert sum(request[0] == 0x40 for request in node.requests) == ATTEMPTS * TRANSFERS
+
+
+@pytest.mark.parametrize("altered", ["8041600001000405", "0041600000000000"])
+def test_a_question_that_was_altered_on_its_way_is_asked_again(altered: str) -> None:
+    """The node knows no such command, or answers another one."""
+    node = ScriptedNode([bytes.fromhex(altered)], [STATUSWORD_ANSWER])
+    assert node.dictionary.read(objects.STATUSWORD) == 0x0237
+
+
+def test_a_node_that_declines_twice_is_believed() -> None:
+    missing = bytes.fromhex("8041600000000206")
+    node = ScriptedNode([missing], [missing])
+    assert node.dictionary.read_optional(objects.STATUSWORD) is None
+    assert len(node.requests) == 2
+
+
+def test_what_everything_hangs_on_is_read_until_two_readings_agree() -> None:
+    altered, rated = bytes.fromhex("4376600090810000"), bytes.fromhex("4376600090010000")
+    assert ScriptedNode([rated], [rated]).dictionary.read_surely(objects.RATED_TORQUE) == 400
+    assert ScriptedNode([altered], [rated], [rated]).dictionary.read_surely(objects.RATED_TORQUE) == 400
+    fickle = ScriptedNode(*[[one] for one in (altered, rated)] * 2)
+    with pytest.raises(DriverError, match="reads 33168, 400, 33168, 400; check the wiring"):
+        fickle.dictionary.read_surely(objects.RATED_TORQUE)

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from drivers.canopen import objects
-from drivers.canopen.data_sheet_text import DataSheetError
-from drivers.canopen.device_file import DescribedObject, DeviceFile
+from drivers.canopen.data_sheet.device_file import DescribedObject, DeviceFile
+from drivers.canopen.data_sheet.text import DataSheetError
 from drivers.canopen.objects import DriveObject
 
 _COMMUNICATION = range(0x1000, 0x2000)

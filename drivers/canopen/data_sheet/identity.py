@@ -3,7 +3,7 @@
 from typing import Protocol
 
 from drivers.canopen import objects
-from drivers.canopen.device_file import DeviceFile
+from drivers.canopen.data_sheet.device_file import DeviceFile
 from drivers.canopen.objects import DriveObject
 from drivers.errors import DriverError, DriverErrorKind
 

@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 from drivers.backend import ControlMode
 from drivers.canopen import objects
-from drivers.canopen.data_sheet_text import DataSheetError
-from drivers.canopen.device_file import TYPE_NAMES, DeviceFile
+from drivers.canopen.data_sheet.device_file import TYPE_NAMES, DeviceFile
+from drivers.canopen.data_sheet.text import DataSheetError
 from drivers.canopen.objects import DriveObject
 from drivers.canopen.process_data import (
     MOTION_PDO,

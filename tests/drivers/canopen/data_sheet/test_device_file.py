@@ -16,8 +16,8 @@ from drivers.canopen.configuration import (
     read_configuration,
     require_targets,
 )
-from drivers.canopen.data_sheet_text import DataSheetError
-from drivers.canopen.device_file import DeviceFile, read_device_file
+from drivers.canopen.data_sheet.device_file import DeviceFile, read_device_file
+from drivers.canopen.data_sheet.text import DataSheetError
 from drivers.errors import DriverError, DriverErrorKind
 from emulated_data_sheet import GAIN, LABEL, OFFSET, Sections, sections, text_of, write_file
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from canopen.objectdictionary import ObjectDictionary, ObjectDictionaryError, ODVariable, datatypes, eds
 
-from drivers.canopen.data_sheet_text import DataSheetError, library_text, read_sections
+from drivers.canopen.data_sheet.text import DataSheetError, library_text, read_sections
 
 LARGEST_FILE = 8 * 1024 * 1024
 """Makers' files of drives have some hundred kilobytes [bytes]."""
