@@ -6,6 +6,7 @@ from datetime import datetime
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from service.acquisition.loop import Cycles
 from service.acquisition.record import RunRecord
@@ -65,6 +66,11 @@ def progress_event(cycles: Cycles, state: RunState, recent: int) -> dict[str, An
         "percent": round(100.0 * cycles.played, 2),
         "time_s": round((cycles.metronome.index + 1) / plan.rate_hz, 3),
         "duration_s": round(plan.cycles / plan.rate_hz, 3),
+        "target": [round(float(value), 5) for value in target],
+        "position": _measured(cycles.arm.state.position),
+        "effort": _measured(cycles.arm.state.effort),
+        "position_range": [_measured(limits.position_low), _measured(limits.position_high)],
+        "torque_limit": _measured(limits.torque),
         "following_error": [float(value) for value in cycles.worst_following],
         "following_share": round(float((cycles.worst_following / limits.following).max()), 4),
         "position_room": [float(value) for value in room],
@@ -73,6 +79,11 @@ def progress_event(cycles: Cycles, state: RunState, recent: int) -> dict[str, An
         "stale_samples": [int(count) for count in cycles.arm.stale],
         "lost_rows": cycles.recorder.lost,
     }
+
+
+def _measured(values: NDArray[np.float64]) -> list[float | None]:
+    """Numbers as plain data: what was not measured, or has no limit, is None."""
+    return [round(float(value), 5) if np.isfinite(value) else None for value in values]
 
 
 class ProgressReporter:

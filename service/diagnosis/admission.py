@@ -37,16 +37,19 @@ class Admission:
         of the training recordings
     pure_error : bool
         whether the noise is known from repetitions
+    looked_at_before : int
+        forms that were looked at with another screen, and count as well
     """
 
-    def __init__(self, screen: Screen, *, pure_error: bool) -> None:
+    def __init__(self, screen: Screen, *, pure_error: bool, looked_at_before: int = 0) -> None:
         self.screen = screen
         self.pure_error = pure_error
+        self._looked_at_before = looked_at_before
 
     @property
     def level(self) -> float:
         """Chance of a false name that each form is given."""
-        return LEVEL / max(len(self.screen.effects), 1)
+        return LEVEL / max(self._looked_at_before + len(self.screen.effects), 1)
 
     def inflation(self, fit: Fit) -> float:
         """By how much the residual exceeds the modelled noise; where nothing repeats, the residual itself is right.
@@ -73,8 +76,8 @@ class Admission:
             whether blocks are asked
         """
         candidate = replace(option.candidate, gain=max(option.gain, 0.0))
-        inflation = self.inflation(option.fit)
-        plain = candidate.p_value(inflation, refined=True)
+        inflation = self._inflation_there(option)
+        plain = candidate.p_value(inflation, refined=True, freedom=self._freedom(option))
         if self.pure_error or not blocks:
             return plain
         ratio, pieces = score_inflation(option.fit.model.terms[-1], fit, option.fit, self.screen)
@@ -82,6 +85,28 @@ class Admission:
             return plain
         tail = float(stats.f.sf(candidate.gain / ratio / candidate.count, candidate.count, pieces - candidate.count))
         return max(plain, min(1.0, candidate.shapes_tried * tail))
+
+    def _freedom(self, option: Option) -> float:
+        """Rows of the joints that an effect touches, less their part of the parameters: they say how large noise is."""
+        if self.pure_error:
+            return np.inf
+        residual, noise = option.fit.projection.residual, self.screen.observations.noise
+        rows = [own.share * len(row) for own, row in zip(noise, residual, strict=True)]
+        touched = option.candidate.effect.touched(len(rows))
+        return max(1.0, sum(rows[j] for j in touched) * option.fit.projection.freedom / sum(rows))
+
+    def _inflation_there(self, option: Option) -> float:
+        """The inflation; where nothing repeats, that of the joints that an effect touches if theirs is larger.
+
+        Noise was told with all rows alike, those near reversals included that weigh less in the fit: by how much it is
+        less for that differs from joint to joint.
+        """
+        everywhere = self.inflation(option.fit)
+        if self.pure_error:
+            return everywhere
+        residual = option.fit.projection.residual
+        there = sum(float(residual[j] @ residual[j]) for j in option.candidate.effect.touched(len(residual)))
+        return max(everywhere, there / self._freedom(option))
 
     def determined(self, fit: Fit, fitter: Fitter) -> bool:
         """Whether the last term's coefficients differ from zero with everything else open, its own shapes included.

@@ -1,7 +1,10 @@
-"""The band in which a diagnosis compares torque and model: the identification's, unless it explains next to nothing.
+"""The bands of a diagnosis: the one in which torque and model are compared, and that of the motion itself.
 
 An identification keeps to where its model explains more than it leaves. Where what is left out is most of the torque,
 that band says nothing, and the diagnosis looks beyond it, as far as the noise of the positions allows.
+
+Friction's step at a reversal has all frequencies. The motion is taken in a band of its own, several times as wide as
+the comparison, so that the step is where it was: a comparison too near to that band sees its rounded corners.
 """
 
 from collections.abc import Sequence
@@ -9,7 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from service.identification import Identification
+from service.identification.band import quiet_limit
 from service.recording.conditioning import Conditioner
+from service.recording.recording import Array
 
 WIDENING = 4.0
 """Width over the identification's band where its model explains too little."""
@@ -26,8 +31,23 @@ WIDEST_HZ = 40.0
 OPEN_SHARE = 0.3
 """Share of the sampling rate that is never exceeded."""
 
+BLURRED = 1.0
+"""Noise of the velocity, relative to the width 1/K_v of friction's step, up to which the motion's own band is opened.
+Narrower it rounds off how a joint sticks at its reversals, always to the same side, which looks like a delay or like
+bristles; wider its noise blurs the step to either side: the rows' weights know of that, but what tells asymmetric
+friction from a constant is lost in it."""
 
-def diagnosis_cutoff(conditioners: Sequence[Conditioner], identification: Identification) -> float:
+QUIET = 0.4
+"""…and up to which it is opened for what the torque is at single samples, where no band takes that noise out again."""
+
+STATE_BANDS = (2.0, 8.0)
+"""Narrowest and widest band of the motion relative to the common one."""
+
+STEPS_SEEN = 4.0
+"""Width of the motion's own band, over that of the comparison, that shows no corners of friction's steps."""
+
+
+def diagnosis_cutoff(conditioners: Sequence[Conditioner], identification: Identification, steepness: Array) -> float:
     """Cut-off of the band that torque and columns share [Hz].
 
     Parameters
@@ -36,17 +56,63 @@ def diagnosis_cutoff(conditioners: Sequence[Conditioner], identification: Identi
         the training recordings
     identification : Identification
         of the nominal model
+    steepness : (n,) float64
+        K_v of every joint's friction [s/rad or s/m]
     """
     rate = min(conditioner.timing.rate_hz for conditioner in conditioners)
     widest = min(WIDEST_HZ, OPEN_SHARE * rate)
-    limits = [c.noise.limit_hz for c in conditioners if c.noise.limit_hz is not None]
-    quiet = min([widest, *(NOISE_MARGIN * limit for limit in limits)])
+    limit = quiet_limit(conditioners)
+    quiet = widest if limit is None else min(widest, NOISE_MARGIN * limit)
     identified = identification.cutoff_hz
     if identified is None:
         return quiet
     if explained_share(conditioners, identification) < LITTLE:
         return max(min(quiet, WIDENING * identified), min(identified, widest))
-    return min(identified, widest)
+    noisiest = min(c.noise.limit_hz or np.inf for c in conditioners)
+    steps = min(step_band(conditioner, steepness, BLURRED) for conditioner in conditioners)
+    return min(identified, widest, max(noisiest, steps / STEPS_SEEN))
+
+
+def state_cutoff(
+    conditioner: Conditioner, cutoff_hz: float | None, steepness: Array | None, blurred: float
+) -> float | None:
+    """Cut-off of the motion's own smoothing [Hz]; None for no filter.
+
+    Parameters
+    ----------
+    conditioner : Conditioner
+        a recording
+    cutoff_hz : float or None
+        of the common band [Hz]; None for no filter
+    steepness : (n,) float64 or None
+        K_v of every joint's friction [s/rad or s/m]
+    blurred : float
+        as of `step_band`
+    """
+    if cutoff_hz is None:
+        return None
+    narrowest, widest = (ratio * cutoff_hz for ratio in STATE_BANDS)
+    if steepness is None:
+        return narrowest
+    return float(np.clip(step_band(conditioner, steepness, blurred), narrowest, widest))
+
+
+def step_band(conditioner: Conditioner, steepness: Array, blurred: float) -> float:
+    """Band of the motion in which noise of density D makes K_v √(D (2π)² f³/3) of `blurred` at the worst joint [Hz].
+
+    Parameters
+    ----------
+    conditioner : Conditioner
+        a recording
+    steepness : (n,) float64
+        K_v of every joint's friction [s/rad or s/m]
+    blurred : float
+        noise of the velocity, relative to the width 1/K_v of friction's step
+    """
+    density = conditioner.noise.density
+    moving = conditioner.moving & (density > 0.0)
+    widths = 3.0 * (blurred / np.maximum(steepness, 1e-9)) ** 2 / (4.0 * np.pi**2)
+    return float(np.cbrt(widths[moving] / density[moving]).min(initial=np.inf))
 
 
 def explained_share(conditioners: Sequence[Conditioner], identification: Identification) -> float:

@@ -5,9 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from service.diagnosis.blocks import add_block_sums
-from service.diagnosis.fit import Fitter
+from service.diagnosis.fit import Fit, Fitter
 from service.diagnosis.model import ExtendedModel
 from service.diagnosis.observations import Observations
+from service.diagnosis.prediction import log_likelihood
 from service.diagnosis.projection import moments
 from service.diagnosis.screening import Screen, model_signals
 from service.diagnosis.term import Term
@@ -35,6 +36,13 @@ SHOULD_BE_SEEN = 3.0
 """Standard errors at which the finding, if true, is expected there: below, estimated anew it says little; what it
 predicts still has to be better than what is predicted without it."""
 
+UNLIKE = -1.0
+"""Likeness below which what held-out recordings show is something else, however well it is predicted."""
+
+RIGHT = 1.1
+"""Residual energy per row of a fit to the held-out recordings, up to which the model may be right: beyond, what
+predictions err by is no uncertainty of parameters."""
+
 TELLS_NOTHING = 1.0
 """…and below which the held-out motion does not even do that."""
 
@@ -54,12 +62,17 @@ class Confirmation:
         standard errors from zero at which the finding would be seen there if it is what training says
     seen_z : float
         the same as estimated there, beside nominal parameters of these recordings' own
+    favour : float
+        logarithm of how much likelier the held-out recordings are with the finding than without it: all parameters as
+        uncertain as training leaves them, where that can be all that is wrong; else by the point prediction, and by
+        the likeness of its size
     """
 
     gain: float
     gain_z: float
     expected_z: float
     seen_z: float
+    favour: float
 
     def confirmed(self, *, cautious: bool) -> bool:
         """Whether the finding is there on motion that it was not made from, and does not spoil the prediction.
@@ -78,17 +91,20 @@ class Confirmation:
         if self.seen_z > max(PLAINLY_SEEN, SAME_SIZE * self.expected_z):
             return True
         if not cautious:
-            return self.favour > 0.0
+            return self.favour > 0.0 and likeness(self.expected_z, self.seen_z) > UNLIKE
         seen = self.expected_z < SHOULD_BE_SEEN or self.seen_z > SEEN_AGAIN
         return seen and self.gain > 0.0 and self.gain_z > CLEARLY_BETTER
 
-    @property
-    def favour(self) -> float:
-        """Logarithm of how much likelier the held-out recordings are with the finding as it is than without it.
 
-        Of its size, found anew with parameters of their own, z·E[z] - E[z]²/2; and of their prediction, half its gain.
-        """
-        return self.expected_z * self.seen_z - 0.5 * self.expected_z**2 + 0.5 * self.gain
+def likeness(expected_z: float, seen_z: float) -> float:
+    """Logarithm of how much likelier a size found anew is if it is what was expected than if it is zero: z E - E²/2.
+
+    Parameters
+    ----------
+    expected_z, seen_z : float
+        E and z, in standard errors of z
+    """
+    return expected_z * seen_z - 0.5 * expected_z**2
 
 
 class HeldOut:
@@ -105,21 +121,28 @@ class HeldOut:
         self.fitter = Fitter(observations)
         self.screen = Screen(observations, ())
 
-    def confirm(self, before: ExtendedModel, after: ExtendedModel, term: Term) -> Confirmation:
+    def confirm(self, before: Fit, after: Fit, training: Fitter) -> Confirmation:
         """Compare predictions without and with a term.
 
         Parameters
         ----------
-        before, after : ExtendedModel
-            fitted to the training recordings
-        term : Term
-            what `after` has more, as fitted there
+        before, after : Fit
+            to the training recordings; `after` has one term more, its last
+        training : Fitter
+            of these
         """
-        gains = self.block_gains(before, after)
+        gains = self.block_gains(before.model, after.model)
         spread = float(gains.std(ddof=1) * np.sqrt(len(gains))) if len(gains) > 1 else np.inf
         total = float(gains.sum())
-        expected, seen = self._seen_again(before, after, term)
-        return Confirmation(total, total / max(spread, np.finfo(float).tiny), expected, seen)
+        expected, seen, inflation = self._seen_again(before.model, after.model, after.model.terms[-1])
+        if inflation > RIGHT:
+            favour = 0.5 * total + likeness(expected, seen)
+        else:
+            favour = self._log_likelihood(after, training) - self._log_likelihood(before, training)
+        return Confirmation(total, total / max(spread, np.finfo(float).tiny), expected, seen, favour)
+
+    def _log_likelihood(self, fit: Fit, training: Fitter) -> float:
+        return log_likelihood(fit.model, training.covariance(fit), self.fitter)
 
     def predicted_by(self, model: ExtendedModel) -> bool:
         """Whether a model leaves no joint much more than noise; else the training motion was too poor to say anything.
@@ -166,8 +189,11 @@ class HeldOut:
         rows = zip(self.fitter.white_residual(before), self.fitter.white_residual(after), strict=True)
         return [old**2 - new**2 for old, new in rows]
 
-    def _seen_again(self, before: ExtendedModel, after: ExtendedModel, term: Term) -> tuple[float, float]:
-        """The term along its training coefficients: expected and found, in standard errors of these recordings."""
+    def _seen_again(self, before: ExtendedModel, after: ExtendedModel, term: Term) -> tuple[float, float, float]:
+        """The term along its training coefficients: expected and found, in standard errors of these recordings.
+
+        And by how much the residual of a fit of their own exceeds the noise.
+        """
         nominal = replace(before, structure=after.structure, parameters=after.parameters)
         fit = self.fitter.projected(nominal)
         white = self.screen.white_columns(term.effect, term.shape[None], model_signals(nominal, self.observations))
@@ -175,4 +201,4 @@ class HeldOut:
         strength = float(np.sqrt(term.coefficients @ found.gram[0] @ term.coefficients))
         noise = float(np.sqrt(fit.inflation()))
         along = float(term.coefficients @ found.target[0]) / max(strength, np.finfo(float).tiny)
-        return strength / noise, along / noise
+        return strength / noise, along / noise, noise**2

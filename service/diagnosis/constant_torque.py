@@ -15,11 +15,10 @@ from service.diagnosis.confirmation import HeldOut
 from service.diagnosis.equivalence import EQUIVALENT
 from service.diagnosis.findings import without_nominal
 from service.diagnosis.fit import Fit, Fitter
-from service.diagnosis.model import with_terms
 from service.diagnosis.refinement import refined
 from service.diagnosis.screening import Candidate, Screen, model_signals
 from service.diagnosis.selection import MOST_FITTED
-from service.diagnosis.term import Term
+from service.diagnosis.table import fitted_option
 
 WITH_A_CONSTANT = ("joint_spring",)
 """Effects whose own constant is the nominal model's offset: beside one, the offset is no finding of its own."""
@@ -44,19 +43,16 @@ def instead_of_a_constant(
         of the same
     """
     enough = gain - EQUIVALENT * without.inflation()
-    near = [each for each in screen.effects if each.joint in (effect.joint, None)]
-    lasting = Screen(screen.observations, [each for each in near if not isinstance(each, TimeLocalEffect)])
+    there = {(term.effect.id, term.effect.joint) for term in without.model.terms}
+    others = [each for each in screen.effects if (each.id, each.joint) not in there]
+    near = [each for each in others if each.joint in (effect.joint, None) and not isinstance(each, TimeLocalEffect)]
+    lasting = Screen(screen.observations, near)
     touching = [each for each in lasting.candidates(without) if each.gain > 0.5 * enough]
     signals = model_signals(without.model, screen.observations)
     closest = sorted((refined(each, without, lasting, signals) for each in touching), key=lambda each: -each.score)
-    options = []
-    for candidate in closest[:MOST_FITTED]:
-        term = Term(candidate.effect, candidate.shape, candidate.coefficients)
-        found = fitter.fit(with_terms(without.model, [*without.model.terms, term]))
-        option = Option(candidate, found, without.energy - found.energy)
-        if option.score > enough - 1.0 and is_physical(option, without):
-            options.append(option)
-    return distinct(sorted(options, key=lambda each: -each.score))
+    options = [fitted_option(candidate, without, fitter) for candidate in closest[:MOST_FITTED]]
+    near_enough = [each for each in options if each.score > enough - 1.0 and is_physical(each, without)]
+    return distinct(sorted(near_enough, key=lambda each: -each.score))
 
 
 def with_better_than_constants(
@@ -105,9 +101,7 @@ def _exchanged(
     if not options or options[0].score <= constant.score:
         return selection
     best = options[0]
-    confirmation = (
-        None if held_out is None else held_out.confirm(without.model, best.fit.model, best.fit.model.terms[-1])
-    )
+    confirmation = None if held_out is None else held_out.confirm(without, best.fit, fitter)
     if confirmation is not None and not confirmation.confirmed(cautious=not admission.pure_error):
         return selection
     near = [each for each in (*options, constant) if each.score > best.score - EQUIVALENT * inflation]

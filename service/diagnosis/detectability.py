@@ -57,6 +57,9 @@ def detectable(candidates: Sequence[Candidate], level: float, inflation: float) 
             continue
         strength = needed_strength(each, level)
         size = float(np.sqrt(strength * inflation / each.information))
+        if size > each.effect.coefficients[0].largest:  # nothing real is as large as that
+            best.setdefault(key, Detectable(*key, None, unit, False))
+            continue
         known = best.get(key)
         if known is None or known.minimum is None or size < known.minimum:
             best[key] = Detectable(*key, size, unit, True)

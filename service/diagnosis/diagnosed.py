@@ -20,6 +20,9 @@ from service.identification import Identification
 from service.recording.recording import Array
 from service.robot import Robot
 
+EXPLAINED = 20.0
+"""Energy that findings take off a joint's residual, in noise variances, from which there was something to explain."""
+
 
 @dataclass(frozen=True)
 class ParameterDifference:
@@ -124,9 +127,16 @@ class Diagnosis:
 
     @property
     def mismatched(self) -> list[bool]:
-        """Per joint, whether there is something to explain: what cannot be measured counts where predictions fail."""
+        """Per joint, whether there is something to explain: what cannot be measured counts where predictions fail.
+
+        What findings explain was there, also where the residual's power alone would not have told.
+        """
         agreed = self.constancy.holds and self.predicts
-        return self.misfit_before.mismatch if agreed else self.misfit_before.significant
+        tested = self.misfit_before.mismatch if agreed else self.misfit_before.significant
+        terms = [term for finding in self.findings for term in finding.terms]
+        touched = {joint for term in terms for joint in term.effect.touched(len(tested))}
+        explained = [each.explained > EXPLAINED * self.inflation for each in self.mismatch]
+        return [told or (explained[joint] and joint in touched) for joint, told in enumerate(tested)]
 
     @cached_property
     def predicts(self) -> bool:

@@ -8,7 +8,7 @@ from threadpoolctl import ThreadpoolController
 
 from service.diagnosis.admission import LEVEL
 from service.diagnosis.band import diagnosis_cutoff
-from service.diagnosis.catalogue import Effect, Setting, doubtful_effects, possible_effects
+from service.diagnosis.catalogue import Effect, Setting, possible_effects
 from service.diagnosis.catalogue.payload import Payload
 from service.diagnosis.catalogue.plain_terms import TorqueOffset
 from service.diagnosis.catalogue.rotor_inertia import RotorInertia
@@ -19,6 +19,7 @@ from service.diagnosis.constant_torque import with_better_than_constants
 from service.diagnosis.detectability import Detectable, detectable, detectable_parameters
 from service.diagnosis.diagnosed import Diagnosis
 from service.diagnosis.events import beside_events
+from service.diagnosis.farther import looked_farther
 from service.diagnosis.findings import Finding, FitSizes, selected_findings, sizes
 from service.diagnosis.fit import Fitter
 from service.diagnosis.friction_slopes import open_slopes, open_stribeck, with_fitting_slopes, with_fitting_stribeck
@@ -30,7 +31,7 @@ from service.diagnosis.nominal import delivered_model, identified_rotors, nomina
 from service.diagnosis.observations import Observations
 from service.diagnosis.plain_findings import states_friction, undeclared_offsets, with_plain_terms
 from service.diagnosis.regressor_noise import row_weights
-from service.diagnosis.screening import Candidate, Screen
+from service.diagnosis.screening import Screen
 from service.diagnosis.selection import Selector
 from service.diagnosis.term import Term
 from service.identification import Identification, Options, identify
@@ -85,10 +86,9 @@ def diagnose(
     identification = identify(robot, recordings, held_out, options, progress)
     progress("prepare observations")
     conditioners = [Conditioner.survey(recording, robot) for recording in recordings]
-    cutoff = diagnosis_cutoff(conditioners, identification)
-    base = identification.structure.base
     model = nominal_model(identification)
-    observations = Observations.prepare(conditioners, robot, base, cutoff, model.steepness)
+    cutoff = diagnosis_cutoff(conditioners, identification, model.steepness)
+    observations = Observations.prepare(conditioners, robot, identification.structure.base, cutoff, model.steepness)
     setting = setting_of(model, observations, conditioners, cutoff)
     effects = possible_effects(setting)
     progress("estimate noise")
@@ -103,6 +103,7 @@ def diagnose(
     model = with_fitting_stribeck(model, fitter, open_stribeck(identification), setting.speed)
     selector = Selector(screen, fitter, confirming, pure_error=pure_error)
     selection = selector.select(model, rotors, progress)
+    selection = looked_farther(selection, selector, setting, progress)
     if states_friction(robot):
         selection = with_better_than_constants(selection, screen, fitter, confirming, selector.admission)
     if confirming is not None and identification.constrained:
@@ -175,18 +176,18 @@ def _concluded(
     observations = fitter.observations
     inflation = 1.0 if pure_error else selection.fit.inflation()
     level = LEVEL / max(len(screen.effects), 1)
-    candidates = [*screen.candidates(selection.nominal), *_doubtful(setting, observations, selection)]
+    misfit_after = lack_of_fit(selection.fit, observations, pure_error=pure_error)
     return Diagnosis(
         identification=identification,
         setting=setting,
         selection=selection,
         findings=selected_findings(selection, screen, fitter, held_out, inflation),
-        mismatch=locate(selection.nominal, observations),
+        mismatch=locate(selection, observations, misfit_after.significant),
         misfit_before=lack_of_fit(selection.nominal, observations, pure_error=pure_error),
-        misfit_after=lack_of_fit(selection.fit, observations, pure_error=pure_error),
+        misfit_after=misfit_after,
         constancy=constancy(fitter, selection.fit, None if held_out is None else held_out.fitter, inflation),
         detectable=(
-            *detectable(candidates, level, inflation),
+            *detectable(screen.candidates(selection.nominal), level, inflation),
             *_detectable_constants(identification.robot, selection, level, inflation),
             Detectable(Payload.id, None, None, Payload.coefficients[0].unit, False),  # it is one with the last link
         ),
@@ -205,8 +206,3 @@ def _detectable_constants(robot: Robot, selection: Selection, level: float, infl
     """Constants as far as one would be named: without stated friction the identified model has them."""
     found = detectable_parameters(selection.fit, (TorqueOffset,), level, inflation)
     return found if states_friction(robot) else tuple(replace(each, minimum=None, visible=False) for each in found)
-
-
-def _doubtful(setting: Setting, observations: Observations, selection: Selection) -> list[Candidate]:
-    """Effects that hardly any data can show, as these data see them."""
-    return Screen(observations, doubtful_effects(setting)).candidates(selection.nominal)

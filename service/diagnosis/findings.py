@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from service.diagnosis.catalogue import TimeLocalEffect
-from service.diagnosis.choice import Choice, Option, Selection
+from service.diagnosis.choice import Option, Selection
 from service.diagnosis.confirmation import HeldOut
 from service.diagnosis.fit import Fit, Fitter
 from service.diagnosis.interleaved import interleaved_confirmation
@@ -123,6 +123,8 @@ def selected_findings(
         slices = fit.model.term_places()
         terms = tuple(fit.model.terms[place] for place in places)
         choices = [selection.choices[place] for place in places]
+        chosen, *rivals = choices[0].options
+        alternatives = _likely(rivals, without, screen, held_out)
         found.append(
             Finding(
                 terms=terms,
@@ -130,10 +132,10 @@ def selected_findings(
                     _spread_out(t, covariance[slices[p], slices[p]]) for t, p in zip(terms, places, strict=True)
                 ),
                 gain=without.energy - fit.energy,
-                probability=_probability(choices[0], inflation),
+                probability=probability_among(chosen.score, [each.score for each in alternatives], inflation),
                 before=sizes(without.model, fitter, held_out),
                 after=after,
-                alternatives=_likely(choices[0].options[1:], without, screen, held_out),
+                alternatives=alternatives,
                 confirmed=any(choice.confirmation is not None for choice in choices) or None,
             )
         )
@@ -204,9 +206,3 @@ def _spread_out(term: Term, covariance: Array) -> Array:
     whole = np.zeros((count + len(term.shape), count + len(term.shape)))
     whole[np.ix_(places, places)] = covariance
     return whole
-
-
-def _probability(choice: Choice, inflation: float) -> float:
-    """Share of the chosen option among its equivalents."""
-    first, *others = choice.options
-    return probability_among(first.score, [option.score for option in others], inflation)

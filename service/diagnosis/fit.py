@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from service.diagnosis.model import ExtendedModel, with_terms
-from service.diagnosis.observations import Observations
+from service.diagnosis.observations import Observations, Piece
 from service.diagnosis.projection import JointColumns, Projection, project
 from service.diagnosis.residual import residual_rows
 from service.diagnosis.term import Term
+from service.diagnosis.threads import side_by_side
 from service.recording.recording import Array
 
 STEPS = 8
@@ -185,36 +186,14 @@ class Fitter:
         return [self.observations.white(joint, pieces)[0] for joint, pieces in enumerate(rows)]
 
     def _columns(self, model: ExtendedModel) -> list[JointColumns]:
-        observations, structure = self.observations, model.structure
-        joints = range(observations.robot.joint_count)
-        own: list[list[Array]] = [[] for _ in joints]
-        index: list[list[int]] = [[] for _ in joints]
-        for number, piece in enumerate(observations):
-            motion = piece.prepared.motion
-            parts: list[list[Array]] = [[] for _ in joints]
-            places: list[list[int]] = [[] for _ in joints]
-            for joint in joints:
-                terms = structure.joint_term_columns(joint, motion.velocity[:, joint], motion.acceleration[:, joint])
-                parts[joint].append(piece.repeated(motion.band.reduce(terms)))
-                places[joint] += list(structure.joint_columns(joint)[-len(terms) :])
-                of_constants, rows = model.sensitivity_columns(piece, joint)
-                parts[joint].append(piece.repeated(rows))
-                places[joint] += of_constants
-            signals = model.signals(piece)
-            for term, place in zip(model.terms, model.term_places(), strict=True):
-                derivatives = model.term_derivatives(term, signals)
-                for slot, joint in enumerate(term.effect.touched(len(joints))):
-                    parts[joint].append(piece.reduced(derivatives[:, slot]))
-                    places[joint] += list(range(place.start, place.stop))
-            for joint in joints:
-                own[joint].append(np.concatenate(parts[joint]))
-                if number == 0:
-                    index[joint] = places[joint]
+        observations = self.observations
+        pieces = side_by_side(lambda piece: _moving_columns(model, piece), observations)
         result = []
-        for joint in joints:
+        for joint in range(observations.robot.joint_count):
             rigid = self._white_rigid(model, joint)
-            all_places = np.concatenate([structure.joint_columns(joint)[: len(rigid)], index[joint]]).astype(np.intp)
-            result.append(JointColumns(all_places, np.concatenate([rigid, observations.white(joint, own[joint])])))
+            moving = observations.white(joint, [piece[joint].rows for piece in pieces])
+            places = [model.structure.joint_columns(joint)[: len(rigid)], pieces[0][joint].index]
+            result.append(JointColumns(np.concatenate(places).astype(np.intp), np.concatenate([rigid, moving])))
         return result
 
     def _white_rigid(self, model: ExtendedModel, joint: int) -> Array:
@@ -225,6 +204,28 @@ class Fitter:
             rows = [piece.repeated(each) for piece, each in zip(self.observations, columns, strict=True)]
             self._rigid[joint] = self.observations.white(joint, rows)
         return self._rigid[joint]
+
+
+def _moving_columns(model: ExtendedModel, piece: Piece) -> list[JointColumns]:
+    """Columns of one piece that change with the model, in the common band: friction, its constants, and all terms."""
+    motion, structure = piece.prepared.motion, model.structure
+    joints = range(structure.robot.joint_count)
+    rows: list[list[Array]] = [[] for _ in joints]
+    places: list[list[int]] = [[] for _ in joints]
+    for joint in joints:
+        terms = structure.joint_term_columns(joint, motion.velocity[:, joint], motion.acceleration[:, joint])
+        rows[joint].append(piece.repeated(motion.band.reduce(terms)))
+        places[joint] += list(structure.joint_columns(joint)[-len(terms) :])
+        of_constants, slopes = model.sensitivity_columns(piece, joint)
+        rows[joint].append(piece.repeated(slopes))
+        places[joint] += of_constants
+    signals = model.signals(piece)
+    for term, place in zip(model.terms, model.term_places(), strict=True):
+        derivatives = model.term_derivatives(term, signals)
+        for slot, joint in enumerate(term.effect.touched(len(joints))):
+            rows[joint].append(piece.reduced(derivatives[:, slot]))
+            places[joint] += list(range(place.start, place.stop))
+    return [JointColumns(np.array(index), np.concatenate(own)) for index, own in zip(places, rows, strict=True)]
 
 
 def _energy(model: ExtendedModel, residual: list[Array]) -> float:

@@ -10,14 +10,14 @@ still is no witness: its friction may be anything, and whatever it is looks like
 import numpy as np
 from numpy.typing import NDArray
 
-from service.diagnosis.confirmation import CLEARLY_WORSE, Confirmation, HeldOut
+from service.diagnosis.confirmation import CLEARLY_WORSE, Confirmation, HeldOut, likeness
 from service.diagnosis.fit import Fit
 from service.diagnosis.observations import Observations
 from service.diagnosis.screening import Screen, model_signals
 from service.diagnosis.term import Term
 from service.recording.recording import Array
 
-NOT_THERE = Confirmation(0.0, -np.inf, np.inf, 0.0)
+NOT_THERE = Confirmation(0.0, -np.inf, np.inf, 0.0, -np.inf)
 
 STILL = 0.05
 """Speed of a joint, relative to its rms, below which it stands."""
@@ -135,4 +135,5 @@ def _predicted(columns: Array, residual: Array, blocks: NDArray[np.intp], folds:
     strength = float(np.sqrt(expected))
     total = float(sums.sum())
     smallest = np.finfo(float).tiny
-    return Confirmation(total, total / max(spread, smallest), strength, along / max(strength, smallest))
+    seen = along / max(strength, smallest)
+    return Confirmation(total, total / max(spread, smallest), strength, seen, likeness(strength, seen))

@@ -81,12 +81,13 @@ def lack_of_fit(fit: Fit, observations: Observations, *, pure_error: bool, seed:
         outside = white - (white @ basis.T) @ basis
         freedom = observations.noise[joint].share * len(residual) * (1.0 - share)
         omnibus[joint] = _f_test(outside, residual, freedom)
-        energy = float(residual @ residual)
-        excess[joint] = max(energy - freedom, 0.0)
+        over = observations.noise[joint].over_repetitions
+        energy = float(residual @ residual) * over  # in what repetitions differ by
+        excess[joint] = max(energy - freedom, 0.0) / over
         if pure_error and repeated[joint] > 0:  # else a saturated fit of the same rows says what noise is: any excess
             measurable[joint] = MEASURABLE * np.sqrt(2.0 * freedom * (1.0 + freedom / repeated[joint]))
         means = freedom - repeated[joint]
-        if pure_error and repeated[joint] > 0 and means > 1.0:
+        if (pure_error or over > 1.0) and repeated[joint] > 0 and means > 1.0:
             ratio = max(energy - repeated[joint], 0.0) / means
             pure[joint] = float(stats.f.sf(ratio, means, repeated[joint]))
     return LackOfFit(omnibus, pure, excess, measurable)

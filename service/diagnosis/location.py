@@ -1,9 +1,15 @@
-"""Where the mismatch is, before anything is named: at which joint, and in which part of its motion."""
+"""Where the mismatch is: at which joint, and in which part of its motion.
 
+Without findings it is what the residual's power exceeds the noise's by. Where findings explain it, the noise need not
+be known: it is in the residual without them and in that with them, and their difference is free of it.
+"""
+
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from service.diagnosis.choice import Selection
 from service.diagnosis.fit import Fit
 from service.diagnosis.observations import BoolArray, Observations
 from service.diagnosis.residual import residual_rows
@@ -46,6 +52,8 @@ class JointMismatch:
         joint index, from 0
     excess_rms : float
         root of what the residual's power exceeds the noise's by, in the common band [Nm or N]
+    explained : float
+        what the findings take off the whitened residual's energy [noise variances]
     place : Place or None
         where it concentrates, most of all but in time
     time : Place or None
@@ -54,28 +62,34 @@ class JointMismatch:
 
     joint: int
     excess_rms: float
+    explained: float
     place: Place | None
     time: Place | None
 
 
-def locate(fit: Fit, observations: Observations) -> tuple[JointMismatch, ...]:
+def locate(selection: Selection, observations: Observations, left: Sequence[bool]) -> tuple[JointMismatch, ...]:
     """Excess residual of every joint.
 
     Parameters
     ----------
-    fit : Fit
-        the nominal model at its optimum
+    selection : Selection
+        models without and with findings
     observations : Observations
-        the rows that it was fitted to
+        the rows that both were fitted to
+    left : sequence of bool, length n
+        whether more than noise is left with the findings
     """
-    residual = residual_rows(fit.model, observations)
-    signals = [fit.model.signals(piece) for piece in observations]
+    nominal, fit = selection.nominal, selection.fit
+    before = residual_rows(nominal.model, observations)
+    after = residual_rows(fit.model, observations) if selection.choices else None
+    signals = [nominal.model.signals(piece) for piece in observations]
     found = []
-    for joint, pieces in enumerate(residual):
+    for joint, pieces in enumerate(before):
         used = np.concatenate([piece.used[joint].ravel() for piece in observations])
-        values = np.concatenate([rows[0] for rows in pieces])[used]
-        noise = observations.noise[joint].model.variance
-        power = values**2 - noise
+        noise: Array | float = observations.noise[joint].model.variance
+        if after is not None and not left[joint]:
+            noise = np.concatenate([rows[0] for rows in after[joint]])[used] ** 2
+        power = np.concatenate([rows[0] for rows in pieces])[used] ** 2 - noise
         places = []
         kinds = {"velocity": "velocity", "position": "position", "load": "load", "acceleration": "acceleration"}
         for variable, name in kinds.items():
@@ -90,8 +104,15 @@ def locate(fit: Fit, observations: Observations) -> tuple[JointMismatch, ...]:
             places.append(_concentration("motor_position", np.concatenate(angle)[used], power))
         best = max((each for each in places if each is not None), key=lambda each: each.share, default=None)
         excess = float(np.sqrt(max(float(power.mean()), 0.0)))
-        found.append(JointMismatch(joint, excess, best, _in_time(observations, used, power)))
+        explained = _energy(nominal, joint) - _energy(fit, joint)
+        found.append(JointMismatch(joint, excess, explained, best, _in_time(observations, used, power)))
     return tuple(found)
+
+
+def _energy(fit: Fit, joint: int) -> float:
+    """Energy of a joint's whitened residual."""
+    residual = fit.projection.residual[joint]
+    return float(residual @ residual)
 
 
 def _concentration(variable: str, values: Array, power: Array) -> Place | None:

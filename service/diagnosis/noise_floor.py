@@ -6,6 +6,7 @@ left-out effect is not taken for the noise's colour and whitened away.
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,14 +137,14 @@ def _beyond_pure_error(
     if fit.inflation() < FAR_ABOVE:
         return observations, True
     left = _saturated(observations, fit.model, effects)
-    far = [
-        float(rows @ rows) / len(rows) > FAR_ABOVE * noise.share
-        for rows, noise in zip(left, observations.noise, strict=True)
-    ]
-    if not any(far):
+    above = [float(rows @ rows) / (len(rows) * own.share) for rows, own in zip(left, observations.noise, strict=True)]
+    if max(above) <= FAR_ABOVE:
         return observations, True
     other = _saturated_noise(observations, fit.model, effects)
-    noise = [b if is_far else a for a, b, is_far in zip(observations.noise, other, far, strict=True)]
+    noise = [
+        replace(of_fit, over_repetitions=far) if far > FAR_ABOVE else of_repetitions
+        for of_repetitions, of_fit, far in zip(observations.noise, other, above, strict=True)
+    ]
     return observations.with_noise(noise), False
 
 
@@ -153,8 +154,9 @@ def _saturated(observations: Observations, model: ExtendedModel, effects: Sequen
     screen = Screen(observations, effects)
     signals = model_signals(model, observations)
     columns: dict[int, list[Array]] = {joint: [] for joint in range(observations.robot.joint_count)}
-    for effect in effects:
-        for joint, white in screen.white_columns(effect, effect.rough_grid(), signals).items():
+    for effect, shapes in ((each, each.rough_grid()) for each in effects):
+        white_columns = screen.white_columns(effect, shapes, signals) if len(shapes) else {}
+        for joint, white in white_columns.items():
             columns[joint].append(white.reshape(-1, white.shape[-1]))
     left = []
     for joint, parts in columns.items():

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from service.diagnosis.band import BLURRED, QUIET, STATE_BANDS, state_cutoff
 from service.diagnosis.spikes import without_spikes
 from service.diagnosis.whitening import JointNoise
 from service.dynamics.base_parameters import BaseParameters
@@ -23,18 +24,6 @@ from service.recording.recording import Array
 from service.robot import Robot
 
 BoolArray = NDArray[np.bool_]
-
-BLURRED = 1.0
-"""Noise of the velocity, relative to the width 1/K_v of friction's step, up to which the motion's own band is opened.
-Narrower it rounds off how a joint sticks at its reversals, always to the same side, which looks like a delay or like
-bristles; wider its noise blurs the step to either side: the rows' weights know of that, but what tells asymmetric
-friction from a constant is lost in it."""
-
-QUIET = 0.4
-"""…and up to which it is opened for what the torque is at single samples, where no band takes that noise out again."""
-
-STATE_BANDS = (2.0, 8.0)
-"""Narrowest and widest band of the motion relative to the common one."""
 
 
 @dataclass(frozen=True)
@@ -195,8 +184,8 @@ class Observations:
             K_v of every joint's friction, for the band of the motion itself [s/rad or s/m]
         """
         starts = [float(c.recording.samples(0, 1).time[0]) for c in conditioners]
-        bands = [_state_cutoff(c, cutoff_hz, steepness, BLURRED) for c in conditioners]
-        quiet = [_state_cutoff(c, cutoff_hz, steepness, QUIET) for c in conditioners]
+        bands = [state_cutoff(c, cutoff_hz, steepness, BLURRED) for c in conditioners]
+        quiet = [state_cutoff(c, cutoff_hz, steepness, QUIET) for c in conditioners]
         apart = [c.as_one_motion(band) for c, band in zip(conditioners, bands, strict=True)]
         prepared = Dataset(apart, robot, base, cutoff_hz)
         return Observations(
@@ -292,22 +281,6 @@ class Observations:
     def __iter__(self) -> Iterator[Piece]:
         """The pieces."""
         return iter(self.pieces)
-
-
-def _state_cutoff(
-    conditioner: Conditioner, cutoff_hz: float | None, steepness: Array | None, blurred: float
-) -> float | None:
-    """Band of the motion [Hz] in which noise of density D makes K_v √(D (2π)² f³/3) of `blurred` at the worst joint."""
-    if cutoff_hz is None:
-        return None
-    if steepness is None:
-        return STATE_BANDS[0] * cutoff_hz
-    density = conditioner.noise.density
-    moving = conditioner.moving & (density > 0.0)
-    widths = 3.0 * (blurred / np.maximum(steepness, 1e-9)) ** 2 / (4.0 * np.pi**2)
-    bands = np.cbrt(widths[moving] / density[moving])
-    narrowest, widest = (ratio * cutoff_hz for ratio in STATE_BANDS)
-    return float(np.clip(bands.min(initial=np.inf), narrowest, widest))
 
 
 def _piece(prepared: PreparedMotion, start_s: float, conditioner: Conditioner, state_hz: float | None) -> Piece:

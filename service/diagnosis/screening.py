@@ -1,7 +1,6 @@
 """Every form of every effect beside the fitted model: how much each would explain, and how likely noise does that."""
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,14 +12,12 @@ from service.diagnosis.fit import Fit
 from service.diagnosis.model import ExtendedModel
 from service.diagnosis.observations import Observations
 from service.diagnosis.projection import INVISIBLE, Moments, moments, statistics
+from service.diagnosis.threads import side_by_side
 from service.diagnosis.windows import Windows, white_torque, windowed_moments, windows_on_rows, windows_tried
 from service.recording.recording import Array
 
 MOST_KEPT = 400 * 1024 * 1024
 """Bytes of columns that are kept from one model to the next."""
-
-THREADS = 2
-"""Effects that are looked at together: nearly all of it is array work, which runs beside other threads."""
 
 WORTH_COUNTING = 1e-3
 """Chance below which the best of many windows is worth the draws that tell how many windows there are in effect; above,
@@ -72,7 +69,7 @@ class Candidate:
         """T less what as many coefficients and shapes would explain of noise."""
         return self.gain - self.count - 2.0 * float(np.log(self.shapes_tried))
 
-    def p_value(self, inflation: float = 1.0, *, refined: bool = False) -> float:
+    def p_value(self, inflation: float = 1.0, *, refined: bool = False, freedom: float = np.inf) -> float:
         """Chance that noise alone explains as much somewhere on this form's grid.
 
         Parameters
@@ -81,9 +78,14 @@ class Candidate:
             factor by which the residual exceeds the modelled noise
         refined : bool
             whether the shape was moved between the grid's points: then noise had that freedom too
+        freedom : float
+            rows from which the noise's size is known, less parameters; infinite where it needs no estimate
         """
         free = sum(self.effect.is_free(place) for place in range(len(self.shape))) if refined else 0
-        tail = float(stats.chi2.sf(self.gain / inflation, self.count + free))
+        count = self.count + free
+        known = np.isinf(freedom)
+        share = self.gain / inflation
+        tail = float(stats.chi2.sf(share, count) if known else stats.f.sf(share / count, count, freedom))
         return min(1.0, self.shapes_tried * tail * (1.0 if free else self._one_sided))
 
     @property
@@ -129,9 +131,8 @@ class Screen:
         """
         if self._first is None or self._first[0] is not fit:
             signals = [fit.model.signals(piece) for piece in self.observations]
-            with ThreadPoolExecutor(THREADS) as threads:
-                places = range(len(self.effects))
-                found = list(threads.map(lambda at: self._candidate(at, self.effects[at], fit, signals), places))
+            places = range(len(self.effects))
+            found = side_by_side(lambda at: self._candidate(at, self.effects[at], fit, signals), places)
             if self._first is not None:
                 return found
             self._first = fit, found  # the nominal model, which is looked at twice
@@ -183,8 +184,6 @@ class Screen:
             found = self._through_windows(place, effect, fit, signals)
         else:
             found = self._on_grid(place, effect, fit, signals)
-        shares = np.where(found.shares > effect.least_share, found.shares, 0.0)
-        found = Moments(found.target, found.gram, shares, found.inner)
         gains, coefficients = statistics(found, [each.positive for each in effect.coefficients])
         best = int(np.argmax(gains - effect.reluctance(effect.grid)))
         visible = (found.shares > INVISIBLE).all(axis=1)

@@ -63,14 +63,24 @@ class Selector:
         what findings are confirmed by
     pure_error : bool
         whether the noise is known from repetitions
+    looked_at_before : int
+        forms that were looked at with another screen, and count as well
     """
 
-    def __init__(self, screen: Screen, fitter: Fitter, held_out: HeldOut | None, *, pure_error: bool) -> None:
+    def __init__(
+        self,
+        screen: Screen,
+        fitter: Fitter,
+        held_out: HeldOut | None,
+        *,
+        pure_error: bool,
+        looked_at_before: int = 0,
+    ) -> None:
         self.screen = screen
         self.fitter = fitter
         self.held_out = held_out
         self.pure_error = pure_error
-        self.admission = Admission(screen, pure_error=pure_error)
+        self.admission = Admission(screen, pure_error=pure_error, looked_at_before=looked_at_before)
 
     def select(self, model: ExtendedModel, beforehand: Sequence[Term], progress: Callable[[str], None]) -> Selection:
         """Add effects as long as one is significant and confirmed.
@@ -94,19 +104,42 @@ class Selector:
             if p_value < self.admission.level and confirmed:
                 choices.append(Choice((option,), confirmation, p_value, was_given=True))
                 fit = option.fit
-        rejected: list[Choice] = []
-        while len(choices) < MOST_TERMS:
-            choice = self._next(fit, choices, rejected)
-            if choice is None:
-                break
-            choices.append(choice)
-            fit = choice.options[0].fit
-            names = [joint.name for joint in model.structure.robot.joints]
-            progress(f"found {choice.options[0].candidate.effect.name(names)}")
+        fit, choices, rejected = self._grown(fit, choices, [], progress)
         fit, choices = self._without_superfluous(fit, choices)
         fit, choices = self._without_proxies(nominal, fit, choices)
         fit, choices = self._settled(fit, choices)
         return Selection(nominal, fit, tuple(choices), tuple(rejected))
+
+    def continued(self, selection: Selection, progress: Callable[[str], None]) -> Selection:
+        """Add effects of this screen to what was selected with another.
+
+        Parameters
+        ----------
+        selection : Selection
+            what there is
+        progress : callable
+            told what was found
+        """
+        fit, choices, rejected = self._grown(selection.fit, list(selection.choices), [], progress)
+        if len(choices) == len(selection.choices):
+            return selection
+        fit, choices = self._without_superfluous(fit, choices)
+        fit, choices = self._without_proxies(selection.nominal, fit, choices)
+        return Selection(selection.nominal, fit, tuple(choices), (*selection.rejected, *rejected))
+
+    def _grown(
+        self, fit: Fit, choices: list[Choice], rejected: list[Choice], progress: Callable[[str], None]
+    ) -> tuple[Fit, list[Choice], list[Choice]]:
+        """A model with one effect after the other, as long as one is significant and confirmed."""
+        names = [joint.name for joint in fit.model.structure.robot.joints]
+        while len(choices) < MOST_TERMS:
+            choice = self._next(fit, choices, rejected)
+            if choice is None:
+                break
+            choices = [*choices, choice]
+            fit = choice.options[0].fit
+            progress(f"found {choice.options[0].candidate.effect.name(names)}")
+        return fit, choices, rejected
 
     def _next(self, fit: Fit, choices: Sequence[Choice], rejected: list[Choice]) -> Choice | None:
         """The best significant and confirmed option; what held-out recordings refuse is added to `rejected`."""
@@ -246,7 +279,7 @@ class Selector:
             return interleaved_confirmation(term, fit, option.fit, self.screen, self.held_out)
         if self.held_out is None:
             return None
-        return self.held_out.confirm(fit.model, option.fit.model, term)
+        return self.held_out.confirm(fit, option.fit, self.fitter)
 
     def _without_proxies(self, nominal: Fit, fit: Fit, choices: list[Choice]) -> tuple[Fit, list[Choice]]:
         """Drop what only stands in for an effect that the catalogue does not have."""

@@ -32,10 +32,13 @@ class JointNoise:
     share : float
         independent rows among a hundred, as a fraction: rows are closer than the band asks for, and above the band
         there is no noise
+    over_repetitions : float
+        its power over that of what repetitions differ by, where it is far more: then most of it is no noise; else 1
     """
 
     model: Autoregression
     share: float = 1.0
+    over_repetitions: float = 1.0
 
     @property
     def std(self) -> float:

@@ -1,7 +1,8 @@
 """Which band torque and regressor share: as wide as the positions allow, no wider than the model explains the torque.
 
 Three bounds, the lowest holds. (1) Noise of the positions, differentiated twice, must stay a small share of q̈, or it
-biases the inertial parameters (`service.recording.conditioning.position_noise`). (2) The torque that this noise makes
+biases the inertial parameters (`service.recording.conditioning.position_noise`); they are estimated from all recordings
+together, so a slow one sets no band by itself. (2) The torque that this noise makes
 in the regressor must stay small beside what the fit leaves, or the bias exceeds the standard errors. (3) Beyond the
 frequency where the unexplained part of the torque first outgrows the explained one, more band adds more disturbance
 than motion; an octave beyond it is kept, because the edges of friction's steps lie there. Neither (2) nor (3) cuts into
@@ -18,7 +19,7 @@ from scipy import signal
 
 from service.dynamics.base_parameters import BaseParameters
 from service.dynamics.regressor import torque_regressor
-from service.identification.dataset import Dataset, PreparedMotion
+from service.identification.dataset import Dataset, PreparedMotion, rms_speed
 from service.identification.estimate import Estimator, estimate
 from service.identification.friction_shape import ORDINARY
 from service.identification.least_squares import factorise
@@ -93,16 +94,15 @@ def choose_cutoff(conditioners: Sequence[Conditioner], robot: Robot, base: BaseP
         cut-off [Hz]; None where the positions are clean enough for no filter
     """
     conditioners = [_beginning(conditioner) for conditioner in conditioners]
-    limits = [conditioner.noise.limit_hz for conditioner in conditioners]
-    bounds = [limit for limit in limits if limit is not None]
-    if not bounds:
+    quiet = quiet_limit(conditioners)
+    if quiet is None:
         return None
     longest = min(
         max(stop - start for start, stop in conditioner.timing.rows) / conditioner.timing.rate_hz
         for conditioner in conditioners
     )
     floor = SMALLEST_CYCLES / longest
-    limit = cutoff = max(min(bounds), floor)
+    limit = cutoff = max(quiet, floor)
     widest = Dataset(conditioners, robot, base, limit)
     floor = max(floor, MOTION_MARGIN * _motion_band(widest), _least_band(widest, robot, base, limit))
     for _ in range(ROUNDS):
@@ -111,6 +111,29 @@ def choose_cutoff(conditioners: Sequence[Conditioner], robot: Robot, base: BaseP
             break
         cutoff = min(max(min(bounds), floor), limit)
     return cutoff
+
+
+def quiet_limit(conditioners: Sequence[Conditioner]) -> float | None:
+    """Widest band in which noise keeps to its share of q̈ in all recordings together [Hz]; None where it always does.
+
+    Where one recording stands the band f_r, its motion has the energy of its noise up to there, which grows as f⁵: all
+    of them stand f⁵ = Σ w_r f_r⁵ / Σ w_r, each by the noise w_r that it brings, density times duration.
+
+    Parameters
+    ----------
+    conditioners : sequence of Conditioner
+        the recordings
+    """
+    limits = np.array([c.noise.joint_limits_hz for c in conditioners])
+    moving = np.array([c.moving for c in conditioners])
+    if np.isinf(limits).all():
+        return None
+    widest = np.array([[c.timing.rate_hz / 2.0] for c in conditioners])
+    stood = np.where(moving, np.minimum(limits, widest), 0.0)
+    duration = np.array([[sum(stop - start for start, stop in c.timing.rows) / c.timing.rate_hz] for c in conditioners])
+    weights = duration * np.array([c.noise.density for c in conditioners]) + np.finfo(float).tiny
+    pooled = (np.sum(weights * stood**5, axis=0) / np.sum(weights, axis=0)) ** 0.2
+    return float(np.where(moving.any(axis=0), pooled, np.inf).min())
 
 
 def _motion_band(motions: Dataset) -> float:
@@ -278,12 +301,7 @@ def preliminary_terms(motions: Dataset, robot: Robot) -> tuple[JointTerms, ...]:
     robot : Robot
         constants that its file states are used
     """
-    squares, count = np.zeros(robot.joint_count), 0
-    for prepared in islice(motions, ENOUGH_PIECES):
-        squares += np.sum(prepared.motion.velocity**2, axis=0)
-        count += len(prepared.motion.velocity)
-    speed = np.maximum(np.sqrt(squares / max(count, 1)), 1e-9)
-    steepness = ORDINARY / speed
+    steepness = ORDINARY / rms_speed(islice(motions, ENOUGH_PIECES))
     return tuple(
         JointTerms(joint.friction_shape.k_v or float(default), joint.friction_shape.delta)
         for joint, default in zip(robot.joints, steepness, strict=True)

@@ -1,6 +1,6 @@
 """The recordings' equations, ready to be summed: kept in memory while they are few, made again when they are many."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -167,3 +167,18 @@ def _without_jitter(motion: Motion, moving: Mask) -> Motion:
     if moving.all():
         return motion
     return replace(motion, velocity=motion.velocity * moving, acceleration=motion.acceleration * moving)
+
+
+def rms_speed(motions: Iterable[PreparedMotion]) -> Array:
+    """Root mean square of every joint's velocity, at least 1e-9, (n,) [rad/s or m/s].
+
+    Parameters
+    ----------
+    motions : iterable of PreparedMotion
+        the data, in pieces; at least one
+    """
+    squares, count = 0.0, 0
+    for prepared in motions:
+        squares = squares + np.sum(prepared.motion.velocity**2, axis=0)
+        count += len(prepared.motion.velocity)
+    return np.maximum(np.sqrt(squares / count), 1e-9)

@@ -1,11 +1,9 @@
 """Shape constants K_v and δ of the friction curve, by separable least squares.
 
 The coefficients of (7) are linear and are eliminated exactly (variable projection); only the shape constants remain.
-All columns Z that do not depend on them (rigid body, viscous, offset) are projected off: with S Sᵀ = (ZᵀZ)⁻¹ from the
-factors at hand, Q = Z S is never formed, only Qᵀ G = Sᵀ (ZᵀG) of the candidate columns G, summed in one pass. What is
-left are small Gram matrices, in which every joint's constants are searched over a logarithmic grid, joint after joint
-until nothing moves, and refined between grid points. A constant that the data cannot tell says so and takes an
-ordinary value that fits as well: never a slope that ran away.
+Every joint's constants are searched over a logarithmic grid of candidates, joint after joint until nothing moves, and
+refined between grid points. A constant that the data cannot tell says so and takes an ordinary value that fits as well:
+never a slope that ran away.
 """
 
 from collections.abc import Iterable, Sequence
@@ -13,11 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg
 
-from service.dynamics.friction import smooth_sign
+from service.identification.candidate_steps import Conditional, JointGrid, projected_grids, total_gain
 from service.identification.dataset import PreparedMotion
-from service.identification.least_squares import JointFactor, Solution, restricted, solve
+from service.identification.least_squares import JointFactor, restricted, solve
 from service.identification.structure import ModelStructure
 from service.recording.recording import Array
 from service.robot import FrictionShape
@@ -32,6 +29,9 @@ LEAST_STEP = 10**0.8
 ORDINARY = 1000.0
 """K times the rms velocity of a constant that the data leave open, as near as they allow: the step of a textbook."""
 
+STRAIGHT = 0.17
+"""δ times the rms velocity v below which A(δ v) is a straight line but for a hundredth: (δ v)²/3."""
+
 SEPARATION = 4.0
 """K_v is at least this many times δ: closer, their columns are one."""
 
@@ -43,9 +43,6 @@ IMPROVEMENT_SHARE = 0.005
 
 KNOWN_BAND = 25.0
 """Constants whose criterion is within this much of the best are not told apart: five standard errors."""
-
-COLLINEAR = 1e-9
-"""A second column with less than this share of its energy left beside the first adds nothing."""
 
 AS_GOOD = 0.02
 """Share of the residual's energy that is no practical difference between two constants."""
@@ -75,31 +72,6 @@ class EstimatedShape:
     delta_given: bool
 
 
-@dataclass(frozen=True, eq=False)
-class _JointGrid:
-    """One joint's candidate columns after projection.
-
-    slopes : (g,) float64
-        candidate constants
-    gram : (g, g) float64
-        GᵀG of its columns, before projection
-    inner : (z, g) float64
-        Q_jᵀ G: what the projection takes away
-    target : (g,) float64
-        Gᵀ y after projection
-    """
-
-    slopes: Array
-    gram: Array
-    inner: Array
-    target: Array
-
-    def block(self, other: "_JointGrid", mine: list[int], theirs: list[int]) -> Array:
-        """Projected Gram matrix between columns of two joints."""
-        product = -self.inner[:, mine].T @ other.inner[:, theirs]
-        return product + self.gram[np.ix_(mine, theirs)] if self is other else product
-
-
 def estimate_shapes(
     motions: Iterable[PreparedMotion],
     structure: ModelStructure,
@@ -107,13 +79,14 @@ def estimate_shapes(
     noise_std: Array,
     unit: Array,
     stribeck: Sequence[bool],
+    speed: Array,
 ) -> tuple[EstimatedShape, ...]:
     """Shape constants of all joints; those that the robot file states are kept.
 
     Parameters
     ----------
     motions : iterable of PreparedMotion
-        the data; gone through twice
+        the data; gone through once
     structure : ModelStructure
         a preliminary model
     factors : tuple of JointFactor
@@ -125,6 +98,8 @@ def estimate_shapes(
         tell; zeros for the best candidates whatever they are worth
     stribeck : sequence of bool, length n
         joints at which a Stribeck term of unknown δ may be proposed
+    speed : (n,) float64
+        rms velocity of every joint, which the candidates are relative to [rad/s or m/s]
 
     Returns
     -------
@@ -135,16 +110,16 @@ def estimate_shapes(
     shared = _shared_columns(structure)
     without_steps = restricted(factors, shared)
     solution = solve(without_steps, len(shared), noise_std)
-    slopes = _candidate_slopes(motions, structure, given)
-    grids = _projected_grids(motions, structure, shared, solution, noise_std, slopes)
+    slopes = _candidate_slopes(speed, given)
+    grids = projected_grids(motions, structure, shared, solution, noise_std, slopes)
     chosen = _search(grids, given)
     squares = (f.squared_residual(solution.parameters) for f in without_steps)
     energy = sum(square / std**2 for square, std in zip(squares, noise_std, strict=True))
     rows = sum(factor.rows for factor in factors)
-    variance = max(float(energy - _total_gain(grids, chosen)) / rows, np.finfo(float).eps)
+    variance = max(float(energy - total_gain(grids, chosen)) / rows, np.finfo(float).eps)
     described = []
     for joint, (grid, shape) in enumerate(zip(grids, given, strict=True)):
-        conditional, indices = _Conditional.of(grids, chosen, joint), chosen[joint]
+        conditional, indices = Conditional.of(grids, chosen, joint), chosen[joint]
         residual_energy = factors[joint].rows * variance
         if stribeck[joint] and shape.delta is None:
             indices = _with_stribeck(conditional, grid, indices, shape, variance, residual_energy)
@@ -152,18 +127,11 @@ def estimate_shapes(
     return tuple(described)
 
 
-def _candidate_slopes(
-    motions: Iterable[PreparedMotion], structure: ModelStructure, given: Sequence[FrictionShape]
-) -> list[Array]:
+def _candidate_slopes(speed: Array, given: Sequence[FrictionShape]) -> list[Array]:
     """Per joint a logarithmic grid relative to its rms velocity, then the stated constants."""
-    squares, count = np.zeros(structure.robot.joint_count), 0
-    for prepared in motions:
-        squares += np.sum(prepared.motion.velocity**2, axis=0)
-        count += len(prepared.motion.velocity)
-    speed = np.sqrt(squares / max(count, 1))
     grids = []
     for shape, typical in zip(given, speed, strict=True):
-        grid = np.logspace(*GRID_DECADES, GRID_POINTS) / max(float(typical), 1e-9)
+        grid = np.logspace(*GRID_DECADES, GRID_POINTS) / typical
         stated = [value for value in (shape.k_v, shape.delta) if value is not None]
         grids.append(np.append(grid, stated))
     return grids
@@ -179,37 +147,7 @@ def _shared_columns(structure: ModelStructure) -> NDArray[np.intp]:
     return np.setdiff1d(np.arange(structure.size), [column for column in steps if column is not None])
 
 
-def _projected_grids(
-    motions: Iterable[PreparedMotion],
-    structure: ModelStructure,
-    shared: NDArray[np.intp],
-    solution: Solution,
-    noise_std: Array,
-    slopes: list[Array],
-) -> list[_JointGrid]:
-    """Candidate columns of every joint, projected off the shared ones; one pass over the data."""
-    joints = range(structure.robot.joint_count)
-    gram = [np.zeros((len(values), len(values))) for values in slopes]
-    cross = [np.zeros((len(shared), len(values))) for values in slopes]
-    target = [np.zeros(len(values)) for values in slopes]
-    for prepared in motions:
-        for joint in joints:
-            columns = prepared.joint_columns(structure, joint)
-            index = structure.joint_columns(joint)
-            kept = np.isin(index, shared)
-            place = np.searchsorted(shared, index[kept])
-            velocity = prepared.motion.velocity[:, joint]
-            weight = prepared.used[joint] * (prepared.row_weight / noise_std[joint])
-            steps = weight * prepared.motion.band.reduce(smooth_sign(velocity, slopes[joint][:, None]))
-            common = weight * columns[kept]
-            residual = weight * prepared.reduced_torque[joint] - solution.parameters[place] @ common
-            gram[joint] += steps @ steps.T
-            cross[joint][place] += common @ steps.T
-            target[joint] += steps @ residual
-    return [_JointGrid(slopes[j], gram[j], solution.spread.T @ cross[j], target[j]) for j in joints]
-
-
-def _search(grids: list[_JointGrid], given: Sequence[FrictionShape]) -> list[list[int]]:
+def _search(grids: list[JointGrid], given: Sequence[FrictionShape]) -> list[list[int]]:
     """Grid indices [K_v] or [K_v, δ] a joint, each joint's best with the others held, until nothing moves."""
     options = [_plain_options(grid, shape) for grid, shape in zip(grids, given, strict=True)]
     chosen = [candidates[len(candidates) // 2] for candidates in options]
@@ -217,14 +155,14 @@ def _search(grids: list[_JointGrid], given: Sequence[FrictionShape]) -> list[lis
         before = list(chosen)
         for joint, candidates in enumerate(options):
             if len(candidates) > 1:
-                gains = _Conditional.of(grids, chosen, joint).gains(candidates)
+                gains = Conditional.of(grids, chosen, joint).gains(candidates)
                 chosen[joint] = candidates[int(np.argmax(gains))]
         if chosen == before:
             break
     return chosen
 
 
-def _steps(grid: _JointGrid, shape: FrictionShape) -> list[int]:
+def _steps(grid: JointGrid, shape: FrictionShape) -> list[int]:
     """Grid indices that K_v may take; the stated one where the robot file states it."""
     if shape.k_v is not None:
         return [GRID_POINTS]
@@ -232,7 +170,7 @@ def _steps(grid: _JointGrid, shape: FrictionShape) -> list[int]:
     return [k for k in range(GRID_POINTS) if grid.slopes[k] >= least]
 
 
-def _plain_options(grid: _JointGrid, shape: FrictionShape) -> list[list[int]]:
+def _plain_options(grid: JointGrid, shape: FrictionShape) -> list[list[int]]:
     """What a joint's constants may be without a Stribeck term of unknown δ; stated constants are kept."""
     if shape.delta is None:
         return [[k] for k in _steps(grid, shape)]
@@ -242,67 +180,15 @@ def _plain_options(grid: _JointGrid, shape: FrictionShape) -> list[list[int]]:
     return [[k, stated] for k in _steps(grid, shape) if grid.slopes[k] >= SEPARATION * shape.delta]
 
 
-def _stribeck_options(grid: _JointGrid, shape: FrictionShape) -> list[list[int]]:
+def _stribeck_options(grid: JointGrid, shape: FrictionShape) -> list[list[int]]:
     """Pairs of constants with a Stribeck term, for joints whose file states no δ."""
     slopes = grid.slopes
     return [[k, d] for k in _steps(grid, shape) for d in range(GRID_POINTS) if slopes[k] >= SEPARATION * slopes[d]]
 
 
-def _total_gain(grids: list[_JointGrid], chosen: list[list[int]]) -> float:
-    """What the chosen columns of all joints together take off the criterion."""
-    pairs = list(zip(grids, chosen, strict=True))
-    matrix = np.block([[a.block(b, i, j) for b, j in pairs] for a, i in pairs])
-    target = np.concatenate([grid.target[indices] for grid, indices in pairs])
-    return float(target @ linalg.lstsq(matrix, target, cond=1e-12)[0])
-
-
-@dataclass(frozen=True, eq=False)
-class _Conditional:
-    """One joint's candidates after the chosen columns of all other joints are projected off as well."""
-
-    gram: Array
-    target: Array
-
-    @staticmethod
-    def of(grids: list[_JointGrid], chosen: list[list[int]], joint: int) -> "_Conditional":
-        """The candidates of `joint` with the other joints as chosen."""
-        grid, every = grids[joint], list(range(len(grids[joint].slopes)))
-        gram, target = grid.block(grid, every, every), grid.target
-        others = [(grids[k], chosen[k]) for k in range(len(grids)) if k != joint]
-        if not others:
-            return _Conditional(gram, target)
-        matrix = np.block([[a.block(b, i, j) for b, j in others] for a, i in others])
-        cross = np.vstack([other.block(grid, indices, every) for other, indices in others])
-        known = np.concatenate([other.target[indices] for other, indices in others])
-        solved = linalg.lstsq(matrix, np.column_stack([cross, known]), cond=1e-12)[0]
-        return _Conditional(gram - cross.T @ solved[:, :-1], target - cross.T @ solved[:, -1])
-
-    def gains(self, options: list[list[int]], *, physical: bool = False) -> Array:
-        """What each option, one or two columns, takes off the criterion.
-
-        With `physical`, a pair counts only where friction falls from τ_s > 0 to a lower τ_s + τ_sc ≥ 0.
-        """
-        first = np.array([option[0] for option in options])
-        energy = np.maximum(np.diag(self.gram), np.finfo(float).tiny)
-        single = self.target[first] ** 2 / energy[first]
-        if len(options[0]) == 1:
-            return single
-        second = np.array([option[1] for option in options])
-        overlap = self.gram[first, second] / energy[first]
-        left = energy[second] - overlap * self.gram[first, second]
-        apart = left > COLLINEAR * energy[second]
-        stribeck = np.where(apart, self.target[second] - overlap * self.target[first], 0.0) / np.where(apart, left, 1.0)
-        added = stribeck**2 * left
-        if physical:
-            stiction = self.target[first] / energy[first] - overlap * stribeck
-            falls = (stribeck < 0.0) & (stiction + stribeck >= 0.0)
-            added = np.where(falls, added, 0.0)
-        return single + added
-
-
 def _described(
-    conditional: _Conditional,
-    grid: _JointGrid,
+    conditional: Conditional,
+    grid: JointGrid,
     indices: list[int],
     shape: FrictionShape,
     unit: float,
@@ -321,7 +207,8 @@ def _described(
     if shape.delta is None and len(indices) > 1:
         gentle = [d for d in range(GRID_POINTS) if slopes[indices[0]] >= SEPARATION * slopes[d]]
         profile = conditional.gains([[indices[0], d] for d in gentle])
-        delta, delta_known = _peak(profile, slopes[gentle], KNOWN_BAND * unit)
+        # Where δ begins: beside a K_v of the grid, its profile tells how far that K_v is off, not what is known of δ.
+        delta, _ = _peak(profile, slopes[gentle], KNOWN_BAND * unit)
     return EstimatedShape(k_v, delta, k_v_known, delta_known, shape.k_v is not None, shape.delta is not None)
 
 
@@ -338,7 +225,7 @@ def _peak(profile: Array, slopes: Array, band: float) -> tuple[float, bool]:
     )
 
 
-def _ordinary(profile: Array, slopes: Array, grid: _JointGrid, unit: float, residual_energy: float) -> float:
+def _ordinary(profile: Array, slopes: Array, grid: JointGrid, unit: float, residual_energy: float) -> float:
     """The most ordinary slope of those that fit practically as well as the best: never one that ran away."""
     ordinary = ORDINARY / 10 ** GRID_DECADES[0] * grid.slopes[0]
     fitting = profile >= profile.max() - AS_GOOD * residual_energy
@@ -349,8 +236,8 @@ def _ordinary(profile: Array, slopes: Array, grid: _JointGrid, unit: float, resi
 
 
 def _with_stribeck(
-    conditional: _Conditional,
-    grid: _JointGrid,
+    conditional: Conditional,
+    grid: JointGrid,
     plain: list[int],
     shape: FrictionShape,
     variance: float,
@@ -371,6 +258,24 @@ def _with_stribeck(
         alone = max(alone, float(conditional.gains(beside).max()))
     enough = max(IMPROVEMENT * variance, IMPROVEMENT_SHARE * residual_energy)
     return pairs[best] if gains[best] - alone > enough else plain
+
+
+def gentle_range(k_v: float, speed: float) -> tuple[float, float]:
+    """Between which slopes a δ stands for a term of its own: gentler ones are viscous friction, steeper ones K_v's.
+
+    Parameters
+    ----------
+    k_v : float
+        slope of the step at zero velocity [s/rad or s/m]
+    speed : float
+        the joint's rms velocity [rad/s or m/s]
+
+    Returns
+    -------
+    tuple of float
+        gentlest and steepest δ [s/rad or s/m]
+    """
+    return STRAIGHT / speed, k_v / SEPARATION
 
 
 def shape_parameters(shapes: Sequence[EstimatedShape]) -> list[tuple[int, str]]:

@@ -4,11 +4,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy import stats
 
 from service.dynamics.base_parameters import BaseParameters
 from service.identification.band import preliminary_terms
 from service.identification.covariance import parameter_covariance
-from service.identification.dataset import Dataset
+from service.identification.dataset import Dataset, rms_speed
 from service.identification.estimate import FINEST_TORQUE, Estimator, estimate, single_joint_std
 from service.identification.friction_shape import EstimatedShape, estimate_shapes, shape_parameters
 from service.identification.least_squares import JointFactor, factorise, restricted
@@ -19,11 +20,13 @@ from service.identification.structure import ModelStructure
 from service.recording.recording import Array
 from service.robot import Robot
 
-TIGHT = 0.1
-"""Standard error of a shape constant's logarithm that leaves no doubt about it, whatever its profile looks like."""
+TIGHT = {"k_v": 0.1, "delta": 0.2}
+"""Standard error of a constant's logarithm that leaves no doubt about it. K_v has its profile as well; δ is known where
+five standard errors are within a factor of e."""
 
-SIGNIFICANT = 5.0
-"""Standard errors by which a Stribeck term must differ from zero to stay in the model."""
+SIGNIFICANT = float(stats.chi2.isf(2.0 * stats.norm.sf(5.0), df=2))
+"""Noise variances that a Stribeck term must take off the criterion to stay in the model: what chance does as rarely as
+five standard errors, with the term's two unknowns τ_sc and δ."""
 
 
 def choose_model(
@@ -51,7 +54,8 @@ def choose_model(
     separable = separable_rotors(robot, base) if rotor_inertia else (False,) * robot.joint_count
     structure = _with_rotors(ModelStructure(robot, base, preliminary_terms(motions, robot)), separable)
     if any(shape.k_v is None or shape.delta is None for shape in given):
-        shapes = _refined(motions, structure, _estimated_shapes(motions, structure))
+        speed = rms_speed(motions)
+        shapes = _refined(motions, structure, _estimated_shapes(motions, structure, speed), speed)
     else:
         shapes = tuple(EstimatedShape(s.k_v or 0.0, s.delta, True, True, True, True) for s in given)
     complete = _with_shapes(structure, shapes)
@@ -61,7 +65,7 @@ def choose_model(
     return _with_rotors(complete, needed), shapes, restricted(factors, keep)
 
 
-def _estimated_shapes(motions: Dataset, structure: ModelStructure) -> tuple[EstimatedShape, ...]:
+def _estimated_shapes(motions: Dataset, structure: ModelStructure, speed: Array) -> tuple[EstimatedShape, ...]:
     """Shape constants; a Stribeck term stays where it is far from zero against the residual that it leaves.
 
     Its significance cannot be judged by the residual without it: what it would explain is the colour in that residual.
@@ -69,15 +73,15 @@ def _estimated_shapes(motions: Dataset, structure: ModelStructure) -> tuple[Esti
     count = structure.robot.joint_count
     factors = factorise(motions, structure)
     noise_std, _ = _preliminary_residual(motions, structure, factors)
-    proposed = estimate_shapes(motions, structure, factors, noise_std, np.zeros(count), (True,) * count)
+    proposed = estimate_shapes(motions, structure, factors, noise_std, np.zeros(count), (True,) * count, speed)
     # Judged by what the refined candidates leave: beside constants off their optimum every other one looks open.
-    refined = _refined(motions, structure, proposed)
-    deviations, unit, tight = _judged(motions, _with_shapes(structure, refined), refined, noise_std)
+    refined = _refined(motions, structure, proposed, speed)
+    gains, unit, tight = _judged(motions, _with_shapes(structure, refined), refined, noise_std)
     supported = [
-        shape.delta is not None and not shape.delta_given and bool(deviations[joint] >= SIGNIFICANT)
+        shape.delta is not None and not shape.delta_given and bool(gains[joint] >= SIGNIFICANT)
         for joint, shape in enumerate(proposed)
     ]
-    found = estimate_shapes(motions, structure, factors, noise_std, unit, supported)
+    found = estimate_shapes(motions, structure, factors, noise_std, unit, supported, speed)
     return tuple(
         _with_tight(shape, best, tight[joint]) for joint, (shape, best) in enumerate(zip(found, refined, strict=True))
     )
@@ -86,19 +90,19 @@ def _estimated_shapes(motions: Dataset, structure: ModelStructure) -> tuple[Esti
 def _with_tight(shape: EstimatedShape, refined: EstimatedShape, tight: set[str]) -> EstimatedShape:
     """The shape with what refining all constants together found, where profiles along single ones left a doubt.
 
-    Beside a Stribeck term the two slopes are one pair: neither may be left where only the grid had put it.
+    Beside a Stribeck term the two slopes are one pair: neither may be left where only the grid had put it, and δ's
+    profile beside the K_v of a grid tells how far that K_v is off, not what is known of δ.
     """
     paired = shape.delta is not None and not shape.delta_given
     if paired:
-        shape = replace(shape, delta=refined.delta)
-        shape = replace(shape, delta_identifiable=shape.delta_identifiable or "delta" in tight)
+        shape = replace(shape, delta=refined.delta, delta_identifiable="delta" in tight)
     if not shape.k_v_given and (paired or "k_v" in tight):
         shape = replace(shape, k_v=refined.k_v, k_v_identifiable=shape.k_v_identifiable or "k_v" in tight)
     return shape
 
 
 def _refined(
-    motions: Dataset, structure: ModelStructure, shapes: tuple[EstimatedShape, ...]
+    motions: Dataset, structure: ModelStructure, shapes: tuple[EstimatedShape, ...], speed: Array
 ) -> tuple[EstimatedShape, ...]:
     """Identifiable constants of all joints moved to their common optimum."""
     estimated = shape_parameters(shapes)
@@ -106,7 +110,7 @@ def _refined(
         return shapes
     structure = _with_shapes(structure, shapes)
     weights, solution = estimate(factorise(motions, structure), structure.size, Estimator.WLS)
-    refined = refined_structure(motions, structure, solution.parameters, weights, estimated)
+    refined = refined_structure(motions, structure, solution.parameters, weights, estimated, speed)
     return tuple(
         replace(shape, k_v=terms.k_v, delta=terms.delta) for shape, terms in zip(shapes, refined.terms, strict=True)
     )
@@ -117,8 +121,8 @@ def _judged(
 ) -> tuple[Array, Array, list[set[str]]]:
     """What a model with all proposed terms says of them, per joint.
 
-    How many standard errors its Stribeck term is from zero; one noise variance, inflated by autocorrelation and
-    divided by `noise_std`²; and which of its shape constants have a small standard error.
+    What its Stribeck term takes off the criterion; one noise variance, inflated by autocorrelation and divided by
+    `noise_std`²; and which of its shape constants have a small standard error.
     """
     factors = factorise(motions, structure)
     weights, solution = estimate(factors, structure.size, Estimator.WLS)
@@ -126,21 +130,31 @@ def _judged(
     given = (motions, structure, solution.parameters, factors, weights, statistics.autoregressions)
     # With δ held: how uncertain δ itself is says nothing about whether the term is there.
     held = parameter_covariance(*given)
-    deviations = np.zeros(len(shapes))
-    for joint in range(len(shapes)):
-        column = structure.coefficient(joint, "stribeck")
-        if column is not None:
-            std = np.sqrt(max(held[column, column], np.finfo(float).tiny))
-            deviations[joint] = abs(solution.parameters[column]) / std
+    gains = np.array([_stribeck_gain(structure, solution.parameters, held, joint) for joint in range(len(shapes))])
     estimated = shape_parameters(shapes)
     errors = np.sqrt(np.diag(parameter_covariance(*given, estimated))[structure.size :])
     tight: list[set[str]] = [set() for _ in shapes]
     for (joint, name), error in zip(estimated, errors, strict=True):
-        if 0.0 < error < TIGHT:
+        if 0.0 < error < TIGHT[name]:
             tight[joint].add(name)
     inflation = np.array([model.long_run_ratio for model in statistics.autoregressions])
     relative = np.maximum(statistics.fit.band_rms, FINEST_TORQUE * noise_std) / noise_std
-    return deviations, inflation * relative**2, tight
+    return gains, inflation * relative**2, tight
+
+
+def _stribeck_gain(structure: ModelStructure, parameters: Array, covariance: Array, joint: int) -> float:
+    """What a joint's Stribeck term takes off the criterion [noise variances]; 0 where friction does not fall.
+
+    (τ_sc/σ)², less what it costs to raise τ_s + τ_sc to zero where it is below: no friction goes there.
+    """
+    stiction, stribeck = (structure.coefficient(joint, name) for name in ("stiction", "stribeck"))
+    if stiction is None or stribeck is None or parameters[stribeck] >= 0.0:
+        return 0.0
+    pair = [stiction, stribeck]
+    impossible = min(parameters[pair].sum(), 0.0)
+    smallest = np.finfo(float).tiny
+    gain = parameters[stribeck] ** 2 / max(covariance[stribeck, stribeck], smallest)
+    return float(gain - impossible**2 / max(covariance[np.ix_(pair, pair)].sum(), smallest))
 
 
 def _with_shapes(structure: ModelStructure, shapes: Sequence[EstimatedShape]) -> ModelStructure:

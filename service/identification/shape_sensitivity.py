@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from service.dynamics.friction import smooth_sign_slope
 from service.identification.dataset import PreparedMotion
+from service.identification.friction_shape import gentle_range
 from service.identification.structure import ModelStructure
 from service.recording.recording import Array
 
@@ -23,10 +24,11 @@ LARGEST_STEP = 0.3
 """Change of a constant's logarithm in one step, about half the way to the next grid point and a bit."""
 
 LARGEST_CHANGE = 0.7
-"""A constant that wants to move further than this from where its profile peaked is left there."""
+"""A K_v whose logarithm wants to move further than this from where its profile peaked is left there. A δ may go
+wherever it stands for a term of its own: its profile was taken beside a K_v of the grid, which displaces its peak."""
 
 SETTLED = 1e-3
-STEPS = 6
+STEPS = 10
 
 
 def columns_with_shapes(
@@ -79,6 +81,7 @@ def refined_structure(
     parameters: Array,
     weight: Array,
     shapes: Sequence[ShapeParameter],
+    speed: Array,
 ) -> ModelStructure:
     """The structure with its estimated shape constants moved to the joint optimum, by Gauss–Newton steps.
 
@@ -94,11 +97,13 @@ def refined_structure(
         1/σ_j of every joint
     shapes : sequence of ShapeParameter
         the constants that were estimated
+    speed : (n,) float64
+        rms velocity of every joint [rad/s or m/s]
 
     Returns
     -------
     ModelStructure
-        with refined constants; a constant that runs away stays where it was
+        with refined constants; a K_v that runs away stays where it was, a δ ends at an end of its range
     """
     start = structure
     for _ in range(STEPS):
@@ -108,7 +113,9 @@ def refined_structure(
         change = np.clip(change, -LARGEST_STEP, LARGEST_STEP)
         for (joint, name), step in zip(shapes, change, strict=True):
             moved = _constant(structure, joint, name) * np.exp(step)
-            if abs(np.log(moved / _constant(start, joint, name))) > LARGEST_CHANGE:
+            if name == "delta":
+                moved = np.clip(moved, *gentle_range(structure.terms[joint].k_v, float(speed[joint])))
+            elif abs(np.log(moved / _constant(start, joint, name))) > LARGEST_CHANGE:
                 moved = _constant(start, joint, name)
             structure = _with_constant(structure, joint, name, float(moved))
         if np.abs(change).max() < SETTLED:

@@ -21,6 +21,7 @@ from mcap.records import Channel, Chunk, Schema
 from mcap.stream_reader import get_chunk_data_stream
 
 from service.errors import RecordingError
+from service.recording.inflation import require_plausible_inflation
 from service.recording.joint_state_log import JointStateLog, MessageHandler
 from service.recording.joint_state_topic import Choice
 from service.recording.recording import Recording
@@ -31,7 +32,7 @@ MCAP_MAGIC = b"\x89MCAP0\r\n"
 
 _RECORD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
-_LARGEST_CHUNK_BYTES = 2**31
+_LARGEST_CHUNK_BYTES = 2**28
 _COPY_BYTES = 2**20
 _UNREADABLE = (
     McapError,
@@ -191,7 +192,7 @@ class _Scan:
 
     def __init__(self, file: BinaryIO, size: int, sink: MessageSink) -> None:
         self._file, self._size, self._sink = file, size, sink
-        self._checksum = 0
+        self._checksum = self._unpacked_bytes = 0
         self._schemas: dict[int, str] = {}
         self._handlers: dict[int, MessageHandler | None] = {}
 
@@ -234,6 +235,8 @@ class _Scan:
             declared.append(max(zstandard.frame_content_size(chunk.data), 0))
         if max(declared) > _LARGEST_CHUNK_BYTES:
             raise ValueError("implausible chunk size")
+        self._unpacked_bytes += max(declared)
+        require_plausible_inflation(self._file.tell(), self._unpacked_bytes, "what was read so far")
         stream, size = get_chunk_data_stream(chunk, validate_crc=True)
         data = stream.read(size)
         at = 0

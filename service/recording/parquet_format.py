@@ -11,6 +11,7 @@ import numpy as np
 
 from service.errors import RecordingError
 from service.recording.columns import find_columns, require_joint_count
+from service.recording.inflation import require_plausible_inflation
 from service.recording.recording import Array, Recording
 from service.recording.row_check import RowCheck, require_rows
 from service.recording.table import SPOOL_ABOVE_BYTES, TableBuilder
@@ -56,6 +57,8 @@ def read_parquet(
         layout = find_columns([str(column) for column in file.schema_arrow.names], name)
         require_joint_count(layout.joint_count, joint_count, name)
         _require_numbers(file.schema_arrow, layout.names, name)
+        unpacked_bytes = file.metadata.num_rows * len(layout.names) * 8
+        require_plausible_inflation(path.stat().st_size, unpacked_bytes, name)
         builder = TableBuilder(layout.names, file.metadata.num_rows, spool_above_bytes)
         check = RowCheck(name, layout.names)
         for batch in file.iter_batches(batch_size=_ROWS_AT_ONCE, columns=list(layout.names), use_threads=False):

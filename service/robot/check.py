@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from service.robot.finding import Finding, Severity
+from service.robot.kinematics import homogeneous
 from service.robot.robot import Joint, JointLimits, JointType, Robot, Segment
 from service.robot.robot_file import load_robot
 
@@ -38,6 +39,8 @@ class JointSummary:
         unit vector of the joint axis, in the frame of the link before
     mass : float or None
         of the link that the joint carries, as the model believes [kg]
+    before, after : tuple of 16 float
+        homogeneous transforms, row by row: link frame = frame of the link before · before · motion about z · after
     """
 
     number: int
@@ -50,6 +53,8 @@ class JointSummary:
     origin: tuple[float, float, float]
     axis: tuple[float, float, float]
     mass: float | None
+    before: tuple[float, ...]
+    after: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -127,6 +132,8 @@ def _summary(number: int, joint: Joint, segment: Segment, mass: float | None) ->
         origin=_triple(before.translation + before.rotation @ after.translation),
         axis=_triple(before.rotation[:, 2]),
         mass=mass,
+        before=tuple(float(value) for value in homogeneous(before).ravel()),
+        after=tuple(float(value) for value in homogeneous(after).ravel()),
     )
 
 

@@ -69,7 +69,7 @@ def find_defect(link: LinkInertia) -> Defect | None:
     if offset == 0.0:
         return _worst(_principal_defects(link.inertia, scale, "about the centre of mass"))
     about_origin = _principal_defects(link.inertia, scale, "about the frame's origin")
-    if offset * offset > 2.0 * link.mass * scale:
+    if offset * (offset / link.mass) > 2.0 * scale:
         # A point mass m at distance d has the moment m d² = h²/m; far beyond the entries given, it might overflow.
         text = (
             f"inertia is not positive semidefinite about the centre of mass: mass {link.mass:g} kg with first moment "
@@ -84,7 +84,8 @@ def find_defect(link: LinkInertia) -> Defect | None:
 def _about_centre(link: LinkInertia) -> Array:
     """Inertia about the centre of mass: I_c = I - (hᵀh 1 - h hᵀ)/m, equation (5) reversed."""
     moment = link.first_moment
-    return link.inertia - (moment @ moment * np.eye(3) - np.outer(moment, moment)) / link.mass
+    centre = moment / link.mass  # before the product, which underflows where the mass is tiny
+    return link.inertia - (moment @ centre * np.eye(3) - np.outer(moment, centre))
 
 
 def _principal_defects(inertia: Array, scale: float, about: str) -> list[Defect]:

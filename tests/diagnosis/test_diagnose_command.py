@@ -80,7 +80,8 @@ def test_everything_that_can_be_written_is_written_and_read_again(files: list[st
     require_within_limits(read_trajectory(out["next.json"], arm), arm, motion_limits(arm))
     assert "joint_spring" in [each.effect_id for each in read_scenario(out["scenario.yaml"], improved).effects]
     page = out["page.html"].read_text()
-    assert page.count("<svg") == 1 + 3  # residuals over time, and where they are, joint by joint
+    assert page.count("<figure") == 2 + 1 + 3 + 1  # maps before and after, shifts, proof by joint, the next motion
+    assert "tauscope diagnose" in page
     assert "explained" in page
     assert "http://" not in page.replace("http://www.w3.org", "")
     compile(out["code.py"].read_text(), "code.py", "exec")

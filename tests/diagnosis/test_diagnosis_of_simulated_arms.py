@@ -10,7 +10,7 @@ from identification.simulated import Array, SimulatedArm, paper_robot
 from service.diagnosis import Diagnosis, DiagnosisDocument, Verdict, diagnose, document
 
 TRAIN, HELD_OUT = (1, 2, 3), (11, 12)
-FEW = 4.2
+FEW, MANY = 4.2, 150.0
 CLIP = 1.4
 
 
@@ -45,6 +45,11 @@ def few_teeth(arm: SimulatedArm, rigid: Array) -> Array:
     return at_joint(0, 0.5 * np.sin(FEW * q + 0.4))
 
 
+def many_teeth(arm: SimulatedArm, rigid: Array) -> Array:
+    """So many that they reach the band near reversals only."""
+    return at_joint(0, 1.2 * np.sin(MANY * arm.exact.exact.position[:, 0] + 0.4))
+
+
 def clipped(arm: SimulatedArm, rigid: Array) -> Array:
     """A sensor that ends at half of what the joint's torque mostly is: more is missing than was measured."""
     torque = arm.exact.torque_exact[:, 0]
@@ -69,6 +74,7 @@ CASES: dict[str, tuple[EffectTorque, str, str, dict[str, float]]] = {
     "bristles": (bristles, "presliding_hysteresis", "joint3", {"F": 1.7, "x_s": 0.03}),
     "teeth": (teeth, "cogging", "joint1", {"order": 17.0, "amplitude": 0.25, "phase": 0.4}),
     "few teeth": (few_teeth, "cogging", "joint1", {"order": FEW, "amplitude": 0.5, "phase": 0.4}),
+    "many teeth": (many_teeth, "cogging", "joint1", {"order": MANY, "amplitude": 1.2, "phase": 0.4}),
     "clipped": (clipped, "torque_saturation", "joint1", {"c": CLIP, "a": 1.0}),
     "wrist": (wrist, "friction_coupling", "joint3", {"f": 0.6}),
 }
@@ -119,6 +125,7 @@ def test_the_mismatch_is_located_before_it_is_named(case: str) -> None:
     excess = [entry.excess_rms / noise for entry, noise in zip(told(case).mismatch, (0.5, 0.3, 0.7), strict=True)]
     strongest = {told(case).joints[int(np.argmax(excess))]}
     assert strongest <= ({"joint2", "joint3"} if case == "wrist" else {CASES[case][2]})
+    assert {entry.joint for entry in told(case).mismatch if entry.significant} >= strongest
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])

@@ -175,7 +175,7 @@ def test_a_joint_warms_as_fast_as_its_friction_dissipates() -> None:
     """Against the equation of heat, integrated sample by sample; a joint that rests stays cold."""
     by_heat = form("friction_drift", 2, 1)
     (found,) = by_heat.columns(SIGNALS, np.array([[2.0]]))
-    power = (2.0 * S + 0.5 * V) * V / (setting().top_torque[2] * setting().speed[2])
+    power = (2.0 * S + 0.5 * V) * V
     warmth, course = 0.0, []
     for each in np.tile(power, 2):
         warmth = each + (warmth - each) * np.exp(-1.0 / (2.0 * RATE))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagnosis.test_effect_columns import setting
-from service.diagnosis.catalogue.periodic_torque import possible_orders
+from service.diagnosis.catalogue.periodic_torque import FARTHER, farther_orders, possible_orders
 
 CYCLES = 2.0 * np.pi
 
@@ -32,3 +32,26 @@ def test_a_joint_that_stands_has_none() -> None:
     given = setting()
     still = replace(given, highest=given.lowest.copy())
     assert not len(possible_orders(still, 0))
+
+
+def test_farther_orders_go_on_where_the_others_end() -> None:
+    given = setting()
+    for joint in given.joints:
+        near, farther = possible_orders(given, joint), farther_orders(given, joint)
+        step = near[1] - near[0]
+        assert farther[0] - near[-1] == pytest.approx(step)
+        assert np.diff(farther) == pytest.approx(np.full(len(farther) - 1, step))
+        assert farther[-1] > 2.0 * near[-1]
+        assert farther[-1] < 1.01 * FARTHER * near[-1] + step
+
+
+def test_a_geared_motor_s_orders_are_its_multiples_however_far() -> None:
+    """100 to 1 at a speed that carries the first order beyond the band: nothing near, and multiples of 100 farther."""
+    given = setting()
+    joints = [replace(joint, gear_ratio=100.0) for joint in given.robot.joints]
+    geared = replace(given, robot=replace(given.robot, joints=tuple(joints)), speed=np.ones_like(given.speed))
+    geared = replace(geared, cutoff_hz=100.0 / (2.0 * np.pi))
+    assert not len(possible_orders(geared, 0))
+    farther = farther_orders(geared, 0)
+    assert len(farther) >= 4
+    assert farther == pytest.approx(100.0 * np.arange(1, len(farther) + 1))

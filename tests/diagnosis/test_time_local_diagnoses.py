@@ -10,10 +10,13 @@ from diagnosis.diagnosed_arm import at_joint
 from diagnosis.loaded_arm import exact_motion, noisy, seconds, torque_of_load
 from identification.simulated import Array, SimulatedArm, paper_robot
 from service.diagnosis import DiagnosisDocument, diagnose, document
-from service.dynamics import smooth_sign
+from service.diagnosis.catalogue.kinematic_error import displaced
+from service.dynamics import inverse_dynamics, smooth_sign
 
 TRAIN, HELD_OUT = (1, 2, 3), (11, 12)
 PLACE = np.array([0.05, 0.02, 0.0])
+LONGER = 0.03
+"""[m]"""
 
 Extra = Callable[[SimulatedArm, int], Array | float]
 
@@ -46,6 +49,15 @@ def one_sided(arm: SimulatedArm, seed: int) -> Array | float:
     """Coulomb friction one way only: half of it is a constant."""
     velocity = arm.exact.exact.velocity[:, 0]
     return at_joint(0, 0.6 * np.maximum(smooth_sign(velocity, 500.0), 0.0))
+
+
+def longer(arm: SimulatedArm, seed: int) -> Array | float:
+    robot = paper_robot()
+    links = np.concatenate([link.to_vector() for link in robot.model.links or ()])
+    exact = arm.exact.exact
+    state = exact.position, exact.velocity, exact.acceleration
+    as_built = displaced(robot, 1, np.array([LONGER, 0.0, 0.0]))
+    return inverse_dynamics(as_built, links, *state) - inverse_dynamics(robot, links, *state)
 
 
 @cache
@@ -118,11 +130,22 @@ def test_friction_that_a_constant_nearly_imitates_is_in_the_set() -> None:
 
 
 @pytest.mark.slow
-def test_a_wrong_length_is_never_claimed_and_listed_as_not_visible() -> None:
+def test_a_wrong_length_is_measured() -> None:
+    """Upper arm 30 mm longer than in the file: torque of one arm less that of the other."""
+    found = told(longer)
+    assert [(finding.effect, finding.joint) for finding in found.findings] == [("kinematic_error", None)]
+    size = sizes(found)
+    assert (size["link"][0], size["axis"][0]) == (2.0, 1.0)
+    assert within(size["d"], LONGER)
+
+
+@pytest.mark.slow
+def test_what_no_motion_shows_is_listed_as_not_visible_and_the_rest_with_its_size() -> None:
     found = told(None)
-    (entry,) = [each for each in found.detectable if each.effect == "kinematic_error"]
-    assert not entry.visible
-    assert entry.minimum is None
+    assert not found.findings
     (payload,) = [each for each in found.detectable if each.effect == "payload"]
     assert not payload.visible
-    assert not found.findings
+    (length,) = [each for each in found.detectable if each.effect == "kinematic_error"]
+    assert length.visible
+    assert length.minimum is not None
+    assert 0.0 < length.minimum < LONGER

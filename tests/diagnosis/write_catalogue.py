@@ -15,8 +15,7 @@ together. Torques are signed as what the drive has to overcome in addition: meas
 `sgn` is smoothed, (2/π) atan(K_v q̇). `{tau}` and `{q}` are the joint's own units: Nm and rad, or N and m.
 
 *How found*: **searched** beside the identified model; **compared**: only against a given model (`--against`), or where
-the robot file declares friction and no constant (`torque_offset`); **hardly visible**: searched only where at least a
-hundredth of its torque lies outside the identified parameters, otherwise listed as not visible.
+the robot file declares friction and no constant (`torque_offset`).
 
 | id | meaning | torque | parameters | how found | revealed by | what to do |
 |---|---|---|---|---|---|---|
@@ -38,8 +37,7 @@ def _rows() -> Iterator[str]:
     from service.diagnosis.catalogue import catalogue
 
     for effect in sorted(catalogue(), key=lambda each: each.id):
-        found = "searched" if effect.screened and not effect.doubtful else "compared"
-        found = "hardly visible" if effect.doubtful else found
+        found = "searched" if effect.screened else "compared"
         shapes = [shape for shape in effect.shapes if shape.reported]
         sizes = ", ".join(f"`{each.name}` [{each.unit}]" for each in (*effect.coefficients, *shapes))
         equation = re.sub(r"\|([^|]+)\|", r"abs(\1)", effect.equation)  # a bar would end the table's cell

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from service.robot import LinkInertia, Severity, find_defect, pseudo_inertia
@@ -16,6 +16,7 @@ def _link(mass: float, first_moment: tuple[float, ...], *entries: float) -> Link
 
 
 @given(st.lists(st.tuples(st.floats(0.0, 5.0), COORDINATE, COORDINATE, COORDINATE), min_size=1, max_size=6))
+@example([(2.0e-159, 0.0, 0.0, 0.5)])
 def test_any_cloud_of_point_masses_is_physical(points: list[tuple[float, float, float, float]]) -> None:
     masses = np.array([point[0] for point in points])
     places = np.array([point[1:] for point in points])

@@ -1,7 +1,7 @@
 """The catalogue of effects that a model may have left out: one small file an effect."""
 
 from service.diagnosis.catalogue.effect import Coefficient, Effect, Quantity, Shape
-from service.diagnosis.catalogue.registry import catalogue, doubtful_effects, possible_effects
+from service.diagnosis.catalogue.registry import catalogue, farther_effects, possible_effects
 from service.diagnosis.catalogue.setting import Setting
 from service.diagnosis.catalogue.signals import Signals
 from service.diagnosis.catalogue.time_local import TimeLocalEffect
@@ -15,6 +15,6 @@ __all__ = [
     "Signals",
     "TimeLocalEffect",
     "catalogue",
-    "doubtful_effects",
+    "farther_effects",
     "possible_effects",
 ]

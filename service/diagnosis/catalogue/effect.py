@@ -101,8 +101,8 @@ class Effect(ABC):
 
     Columns of an effect `of_motion_alone` are the same beside every model, and are made once.
     What a sensor does not pass on, `swallows`, may be more than what was measured; no other effect's torque can be.
-    An effect that is `screened` is looked for beside the nominal model, one that is `doubtful` only where its columns
-    have `least_share` of their energy outside it; any other becomes a finding by comparison with a given model.
+    An effect that is `screened` is looked for beside the nominal model; any other becomes a finding by comparison with
+    a given model.
     One that does not do the same whenever the motion does, that does not `repeats_with_motion`, passes for noise there.
     """
 
@@ -117,9 +117,7 @@ class Effect(ABC):
     of_motion_alone: ClassVar[bool] = False
     swallows: ClassVar[bool] = False
     screened: ClassVar[bool] = True
-    doubtful: ClassVar[bool] = False
     repeats_with_motion: ClassVar[bool] = True
-    least_share: ClassVar[float] = 0.0
 
     joint: int | None
     grid: Array = field(default_factory=lambda: NO_SHAPE)
@@ -136,6 +134,17 @@ class Effect(ABC):
         setting : Setting
             the arm and the ranges of its motion
         """
+
+    @classmethod
+    def farther_forms(cls, setting: Setting) -> "Sequence[Effect]":
+        """Forms that show in a small part of the motion: looked at where all others leave more than noise.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm and the ranges of its motion
+        """
+        return ()
 
     @abstractmethod
     def columns(self, signals: Signals, shapes: Array) -> Array:

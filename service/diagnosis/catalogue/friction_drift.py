@@ -21,19 +21,19 @@ class FrictionDrift(Effect):
     """τ = (f A(q̇) + w q̇) h(t), T ḣ = p / (1 - e^{-D/T}) - h, h = 0 when recording begins.
 
     f and w are what friction changes by until D under p = 1, however slowly it does: a T far beyond the recordings
-    would else leave them open. By the clock p is 1. By heat it is the power that the model's friction dissipates,
-    relative to that of the largest torque at the rms speed: a joint that rests or creeps cools.
+    would else leave them open. By the clock p is 1. By heat it is the power that the model's friction dissipates, in
+    watts: a joint that rests or creeps cools.
 
     duration_s : float
         D, of the longest recording [s]
-    full_power : float or None
-        at which p is 1 [W]; None for a change by the clock
+    by_heat : bool
+        whether friction's own power makes the change, rather than the clock
     """
 
     repeats_with_motion: ClassVar[bool] = False
     id: ClassVar[str] = "friction_drift"
     equation: ClassVar[str] = (
-        "tau = (f sgn(qd) + w qd) h, T dh/dt = p / (1 - exp(-D/T)) - h, p = 1 or friction's own power / P0"
+        "tau = (f sgn(qd) + w qd) h, T dh/dt = p / (1 - exp(-D/T)) - h, p = 1 or friction's own power / 1 W"
     )
     meaning: ClassVar[str] = "friction changes over time, as in a warm-up"
     remedy: ClassVar[str] = "warm the joint up before recording, or let friction depend on temperature"
@@ -42,7 +42,7 @@ class FrictionDrift(Effect):
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("T", "s", logarithmic=True),)
 
     duration_s: float = 1.0
-    full_power: float | None = None
+    by_heat: bool = False
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
@@ -57,8 +57,7 @@ class FrictionDrift(Effect):
         times = TIMES * longest
         grid = times[:, None], 0.5 * times[:1], 1.5 * times[-1:]
         moving = [joint for joint in setting.joints if setting.moves(joint)]
-        power = setting.top_torque * setting.speed
-        return [cls(joint, *grid, longest, each) for joint in moving for each in (None, float(power[joint]))]
+        return [cls(joint, *grid, longest, by_heat) for joint in moving for by_heat in (False, True)]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """A(q̇) h, q̇ h, repetition by repetition.
@@ -71,18 +70,18 @@ class FrictionDrift(Effect):
             T [s]
         """
         constants = shapes[:, 0]
-        if self.full_power is None:
-            course = 1.0 - np.exp(-signals.time[None] / constants[:, None, None])
+        if self.by_heat:
+            course = self._temperature(signals, constants)
         else:
-            course = self._temperature(signals, constants, self.full_power)
+            course = 1.0 - np.exp(-signals.time[None] / constants[:, None, None])
         course = course / (1.0 - np.exp(-self.duration_s / constants))[:, None, None]
         own = np.stack([signals.step[self.joint], signals.velocity[self.joint]])
         return (own[None, :, None, :] * course[:, None])[:, :, None]
 
-    def _temperature(self, signals: Signals, constants: Array, full_power: float) -> Array:
+    def _temperature(self, signals: Signals, constants: Array) -> Array:
         """T ϑ̇ = p - ϑ of a joint that its friction warms, (g, P, N); before the piece it did so as within it."""
         friction = signals.torque[self.joint] - signals.load[self.joint]
-        power = np.maximum(friction * signals.velocity[self.joint], 0.0) / full_power
+        power = np.maximum(friction * signals.velocity[self.joint], 0.0)
         power = np.tile(power, signals.time.shape[0])
         before = max(float(signals.time[0, 0]), 0.0)
         found = []

@@ -1,6 +1,6 @@
 """A link frame that is not where the robot file has it: a wrong length.
 
-The base parameters take nearly all of it: what is left of a few millimetres is a ten-thousandth of its torque.
+The base parameters take nearly all of it: what is left of a few millimetres is often a ten-thousandth of its torque.
 """
 
 from collections.abc import Sequence
@@ -16,63 +16,79 @@ from service.dynamics import inverse_dynamics
 from service.recording.recording import Array
 from service.robot import Placement, Robot
 
-STEP_M = 1e-3
-"""Displacement of a frame for the difference quotient [m]: torque is quadratic in it, and central differences exact."""
+STEP_M = 1e-5
+"""Displacement of a frame for the difference quotient [m]; torque is quadratic in it, on the scale of the arm."""
+
+LARGEST_M = 0.2
+"""A frame farther off is no error of measurement [m]."""
 
 
 class KinematicError(Effect):
-    """τ = Σ_k ∂τ/∂d_k d_k: the frame of link j lies d farther, in the axes before its last turn."""
+    """τ = ∂τ/∂d d: the frame of one link lies d farther along one axis, of those before its last turn."""
 
     id: ClassVar[str] = "kinematic_error"
-    equation: ClassVar[str] = "tau = dtau/dd d, d the displacement of one link's frame"
+    equation: ClassVar[str] = "tau = dtau/dd d, d the displacement of one link's frame along one of its axes"
     meaning: ClassVar[str] = "a link length or frame is wrong"
-    remedy: ClassVar[str] = "measure the arm's geometry: torque hardly shows it"
+    remedy: ClassVar[str] = "measure the arm's geometry, and correct the robot file by d"
     revealing_motion: ClassVar[str] = "none: measure the tool's place in several postures instead"
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (
-        Coefficient("d_x", "m"),
-        Coefficient("d_y", "m"),
-        Coefficient("d_z", "m"),
-    )
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("link", "1", fixed=True),)
-    least_share: ClassVar[float] = 0.01
-    doubtful: ClassVar[bool] = True
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("d", "m", largest=LARGEST_M),)
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("link", "1", fixed=True), Shape("axis", "1", fixed=True))
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """One for the arm; links are its shapes, the last one left out: what it carries hangs at its own frame.
+        """One for the arm; links and axes are its shapes, the last link left out: what it carries hangs at its frame.
 
         Parameters
         ----------
         setting : Setting
             the arm
         """
-        links = np.arange(1.0, setting.robot.joint_count)[:, None]
-        return [cls(None, links, links[0], links[-1])] if len(links) else []
+        links = np.arange(1.0, setting.robot.joint_count)
+        grid = np.stack(np.meshgrid(links, np.arange(1.0, 4.0), indexing="ij"), axis=-1).reshape(-1, 2)
+        return [cls(None, grid, grid[0], grid[-1])] if len(grid) else []
+
+    def rough_grid(self) -> Array:
+        """None: nearly all of these columns is the identified parameters' own, and the rest like everything else."""
+        return self.grid[:0]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """Torque per metre along the three axes, (g, 3, n, N).
+        """Torque per metre, (g, 1, n, N).
 
         Parameters
         ----------
         signals : Signals
             one piece of motion
-        shapes : (g, 1) float64
-            number of the link, from 1
+        shapes : (g, 2) float64
+            number of the link and of the axis, from 1
         """
-        state = [np.ascontiguousarray(each.T) for each in (signals.position, signals.velocity, signals.acceleration)]
-        found = []
-        for (number,) in shapes:
-            rows = []
-            for axis in np.eye(3):
-                ahead, behind = (
-                    inverse_dynamics(
-                        displaced(signals.robot, int(number) - 1, sign * STEP_M * axis), signals.links, *state
-                    )
-                    for sign in (1.0, -1.0)
-                )
-                rows.append((ahead - behind).T / (2.0 * STEP_M))
-            found.append(rows)
-        return np.array(found)
+        exact, *longer = _torques(signals, [(shapes[0], 0.0), *((shape, STEP_M) for shape in shapes)])
+        return np.stack([(each - exact) / STEP_M for each in longer])[:, None]
+
+    def torque_of(self, signals: Signals, coefficients: Array, shape: Array) -> Array:
+        """Torque of the arm as it is less that of the arm as the file has it, (n, N).
+
+        Parameters
+        ----------
+        signals : Signals
+            one piece of motion
+        coefficients : (1,) float64
+            d [m]
+        shape : (2,) float64
+            number of the link and of the axis
+        """
+        longer, exact = _torques(signals, [(shape, float(coefficients[0])), (shape, 0.0)])
+        return longer - exact
+
+
+def _torques(signals: Signals, displacements: Sequence[tuple[Array, float]]) -> list[Array]:
+    """Rigid-body torque (n, N) with one link's frame displaced along one of its axes, for each shape and length."""
+    state = [np.ascontiguousarray(each.T) for each in (signals.position, signals.velocity, signals.acceleration)]
+    found = []
+    for shape, by in displacements:
+        link, axis = (int(each) - 1 for each in shape)
+        arm = displaced(signals.robot, link, by * np.eye(3)[axis])
+        found.append(inverse_dynamics(arm, signals.links, *state).T)
+    return found
 
 
 def displaced(robot: Robot, link: int, by: Array) -> Robot:

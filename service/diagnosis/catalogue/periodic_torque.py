@@ -4,7 +4,7 @@ Orders are counted per unit of joint position. Where the robot file states a gea
 motor's revolution can occur; otherwise the angle-periodogram is scanned as finely as the range of motion resolves.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -27,6 +27,12 @@ BAND_SHARE = 0.8
 
 MOST_ORDERS = 220
 
+FARTHER = 8.0
+"""Factor up to which orders are looked at where something is left: they reach the band near reversals only, in a
+twentieth of the time of a sine."""
+
+MOST_FARTHER_ORDERS = 800
+
 
 def possible_orders(setting: Setting, joint: int) -> Array:
     """Orders of a periodic torque that this motion can show, (g,), ascending; empty where there are none.
@@ -38,18 +44,37 @@ def possible_orders(setting: Setting, joint: int) -> Array:
     joint : int
         joint index, from 0
     """
-    reach = float(setting.highest[joint] - setting.lowest[joint])
+    return _orders(setting, joint, 1.0)[:MOST_ORDERS]
+
+
+def farther_orders(setting: Setting, joint: int) -> Array:
+    """Orders beyond those, that show in a part of the motion only, (g,), ascending.
+
+    Parameters
+    ----------
+    setting : Setting
+        the arm and its motion
+    joint : int
+        joint index, from 0
+    """
+    near = possible_orders(setting, joint)
+    return _orders(setting, joint, FARTHER)[len(near) :][:MOST_FARTHER_ORDERS]
+
+
+def _orders(setting: Setting, joint: int, factor: float) -> Array:
+    """Orders whose frequency at rms speed reaches up to some times the band."""
     if not setting.moves(joint):
         return np.zeros(0)
+    reach = float(setting.highest[joint] - setting.lowest[joint])
     lowest = FEWEST_CYCLES * 2.0 * np.pi / reach
-    highest = BAND_SHARE * 2.0 * np.pi * setting.cutoff_hz / float(setting.speed[joint])
+    highest = factor * BAND_SHARE * 2.0 * np.pi * setting.cutoff_hz / float(setting.speed[joint])
     if _is_geared(setting, joint):
         unit = abs(setting.robot.joints[joint].gear_ratio or 1.0) * _pole_pairs(setting, joint)
         lowest = min(lowest, unit) if reach >= 2.0 * np.pi / unit * FEWEST_CYCLES else lowest
         multiples = np.arange(max(1, int(np.ceil(lowest / unit - 1e-9))), int(highest / unit) + 1)
-        return np.asarray(unit * multiples[:MOST_ORDERS], dtype=np.float64)
+        return np.asarray(unit * multiples, dtype=np.float64)
     step = CYCLES_A_STEP * 2.0 * np.pi / reach
-    return np.asarray(np.arange(lowest, highest, step)[:MOST_ORDERS], dtype=np.float64)
+    return np.asarray(np.arange(lowest, highest, step), dtype=np.float64)
 
 
 def _pole_pairs(setting: Setting, joint: int) -> int:
@@ -85,13 +110,32 @@ class _Periodic(Effect):
         setting : Setting
             the arm
         """
-        made = []
-        for joint in setting.joints:
-            orders = possible_orders(setting, joint)
-            if len(orders):
-                bounds = 0.9 * orders[:1], 1.1 * orders[-1:]
-                made.append(cls(joint, orders[:, None], *bounds, geared=_is_geared(setting, joint)))
-        return made
+        return cls._of_orders(setting, possible_orders)
+
+    @classmethod
+    def farther_forms(cls, setting: Setting) -> Sequence[Effect]:
+        """The same of orders that show near reversals only.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        """
+        return cls._of_orders(setting, farther_orders)
+
+    @classmethod
+    def _of_orders(cls, setting: Setting, orders: Callable[[Setting, int], Array]) -> Sequence[Effect]:
+        """One a joint where the effect may be and has such orders."""
+        found = {joint: orders(setting, joint) for joint in cls._places(setting)}
+        return [
+            cls(joint, own[:, None], 0.9 * own[:1], 1.1 * own[-1:], geared=_is_geared(setting, joint))
+            for joint, own in found.items()
+            if len(own)
+        ]
+
+    @classmethod
+    def _places(cls, setting: Setting) -> Sequence[int]:
+        return setting.joints
 
     def is_free(self, place: int) -> bool:
         """Whether the order lies between the grid's points.
@@ -181,15 +225,8 @@ class TorqueRipple(_Periodic):
     )
 
     @classmethod
-    def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """One a joint that is loaded and covers enough cycles.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
-        return [form for form in super().forms(setting) if form.joint is not None and setting.is_loaded(form.joint)]
+    def _places(cls, setting: Setting) -> Sequence[int]:
+        return [joint for joint in super()._places(setting) if setting.is_loaded(joint)]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """τ_rb sin kq, τ_rb cos kq.

@@ -94,15 +94,15 @@ def possible_effects(setting: Setting) -> Sequence[Effect]:
     setting : Setting
         the arm and the ranges of its motion
     """
-    return [form for effect in catalogue() if effect.screened and not effect.doubtful for form in effect.forms(setting)]
+    return [form for effect in catalogue() if effect.screened for form in effect.forms(setting)]
 
 
-def doubtful_effects(setting: Setting) -> Sequence[Effect]:
-    """Every form of the effects that hardly any data can show: looked for where these do.
+def farther_effects(setting: Setting) -> Sequence[Effect]:
+    """Every form that is worth a look only where something is left.
 
     Parameters
     ----------
     setting : Setting
         the arm and the ranges of its motion
     """
-    return [form for effect in catalogue() if effect.screened and effect.doubtful for form in effect.forms(setting)]
+    return [form for effect in catalogue() if effect.screened for form in effect.farther_forms(setting)]

@@ -144,10 +144,17 @@ def _payload_change(term: Term, shape: Sequence[float], own: Sequence[float], di
 
 
 def _saturation(term: Term, shape: Sequence[float], own: Sequence[float], diagnosis: Diagnosis) -> list[Entry]:
-    """The soft curve: τ - c τ³/τ_max² is l tanh(τ/l) to third order, l = τ_max / √(3 c)."""
-    if shape[0] != 0.0 or own[0] <= 0.0:
+    """Clipped at c, or the soft curve: τ - a (τ - c tanh(τ/c)) is l tanh(τ/l) to third order, l = c/√a."""
+    if own[0] <= 0.0:
         return []
-    return [{"level": float(term.effect.upper[0]) / float(np.sqrt(3.0 * own[0])), "shape": "compression"}]
+    clips = getattr(term.effect, "clips", False)
+    level = shape[0] if clips else shape[0] / float(np.sqrt(own[0]))
+    return [{"level": level, "shape": "clip" if clips else "compression"}]
+
+
+def _displacement(term: Term, shape: Sequence[float], own: Sequence[float], diagnosis: Diagnosis) -> list[Entry]:
+    link, axis = (int(each) for each in shape)
+    return [{"link": link, "translation": [own[0] if number == axis else 0.0 for number in (1, 2, 3)]}]
 
 
 ENTRIES: Mapping[str, Any] = {
@@ -183,6 +190,7 @@ ENTRIES: Mapping[str, Any] = {
     "torque_saturation": _saturation,
     "time_delay": lambda t, s, c, d: [{"delay": c[0]}],
     "base_tilt": _tilt,
+    "kinematic_error": _displacement,
     "external_contact": _contact,
     "payload_change": _payload_change,
 }

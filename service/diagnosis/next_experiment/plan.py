@@ -97,20 +97,21 @@ def plan_experiment(
     bank = Bank(diagnosis.identification, np.random.default_rng(seed))
     nominal = diagnosis.selection.fit.model.without_terms()
 
-    def judged(primitive: Primitive) -> tuple[float, Primitive]:
+    def judged(primitive: Primitive) -> _Judged:
         motion = played(primitive.trajectory, diagnosis.fitter.observations, nominal, diagnosis.cutoff_hz)
-        return judge.value([equations(model, motion.fitter, others) for model, others in judge.tasks]), primitive
+        added = tuple(equations(model, motion.fitter, others) for model, others in judge.tasks)
+        return _Judged(primitive, added, judge.value(added))
 
     seen = [judged(primitive) for primitive in bank.first_look(FIRST_LOOK)]
-    best = max(seen, key=lambda each: each[0])
-    if best[1].kind in KINDS:
-        seen += [judged(primitive) for primitive in bank.fourier(best[1].kind, SECOND_LOOK)]
-    value, chosen = max(seen, key=lambda each: each[0])
-    before = judge.value(None)
-    times = judge.times_wanted(before, value, chosen.trajectory.duration_s)
-    trajectory = replace(chosen.trajectory, segments=chosen.trajectory.segments * times)  # all end where they begin
-    after = before + times * (value - before)
-    kind = chosen.kind if times == 1 else f"{chosen.kind}, {times} times"
+    best = max(seen, key=lambda each: each.value)
+    if best.primitive.kind in KINDS:
+        seen += [judged(primitive) for primitive in bank.fourier(best.primitive.kind, SECOND_LOOK)]
+    best = max(seen, key=lambda each: each.value)
+    chosen = best.primitive.trajectory
+    times = judge.times_wanted(best, max(1, int(LONGEST_S / chosen.duration_s)))
+    trajectory = replace(chosen, segments=chosen.segments * times)  # all end where they begin
+    before, after = judge.value(None), judge.value(best.added, times)
+    kind = best.primitive.kind if times == 1 else f"{best.primitive.kind}, {times} times"
     return PlannedExperiment(trajectory, kind, judge.separates, judge.readable(before), judge.readable(after))
 
 
@@ -144,6 +145,15 @@ def planned_experiment(
 
 
 @dataclass(frozen=True, eq=False)
+class _Judged:
+    """A motion, what it adds to the tasks of the judge, and its worth when it is played once."""
+
+    primitive: Primitive
+    added: tuple[Array, ...]
+    value: float
+
+
+@dataclass(frozen=True, eq=False)
 class _Judge:
     """What a motion is worth beside the recordings that there are.
 
@@ -165,23 +175,24 @@ class _Judge:
     wanted: Array
     inflation: float
 
-    def value(self, added: Sequence[Array] | None) -> float:
-        """Larger is better: the smallest λ, or the information about what is wanted."""
+    def value(self, added: Sequence[Array] | None, times: int = 1) -> float:
+        """Larger is better: the smallest λ, or the information about what is wanted, with a motion played so often."""
         stacked = list(self.known)
         if added is not None:
-            stacked = [np.concatenate(pair) for pair in zip(self.known, added, strict=True)]
+            repeated = [np.sqrt(times) * rows for rows in added]  # as many equal rows count as one, so much larger
+            stacked = [np.concatenate(pair) for pair in zip(self.known, repeated, strict=True)]
         if self.separates:
             return min(
                 float(separations(model, rows).min()) for (model, _), rows in zip(self.tasks, stacked, strict=True)
             )
         return -float(log_variances(self.tasks[0][0], stacked[0])[self.wanted.astype(int)].mean())
 
-    def times_wanted(self, before: float, once: float, duration_s: float) -> int:
+    def times_wanted(self, motion: _Judged, most: int) -> int:
         """How often a motion is played: λ grows with its rows, and `SETTLING` of it is wanted."""
-        if not self.separates or once <= before:
+        if not self.separates or motion.value <= self.value(None):
             return 1
-        wanted = int(np.ceil((SETTLING * self.inflation - before) / (once - before)))
-        return int(np.clip(wanted, 1, max(1, int(LONGEST_S / duration_s))))
+        settling = (each for each in range(1, most) if self.value(motion.added, each) >= SETTLING * self.inflation)
+        return next(settling, most)
 
     def readable(self, value: float) -> float:
         """Standard errors, or the logarithm of one."""

@@ -53,7 +53,7 @@ def played(trajectory: Trajectory, observations: Observations, model: ExtendedMo
     """
     robot, rate = observations.robot, observations.pieces[0].prepared.motion.rate_hz
     samples = trajectory.samples(rate)
-    position = _measured(samples.position, observations.pieces[0].position_noise, rate)
+    position = _measured(samples.position, [piece.position_noise for piece in observations], rate)
     recording = Recording.from_arrays("planned", samples.time, position, np.zeros_like(position))
     conditioner = Conditioner.survey(recording, robot)
     rows = Observations.prepare([conditioner], robot, model.structure.base, cutoff_hz, model.steepness)
@@ -63,12 +63,15 @@ def played(trajectory: Trajectory, observations: Observations, model: ExtendedMo
     return Played(Fitter(rows.with_weights(weights_of_motion(rows, model))))
 
 
-def _measured(position: Array, noise: PositionNoise, rate_hz: float) -> Array:
-    """Positions as the arm's encoders would tell them, (N, n): what exact ones could show, these need not."""
-    std = np.sqrt(np.maximum(noise.density * rate_hz / 2.0 - np.square(noise.step) / 12.0, 0.0))
+def _measured(position: Array, noises: Sequence[PositionNoise], rate_hz: float) -> Array:
+    """Positions as the arm's encoders told them where they were worst, (N, n): exact ones could show more."""
+    density = np.max([noise.density for noise in noises], axis=0)
+    step = np.max([noise.step for noise in noises], axis=0)
+    std = np.sqrt(np.maximum(density * rate_hz / 2.0 - np.square(step) / 12.0, 0.0))
     noisy = position + std * np.random.default_rng(0).standard_normal(position.shape)
-    step = np.where(noise.step > 0.0, noise.step, 1.0)
-    return np.where(noise.step > 0.0, np.rint(noisy / step) * step, noisy)
+    rounds = step > 0.0
+    divisor = np.where(rounds, step, 1.0)
+    return np.where(rounds, np.rint(noisy / divisor) * divisor, noisy)
 
 
 def equations(model: ExtendedModel, fitter: Fitter, others: Sequence[ExtendedModel] = ()) -> Array:

@@ -1,0 +1,83 @@
+"""How a parameter changes over many identifications: a weighted straight line, v(t) = a + b t."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+
+import numpy as np
+
+WEEK_S = 7 * 86400.0
+
+
+@dataclass(frozen=True)
+class TrendPoint:
+    """A parameter in one identification.
+
+    time : datetime
+        of the identification
+    value, std : float
+        estimate and its standard error [SI]
+    """
+
+    time: datetime
+    value: float
+    std: float
+
+
+@dataclass(frozen=True)
+class Trend:
+    """The line through all points.
+
+    count : int
+        number of points
+    slope : float
+        change a week [SI/week]
+    slope_std : float
+        its standard error; larger where the points scatter more than their own errors say
+    scatter : float
+        √(χ²/(N − 2)): 1 where the points scatter as their errors say, more where something else changes too
+    change : float
+        of the line from the first point to the last [SI]
+    """
+
+    count: int
+    slope: float
+    slope_std: float
+    scatter: float
+    change: float
+
+    @property
+    def in_std(self) -> float:
+        """The slope in its standard errors."""
+        return self.slope / self.slope_std
+
+
+def trend_of(points: Sequence[TrendPoint]) -> Trend | None:
+    """The line through all points, by weighted least squares.
+
+    Parameters
+    ----------
+    points : sequence of TrendPoint
+        in any order, standard errors positive
+
+    Returns
+    -------
+    Trend or None
+        None where fewer than three points, or all at one time, tell no slope
+    """
+    if len(points) < 3:
+        return None
+    start = min(point.time for point in points)
+    time = np.array([(point.time - start).total_seconds() / WEEK_S for point in points])
+    value = np.array([point.value for point in points])
+    weight = 1.0 / np.array([point.std for point in points]) ** 2
+    centred = time - np.average(time, weights=weight)
+    spread = float(np.sum(weight * centred**2))
+    if spread <= 0.0:
+        return None
+    slope = float(np.sum(weight * centred * value)) / spread
+    residual = value - np.average(value, weights=weight) - slope * centred
+    scatter = math.sqrt(float(np.sum(weight * residual**2)) / (len(points) - 2))
+    slope_std = max(1.0, scatter) / math.sqrt(spread)
+    return Trend(len(points), slope, slope_std, scatter, slope * float(np.ptp(time)))
