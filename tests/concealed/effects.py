@@ -29,8 +29,8 @@ class Ground:
         rms of its torque [Nm]
     low, high : float
         range of its motion [rad]
-    duration : float
-        of the longest recording [s]
+    duration, shortest : float
+        of the longest and the shortest recording [s]
     """
 
     robot: Robot
@@ -40,6 +40,7 @@ class Ground:
     low: float
     high: float
     duration: float
+    shortest: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +61,8 @@ class Drawn:
         ids that come with it: a second mass that an elastic transmission brings
     smallest : float
         size below which the effect is another: bristles shorter than the encoder's noise are a step
+    largest : float
+        size beyond which no arm has it
     """
 
     entry: Callable[[float], Entry]
@@ -69,6 +72,7 @@ class Drawn:
     names: tuple[str, ...]
     also: tuple[str, ...] = ()
     smallest: float = 0.0
+    largest: float = np.inf
 
 
 def _law(effect: str, ground: Ground, key: str, size: float, **more: object) -> Drawn:
@@ -181,6 +185,7 @@ def joint_elasticity(g: Ground, rng: np.random.Generator) -> Drawn:
         (g.joint,),
         ("joint_elasticity",),
         ("rotor_inertia",),
+        largest=0.02,
     )
 
 
@@ -199,6 +204,7 @@ def backlash(g: Ground, rng: np.random.Generator) -> Drawn:
         (g.joint,),
         ("backlash",),
         ("rotor_inertia",),
+        largest=0.05,
     )
 
 
@@ -234,6 +240,7 @@ def time_delay(g: Ground, rng: np.random.Generator) -> Drawn:
         1.0,
         (None if whole else g.joint,),
         ("time_delay",),
+        largest=0.03,
     )
 
 
@@ -259,6 +266,51 @@ def base_tilt(g: Ground, rng: np.random.Generator) -> Drawn:
     )
 
 
+def kinematic_error(g: Ground, rng: np.random.Generator) -> Drawn:
+    link = int(rng.integers(1, g.robot.joint_count))
+    axis = int(rng.integers(3))
+    return Drawn(
+        lambda value: {
+            "effect": "kinematic_error",
+            "link": link,
+            "translation": [value if place == axis else 0.0 for place in range(3)],
+        },
+        0.03 * _sign(rng),
+        1.0,
+        (None,),
+        ("kinematic_error",),
+        largest=0.15,
+    )
+
+
+def payload_change(g: Ground, rng: np.random.Generator) -> Drawn:
+    """From one instant to another of every recording: a cycle that picks something up."""
+    offset = [float(value) for value in rng.uniform(-0.1, 0.1, 3).round(3)]
+    begin, length = float(rng.uniform(0.2, 0.5)) * g.shortest, float(rng.uniform(0.2, 0.4)) * g.shortest
+    when = {"start": round(begin, 2), "end": round(begin + length, 2)}
+    return Drawn(
+        lambda value: {"effect": "payload_change", "mass": value, "offset": offset, **when},
+        0.2,
+        1.0,
+        (None,),
+        ("payload_change",),
+        largest=20.0,
+    )
+
+
+def external_contact(g: Ground, rng: np.random.Generator) -> Drawn:
+    """A push at one joint, once in every recording."""
+    profile = str(rng.choice(["half_sine", "rectangular"]))
+    when = {
+        "start": round(float(rng.uniform(0.2, 0.7)) * g.shortest, 2),
+        "duration": round(float(rng.uniform(0.5, 3.0)), 2),
+    }
+    return _law("external_contact", g, "torque", 2.0 * g.noise * _sign(rng), profile=profile, **when)
+
+
+EVENTS: dict[str, Draw] = {draw.__name__: draw for draw in (payload_change, external_contact)}
+"""Effects that happen once a recording."""
+
 CATALOGUE: dict[str, Draw] = {
     draw.__name__: draw
     for draw in (
@@ -282,5 +334,6 @@ CATALOGUE: dict[str, Draw] = {
         joint_spring,
         cable_force,
         base_tilt,
+        kinematic_error,
     )
 }

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from concealed.motions import RATE_HZ, Motion
+from concealed.motions import RATE_HZ, Asked
 from drivers import ControlMode, DriveLimits, Setpoint, StopPolicy
 from service.robot import Robot, robot_to_dict
 from sim_backend.driver import SimulatedArm
@@ -66,7 +66,7 @@ def _effect(entry: Entry) -> Any:
     return EFFECTS[entry["effect"]].model_validate({key: value for key, value in entry.items() if key != "effect"})
 
 
-def passage(robot: Robot, entries: Sequence[Entry], motion: Motion) -> Passage:
+def passage(robot: Robot, entries: Sequence[Entry], motion: Asked) -> Passage:
     """The motion under the physical ones of some effects; from disk where it was made before."""
     acting = [entry for entry in entries if physical([entry])]
     setpoints = motion.setpoints

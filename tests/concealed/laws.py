@@ -15,11 +15,14 @@ from concealed.motions import RATE_HZ
 from service.robot import Robot
 from sim_backend.effects import Effect
 from sim_backend.effects.base_tilt import BaseTilt
+from sim_backend.effects.external_contact import ExternalContact
 from sim_backend.effects.friction_coupling import FrictionCoupling
 from sim_backend.effects.friction_drift import FrictionDrift
 from sim_backend.effects.joint_law import JointLaw
+from sim_backend.effects.kinematic_error import KinematicError
 from sim_backend.effects.load_dependent_friction import LoadDependentFriction
 from sim_backend.effects.payload import Payload
+from sim_backend.effects.payload_change import PayloadChange
 from sim_backend.effects.presliding_hysteresis import PreslidingHysteresis
 from sim_backend.effects.rotor_inertia import RotorInertia
 from sim_backend.effects.torque_ripple import TorqueRipple
@@ -65,7 +68,12 @@ def law_torque(robot: Robot, effect: Effect, passage: Passage) -> Array | None:
             torque[:, effect.index] = _bristles(robot, effect, q[:, effect.index], v[:, effect.index])
         case FrictionDrift():
             torque[:, effect.index] = _warming(robot, effect, v[:, effect.index])
-        case BaseTilt() | Payload():
+        case ExternalContact() if effect.joint is not None:
+            torque[:, effect.joint - 1] = (effect.torque or 0.0) * _pressing(effect, len(q))
+        case PayloadChange():
+            carries = Payload(mass=effect.mass, offset=effect.offset, moments=effect.moments)
+            torque = _carrying(effect, len(q)) * (_load(carries.alter(robot), passage) - _load(robot, passage))
+        case BaseTilt() | Payload() | KinematicError():
             torque = _load(effect.alter(robot), passage) - _load(robot, passage)
         case _:
             return None
@@ -75,6 +83,19 @@ def law_torque(robot: Robot, effect: Effect, passage: Passage) -> Array | None:
 def _load(robot: Robot, passage: Passage) -> Array:
     """Rigid-body torque by MuJoCo, (N, n) [Nm]."""
     return rigid_body_torque(build_model(robot), passage.position, passage.velocity, _acceleration(passage.velocity))
+
+
+def _carrying(effect: PayloadChange, count: int) -> Array:
+    """One while the body is carried, (N, 1)."""
+    time = STEP_S * np.arange(count)[:, None]
+    return np.where((time >= effect.start) & (time < (effect.end or np.inf)), 1.0, 0.0)
+
+
+def _pressing(effect: ExternalContact, count: int) -> Array:
+    """w(t), (N,)."""
+    phase = (STEP_S * np.arange(count) - effect.start) / effect.duration
+    shape = np.sin(np.pi * phase) if effect.profile == "half_sine" else np.ones(count)
+    return np.where((phase >= 0.0) & (phase < 1.0), shape, 0.0)
 
 
 def _acceleration(velocity: Array) -> Array:

@@ -1,10 +1,12 @@
 """What the arm is asked to do: random Fourier series, slow reversals, and motions too narrow or too slow to tell."""
 
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from service.excitation import Trajectory
 from service.robot import Joint, JointLimits, Robot
 from sim_backend.motion import FourierMotion, random_fourier_motion
 
@@ -16,6 +18,19 @@ HOLD_S = 0.5
 
 SLOW_SPEED = 0.12
 """Speed limit of slow reversals [rad/s]."""
+
+
+class Asked(Protocol):
+    """What a drive is told, and which period of it each setpoint belongs to."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def setpoints(self) -> Array: ...
+
+    @property
+    def period(self) -> Array: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +63,31 @@ class Motion:
         count = round(self.series.period_s * RATE_HZ)
         rest = np.full(round(HOLD_S * RATE_HZ), np.nan)
         return np.concatenate([rest, np.repeat(np.arange(self.periods, dtype=np.float64), count)])
+
+
+@dataclass(frozen=True, eq=False)
+class Planned:
+    """A motion that somebody else has planned, with rest before it.
+
+    name : str
+        of the recording
+    trajectory : Trajectory
+        the motion
+    """
+
+    name: str
+    trajectory: Trajectory
+
+    @property
+    def setpoints(self) -> Array:
+        """Position at `RATE_HZ`, (N, n) [rad or m]."""
+        position = self.trajectory.samples(RATE_HZ).position
+        return np.concatenate([np.tile(position[:1], (round(HOLD_S * RATE_HZ), 1)), position])
+
+    @property
+    def period(self) -> Array:
+        """No period is stated, (N,)."""
+        return np.full(len(self.setpoints), np.nan)
 
 
 def campaign(robot: Robot, seed: int, kind: str = "rich", period_s: float = 8.0) -> tuple[list[Motion], list[Motion]]:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from concealed.forward import Entry, Passage, sensory
-from concealed.motions import RATE_HZ, Motion
+from concealed.motions import RATE_HZ, Asked
 from service.recording import Recording
 
 Array = NDArray[np.float64]
@@ -24,6 +24,8 @@ class Noise:
         [rad]
     encoder_step : float
         zero for none [rad]
+    dropped : float
+        share of samples that the logger lost
     kind : str
         ``white``, ``coloured`` (half of its power below 2 Hz) or ``heavy`` (Student's t with three degrees of freedom)
     """
@@ -31,6 +33,7 @@ class Noise:
     torque_std: tuple[float, ...]
     position_std: float = 2e-5
     encoder_step: float = 0.0
+    dropped: float = 0.0
     kind: str = "white"
 
 
@@ -44,7 +47,7 @@ def sensed(entries: Sequence[Entry], position: Array, torque: Array) -> tuple[Ar
 
 
 def recording(
-    motion: Motion,
+    motion: Asked,
     passage: Passage,
     entries: Sequence[Entry],
     noise: Noise,
@@ -60,8 +63,11 @@ def recording(
         position = np.rint(position / noise.encoder_step) * noise.encoder_step
     torque = torque + np.array(noise.torque_std) * _unit_noise(noise.kind, torque.shape, rng)
     time = np.arange(len(position)) / RATE_HZ
-    period = motion.period[::every] if states_periods else None
-    return Recording.from_arrays(motion.name, time[::every], position[::every], torque[::every], period=period)
+    kept = np.flatnonzero(np.arange(len(time)) % every == 0)
+    if noise.dropped:
+        kept = kept[rng.random(len(kept)) >= noise.dropped]
+    period = motion.period[kept] if states_periods and np.isfinite(motion.period).any() else None
+    return Recording.from_arrays(motion.name, time[kept], position[kept], torque[kept], period=period)
 
 
 def _unit_noise(kind: str, shape: tuple[int, ...], rng: np.random.Generator) -> Array:

@@ -1,0 +1,57 @@
+"""Try the diagnosis on concealed effects: `PYTHONPATH=tests python -m concealed.prove --help`.
+
+A trial's truth is sealed before the diagnosis, which runs in a process of its own and sees recordings and a robot file;
+only then is it opened. Outcomes are kept line by line: what is there is not tried again.
+"""
+
+import argparse
+from pathlib import Path
+
+from concealed.case import SERIES
+from concealed.kept import Kept, Outcome
+from concealed.running import commit, run
+from concealed.tables import summary
+from concealed.task import REAL, Task
+from concealed.workers import workers
+
+
+def main() -> None:
+    """Try some series, and say how it went."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("series", nargs="+", choices=list(SERIES), metavar="SERIES", help=", ".join(SERIES))
+    parser.add_argument("--count", type=int, default=16, help="trials of each series")
+    parser.add_argument("--first-seed", type=int, default=0, help="below 10000: development; from a million: reports")
+    parser.add_argument("--arm", help="one arm instead of all")
+    parser.add_argument("--jobs", type=int, default=2, help="trials at the same time")
+    parser.add_argument("--out", type=Path, default=Path("outcomes.jsonl"), help="outcomes, one a line")
+    parser.add_argument("--oracle", action="store_true", help="compare with a diagnosis that knows the form")
+    asked = parser.parse_args()
+    kept, state = Kept(asked.out), commit()
+    wanted = [
+        Task(series, asked.first_seed + number, asked.arm, state, asked.oracle)
+        for series in asked.series
+        for number in range(asked.count)
+    ]
+    with workers(asked.jobs) as executor:
+        run(wanted, kept, executor, lambda each: print(line(each), flush=True))
+    print(summary(kept.of({task.key for task in wanted})))
+
+
+def line(each: Outcome) -> str:
+    """One trial in one line."""
+    if "error" in each:
+        return f"{each['series']} {each['seed']}: {each['error'][:200]}"
+    score, places = each["score"], [f"{what}@{joint + 1}" for what, joint in each["case"]["places"]]
+    again = f" -> {each['again']['verdict']} {each['again']['told']}" if "again" in each else ""
+    extra = f" ratio {each['oracle_ratio']:.3f}" if "oracle_ratio" in each else ""
+    if each["series"] == REAL:
+        return f"{each['name']} {score['verdict']} {score['told']} {score['seconds']:.0f} s"
+    return (
+        f"{each['name']} {', '.join(places) or 'sound'} s {score['strength']:.0f} {each['case']['kind']}"
+        f" {each['case']['sensors'] or ''}: {'named' if score['named'] else 'MISSED' if places else ''}"
+        f" {score['verdict']} {score['told']}{again}{extra} {score['seconds']:.0f} s"
+    )
+
+
+if __name__ == "__main__":
+    main()

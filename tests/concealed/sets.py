@@ -1,0 +1,61 @@
+"""The two sets of the proof: how many trials of which series, and in which order."""
+
+from collections.abc import Sequence
+
+from concealed.case import SERIES
+from concealed.real.trials import REAL, data
+from concealed.task import REAL as REAL_SERIES
+from concealed.task import Task
+
+FULL: dict[str, int] = {
+    "sound": 78,
+    "sound-sensing": 25,
+    "sound-coarse": 8,
+    "weak": 40,
+    "moderate": 60,
+    "strong": 48,
+    "pair": 20,
+    "triple": 10,
+    "form": 48,
+    "unknown": 24,
+    "aliased": 24,
+    "strong-sensing": 28,
+    "strong-coarse": 8,
+    "constant": 12,
+    "event": 14,
+}
+"""Trials of each series by ``tauscope prove --full``: a quarter of all conceal nothing."""
+
+REDUCED: dict[str, int] = {
+    "sound": 8,
+    "sound-sensing": 3,
+    "weak": 4,
+    "moderate": 7,
+    "strong": 5,
+    "pair": 2,
+    "triple": 1,
+    "form": 5,
+    "unknown": 2,
+    "aliased": 2,
+    "strong-sensing": 3,
+    "constant": 2,
+    "event": 1,
+}
+"""Trials of each series by ``tauscope prove``: what two cores do in a quarter of an hour."""
+
+REPORTING = 1_000_000
+"""First seed of reports. Seeds below 10,000 were looked at while the diagnosis was made."""
+
+COMPARED = frozenset(SERIES) - {"sound", "sound-sensing", "sound-coarse", "form", "unknown", "aliased"}
+"""Series whose truth has a form in the catalogue, so that an oracle can know it."""
+
+
+def real_tasks(names: Sequence[str], commit: str) -> list[Task]:
+    """Trials on recordings of real arms; none where those are not there."""
+    return [Task(REAL_SERIES, 0, name, commit) for name in names if (data() / REAL[name].recordings).is_dir()]
+
+
+def tasks(counts: dict[str, int], first_seed: int, commit: str) -> list[Task]:
+    """All trials of a set, the series mixed evenly: a set that is cut short is a smaller one of the same mix."""
+    places = [((number + 0.5) / count, series, number) for series, count in counts.items() for number in range(count)]
+    return [Task(series, first_seed + number, None, commit, series in COMPARED) for _, series, number in sorted(places)]

@@ -1,0 +1,92 @@
+"""One trial from its draw to its score: made, sealed, diagnosed apart, opened, compared."""
+
+import tempfile
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from concealed.baselines.columns import ground
+from concealed.baselines.ranking import rankings
+from concealed.case import Case
+from concealed.kept import Key, Outcome
+from concealed.oracle import against_oracle, oracle
+from concealed.plain import plain
+from concealed.real.outcome import real_outcome
+from concealed.score import compared
+from concealed.sealed import Sealed, diagnosis_apart, made, sealed, with_recommended
+from concealed.trial import Trial
+from concealed.truth import opened
+
+FOLLOWED = ("aliased",)
+"""Series in which the recommended motion is played and the diagnosis repeated."""
+
+REAL = "real"
+"""Series of the trials on recordings of real arms; the arm is the trial's name there."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """A trial to make.
+
+    series : str
+        what is tried
+    seed : int
+        of everything that is drawn
+    arm : str or None
+        drawn where None
+    commit : str
+        of the source that makes it and diagnoses it
+    with_oracle : bool
+        whether it is compared with a diagnosis that knows the form
+    """
+
+    series: str
+    seed: int
+    arm: str | None = None
+    commit: str = ""
+    with_oracle: bool = False
+
+    @property
+    def key(self) -> Key:
+        return self.series, self.seed, self.arm
+
+
+def outcome(task: Task) -> Outcome:
+    """The trial's outcome; where it could not be made or diagnosed, why.
+
+    Everything that a reader needs to draw it again is in it, and the diagnosis itself, so that it can be scored anew.
+    """
+    told: Outcome = {"series": task.series, "seed": task.seed, "arm": task.arm, "commit": task.commit}
+    told["began"] = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
+    try:
+        return {**told, **(real_outcome(task.arm or "") if task.series == REAL else _tried(task))}
+    except Exception as error:  # whatever it is, the other trials go on and this one is counted as failed
+        return {**told, "error": repr(error)}
+
+
+def _tried(task: Task) -> Outcome:
+    with (
+        tempfile.TemporaryDirectory(prefix="concealed-") as where,
+        tempfile.TemporaryDirectory(prefix="vault-") as vault,
+    ):
+        case, trial = made(task.series, task.seed, task.arm)
+        these = sealed(case, trial, Path(where), Path(vault))
+        print(f"sealed {case.name} {these.seal}", flush=True)
+        return _diagnosed(task, case, trial, these)
+
+
+def _diagnosed(task: Task, case: Case, trial: Trial, these: Sealed) -> Outcome:
+    plans = task.series in FOLLOWED
+    found, seconds = diagnosis_apart(these.folder, plans=plans)
+    again = diagnosis_apart(these.folder) if plans and with_recommended(these) else None
+    truth = opened(these.truth, these.seal)
+    told: dict[str, Any] = {"name": case.name, "case": case.as_dict(), "seal": these.seal, "truth": asdict(truth)}
+    told |= {"score": asdict(compared(truth, found, seconds)), "seconds": seconds, "diagnosis": plain(found)}
+    told["baselines"] = rankings(ground(trial.robot, trial.train))
+    if again is not None:
+        told |= {"again": asdict(compared(truth, *again)), "diagnosis_again": plain(again[0])}
+    if task.with_oracle and again is None and trial.concealed.entries:
+        best = oracle(trial)
+        told |= {"oracle_ratio": against_oracle(found, best), "oracle": plain(best)["fit"]}
+    return told
