@@ -7,6 +7,8 @@ from contextlib import asynccontextmanager
 from fastapi import FastAPI
 
 from service.api import health, pages
+from service.api.access.gate import Gate
+from service.api.audit.recorder import Audited
 from service.api.body_limit import BodyLimit
 from service.api.campaigns.models import CampaignRequest
 from service.api.campaigns.router import router as campaigns
@@ -14,10 +16,21 @@ from service.api.diagnoses.models import DiagnosisRequest
 from service.api.diagnoses.router import router as diagnoses
 from service.api.excitations.models import ExcitationRequest
 from service.api.excitations.router import router as excitations
+from service.api.history.models import ReasonRequest
+from service.api.history.router import router as history
+from service.api.idempotency.repeatable import Repeatable
 from service.api.identifications.models import IdentificationRequest
 from service.api.identifications.router import router as identifications
+from service.api.items.router import router as items
 from service.api.jobs.events import EVENT_MODELS
+from service.api.leases.models import LeaseRequest
+from service.api.leases.router import router as leases
+from service.api.leases.router import stop_router
 from service.api.openapi import install_openapi
+from service.api.opening import open_services
+from service.api.operations.observed import Observed
+from service.api.operations.systemd import told
+from service.api.page.router import router as page
 from service.api.problem_handlers import install_problem_handlers
 from service.api.problems import Problem
 from service.api.protection import KnownCallers, SafeAnswers
@@ -26,11 +39,13 @@ from service.api.robots.models import RobotCheckRequest
 from service.api.robots.router import router as robots
 from service.api.runs.models import RunRequest
 from service.api.runs.router import router as runs
-from service.api.services import open_services
+from service.api.schedules.models import ScheduleRequest
+from service.api.schedules.router import router as schedules
 from service.api.settings import Settings
+from service.identification.history import ModelPolicy
 from service.jobs import StartControl
 
-API_VERSION = "1.2.0"
+API_VERSION = "1.5.0"
 """Of the interface, not of the package; a change of tests/api/openapi.json goes with a change here."""
 
 PREFIX = "/api/v1"
@@ -53,7 +68,7 @@ def create_app(settings: Settings, executor: Executor | None = None, start: Star
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         with open_services(settings, executor, start) as services:
             app.state.services = services
-            async with services.pulse.beating():
+            async with services.pulse.beating(), told():
                 yield
 
     app = FastAPI(
@@ -65,10 +80,24 @@ def create_app(settings: Settings, executor: Executor | None = None, start: Star
         docs_url=None,
         redoc_url=None,
     )
-    for router in (campaigns, excitations, runs, recordings, identifications, diagnoses, robots):
+    for router in (
+        campaigns,
+        excitations,
+        runs,
+        recordings,
+        identifications,
+        diagnoses,
+        robots,
+        items,
+        history,
+        schedules,
+        leases,
+        stop_router,
+    ):
         app.include_router(router, prefix=PREFIX)
     app.include_router(health.router)
     app.include_router(pages.router)
+    app.include_router(page)
     install_problem_handlers(app)
     requests = [
         IdentificationRequest,
@@ -77,10 +106,18 @@ def create_app(settings: Settings, executor: Executor | None = None, start: Star
         RunRequest,
         CampaignRequest,
         RobotCheckRequest,
+        LeaseRequest,
+        ReasonRequest,
+        ModelPolicy,
+        ScheduleRequest,
     ]
     install_openapi(app, [*requests, Problem, *EVENT_MODELS])
     # The last one added is the first to see a request.
+    app.add_middleware(Repeatable)
+    app.add_middleware(Audited)
+    app.add_middleware(Gate)
     app.add_middleware(BodyLimit, limit=settings.max_upload_bytes)
-    app.add_middleware(KnownCallers, allowed_hosts=settings.allowed_hosts)
+    app.add_middleware(KnownCallers, answers_for=settings.answers_for)
+    app.add_middleware(Observed)
     app.add_middleware(SafeAnswers)
     return app

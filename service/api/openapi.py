@@ -8,6 +8,9 @@ from fastapi.openapi.utils import get_openapi
 from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
+from service.api.access.scopes import needed_scope
+from service.api.problems import MEDIA_TYPE, problem_responses
+
 _REFERENCE = "#/components/schemas/{model}"
 
 Examples = Mapping[str, tuple[str, Any]]
@@ -97,8 +100,44 @@ def _document(app: FastAPI, models: Sequence[type[BaseModel]]) -> dict[str, Any]
     _, definitions = models_json_schema([(model, "validation") for model in models], ref_template=_REFERENCE)
     components = document.setdefault("components", {}).setdefault("schemas", {})
     components.update(definitions.get("$defs", {}))
+    _add_common_answers(document)
     # The framework's own form of validation errors is never sent.
     for unused in ("HTTPValidationError", "ValidationError"):
         components.pop(unused, None)
     document["components"]["schemas"] = dict(sorted(components.items()))
     return document
+
+
+_COMMON = ("bad-request", "host", "origin", "unauthorized", "forbidden", "rate-limited", "internal")
+"""Problems that any request to the interface may meet, before its route or in it."""
+
+
+def _add_common_answers(document: dict[str, Any]) -> None:
+    """Say of every operation that a key may be asked for, and what may come of any request."""
+    document["components"]["securitySchemes"] = {
+        "key": {
+            "type": "http",
+            "scheme": "bearer",
+            "description": "an API key (`tauscope key add`); not asked for by a service on loopback that has no keys",
+        }
+    }
+    for path, operations in document["paths"].items():
+        for method, operation in operations.items():
+            scope = needed_scope(method.upper(), path)
+            if scope is None:
+                continue
+            operation["security"] = [{"key": []}, {}]
+            operation["x-tauscope-scope"] = scope.value
+            for status, answer in problem_responses(*_COMMON).items():
+                _merge_answer(operation["responses"], str(status), answer)
+            operation["responses"] = dict(sorted(operation["responses"].items()))
+
+
+def _merge_answer(responses: dict[str, Any], status: str, answer: dict[str, Any]) -> None:
+    """Add what a status may mean to what it means already."""
+    present = responses.setdefault(status, answer)
+    if present is not answer:
+        examples = present["content"][MEDIA_TYPE]["examples"]
+        new = {code: value for code, value in answer["content"][MEDIA_TYPE]["examples"].items() if code not in examples}
+        examples.update(new)
+        present["description"] = "; ".join([present["description"], *(value["summary"] for value in new.values())])

@@ -15,8 +15,9 @@ from service.robot.messages import one_line, shown
 router = APIRouter(prefix="/docs", include_in_schema=False)
 
 _METHODS = ("get", "post", "put", "delete")
+_FOLDER = FilePath(__file__).parent / "templates"
 _templates = Environment(
-    loader=FileSystemLoader(FilePath(__file__).parent / "templates"),
+    loader=FileSystemLoader(_FOLDER),
     autoescape=True,
     undefined=StrictUndefined,
     trim_blocks=True,
@@ -30,6 +31,12 @@ def show_interface(request: Request) -> Response:
     document = request.app.openapi()
     page = _templates.get_template("interface.html")
     return HTMLResponse(page.render(info=document["info"], operations=_operations(document), kinds=KINDS.values()))
+
+
+@router.get("/pages.css")
+def get_style() -> Response:
+    """How the pages look; a file, because nothing inline is let through."""
+    return Response((_FOLDER / "pages.css").read_bytes(), media_type="text/css")
 
 
 @router.get("/errors/{code}")

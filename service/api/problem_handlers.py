@@ -11,11 +11,17 @@ from starlette.requests import ClientDisconnect
 
 from service.api.problems import ProblemError, answer_code, field_errors, make_problem, problem_answer, summarised
 from service.errors import TauscopeError
-from service.jobs import BusyError, QueueFullError
+from service.jobs import BusyError, LeasedError, LeaseLostError, LeaseNeededError, NotArmedError, QueueFullError
 from service.store import NameTakenError
 
 _log = logging.getLogger("tauscope.api")
 
+_OF_LEASE: Mapping[type[Exception], str] = {
+    LeasedError: "leased",
+    LeaseNeededError: "lease-needed",
+    LeaseLostError: "lease-lost",
+    NotArmedError: "not-armed",
+}
 _OF_STATUS: Mapping[int, str] = {404: "not-found", 405: "method-not-allowed", 413: "limit-exceeded", 415: "media-type"}
 
 
@@ -42,7 +48,7 @@ async def _tauscope_error(request: Request, error: Exception) -> Response:
         return problem_answer(make_problem("busy", str(error), request.url.path), {"Retry-After": "10"})
     if isinstance(error, NameTakenError):
         return answer_code(request, "name-taken", str(error))
-    code = error.code if isinstance(error, TauscopeError) else "internal"
+    code = _OF_LEASE.get(type(error)) or (error.code if isinstance(error, TauscopeError) else "internal")
     return answer_code(request, code, str(error))
 
 

@@ -1,7 +1,7 @@
 """What stands before every route: host and origin checks, safe headers, no tracebacks."""
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
@@ -16,7 +16,12 @@ HEADERS: Mapping[str, str] = {
     "Cache-Control": "no-store",
     "Referrer-Policy": "no-referrer",
     "Cross-Origin-Resource-Policy": "same-origin",
-    "Content-Security-Policy": "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'; base-uri 'none'",
+    # The page is made of files of our own; nothing inline is run or styled, whatever a robot is called.
+    "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:;"
+    " font-src 'self'; connect-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
+    "X-Frame-Options": "DENY",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Permissions-Policy": "camera=(), geolocation=(), microphone=(), usb=(), serial=()",
 }
 
 
@@ -62,18 +67,18 @@ class SafeAnswers:
 class KnownCallers:
     """Turns away requests for other host names (DNS rebinding) and those that a page of another origin makes."""
 
-    def __init__(self, app: ASGIApp, allowed_hosts: frozenset[str]) -> None:
+    def __init__(self, app: ASGIApp, answers_for: Callable[[str | None], bool]) -> None:
         """Wrap an application.
 
         Parameters
         ----------
         app : ASGI application
             what is wrapped
-        allowed_hosts : frozenset of str
-            names and addresses of this service, in lower case, without ports
+        answers_for : callable
+            whether a host, in lower case and without port, is this service
         """
         self.app = app
-        self.allowed_hosts = allowed_hosts
+        self.answers_for = answers_for
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request, or turn it away."""
@@ -85,7 +90,7 @@ class KnownCallers:
     def _reason(self, headers: Headers) -> tuple[str, str] | None:
         """Code and detail of the problem with the caller, if there is one."""
         host, origin = headers.get("host", ""), headers.get("origin")
-        if _host_name(f"//{host}") not in self.allowed_hosts:
+        if not self.answers_for(_host_name(f"//{host}")):
             return "host", f"this service does not answer for the host {host!r}; call it by the address it listens at"
         own = origin is None or origin.lower() in (f"http://{host.lower()}", f"https://{host.lower()}")
         if not own or headers.get("sec-fetch-site", "none") not in ("none", "same-origin"):

@@ -1,13 +1,17 @@
 """The application behind a socket."""
 
 import socket
+import ssl
 from collections.abc import Callable
 
 import uvicorn
 from fastapi import FastAPI
+from uvicorn.config import LOGGING_CONFIG
 
 from service.api.app import create_app
-from service.api.services import Services, require_data_folder
+from service.api.opening import require_data_folder
+from service.api.operations.logs import log_as_json
+from service.api.services import Services
 from service.api.settings import Settings
 from service.errors import TauscopeError
 
@@ -28,21 +32,31 @@ def serve(settings: Settings, announce: Callable[[str], None]) -> None:
     Raises
     ------
     TauscopeError
-        if the address is not loopback or cannot be had, or another service works with the data folder
+        if the address cannot be had, others could reach it and there is no API key, or another service works with the
+        data folder; or the certificate cannot be used
     """
-    settings.require_loopback()
+    _require_certificate(settings)
     require_data_folder(settings)
+    if settings.log_format == "json":
+        log_as_json()
     with _listening(settings) as listener:
         app = create_app(settings)
         config = uvicorn.Config(
             app,
-            log_level="warning",
+            log_level="warning" if settings.log_format == "text" else None,
+            log_config=LOGGING_CONFIG if settings.log_format == "text" else None,
+            access_log=False,
             server_header=False,
-            proxy_headers=False,
+            # Nobody's word on an address is believed but that of proxies that the operator named.
+            proxy_headers=bool(settings.trusted_proxies),
+            forwarded_allow_ips=list(settings.trusted_proxies),
+            ssl_certfile=settings.tls_certificate,
+            ssl_keyfile=settings.tls_key,
             timeout_graceful_shutdown=GRACE_S,
         )
         host, port = listener.getsockname()[:2]
-        announce(f"http://{f'[{host}]' if ':' in host else host}:{port}")
+        scheme = "http" if settings.tls_certificate is None else "https"
+        announce(f"{scheme}://{f'[{host}]' if ':' in host else host}:{port}")
         _Server(config, app).run(sockets=[listener])
 
 
@@ -59,6 +73,19 @@ class _Server(uvicorn.Server):
         if services is not None:
             services.begin_to_close()
         await super().shutdown(sockets)
+
+
+def _require_certificate(settings: Settings) -> None:
+    """Refuse a certificate without key, or files that are neither."""
+    if (settings.tls_certificate is None) != (settings.tls_key is None):
+        raise TauscopeError("TLS: certificate and key belong together; give --tls-certificate and --tls-key")
+    if settings.tls_certificate is None:
+        return
+    try:
+        ssl.create_default_context(ssl.Purpose.CLIENT_AUTH).load_cert_chain(settings.tls_certificate, settings.tls_key)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise TauscopeError(f"{settings.tls_certificate}: no usable certificate with its key ({reason})") from None
 
 
 def _listening(settings: Settings) -> socket.socket:

@@ -14,12 +14,14 @@ from rich.console import Console
 from ruamel.yaml import YAML
 
 from service.acquisition import BackendOrder, RunOptions, RunOrder, RunState
+from service.cli.demo_campaign import run_campaign
 from service.cli.demo_folder import prepare_folder
 from service.cli.identify_run import Outcome, Request, identify_files, write_outcome
 from service.cli.identify_summary import show_identification
 from service.cli.output_files import write_file
 from service.cli.run_session import keep_recording, run_to_end, why_unfinished
 from service.cli.terminal import Told, output, plain, shown_percent, shown_progress, table
+from service.diagnosis import DiagnosisDocument
 from service.errors import AcquisitionError
 from service.excitation import ExcitationOptions, OptimiserProgress, design_excitation, write_trajectory
 from service.identification import Identification
@@ -41,6 +43,14 @@ RESULT, REPORT = "identification.json", "report.html"
 EXPORTS = ("friction.json", "friction.yaml", "friction.h", "friction.py", "model.xml")
 FILES = (ROBOT, SCENARIO, TRAIN_TRAJECTORY, HELD_OUT_TRAJECTORY, TRAIN, HELD_OUT, RESULT, REPORT, *EXPORTS)
 """What the demo writes, and may therefore write again."""
+
+DATA = "service"
+"""Data folder of a service, which holds a campaign on an arm that conceals an effect."""
+
+CONCEALED = {"torque_noise_std": list(NOISE_STD_NM), "seed": 1} | {
+    "effects": [{"effect": "joint_spring", "joint": 1, "stiffness": 0.6}]
+}
+"""What the arm of that campaign conceals: a scenario, by which the diagnosis is put to the test."""
 
 SCENARIO_TEXT = f"torque_noise_std: {list(NOISE_STD_NM)}\n"
 """What the simulated arm conceals, but for the seed of its noise."""
@@ -84,7 +94,7 @@ def run_demo(folder: Path) -> None:
     TauscopeError
         where the folder holds somebody else's files of the same names, or cannot be written
     """
-    prepare_folder(folder, FILES)
+    prepare_folder(folder, (*FILES, DATA))
     arm = read_robot(example_robot("paper_arm"))
     write_file(folder / ROBOT, robot_text_without_model(example_robot("paper_arm")).encode())
     write_file(folder / SCENARIO, SCENARIO_TEXT.encode())
@@ -105,6 +115,9 @@ def run_demo(folder: Path) -> None:
         outcome = identify_files(request, progress)
         write_outcome(request, outcome, progress)
     _show(output(), folder, outcome, compare(arm, outcome.identification))
+    with shown_percent() as told:
+        found = run_campaign(folder / DATA, example_robot("paper_arm"), CONCEALED, told)
+    _show_page(output(), folder / DATA, found)
 
 
 def design_motion(robot: Path, out: Path, options: ExcitationOptions, told: Told) -> None:
@@ -223,3 +236,17 @@ def _show(console: Console, folder: Path, outcome: Outcome, comparisons: list[Co
     )
     for name in FILES:
         console.print(plain(f"wrote {folder / name}"), soft_wrap=True)
+
+
+def _show_page(console: Console, data: Path, found: DiagnosisDocument) -> None:
+    """What was found on an arm that conceals something, and where to look at it."""
+    console.print()
+    console.print(plain("The same arm once more, a spring concealed at its first joint; what the diagnosis found:"))
+    for finding in found.findings:
+        console.print(plain(f"{finding.effect} at {finding.joint}: {finding.statement}"), soft_wrap=True)
+    console.print(plain(f"verdict: {found.verdict}"))
+    console.print()
+    console.print(
+        plain(f"Look at it: tauscope serve --data {data} (or make page), then open http://127.0.0.1:8000"),
+        soft_wrap=True,
+    )

@@ -14,7 +14,8 @@ def demo(
     """Run a whole campaign on a simulated arm.
 
     Designs a motion for the seed paper's arm and a second one that the model is judged by, runs both, identifies the
-    arm from the noisy recordings, and compares the estimate with the truth. Takes a minute.
+    arm from the noisy recordings, and compares the estimate with the truth. Then a campaign through the service on the
+    same arm with a concealed spring, which the page shows. Takes a minute or two.
 
     Parameters
     ----------

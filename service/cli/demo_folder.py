@@ -11,14 +11,14 @@ _FIRST_LINE = "Written by `tauscope demo`, which replaces the files named here w
 
 
 def prepare_folder(folder: Path, files: Sequence[str]) -> None:
-    """Make the folder, mark it, and take away what an earlier demo wrote into it.
+    """Make the folder, mark it, and take away the files that an earlier demo wrote into it; folders stay.
 
     Parameters
     ----------
     folder : Path
         where the demo writes
     files : sequence of str
-        names of all files that it writes
+        names of all files and folders that it writes
 
     Raises
     ------
@@ -35,7 +35,8 @@ def prepare_folder(folder: Path, files: Sequence[str]) -> None:
                 )
         write_file(folder / MARK, "\n".join([_FIRST_LINE, "", *files, ""]).encode())
         for name in ours.intersection(files):
-            (folder / name).unlink(missing_ok=True)
+            if not (folder / name).is_dir():  # a service's data: whoever worked on it since may want it
+                (folder / name).unlink(missing_ok=True)
     except OSError as error:
         raise ExportError(f"{folder}: cannot be written ({error.strerror or error}); choose another --out") from error
 

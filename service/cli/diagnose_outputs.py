@@ -1,6 +1,6 @@
 """Files that ``tauscope diagnose`` writes beside its result."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -15,8 +15,8 @@ from service.excitation.trajectory_csv import trajectory_csv
 from service.excitation.trajectory_files import DEFAULT_RATE_HZ
 from service.identification.compensation import RecordingSource
 from service.jobs.version import tauscope_version
-from service.recording import EffortKind, Recording
-from service.report.provenance import record_provenance
+from service.recording import EffortKind
+from service.report.provenance import Provenance, record_provenance
 
 CODE = (".py", ".h")
 TRAJECTORIES = (".json", ".csv")
@@ -71,13 +71,51 @@ class OutputRequest:
             )
 
 
+@dataclass(frozen=True)
+class Source:
+    """What was diagnosed.
+
+    command : tuple of str
+        words of the command line that does it again
+    robot_file : Path
+        of the arm
+    recordings, held_out, compared : tuple of Path
+        what was explained, what findings were confirmed by, and the simulator's recordings or saved model
+    current : bool
+        whether any recording holds currents
+    """
+
+    command: tuple[str, ...]
+    robot_file: Path
+    recordings: tuple[Path, ...]
+    held_out: tuple[Path, ...]
+    compared: tuple[Path, ...]
+    current: bool
+
+    def provenance(self, diagnosis: Diagnosis) -> Provenance:
+        """Hashes of all files, versions and the time.
+
+        Parameters
+        ----------
+        diagnosis : Diagnosis
+            the result
+        """
+        return record_provenance(
+            command=self.command,
+            robot=diagnosis.robot,
+            recordings=[str(path) for path in self.recordings],
+            held_out=[str(path) for path in self.held_out],
+            compared=[str(path) for path in self.compared],
+            created=datetime.now(UTC),
+        )
+
+
 def contents(
     request: OutputRequest,
     diagnosis: Diagnosis,
     document: DiagnosisDocument,
     planned: PlannedExperiment | None,
-    robot_file: Path,
-    recordings: Sequence[tuple[Path, Recording]],
+    source: Source,
     progress: Callable[[str], None],
 ) -> dict[Path, bytes]:
     """What the files hold.
@@ -92,9 +130,7 @@ def contents(
         the same as plain data
     planned : PlannedExperiment or None
         the next motion
-    robot_file : Path
-        of the arm
-    recordings : sequence of (Path, Recording)
+    source : Source
         what was diagnosed
     progress : callable
         told the name of each step as it begins
@@ -110,27 +146,22 @@ def contents(
     if request.scenario is not None:
         made[request.scenario] = scenario_text(diagnosis)
     if request.improved_robot is not None:
-        made[request.improved_robot] = improved_robot(diagnosis, robot_file, request.improved_robot)
+        made[request.improved_robot] = improved_robot(diagnosis, source.robot_file, request.improved_robot)
     if request.next_trajectory is not None and planned is not None:
         as_json = request.next_trajectory.suffix.lower() == ".json"
         text = trajectory_json(planned.trajectory) if as_json else trajectory_csv(planned.trajectory, DEFAULT_RATE_HZ)
         made[request.next_trajectory] = text
     if request.code or request.report is not None:
         progress("hash inputs")
-        paths = [str(path) for path, _ in recordings]
-        created = datetime.now(UTC)
-        provenance = record_provenance(
-            command=(), robot=diagnosis.robot, recordings=paths, held_out=[], created=created
-        )
+        provenance = source.provenance(diagnosis)
         sources = [RecordingSource(e.path, e.sha256) for e in provenance.inputs if e.role == "recording"]
-        current = any(recording.effort_kind is EffortKind.CURRENT for _, recording in recordings)
-        kind = EffortKind.CURRENT if current else EffortKind.TORQUE
+        kind = EffortKind.CURRENT if source.current else EffortKind.TORQUE
         for path in request.code:
             made[path] = compensation_code(
                 diagnosis,
                 path.suffix.lower(),
                 sources=sources,
-                created=created,
+                created=provenance.created,
                 version=tauscope_version(),
                 effort_kind=kind,
             )
@@ -138,5 +169,5 @@ def contents(
             from service.report.diagnosis_report import diagnosis_report
 
             progress("draw report")
-            made[request.report] = diagnosis_report(diagnosis, document, provenance)
+            made[request.report] = diagnosis_report(diagnosis, document, provenance, planned)
     return {path: text.encode() for path, text in made.items()}

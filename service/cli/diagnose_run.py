@@ -6,7 +6,7 @@ from pathlib import Path
 
 import typer
 
-from service.cli.diagnose_outputs import OutputRequest, contents
+from service.cli.diagnose_outputs import OutputRequest, Source, contents
 from service.cli.diagnose_summary import show_diagnosis
 from service.cli.output_files import STANDARD_OUTPUT, require_distinct, require_free, write_file
 from service.cli.terminal import output, plain, shown_progress
@@ -22,7 +22,7 @@ from service.diagnosis import (
 from service.diagnosis.extended_model import read_model
 from service.diagnosis.next_experiment import PlannedExperiment, planned_experiment
 from service.identification import Options
-from service.recording import Recording, read_recording
+from service.recording import EffortKind, Recording, read_recording
 from service.robot import Robot, read_robot
 
 IDENTIFIED, MODEL, SAVED = "identified", "model", ".json"
@@ -61,6 +61,19 @@ class DiagnoseRequest:
         return tuple(Path(word) for word in words)
 
     @property
+    def compared(self) -> tuple[Path, ...]:
+        """Files that the recordings are compared with."""
+        return self.simulated if self.saved is None else (self.saved,)
+
+    @property
+    def command(self) -> tuple[str, ...]:
+        """The command line that does the same, outputs left to whoever repeats it."""
+        cutoff = "none" if self.options.cutoff_hz is None else str(self.options.cutoff_hz)
+        words = ["tauscope", "diagnose", str(self.robot), *map(str, self.recordings)]
+        words += ["--held-out", *map(str, self.held_out)] if self.held_out else []
+        return (*words, "--against", *self.against, "--cutoff", cutoff)
+
+    @property
     def saved(self) -> Path | None:
         """A model that was saved before."""
         path = Path(self.against[0])
@@ -82,7 +95,7 @@ def run_diagnose(request: DiagnoseRequest) -> None:
     TauscopeError
         where the data or the robot cannot answer
     """
-    compared = request.simulated if request.saved is None else (request.saved,)
+    compared = request.compared
     inputs = (*request.recordings, *request.held_out, *compared)
     for path in compared:
         if not path.exists():
@@ -101,8 +114,14 @@ def run_diagnose(request: DiagnoseRequest) -> None:
             outcome.diagnosis,
             outcome.document,
             outcome.planned,
-            request.robot,
-            list(zip(request.recordings, outcome.recordings, strict=True)),
+            Source(
+                request.command,
+                request.robot,
+                request.recordings,
+                request.held_out,
+                compared,
+                any(recording.effort_kind is EffortKind.CURRENT for recording in outcome.recordings),
+            ),
             progress,
         )
         if request.json is not None:

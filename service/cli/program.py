@@ -19,16 +19,24 @@ from typing import Annotated
 import typer
 from typer.main import get_command
 
+from service.cli.audit_command import audit
+from service.cli.backup_command import backup, restore
 from service.cli.bus_command import bus
 from service.cli.demo_command import demo
 from service.cli.diagnose_command import diagnose
 from service.cli.doctor_command import doctor
 from service.cli.excite_command import excite
+from service.cli.fleet_command import fleet
 from service.cli.identify_command import identify
+from service.cli.job_command import job
+from service.cli.key_command import key
+from service.cli.model_command import model
+from service.cli.prove_command import prove
 from service.cli.recording_command import recording
 from service.cli.robot_command import robot
 from service.cli.run_command import run
 from service.cli.serve_command import serve
+from service.cli.store_command import store
 from service.cli.values import SeveralValuesCommand
 from service.cli.verbs import add_verb
 from service.errors import TauscopeError
@@ -64,7 +72,16 @@ add_verb(app, run)
 add_verb(app, doctor)
 app.add_typer(bus, name="bus")
 add_verb(app, serve)
+app.add_typer(key, name="key")
+app.add_typer(audit, name="audit")
+app.add_typer(store, name="store")
+add_verb(app, backup)
+add_verb(app, restore)
+app.add_typer(model, name="model")
+app.add_typer(job, name="job")
+app.add_typer(fleet, name="fleet")
 add_verb(app, demo)
+add_verb(app, prove)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -1,7 +1,7 @@
 """``tauscope serve``: the HTTP service in this process."""
 
 from pathlib import Path
-from typing import Literal
+from typing import Any
 
 import typer
 from pydantic import ValidationError
@@ -10,47 +10,34 @@ from service.api.server import serve
 from service.api.settings import Settings, default_data_folder
 
 
-def run_server(
-    host: str,
-    port: int,
-    data: Path | None,
-    *,
-    backend: Literal["sim", "dynamixel", "canopen"] = "sim",
-    sim_time: Literal["virtual", "real"] = "virtual",
-    sim_socket: Path | None = None,
-) -> None:
+def run_server(data: Path | None, **choices: Any) -> None:
     """Serve until interrupted.
 
     Parameters
     ----------
-    host : str
-        address to listen at
-    port : int
-        port to listen at; 0 takes any free one
     data : Path or None
         folder of everything that is kept; the user's own data folder where None
-    backend : str
-        what moves the arm where a request does not say
-    sim_time : str
-        of the simulated arm, where a request does not say
-    sim_socket : Path or None
-        where a simulated arm that runs by the clock listens; one is started for each run where None
+    **choices : object
+        fields of `Settings`
 
     Raises
     ------
     typer.BadParameter
         if a setting is out of its range
     TauscopeError
-        if the address cannot be listened at, or is one that others could reach
+        if the address cannot be listened at, or is one that others could reach without a key
     """
     try:
-        folder = data or default_data_folder()
-        settings = Settings(
-            data_folder=folder, host=host, port=port, backend=backend, sim_time=sim_time, sim_socket=sim_socket
-        )
+        settings = Settings(data_folder=data or default_data_folder(), **choices)
     except ValidationError as error:
         first = error.errors()[0]
         raise typer.BadParameter(f"{first['loc'][0]}: {first['msg']}") from error
-    serve(
-        settings, lambda address: typer.echo(f"Tauscope at {address}, documentation at {address}/docs; Ctrl-C ends it")
-    )
+    serve(settings, lambda address: _announce(settings, address))
+
+
+def _announce(settings: Settings, address: str) -> None:
+    """Say where the service is, and who could listen."""
+    if not settings.is_local and settings.tls_certificate is None:
+        hint = "give --tls-certificate, or put a proxy in front that does TLS (deploy/)"
+        typer.echo(f"warning: whoever listens on the network of {settings.host} sees keys and data; {hint}", err=True)
+    typer.echo(f"Tauscope at {address}, documentation at {address}/docs; Ctrl-C ends it")

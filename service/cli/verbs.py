@@ -7,7 +7,9 @@ import typer
 from typer.core import TyperCommand
 
 
-def add_verb(app: typer.Typer, function: Callable[..., None], cls: type[TyperCommand] = TyperCommand) -> None:
+def add_verb(
+    app: typer.Typer, function: Callable[..., None], cls: type[TyperCommand] = TyperCommand, name: str | None = None
+) -> None:
     """Make a function a command of the same name; its help ends where its docstring turns to programmers.
 
     Parameters
@@ -18,5 +20,7 @@ def add_verb(app: typer.Typer, function: Callable[..., None], cls: type[TyperCom
         what the command does
     cls : type of TyperCommand
         how its command line is parsed
+    name : str or None
+        of the command, where the function's own will not do
     """
-    app.command(cls=cls, help=(inspect.getdoc(function) or "").partition("\n\nParameters\n")[0])(function)
+    app.command(name, cls=cls, help=(inspect.getdoc(function) or "").partition("\n\nParameters\n")[0])(function)

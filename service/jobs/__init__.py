@@ -14,12 +14,20 @@ from service.jobs.excitation_order import ExcitationDesignOptions, ExcitationOrd
 from service.jobs.excitation_submission import hand_in_excitation
 from service.jobs.excitation_work import check_trajectory, read_designed_trajectory, run_excitation
 from service.jobs.excitation_workspace import ExcitationWorkspace
+from service.jobs.executors import ClusterExecutor, open_executor
 from service.jobs.exports import EXPORT_FILES, ExportFormat
+from service.jobs.housekeeping import Housekeeping
 from service.jobs.identification_order import IdentificationOptions, IdentificationOrder, OrderedRecording
 from service.jobs.identification_work import run_identification
 from service.jobs.identification_workspace import IdentificationWorkspace
+from service.jobs.index_keeper import ChangedItem, IndexKeeper, open_index
+from service.jobs.lease_errors import LeasedError, LeaseError, LeaseLostError, LeaseNeededError, NotArmedError
+from service.jobs.leases import LONGEST_TTL_S, Lease, Leases
 from service.jobs.messages import without_folders
+from service.jobs.model_keeper import ModelKeeper
 from service.jobs.motions import DesignedMotion, Motion, ready_motion, take_trajectory
+from service.jobs.parameter_trends import ParameterTrend, parameter_trends
+from service.jobs.permits import Permit
 from service.jobs.queue import JobKind, JobQueue, QueueFullError
 from service.jobs.record import JobProblem, JobRecord
 from service.jobs.run_desk import RunDesk, run_recording_name
@@ -27,6 +35,11 @@ from service.jobs.run_leader import ControlProcess, Live, StartControl
 from service.jobs.run_order import BackendChoice, RunRequestRecord
 from service.jobs.run_start import start_control
 from service.jobs.run_workspace import RunWorkspace
+from service.jobs.samples_work import read_kept_samples
+from service.jobs.schedule_definition import ScheduleDefinition
+from service.jobs.schedule_keeper import ScheduleKeeper, new_boot, parse_schedule
+from service.jobs.schedule_start import Repeater
+from service.jobs.schedule_template import make_schedule
 from service.jobs.states import JobState
 from service.jobs.version import tauscope_version
 from service.jobs.worker_pool import WorkerPool
@@ -35,12 +48,15 @@ from service.jobs.workspace import Workspace
 __all__ = [
     "DIAGNOSIS_ROLES",
     "EXPORT_FILES",
+    "LONGEST_TTL_S",
     "BackendChoice",
     "BusyError",
     "CampaignDesk",
     "CampaignLinks",
     "CampaignOrder",
     "CampaignWorkspace",
+    "ChangedItem",
+    "ClusterExecutor",
     "ControlProcess",
     "DesignedMotion",
     "DeviceClaims",
@@ -53,21 +69,36 @@ __all__ = [
     "ExportFormat",
     "ForbiddenBox",
     "HeldOutMotion",
+    "Housekeeping",
     "IdentificationOptions",
     "IdentificationOrder",
     "IdentificationWorkspace",
+    "IndexKeeper",
     "JobKind",
     "JobProblem",
     "JobQueue",
     "JobRecord",
     "JobState",
+    "Lease",
+    "LeaseError",
+    "LeaseLostError",
+    "LeaseNeededError",
+    "LeasedError",
+    "Leases",
     "Live",
+    "ModelKeeper",
     "Motion",
+    "NotArmedError",
     "OrderedRecording",
+    "ParameterTrend",
+    "Permit",
     "QueueFullError",
+    "Repeater",
     "RunDesk",
     "RunRequestRecord",
     "RunWorkspace",
+    "ScheduleDefinition",
+    "ScheduleKeeper",
     "StartControl",
     "WorkerPool",
     "Workshop",
@@ -75,7 +106,14 @@ __all__ = [
     "check_kept_recording",
     "check_trajectory",
     "hand_in_excitation",
+    "make_schedule",
+    "new_boot",
+    "open_executor",
+    "open_index",
+    "parameter_trends",
+    "parse_schedule",
     "read_designed_trajectory",
+    "read_kept_samples",
     "ready_motion",
     "run_diagnosis",
     "run_excitation",

@@ -8,6 +8,7 @@ from service.jobs.campaign_leader import CampaignLeader, Workshop
 from service.jobs.campaign_workspace import CampaignWorkspace
 from service.jobs.device_claims import BusyError
 from service.jobs.led_work import LedWork
+from service.jobs.permits import FREE, Permit
 from service.jobs.queue import INTERRUPTED
 from service.jobs.record import JobRecord
 from service.jobs.states import JobState
@@ -43,13 +44,15 @@ class CampaignDesk:
         for identifier in items.identifiers():
             self._take_up(CampaignWorkspace(items.folder(identifier)))
 
-    def submit(self, staged: Path) -> str:
+    def submit(self, staged: Path, permit: Permit = FREE) -> str:
         """Take a campaign; it begins at once, and has the arm until its motions are done.
 
         Parameters
         ----------
         staged : Path
             staged folder that holds the campaign's input
+        permit : Permit
+            leave to move the arm; the motions stop when it ends
 
         Returns
         -------
@@ -60,6 +63,8 @@ class CampaignDesk:
         ------
         BusyError
             if somebody else has the arm; the folder stays staged
+        LeaseError
+            if the arm may not be moved by that leave; the folder stays staged
         """
         workspace = CampaignWorkspace(staged)
         order = workspace.read_order()
@@ -71,13 +76,16 @@ class CampaignDesk:
                 raise BusyError("the service is ending; hand the campaign in when it is up again")
             self._shop.runs.claims.take(*claim)
             try:
+                permit.require()
                 workspace.write_record(JobRecord(state=JobState.QUEUED, created=self.items.clock()))
                 identifier = self.items.publish(staged)
             except BaseException:
                 self._shop.runs.claims.release(*claim)
                 raise
             workspace = CampaignWorkspace(self.items.folder(identifier))
-            leader = CampaignLeader(workspace, order, self._shop, lambda: self._shop.runs.claims.release(*claim))
+            leader = CampaignLeader(
+                workspace, order, self._shop, lambda: self._shop.runs.claims.release(*claim), permit
+            )
             self._led.begin(identifier, leader, lambda: None)
         return identifier
 
@@ -123,6 +131,10 @@ class CampaignDesk:
             return False
         self.items.remove(identifier)
         return True
+
+    def stop_every(self) -> list[str]:
+        """Stop every campaign that goes on, and go on taking further ones; takes no lock. Their identifiers."""
+        return [identifier for identifier in self._led.identifiers() if self.stop(identifier) is not None]
 
     def stop_all(self) -> None:
         """Stop every campaign and take no further ones; returns at once."""

@@ -19,6 +19,7 @@ from service.jobs.excitation_submission import hand_in_excitation
 from service.jobs.excitation_workspace import ExcitationWorkspace
 from service.jobs.identification_submission import hand_in_identification
 from service.jobs.motions import StepFailedError, require_succeeded, wait_for_end
+from service.jobs.permits import FREE, Permit
 from service.jobs.queue import CANCELLED, INTERNAL, INTERRUPTED, JobKind, JobQueue, QueueFullError
 from service.jobs.record import JobProblem
 from service.jobs.run_desk import RunDesk, run_recording_name
@@ -65,7 +66,12 @@ class CampaignLeader:
     """One campaign on its way. `stop` takes no lock and touches no disk, and stops the arm first."""
 
     def __init__(
-        self, workspace: CampaignWorkspace, order: CampaignOrder, shop: Workshop, release_arm: Callable[[], None]
+        self,
+        workspace: CampaignWorkspace,
+        order: CampaignOrder,
+        shop: Workshop,
+        release_arm: Callable[[], None],
+        permit: Permit = FREE,
     ) -> None:
         """Prepare; nothing happens before `lead`.
 
@@ -79,12 +85,15 @@ class CampaignLeader:
             what it works with
         release_arm : callable
             lets go of the arm; called when nothing more will move
+        permit : Permit
+            leave to move the arm
         """
         self.state = JobState.QUEUED
         self._workspace = workspace
         self._order = order
         self._shop = shop
         self._release_arm = release_arm
+        self._permit = permit
         self._robot = (order.robot_file, order.robot_name)
         self._run: str | None = None
         self._stop_asked = threading.Event()
@@ -96,7 +105,8 @@ class CampaignLeader:
         return f"campaign {self._workspace.folder.name}"
 
     def stop(self) -> None:
-        """Stop the campaign, in whatever step it is."""
+        """Stop the campaign, in whatever step it is; the arm has to be armed again before it moves again."""
+        self._permit.stopped()
         self._stop_asked.set()
         # Whoever begins a run looks at the flag after it has told us of the run.
         run = self._run
@@ -114,9 +124,11 @@ class CampaignLeader:
             self._move(JobState.RUNNING)
             self._go()
         except StoppedError:
+            if self._is_closing and self._workspace.read_made().recordings:
+                return  # its analysis goes on after the next start, and so does the job that is in the queue
             self._cancel_jobs()
             if self._is_closing:
-                self._leave_for_later()
+                self._move(JobState.INTERRUPTED, INTERRUPTED)
             else:
                 self._move(JobState.CANCELLED, CANCELLED)
         except StepFailedError as error:
@@ -192,7 +204,7 @@ class CampaignLeader:
             options=order.run,
         )
         motion = ExcitationWorkspace(shop.excitations.items.folder(excitation))
-        self._run = hand_in_run(shop.runs, self._workspace.robot, request, motion, self.holder)
+        self._run = hand_in_run(shop.runs, self._workspace.robot, request, motion, self.holder, self._permit)
         self._note(**{link: self._run})
         if self._stop_asked.is_set():
             shop.runs.stop(self._run)
@@ -217,7 +229,7 @@ class CampaignLeader:
     def _identify(self) -> None:
         """From the recordings to the model."""
         made, shop = self._workspace.read_made(), self._shop
-        identifier = self._when_there_is_room(
+        identifier = self._handed_in(shop.identifications, made.identification) or self._when_there_is_room(
             lambda: hand_in_identification(
                 shop.jobs,
                 shop.identifications,
@@ -235,7 +247,7 @@ class CampaignLeader:
     def _diagnose(self, options: DiagnosisOptions) -> None:
         """From the same recordings to what the model leaves out."""
         made, shop = self._workspace.read_made(), self._shop
-        identifier = self._when_there_is_room(
+        identifier = self._handed_in(shop.diagnoses, made.diagnosis) or self._when_there_is_room(
             lambda: hand_in_diagnosis(
                 shop.jobs,
                 shop.diagnoses,
@@ -249,6 +261,15 @@ class CampaignLeader:
         )
         self._note(diagnosis=identifier)
         self._wait(Workspace, shop.diagnoses, identifier, "diagnosis")
+
+    def _handed_in(self, kind: JobKind, identifier: str | None) -> str | None:
+        """The job that this campaign handed in before the service was started again, where that one counts still."""
+        try:
+            record = None if identifier is None else Workspace(kind.items.folder(identifier)).read_record()
+        except NotFoundError:
+            return None
+        given_up = (JobState.CANCELLED, JobState.INTERRUPTED)
+        return None if record is None or record.state in given_up else identifier
 
     def _begin(self, step: str) -> None:
         """Tell a step, unless nobody wants to know any more."""
@@ -269,11 +290,6 @@ class CampaignLeader:
             with suppress(NotFoundError):
                 if identifier is not None:
                     shop.jobs.cancel(kind, identifier)
-
-    def _leave_for_later(self) -> None:
-        """The service ends: what can be gone on with stays running, everything else is interrupted."""
-        if not self._workspace.read_made().recordings:
-            self._move(JobState.INTERRUPTED, INTERRUPTED)
 
     def _move(self, state: JobState, problem: JobProblem | None = None) -> None:
         """Write the campaign's new state, if it may follow the present one."""

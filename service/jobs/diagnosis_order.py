@@ -41,3 +41,13 @@ class DiagnosisOrder(StoredModel):
     held_out: tuple[OrderedRecording, ...] = Field(default=(), description="what findings are confirmed by")
     simulated: tuple[OrderedRecording, ...] = Field(default=(), description="what the user's simulator recorded")
     options: DiagnosisOptions = Field(default=DiagnosisOptions(), description="how it is diagnosed")
+
+    @property
+    def command(self) -> tuple[str, ...]:
+        """The command line that does the same with the same files."""
+        options = self.options
+        cutoff = "none" if options.cutoff_hz is None else str(options.cutoff_hz)
+        words = ["tauscope", "diagnose", self.robot_file, *(entry.name for entry in self.recordings)]
+        words += ["--held-out", *(entry.name for entry in self.held_out)] if self.held_out else []
+        against = [entry.name for entry in self.simulated] or [options.against]
+        return (*words, "--against", *against, "--cutoff", cutoff)

@@ -5,15 +5,16 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from service.diagnosis import Diagnosis, against_model, against_simulation, diagnose, document
+from service.diagnosis import Diagnosis, DiagnosisDocument, against_model, against_simulation, diagnose, document
 from service.diagnosis.extended_model import model_document
-from service.diagnosis.next_experiment import planned_experiment
+from service.diagnosis.next_experiment import PlannedExperiment, planned_experiment
 from service.diagnosis.plots import diagnosis_plots
 from service.errors import RecordingError, TauscopeError
 from service.excitation import trajectory_json
 from service.jobs.diagnosis_order import DiagnosisOrder
 from service.jobs.diagnosis_workspace import ROLES, DiagnosisWorkspace
 from service.jobs.identification_order import OrderedRecording
+from service.jobs.job_provenance import job_provenance
 from service.jobs.record import JobProblem
 from service.jobs.work import begin_step, do_work
 from service.recording import Recording, read_recording
@@ -69,8 +70,28 @@ class _Work:
             write_atomically(self.workspace.trajectory, trajectory_json(planned.trajectory).encode())
         write_atomically(self.workspace.plots, diagnosis_plots(found).model_dump_json(by_alias=True).encode())
         write_atomically(self.workspace.model, model_document(found).model_dump_json(by_alias=True, indent=1).encode())
-        content = document(found, planned, name).model_dump_json(by_alias=True, indent=1).encode()
-        write_atomically(self.workspace.result, content)
+        told = document(found, planned, name)
+        write_atomically(self.workspace.report, self._report(found, told, planned, order).encode())
+        write_atomically(self.workspace.result, told.model_dump_json(by_alias=True, indent=1).encode())
+
+    def _report(
+        self,
+        found: Diagnosis,
+        told: DiagnosisDocument,
+        planned: PlannedExperiment | None,
+        order: DiagnosisOrder,
+    ) -> str:
+        """The page; what draws it is slow to load and is loaded where it is needed."""
+        from service.report.diagnosis_report import diagnosis_report
+
+        roles = ("recording", "held out", "compared with")
+        groups = (order.recordings, order.held_out, order.simulated)
+        inputs = [
+            (role, entry, self.workspace.recording_path(entry, self.server_recordings, where))
+            for role, where, entries in zip(roles, ROLES, groups, strict=True)
+            for entry in entries
+        ]
+        return diagnosis_report(found, told, job_provenance(order.command, self.workspace.robot, inputs), planned)
 
     def _compared(self, found: Diagnosis, order: DiagnosisOrder, robot: Robot) -> Diagnosis:
         """The diagnosis compared with what the order names."""

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from service.jobs.diagnosis_order import DiagnosisOrder
 from service.jobs.identification_order import OrderedRecording
-from service.jobs.stored import read_document, read_stored, write_stored
+from service.jobs.stored import read_bytes, read_document, read_stored, write_stored
 from service.jobs.workspace import Workspace
 
 ROLES = ("recordings", "held_out", "simulated")
@@ -15,7 +15,7 @@ class DiagnosisWorkspace(Workspace):
     """Files of a diagnosis job.
 
     ``order.json``, ``robot/`` and a folder for each of `ROLES` are its input; ``result.json``, ``plots.json``,
-    ``model.json`` and, where a motion was planned, ``trajectory.json`` are what the work makes of it.
+    ``model.json``, ``report.html`` and, where a motion was planned, ``trajectory.json`` are what the work makes of it.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -32,6 +32,7 @@ class DiagnosisWorkspace(Workspace):
         self.plots = folder / "plots.json"
         self.model = folder / "model.json"
         self.trajectory = folder / "trajectory.json"
+        self.report = folder / "report.html"
         self._order = folder / "order.json"
 
     def prepare(self) -> None:
@@ -84,6 +85,10 @@ class DiagnosisWorkspace(Workspace):
     def read_plots(self) -> bytes | None:
         """Data of its figures, or None where the file is missing or damaged."""
         return read_document(self.plots, "tauscope.diagnosis-plots/1")
+
+    def read_report(self) -> bytes | None:
+        """The page, or None where the file is missing."""
+        return read_bytes(self.report)
 
     def read_model(self) -> bytes | None:
         """The model with all findings, or None where the file is missing or damaged."""

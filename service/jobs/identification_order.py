@@ -43,3 +43,13 @@ class IdentificationOrder(StoredModel):
     recordings: tuple[OrderedRecording, ...] = Field(description="what the model is made from")
     held_out: tuple[OrderedRecording, ...] = Field(default=(), description="what it is judged by")
     options: IdentificationOptions = Field(default=IdentificationOptions(), description="how it is identified")
+
+    @property
+    def command(self) -> tuple[str, ...]:
+        """The command line that does the same with the same files."""
+        options = self.options
+        cutoff = "none" if options.cutoff_hz is None else str(options.cutoff_hz)
+        words = ["tauscope", "identify", self.robot_file, *(entry.name for entry in self.recordings)]
+        words += ["--held-out", *(entry.name for entry in self.held_out)] if self.held_out else []
+        words += ["--estimator", options.estimator, "--cutoff", cutoff]
+        return (*words, "--rotor-inertia" if options.rotor_inertia else "--no-rotor-inertia")

@@ -13,10 +13,12 @@ from service.identification.compensation import RecordingSource
 from service.jobs.exports import EXPORT_FILES, ExportFormat, ExportInput, make_export
 from service.jobs.identification_order import IdentificationOrder, OrderedRecording
 from service.jobs.identification_workspace import IdentificationWorkspace
+from service.jobs.job_provenance import job_provenance
 from service.jobs.messages import without_folders
 from service.jobs.record import JobProblem
 from service.jobs.work import begin_step, do_work
 from service.recording import EffortKind, Recording, read_recording
+from service.report.identification_plots import identification_plots
 from service.robot import Robot, read_robot
 from service.store import hash_file, write_atomically
 
@@ -61,9 +63,31 @@ class _Work:
         held_out = self._read(order.held_out, robot, held_out=True)
         identification = identify(robot, recordings, held_out, order.options.to_options(), self.begin)
         self.begin("write result and exports")
+        plots = identification_plots(identification, recordings, held_out)
+        write_atomically(self.workspace.plots, plots.model_dump_json(by_alias=True).encode())
+        write_atomically(self.workspace.report, self._report(identification, order, recordings, held_out).encode())
         content = document(identification).model_dump_json(by_alias=True, indent=1).encode()
         write_atomically(self.workspace.result, content)
         self._write_exports(identification, order, recordings)
+
+    def _report(
+        self,
+        identification: Identification,
+        order: IdentificationOrder,
+        recordings: list[Recording],
+        held_out: list[Recording],
+    ) -> str:
+        """The page; what draws it is slow to load and is loaded where it is needed."""
+        from service.report.identification_report import identification_report
+
+        groups = (("recording", order.recordings, False), ("held out", order.held_out, True))
+        inputs = [
+            (role, entry, self.workspace.recording_path(entry, self.server_recordings, held_out=apart))
+            for role, entries, apart in groups
+            for entry in entries
+        ]
+        provenance = job_provenance(order.command, self.workspace.robot, inputs)
+        return identification_report(identification, recordings, held_out, provenance)
 
     def _read(self, ordered: Iterable[OrderedRecording], robot: Robot, *, held_out: bool) -> list[Recording]:
         """The recordings of the order, each with the bytes that were ordered."""

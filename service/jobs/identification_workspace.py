@@ -5,15 +5,15 @@ from pathlib import Path
 
 from service.errors import NotFoundError
 from service.jobs.identification_order import IdentificationOrder, OrderedRecording
-from service.jobs.stored import read_document, read_stored, write_stored
+from service.jobs.stored import read_bytes, read_document, read_stored, write_stored
 from service.jobs.workspace import Workspace
 
 
 class IdentificationWorkspace(Workspace):
     """Files of an identification job.
 
-    ``order.json``, ``robot/``, ``recordings/`` and ``held_out/`` are its input, ``result.json`` and ``exports/`` what
-    the work makes of it.
+    ``order.json``, ``robot/``, ``recordings/`` and ``held_out/`` are its input, ``result.json``, ``plots.json``,
+    ``report.html`` and ``exports/`` what the work makes of it.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -29,6 +29,8 @@ class IdentificationWorkspace(Workspace):
         self.exports = folder / "exports"
         self.refusals = self.exports / "refused.json"
         self.result = folder / "result.json"
+        self.plots = folder / "plots.json"
+        self.report = folder / "report.html"
         self._order = folder / "order.json"
 
     def prepare(self) -> None:
@@ -78,6 +80,14 @@ class IdentificationWorkspace(Workspace):
     def read_result(self) -> bytes | None:
         """The identification document, or None where the file is missing or damaged."""
         return read_document(self.result, "tauscope.identification/1")
+
+    def read_plots(self) -> bytes | None:
+        """Data of its figures, or None where the file is missing or damaged."""
+        return read_document(self.plots, "tauscope.identification-plots/1")
+
+    def read_report(self) -> bytes | None:
+        """The page, or None where the file is missing."""
+        return read_bytes(self.report)
 
     def refused_exports(self) -> dict[str, str]:
         """Formats that cannot hold the model, each with the reason; empty before the exports were written."""

@@ -75,6 +75,10 @@ class LedWork(Generic[L]):
         led = self._active.get(identifier)
         return None if led is None else led.leader
 
+    def identifiers(self) -> tuple[str, ...]:
+        """What goes on now."""
+        return tuple(self._active)
+
     def leaders(self) -> tuple[L, ...]:
         """Who leads what goes on now."""
         return tuple(led.leader for led in self._active.values())

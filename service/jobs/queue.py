@@ -1,4 +1,4 @@
-"""The queue of jobs: one after the other into an executor; each has a definite state, also after a restart."""
+"""The queue of jobs: one after the other into an executor; what a restart leaves unfinished is done again."""
 
 import logging
 import threading
@@ -21,6 +21,13 @@ _log = logging.getLogger("tauscope.jobs")
 
 INTERRUPTED = JobProblem(code="interrupted", detail="the service ended before this job did; hand it in again")
 CANCELLED = JobProblem(code="cancelled", detail="the job was cancelled on request")
+MOST_ATTEMPTS = 3
+"""How often the work of a job is begun whose service was killed meanwhile: it may be what brought the service down."""
+
+TOO_OFTEN = JobProblem(
+    code="interrupted",
+    detail=f"the service ended {MOST_ATTEMPTS} times in the middle of this job; look into its log, and hand less in",
+)
 WORKER_LOST = JobProblem(
     code="worker-lost",
     detail="the process that worked on this job ended unexpectedly, perhaps for want of memory; send less data",
@@ -61,7 +68,7 @@ class JobQueue:
     """
 
     def __init__(self, kinds: Sequence[JobKind], executor: Executor, *, slots: int, most_waiting: int) -> None:
-        """Make the queue; jobs that an earlier service left unfinished become `interrupted`.
+        """Make the queue; jobs that an earlier service left unfinished are done again, in their order.
 
         Parameters
         ----------
@@ -83,9 +90,11 @@ class JobQueue:
         self._is_closed = False
         for kind in kinds:
             kind.items.tidy()
-            for identifier in kind.items.identifiers():
-                if not _move(_Job(kind, identifier), JobState.INTERRUPTED, INTERRUPTED):
-                    Workspace(kind.items.folder(identifier)).tell_lost_end()
+        jobs = [_Job(kind, identifier) for kind in kinds for identifier in kind.items.identifiers()]
+        unfinished = [(record.created, job) for job in jobs if (record := _take_up(job)) is not None]
+        with self._lock:
+            self._waiting.extend(job for _, job in sorted(unfinished, key=lambda pair: pair[0]))
+            self._fill_slots()
 
     def submit(self, kind: JobKind, staged: Path) -> str:
         """Take a job.
@@ -173,14 +182,17 @@ class JobQueue:
                 self._waiting.remove(job)
             return True
 
+    def waiting(self) -> int:
+        """How many jobs wait."""
+        return len(self._waiting)
+
     def close(self) -> None:
-        """End the work; whatever has not ended by itself becomes `interrupted`."""
+        """End the work; whatever has not ended by itself waits for the next start."""
         with self._lock:
             self._is_closed = True
-            unfinished = [*self._running, *self._waiting]
             self._waiting.clear()
-            for job in unfinished:
-                _move(job, JobState.INTERRUPTED, INTERRUPTED)
+            for job in self._running:
+                _give_up(job)
         self._executor.shutdown(wait=True, cancel_futures=True)
 
     def _fill_slots(self) -> None:
@@ -205,7 +217,7 @@ class JobQueue:
             try:
                 _move(job, JobState.SUCCEEDED if problem is None else JobState.FAILED, problem)
             except OSError:
-                # The disk is full or gone: the job becomes `interrupted` with the next start.
+                # The disk is full or gone: the job is done again with the next start.
                 _log.exception("the state of job %s could not be written", job.identifier)
             self._fill_slots()
 
@@ -222,6 +234,34 @@ def _move(job: _Job, state: JobState, problem: JobProblem | None = None) -> bool
         return False
     workspace.write_record(record.moved(state, items.clock(), problem))
     return True
+
+
+def _take_up(job: _Job) -> JobRecord | None:
+    """Have a job wait that an earlier service left unfinished; None for one that has ended, or ends here."""
+    items = job.kind.items
+    workspace = Workspace(items.folder(job.identifier))
+    record = workspace.read_record()
+    if record is None or record.state.is_end:
+        workspace.tell_lost_end()
+        return None
+    if record.attempts >= MOST_ATTEMPTS:
+        _move(job, JobState.INTERRUPTED, TOO_OFTEN)
+        return None
+    if record.state is not JobState.QUEUED:
+        workspace.write_record(record.moved(JobState.QUEUED, items.clock()))
+    return record
+
+
+def _give_up(job: _Job) -> None:
+    """Have a job wait whose work is ended with the service."""
+    items = job.kind.items
+    try:
+        workspace = Workspace(items.folder(job.identifier))
+        record = workspace.read_record()
+        if record is not None and record.may_become(JobState.QUEUED):
+            workspace.write_record(record.given_up(items.clock()))
+    except (NotFoundError, OSError):
+        _log.exception("the state of job %s could not be written", job.identifier)
 
 
 def _problem_of(identifier: str, future: "Future[JobProblem | None]") -> JobProblem | None:

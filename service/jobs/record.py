@@ -25,6 +25,7 @@ class JobRecord(StoredModel):
     started: AwareDatetime | None = Field(default=None, description="when its work began")
     ended: AwareDatetime | None = Field(default=None, description="when it reached its end state")
     problem: JobProblem | None = Field(default=None, description="why it did not succeed")
+    attempts: int = Field(default=0, ge=0, description="how often its work was begun and not given up in good order")
 
     def may_become(self, state: JobState) -> bool:
         """Whether a state may follow.
@@ -55,5 +56,19 @@ class JobRecord(StoredModel):
         """
         if not self.may_become(state):
             raise ValueError(f"a job that is {self.state} cannot become {state}")
-        times = {"started": now} if state is JobState.RUNNING else {"ended": now}
-        return self.model_copy(update={"state": state, "problem": problem, **times})
+        changes: dict[str, object] = {"ended": now}
+        if state is JobState.RUNNING:
+            changes = {"started": now, "attempts": self.attempts + 1}
+        elif state is JobState.QUEUED:
+            changes = {"started": None}
+        return self.model_copy(update={"state": state, "problem": problem, **changes})
+
+    def given_up(self, now: datetime) -> "JobRecord":
+        """The record of a job that waits again because the service ends in good order: that counts as no attempt.
+
+        Parameters
+        ----------
+        now : datetime
+            the present moment
+        """
+        return self.moved(JobState.QUEUED, now).model_copy(update={"attempts": max(0, self.attempts - 1)})

@@ -5,10 +5,12 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 
+from service.acquisition.record import RunRecord
 from service.errors import TauscopeError
 from service.jobs.device_claims import BusyError, DeviceClaims
 from service.jobs.led_work import LedWork
 from service.jobs.motions import Motion
+from service.jobs.permits import FREE, Permit
 from service.jobs.run_leader import Live, RunLeader, StartControl
 from service.jobs.run_workspace import RunWorkspace
 from service.store import ItemStore, KeptFile, RecordingStore, hash_file
@@ -30,6 +32,7 @@ class RunDesk:
         start: StartControl,
         claims: DeviceClaims,
         is_alive: Callable[[], bool],
+        on_end: Callable[[RunRecord], None] = lambda _record: None,
     ) -> None:
         """Open the desk; runs that an earlier service left unfinished become `interrupted`.
 
@@ -45,12 +48,15 @@ class RunDesk:
             who has which arm
         is_alive : callable
             whether the service can still be reached; while it cannot, no control process hears of its owner
+        on_end : callable
+            told the record of every run that has ended under this desk
         """
         self.items = items
         self.claims = claims
         self._recordings = recordings
         self._start = start
         self._is_alive = is_alive
+        self._on_end = on_end
         self._lock = threading.Lock()
         self._led: LedWork[RunLeader] = LedWork()
         self._is_closed = False
@@ -58,7 +64,7 @@ class RunDesk:
         for identifier in items.identifiers():
             self._end(RunWorkspace(items.folder(identifier)), None)
 
-    def submit(self, staged: Path, motion: Motion, holder: str | None = None) -> str:
+    def submit(self, staged: Path, motion: Motion, holder: str | None = None, permit: Permit = FREE) -> str:
         """Take a run; it begins at once.
 
         Parameters
@@ -69,6 +75,8 @@ class RunDesk:
             sees to it that the run has its trajectory
         holder : str or None
             who has the arm already, to whom the run belongs; None where the run takes the arm itself
+        permit : Permit
+            leave to move the arm; the run stops when it ends
 
         Returns
         -------
@@ -79,6 +87,8 @@ class RunDesk:
         ------
         BusyError
             if somebody else has the arm; the folder stays staged
+        LeaseError
+            if the arm may not be moved by that leave; the folder stays staged
         """
         workspace = RunWorkspace(staged)
         request = workspace.read_request()
@@ -92,13 +102,15 @@ class RunDesk:
             if claim is not None:
                 self.claims.take(*claim)
             try:
+                # Only now: whoever leases an arm looks at the claims after the lease is written.
+                permit.require()
                 identifier = self.items.publish(staged)
             except BaseException:
                 self._release(claim)
                 raise
             workspace = RunWorkspace(self.items.folder(identifier))
-            leader = RunLeader(workspace, self._start, motion, self._is_alive)
-            self._led.begin(identifier, leader, lambda: self._end(workspace, claim))
+            leader = RunLeader(workspace, self._start, motion, self._is_alive, permit)
+            self._led.begin(identifier, leader, lambda: self._end_led(workspace, claim))
         return identifier
 
     def stop(self, identifier: str) -> Live | None:
@@ -154,6 +166,14 @@ class RunDesk:
         self.items.remove(identifier)
         return True
 
+    def lives(self) -> list[Live]:
+        """What is known of each run that goes on."""
+        return [leader.live for leader in self._led.leaders()]
+
+    def stop_every(self) -> list[str]:
+        """Stop every run that goes on, and go on taking further ones; takes no lock. The runs' identifiers."""
+        return [identifier for identifier in self._led.identifiers() if self.stop(identifier) is not None]
+
     def stop_all(self) -> None:
         """Stop every run and take no further ones; returns at once."""
         self._is_closed = True
@@ -165,6 +185,13 @@ class RunDesk:
         with self._lock:
             self.stop_all()
         self._led.join(PATIENCE_S)
+
+    def _end_led(self, workspace: RunWorkspace, claim: tuple[str, str] | None) -> None:
+        """Put everything in its place, and tell whoever counts."""
+        self._end(workspace, claim)
+        record = workspace.read_run()
+        if record is not None:
+            self._on_end(record)
 
     def _end(self, workspace: RunWorkspace, claim: tuple[str, str] | None) -> None:
         """Put everything in its place after a run."""

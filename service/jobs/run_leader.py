@@ -13,6 +13,7 @@ from service.acquisition.states import RunState
 from service.errors import TauscopeError
 from service.jobs.events import StateEvent
 from service.jobs.motions import Motion, StepFailedError
+from service.jobs.permits import FREE, Permit
 from service.jobs.run_workspace import RunWorkspace
 
 _log = logging.getLogger("tauscope.jobs")
@@ -79,7 +80,12 @@ class RunLeader:
     """
 
     def __init__(
-        self, workspace: RunWorkspace, start: StartControl, motion: Motion, is_alive: Callable[[], bool]
+        self,
+        workspace: RunWorkspace,
+        start: StartControl,
+        motion: Motion,
+        is_alive: Callable[[], bool],
+        permit: Permit = FREE,
     ) -> None:
         """Prepare; nothing happens before `lead`.
 
@@ -94,17 +100,25 @@ class RunLeader:
         is_alive : callable
             whether the service can still be reached; while it cannot, the control process hears nothing of its owner,
             and stops the arm
+        permit : Permit
+            leave to move the arm; the run stops when it ends
         """
         self.live = Live(RunState.CREATED, None, {})
         self._workspace = workspace
         self._start = start
         self._motion = motion
         self._is_alive = is_alive
+        self._permit = permit
         self._control: ControlProcess | None = None
         self._stop_asked = threading.Event()
 
     def stop(self) -> None:
-        """Stop the run, in whatever state it is."""
+        """Stop the run, in whatever state it is; the arm has to be armed again before it moves again."""
+        self._permit.stopped()
+        self._halt()
+
+    def _halt(self) -> None:
+        """Stop the run, whoever wants it."""
         self._stop_asked.set()
         # Whoever starts the control process looks at the flag after it has told us of the process.
         control = self._control
@@ -115,6 +129,8 @@ class RunLeader:
         """Take the run to its end; never raises."""
         try:
             if self._motion(self._workspace, self._stop_asked):
+                if not self._stop_asked.is_set():
+                    self._permit.require()
                 self._run()
             else:
                 self._end(RunState.STOPPED)
@@ -135,13 +151,30 @@ class RunLeader:
         beat_s = BEAT_S if request is None else min(BEAT_S, request.options.heartbeat_s / BEATS_A_HEARTBEAT)
         has_ended = False
         while not has_ended:
-            if self._is_alive():
+            # Two ways to the same end: the run is asked to stop, and hears nothing of its owner any more.
+            if (lost := self._permit.end()) is not None:
+                self._lose(lost)
+            elif self._is_alive():
                 control.beat()
             try:
                 control.wait(beat_s)
                 has_ended = True
             except TimeoutError:
                 continue
+
+    def _lose(self, why: str) -> None:
+        """The leave to move has ended: stop, and say why; nothing is new where somebody has stopped the run already."""
+        if not self._stop_asked.is_set():
+            self._halt()
+            _log.info("run %s is stopped: %s", self._workspace.folder.name, why)
+            self._tell(f"stop: {why}")
+
+    def _tell(self, step: str) -> None:
+        """Tell a step; a disk that takes none holds nothing up."""
+        try:
+            self._workspace.write_step(step)
+        except OSError:
+            _log.exception("a step of run %s could not be written", self._workspace.folder.name)
 
     def _take(self, event: Mapping[str, Any]) -> None:
         """Tell what the control process said."""

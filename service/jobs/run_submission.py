@@ -5,13 +5,19 @@ from pathlib import Path
 
 from service.jobs.excitation_workspace import ExcitationWorkspace
 from service.jobs.motions import ready_motion, take_trajectory
+from service.jobs.permits import Permit
 from service.jobs.run_desk import RunDesk
 from service.jobs.run_order import RunRequestRecord
 from service.jobs.run_workspace import RunWorkspace
 
 
 def hand_in_run(
-    desk: RunDesk, robot_folder: Path, request: RunRequestRecord, excitation: ExcitationWorkspace, holder: str | None
+    desk: RunDesk,
+    robot_folder: Path,
+    request: RunRequestRecord,
+    excitation: ExcitationWorkspace,
+    holder: str | None,
+    permit: Permit,
 ) -> str:
     """Begin a run of an excitation that succeeded.
 
@@ -27,6 +33,8 @@ def hand_in_run(
         its motion
     holder : str or None
         who has the arm already; None where the run takes it itself
+    permit : Permit
+        leave to move the arm
 
     Returns
     -------
@@ -37,6 +45,8 @@ def hand_in_run(
     ------
     BusyError
         if somebody else has the arm
+    LeaseError
+        if the arm may not be moved by that leave
     AcquisitionError
         if the trajectory is not there any more
     """
@@ -47,6 +57,6 @@ def hand_in_run(
         shutil.copytree(robot_folder, workspace.robot, dirs_exist_ok=True)
         take_trajectory(excitation, workspace)
         workspace.write_request(request)
-        return desk.submit(staged, ready_motion, holder)
+        return desk.submit(staged, ready_motion, holder, permit)
     finally:
         desk.items.discard(staged)

@@ -22,13 +22,16 @@ class JobState(StrEnum):
 
 TRANSITIONS: Mapping[JobState, frozenset[JobState]] = {
     JobState.QUEUED: frozenset({JobState.RUNNING, JobState.CANCELLED, JobState.INTERRUPTED}),
-    JobState.RUNNING: frozenset({JobState.SUCCEEDED, JobState.FAILED, JobState.CANCELLED, JobState.INTERRUPTED}),
+    JobState.RUNNING: frozenset(
+        {JobState.QUEUED, JobState.SUCCEEDED, JobState.FAILED, JobState.CANCELLED, JobState.INTERRUPTED}
+    ),
     JobState.SUCCEEDED: frozenset(),
     JobState.FAILED: frozenset(),
     JobState.CANCELLED: frozenset(),
     JobState.INTERRUPTED: frozenset(),
 }
-"""For each state, the states that may follow. `interrupted`: the service ended before the job did."""
+"""For each state, the states that may follow. A job goes back to `queued` where the service ended before it did, and is
+`interrupted` where that happens again and again, or where it moves an arm."""
 
 
 def may_follow(before: JobState, after: JobState) -> bool:

@@ -63,3 +63,17 @@ def read_document(path: Path, schema: str) -> bytes | None:
     except (OSError, ValueError, RecursionError):
         return None
     return content if isinstance(document, dict) and document.get("schema") == schema else None
+
+
+def read_bytes(path: Path) -> bytes | None:
+    """A file as it was written, or None where it is missing.
+
+    Parameters
+    ----------
+    path : Path
+        of the file
+    """
+    try:
+        return path.read_bytes()
+    except OSError:
+        return None

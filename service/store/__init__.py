@@ -5,11 +5,15 @@ from service.store.event_log import EventLog, LogFollower, LoggedEvent
 from service.store.folder_lock import FolderLock
 from service.store.incoming import IncomingFile, KeptFile, hash_file
 from service.store.items import ItemStore
+from service.store.layout import FOLDERS, RECORDINGS, item_stores
 from service.store.names import FILE_NAME_RULE, is_file_name, is_identifier, new_identifier
 from service.store.recordings import NameTakenError, RecordingStore, StoredRecording
+from service.store.site import site_identifier
 
 __all__ = [
     "FILE_NAME_RULE",
+    "FOLDERS",
+    "RECORDINGS",
     "EventLog",
     "FolderLock",
     "IncomingFile",
@@ -23,6 +27,8 @@ __all__ = [
     "hash_file",
     "is_file_name",
     "is_identifier",
+    "item_stores",
     "new_identifier",
+    "site_identifier",
     "write_atomically",
 ]

@@ -44,3 +44,19 @@ def is_identifier(text: str) -> bool:
         any text
     """
     return _IDENTIFIER.fullmatch(text) is not None
+
+
+def identifier_time(identifier: str) -> datetime:
+    """The second in which an identifier was made.
+
+    Parameters
+    ----------
+    identifier : str
+        of `new_identifier`
+
+    Raises
+    ------
+    ValueError
+        if it is none
+    """
+    return datetime.strptime(identifier[:16], "%Y%m%dT%H%M%SZ").replace(tzinfo=UTC)

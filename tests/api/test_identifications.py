@@ -158,17 +158,17 @@ def test_a_worker_that_dies(waiting_client: TestClient, executor: ManualExecutor
     assert_problem(waiting_client.get(f"{here}/result"), "worker-lost", 500)
 
 
-def test_after_a_restart_results_are_there_and_unfinished_work_is_interrupted(
+def test_after_a_restart_results_are_there_and_unfinished_work_is_done(
     settings: Settings, executor: ManualExecutor, files: Files
 ) -> None:
     with connected(create_app(settings, executor)) as client:
         done = client.post(IDENTIFICATIONS, files=files, data=form(QUICK)).headers["location"]
         executor.run()
-        unfinished = client.post(IDENTIFICATIONS, files=files).headers["location"]
+        unfinished = client.post(IDENTIFICATIONS, files=files, data=form(QUICK)).headers["location"]
     with connected(create_app(settings, InlineExecutor())) as client:
         assert client.get(f"{done}/result").status_code == 200
-        assert_problem(client.get(f"{unfinished}/result"), "interrupted", 409)
-        assert client.get(unfinished).json()["state"] == "interrupted"
+        assert client.get(unfinished).json()["state"] == "succeeded"
+        assert client.get(f"{unfinished}/result").json() == client.get(f"{done}/result").json()
 
 
 @pytest.mark.parametrize("file", ["state.json", "order.json"])

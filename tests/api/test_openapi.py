@@ -9,6 +9,7 @@ import pytest
 from starlette.testclient import TestClient
 
 import service.errors
+from api import write_openapi
 from api.problem_check import assert_problem
 from api.write_openapi import COMMITTED, document_text
 from service.api.problems import KINDS
@@ -35,6 +36,20 @@ def test_the_committed_document_is_the_present_one() -> None:
         " and note it in CHANGELOG.md"
     )
     assert COMMITTED.read_text(encoding="utf-8") == document_text(), hint
+
+
+def test_a_changed_document_has_a_version_of_its_own(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    text = COMMITTED.read_text(encoding="utf-8")
+    version = json.loads(text)["info"]["version"]
+    assert write_openapi.known_versions()[version] == write_openapi.document_hash(text)
+    monkeypatch.setattr(write_openapi, "COMMITTED", tmp_path / "openapi.json")
+    monkeypatch.setattr(write_openapi, "VERSIONS", tmp_path / "versions.json")
+    (tmp_path / "versions.json").write_text(json.dumps({version: write_openapi.document_hash(text)}))
+    assert write_openapi.write(amend=False) is None
+    monkeypatch.setattr(write_openapi, "document_text", lambda: text.replace("Tauscope", "Otherscope"))
+    assert "raise API_VERSION" in str(write_openapi.write(amend=False))
+    assert (tmp_path / "openapi.json").read_text(encoding="utf-8") == text
+    assert write_openapi.write(amend=True) is None
 
 
 def test_the_document_is_served(client: TestClient, document: dict[str, Any]) -> None:

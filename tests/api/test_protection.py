@@ -1,5 +1,7 @@
 """What stands before every route: hosts, origins, headers, unforeseen failures; and the settings."""
 
+import re
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
@@ -9,7 +11,10 @@ from starlette.testclient import TestClient
 from api.conftest import IDENTIFICATIONS, connected
 from api.problem_check import assert_problem
 from jobs.executors import InlineExecutor
-from service.api import Settings, create_app, default_data_folder
+from service.api import Settings, create_app, default_data_folder, serve
+from service.api.access.keys import KeyFile
+from service.api.access.scopes import Scope
+from service.api.opening import require_data_folder
 from service.api.protection import HEADERS
 from service.errors import TauscopeError
 from service.store import ItemStore
@@ -96,15 +101,61 @@ def test_a_fault_of_our_own_is_500_and_tells_nothing(
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.8.9.10", "localhost", "::1", "[::1]"])
-def test_loopback_is_accepted(host: str, tmp_path: Path) -> None:
-    Settings(data_folder=tmp_path, host=host).require_loopback()
+def test_loopback_needs_no_key(host: str, tmp_path: Path) -> None:
+    require_data_folder(Settings(data_folder=tmp_path, host=host))
 
 
-@pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.5", "arm-lab.example", "", "127.0.0.1.evil.example", "*"])
-def test_other_addresses_are_refused(host: str, tmp_path: Path) -> None:
-    with pytest.raises(TauscopeError, match="others could reach it") as raised:
-        Settings(data_folder=tmp_path, host=host).require_loopback()
-    assert "\n" not in str(raised.value)
+OTHERS = ["0.0.0.0", "::", "192.168.1.5", "arm-lab.example", "", "127.0.0.1.evil.example", "*"]
+
+
+@pytest.mark.parametrize("host", OTHERS)
+def test_other_addresses_are_refused_without_a_key(host: str, tmp_path: Path) -> None:
+    settings = Settings(data_folder=tmp_path, host=host)
+    for begin in (lambda: require_data_folder(settings), lambda: serve(settings, lambda _: pytest.fail("it listens"))):
+        with pytest.raises(TauscopeError, match="others could reach it") as raised:
+            begin()
+        assert "\n" not in str(raised.value)
+    now = datetime.now(UTC)
+    KeyFile(tmp_path).add("expired", Scope.ADMIN, now - timedelta(days=2), timedelta(days=1))
+    KeyFile(tmp_path).add("revoked", Scope.ADMIN, now, None)
+    KeyFile(tmp_path).revoke("revoked", now)
+    with pytest.raises(TauscopeError, match="no valid API key"):
+        require_data_folder(settings)
+    KeyFile(tmp_path).add("valid", Scope.READ, now, None)
+    require_data_folder(settings)
+
+
+def test_hosts_of_a_service_that_others_can_reach(tmp_path: Path) -> None:
+    settings = Settings(data_folder=tmp_path, host="0.0.0.0", names=("Arm-Lab.example",))
+    assert all(settings.answers_for(name) for name in ("arm-lab.example", "localhost", "192.168.1.5", "2001:db8::1"))
+    assert not any(settings.answers_for(name) for name in ("evil.example", "192.168.1.5.evil.example", "", None))
+
+
+@pytest.mark.parametrize(
+    ("certificate", "key", "reason"),
+    [("c.pem", None, "belong together"), (None, "k.pem", "belong together"), ("c.pem", "k.pem", "no usable")],
+)
+def test_a_certificate_that_cannot_be_used(
+    certificate: str | None, key: str | None, reason: str, tmp_path: Path
+) -> None:
+    for name in ("c.pem", "k.pem"):
+        (tmp_path / name).write_text("nothing")
+    files = {"tls_certificate": certificate and tmp_path / certificate, "tls_key": key and tmp_path / key}
+    settings = Settings.model_validate({"data_folder": tmp_path, "port": 0, **files})
+    with pytest.raises(TauscopeError, match=reason):
+        serve(settings, lambda _: pytest.fail("it listens"))
+
+
+def test_pages_bring_nothing_inline(client: TestClient) -> None:
+    for path in ("/docs", "/docs/errors/internal"):
+        answer = client.get(path)
+        assert not re.search(r"<style|<script|\sstyle=|\son[a-z]+=|javascript:", answer.text)
+        policy = answer.headers["content-security-policy"]
+        assert "unsafe" not in policy
+        assert "default-src 'none'" in policy
+    sheet = client.get("/docs/pages.css")
+    assert sheet.headers["content-type"].startswith("text/css")
+    assert "/docs/pages.css" in client.get("/docs").text
 
 
 def test_settings_are_checked(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ import pytest
 
 from cli.conftest import Ended
 from service.cli.demo import (
+    DATA,
     FILES,
     HELD_OUT,
     HELD_OUT_TRAJECTORY,
@@ -49,7 +50,7 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
 @in_whole_demo
 def test_everything_is_there_and_named(demo: tuple[Path, str]) -> None:
     folder, printed = demo
-    assert sorted(path.name for path in folder.iterdir()) == sorted([MARK, *FILES])
+    assert sorted(path.name for path in folder.iterdir()) == sorted([MARK, *FILES, DATA])
     for name in FILES:
         assert f"wrote {folder / name}\n" in printed
 
@@ -99,6 +100,27 @@ def test_z_scores_are_printed_and_plausible(demo: tuple[Path, str]) -> None:
     rms = float(line.split(" is ")[-1].split()[0])
     assert 0.5 < rms < 1.6
     assert (demo[0] / REPORT).stat().st_size < 3_000_000
+
+
+@in_whole_demo
+def test_the_concealed_spring_is_found_and_the_page_can_show_it(demo: tuple[Path, str]) -> None:
+    folder, printed = demo
+    assert "joint_spring at joint1" in printed
+    assert "verdict: explained" in printed
+    assert f"tauscope serve --data {folder / DATA}" in printed
+    (result,) = (folder / DATA / "diagnoses").glob("*/result.json")
+    found = json.loads(result.read_text(encoding="utf-8"))
+    assert [(each["effect"], each["joint"]) for each in found["findings"]] == [("joint_spring", "joint1")]
+    (stiffness,) = (each for each in found["findings"][0]["parameters"] if each["name"] == "k")
+    assert abs(stiffness["value"] - 0.6) < 5 * stiffness["std"]
+
+
+def test_the_folder_of_a_service_stays(tmp_path: Path) -> None:
+    prepare_folder(tmp_path, (*FILES, DATA))
+    (tmp_path / DATA).mkdir()
+    (tmp_path / DATA / "mine").write_text("a campaign")
+    prepare_folder(tmp_path, (*FILES, DATA))
+    assert (tmp_path / DATA / "mine").read_text() == "a campaign"
 
 
 def test_it_replaces_its_own_files_only(tmp_path: Path) -> None:

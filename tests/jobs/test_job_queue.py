@@ -177,26 +177,52 @@ def test_a_job_with_a_damaged_record_can_be_removed(damage: bytes, items: ItemSt
     assert queue.cancel_or_remove(job)
 
 
-def test_what_an_earlier_service_left_unfinished_is_interrupted(items: ItemStore, executor: ManualExecutor) -> None:
+def test_what_an_earlier_service_left_unfinished_is_done_again_in_its_order(
+    items: ItemStore, executor: ManualExecutor
+) -> None:
     earlier = make_queue(items, executor)
     done = earlier.submit(items.stage())
     executor.run()
     running, waiting = earlier.submit(items.stage()), earlier.submit(items.stage())
     half_staged = items.stage()
     # The earlier service is killed here: nothing of it runs any more.
-    make_queue(items, ManualExecutor())
-    assert state_of(items, done) == "succeeded"
-    for job in (running, waiting):
-        assert (state_of(items, job), problem_of(items, job)) == ("interrupted", "interrupted")
+    again = ManualExecutor()
+    make_queue(items, again)
+    assert [state_of(items, job) for job in (done, running, waiting)] == ["succeeded", "running", "queued"]
+    for _ in range(2):
+        again.run()
+    assert again.tasks == []
+    assert [state_of(items, job) for job in (running, waiting)] == ["succeeded"] * 2
     assert not half_staged.exists()
 
 
-def test_closing_interrupts_and_takes_nothing_more(items: ItemStore, executor: ManualExecutor) -> None:
+def test_a_job_that_brings_the_service_down_is_not_done_for_ever(items: ItemStore) -> None:
+    deadly = make_queue(items, ManualExecutor()).submit(items.stage())
+    states = []
+    for _ in range(4):
+        make_queue(items, ManualExecutor())  # killed in the middle of it, again and again
+        states.append(state_of(items, deadly))
+    assert states == ["running", "running", "interrupted", "interrupted"]
+    assert problem_of(items, deadly) == "interrupted"
+
+
+def test_ending_in_good_order_counts_as_no_attempt(items: ItemStore) -> None:
+    job = make_queue(items, ManualExecutor()).submit(items.stage())
+    for _ in range(10):
+        queue = make_queue(items, ManualExecutor())
+        assert state_of(items, job) == "running"
+        queue.close()
+        assert state_of(items, job) == "queued"
+
+
+def test_closing_leaves_jobs_for_the_next_start_and_takes_nothing_more(
+    items: ItemStore, executor: ManualExecutor
+) -> None:
     queue = make_queue(items, executor)
     running, waiting = queue.submit(items.stage()), queue.submit(items.stage())
     queue.close()
     assert executor.shutdowns == [True]
-    assert [state_of(items, job) for job in (running, waiting)] == ["interrupted", "interrupted"]
+    assert [state_of(items, job) for job in (running, waiting)] == ["queued", "queued"]
     with pytest.raises(QueueFullError):
         queue.submit(items.stage())
 
@@ -217,7 +243,7 @@ def test_a_full_disk_when_a_job_ends_does_not_stop_the_queue(
     assert state_of(items, following) == "running"
     assert "could not be written" in caplog.text
     make_queue(items, ManualExecutor())
-    assert state_of(items, unlucky) == "interrupted"
+    assert state_of(items, unlucky) == "running"  # its result was never told: it is done again
 
 
 def test_jobs_of_several_kinds_take_their_turns(tmp_path: Path, executor: ManualExecutor) -> None:

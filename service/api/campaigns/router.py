@@ -1,5 +1,7 @@
 """Routes about campaigns."""
 
+from pathlib import Path
+
 from fastapi import APIRouter, Request, Response
 from starlette.concurrency import run_in_threadpool
 
@@ -14,10 +16,12 @@ from service.api.campaigns.models import (
 from service.api.campaigns.status import describe, find_campaign, result_of
 from service.api.campaigns.submission import submit_campaign
 from service.api.jobs.events import add_events_route
-from service.api.jobs.routes import ENDINGS, SUBMISSION, Identifier, Limit, collection
+from service.api.jobs.routes import ENDINGS, MOTION, SUBMISSION, Identifier, Limit, collection
 from service.api.jobs.submission import request_body
+from service.api.leases.holding import LeaseToken
 from service.api.problems import ProblemError, problem_responses
-from service.api.services import Offered
+from service.api.robots.of_job import add_robot_route
+from service.api.services import Offered, Services
 
 router = APIRouter(prefix="/campaigns", tags=["campaigns"], responses=problem_responses("invalid-request"))
 
@@ -27,10 +31,10 @@ router = APIRouter(prefix="/campaigns", tags=["campaigns"], responses=problem_re
     status_code=202,
     summary="Begin a campaign",
     response_model=CampaignAnswer,
-    responses=problem_responses(*SUBMISSION, "busy"),
+    responses=problem_responses(*SUBMISSION, *MOTION),
     openapi_extra=request_body(CampaignRequest, EXAMPLES),
 )
-async def hand_in(request: Request, response: Response, services: Offered) -> CampaignAnswer:
+async def hand_in(request: Request, response: Response, services: Offered, _lease: LeaseToken = None) -> CampaignAnswer:
     """Designs a motion, runs it, runs a second one that the model is judged by, and identifies the arm.
 
     The campaign has the arm until its motions are done. Follow `Location` until it has ended, or stop it at any time.
@@ -107,3 +111,13 @@ def remove_campaign(identifier: Identifier, services: Offered) -> None:
 
 
 add_events_route(router, "a campaign", find_campaign)
+
+
+def _robot(services: Services, identifier: str) -> tuple[Path, str | None]:
+    """Where the robot of a campaign lies."""
+    workspace = find_campaign(services, identifier)
+    order = workspace.read_order()
+    return workspace.robot, None if order is None else order.robot_file
+
+
+add_robot_route(router, "a campaign", _robot)

@@ -6,6 +6,7 @@ from starlette.concurrency import run_in_threadpool
 from service.api.backends import chosen_backend
 from service.api.campaigns.models import CampaignRequest
 from service.api.jobs.submission import Received, keep_robot, receive_request
+from service.api.leases.holding import permit_of
 from service.api.robots.files import read_received_robot
 from service.api.services import Services
 from service.jobs import CampaignOrder, CampaignWorkspace
@@ -31,7 +32,7 @@ async def submit_campaign(request: Request, services: Services) -> str:
     ProblemError
         if the request is not as documented
     TauscopeError
-        if the robot is not valid, or somebody else has the arm
+        if the robot is not valid, somebody else has the arm, or the lease does not let it move
     """
     items = services.campaigns.items
     staged = await run_in_threadpool(items.stage)
@@ -39,20 +40,24 @@ async def submit_campaign(request: Request, services: Services) -> str:
         workspace = CampaignWorkspace(staged)
         await run_in_threadpool(workspace.prepare)
         received = await receive_request(request, CampaignRequest, services.settings, workspace.robot)
-        return await run_in_threadpool(_hand_in, received, services, workspace)
+        return await run_in_threadpool(_hand_in, received, services, workspace, request)
     finally:
         await run_in_threadpool(items.discard, staged)
 
 
-def _hand_in(received: Received[CampaignRequest], services: Services, workspace: CampaignWorkspace) -> str:
+def _hand_in(
+    received: Received[CampaignRequest], services: Services, workspace: CampaignWorkspace, request: Request
+) -> str:
     """Check what was received, and begin."""
     document, robot_file = received.document, keep_robot(received, workspace.robot)
     robot = read_received_robot(workspace.robot, robot_file)
+    backend = chosen_backend(services.settings, document.backend, robot)
+    permit = permit_of(request, services, backend.device(robot.name))
     workspace.write_order(
         CampaignOrder(
             robot_file=robot_file,
             robot_name=robot.name,
-            backend=chosen_backend(services.settings, document.backend, robot),
+            backend=backend,
             excitation=document.excitation,
             held_out=document.held_out,
             run=document.run,
@@ -60,4 +65,4 @@ def _hand_in(received: Received[CampaignRequest], services: Services, workspace:
             diagnosis=document.diagnosis,
         )
     )
-    return services.campaigns.submit(workspace.folder)
+    return services.campaigns.submit(workspace.folder, permit)

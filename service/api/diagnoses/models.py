@@ -65,6 +65,7 @@ class DiagnosisLinksAnswer(AnswerModel):
     events: str = Field(description="what happens to it, as server-sent events")
     result: str | None = Field(default=None, description="its result, once it succeeded")
     plots: str | None = Field(default=None, description="data of its figures, once it succeeded")
+    report: str | None = Field(default=None, description="its report as a page, once it succeeded")
     model: str | None = Field(default=None, description="the model with all findings, once it succeeded")
     next_trajectory: str | None = Field(default=None, description="the motion to record next, where one was planned")
 

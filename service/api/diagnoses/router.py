@@ -1,5 +1,7 @@
 """Routes about diagnoses."""
 
+from pathlib import Path
+
 from fastapi import APIRouter, Request, Response
 from starlette.concurrency import run_in_threadpool
 
@@ -7,12 +9,13 @@ from service.api.diagnoses.models import EXAMPLES, DiagnosisAnswer, DiagnosisLis
 from service.api.diagnoses.status import describe, find_diagnosis, finished_diagnosis
 from service.api.diagnoses.submission import submit_diagnosis
 from service.api.jobs.collection import add_collection_routes
-from service.api.jobs.documents import JobDocument, add_document_routes
+from service.api.jobs.documents import HTML, HTML_CONTENT, JobDocument, add_document_routes
 from service.api.jobs.events import add_events_route
 from service.api.jobs.routes import SUBMISSION
 from service.api.jobs.submission import request_body
 from service.api.problems import problem_responses
-from service.api.services import Offered
+from service.api.robots.of_job import add_robot_route
+from service.api.services import Offered, Services
 from service.diagnosis import DiagnosisDocument
 from service.diagnosis.extended_model import ModelDocument
 from service.diagnosis.plots import DiagnosisPlots
@@ -70,6 +73,17 @@ _DOCUMENTS = (
         {"model": DiagnosisPlots, "description": "residuals over time and by variable, before and after"},
     ),
     JobDocument(
+        "report",
+        DiagnosisWorkspace.read_report,
+        "Fetch the report",
+        "The report as one page: no script, no request to anywhere, ready to print.",
+        {
+            "content": HTML_CONTENT,
+            "description": "the same page as `tauscope diagnose --report`",
+        },
+        HTML,
+    ),
+    JobDocument(
         "model",
         DiagnosisWorkspace.read_model,
         "Fetch the model with all findings",
@@ -100,3 +114,13 @@ add_document_routes(
     "invalid-request",
 )
 add_events_route(router, "a diagnosis", find_diagnosis)
+
+
+def _robot(services: Services, identifier: str) -> tuple[Path, str | None]:
+    """Where the robot of a diagnosis lies."""
+    workspace = find_diagnosis(services, identifier)
+    order = workspace.read_order()
+    return workspace.robot, None if order is None else order.robot_file
+
+
+add_robot_route(router, "a diagnosis", _robot)

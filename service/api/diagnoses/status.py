@@ -90,6 +90,7 @@ def _links(here: str, state: str | None, workspace: DiagnosisWorkspace) -> Diagn
         events=events,
         result=f"{here}/result",
         plots=f"{here}/plots",
+        report=f"{here}/report",
         model=f"{here}/model",
         next_trajectory=f"{here}/next-trajectory" if workspace.trajectory.is_file() else None,
     )

@@ -71,6 +71,8 @@ class LinksAnswer(AnswerModel):
     self_: str = Field(alias="self", description="its state")
     events: str = Field(description="what happens to it, as server-sent events")
     result: str | None = Field(default=None, description="its result, once it succeeded")
+    plots: str | None = Field(default=None, description="data of its figures, once it succeeded")
+    report: str | None = Field(default=None, description="its report as a page, once it succeeded")
     exports: dict[str, str] = Field(default={}, description="its exports by format, once it succeeded")
 
 

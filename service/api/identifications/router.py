@@ -1,5 +1,6 @@
 """Routes about identifications."""
 
+from pathlib import Path as FilePath
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Request, Response
@@ -14,15 +15,17 @@ from service.api.identifications.models import (
 from service.api.identifications.status import describe, find_identification, finished_identification
 from service.api.identifications.submission import submit_identification
 from service.api.jobs.collection import add_collection_routes
-from service.api.jobs.documents import JobDocument, add_document_routes
+from service.api.jobs.documents import HTML, HTML_CONTENT, JobDocument, add_document_routes
 from service.api.jobs.events import add_events_route
 from service.api.jobs.routes import ENDINGS, SUBMISSION, Identifier
 from service.api.jobs.submission import request_body
 from service.api.problems import problem_responses
-from service.api.services import Offered
+from service.api.robots.of_job import add_robot_route
+from service.api.services import Offered, Services
 from service.errors import ExportError, NotFoundError
 from service.identification import IdentificationDocument
 from service.jobs import EXPORT_FILES, ExportFormat, IdentificationWorkspace
+from service.report.identification_plots import IdentificationPlots
 from service.robot.messages import nearest, one_line, shown
 
 router = APIRouter(prefix="/identifications", tags=["identifications"], responses=problem_responses("invalid-request"))
@@ -58,12 +61,32 @@ async def hand_in(request: Request, response: Response, services: Offered) -> Id
     return answer
 
 
-_RESULT = JobDocument(
-    "result",
-    IdentificationWorkspace.read_result,
-    "Fetch the result",
-    "The result of an identification that succeeded; else the problem that it ended in.",
-    {"model": IdentificationDocument, "description": "the same document as `tauscope identify --json`"},
+_DOCUMENTS = (
+    JobDocument(
+        "result",
+        IdentificationWorkspace.read_result,
+        "Fetch the result",
+        "The result of an identification that succeeded; else the problem that it ended in.",
+        {"model": IdentificationDocument, "description": "the same document as `tauscope identify --json`"},
+    ),
+    JobDocument(
+        "plots",
+        IdentificationWorkspace.read_plots,
+        "Fetch the data of its figures",
+        "What figures of the identification are drawn from.",
+        {"model": IdentificationPlots, "description": "torque over time and friction over velocity, joint by joint"},
+    ),
+    JobDocument(
+        "report",
+        IdentificationWorkspace.read_report,
+        "Fetch the report",
+        "The report as one page: no script, no request to anywhere, ready to print.",
+        {
+            "content": HTML_CONTENT,
+            "description": "the same page as `tauscope identify --report`",
+        },
+        HTML,
+    ),
 )
 
 add_collection_routes(
@@ -76,7 +99,7 @@ add_collection_routes(
 add_document_routes(
     router,
     finished_identification,
-    [_RESULT],
+    _DOCUMENTS,
     "robot-file",
     "recording",
     "recording-mismatch",
@@ -108,3 +131,13 @@ def get_export(identifier: Identifier, format_: Format, services: Offered) -> Re
 
 
 add_events_route(router, "an identification", find_identification)
+
+
+def _robot(services: Services, identifier: str) -> tuple[FilePath, str | None]:
+    """Where the robot of an identification lies."""
+    workspace = find_identification(services, identifier)
+    order = workspace.read_order()
+    return workspace.robot, None if order is None else order.robot_file
+
+
+add_robot_route(router, "an identification", _robot)

@@ -89,4 +89,11 @@ def _links(here: str, state: str | None, refused: Mapping[str, str]) -> LinksAns
         return LinksAnswer(self=here, events=events)
     formats = (export_format for export_format in EXPORT_FILES if export_format not in refused)
     exports = {export_format.value: f"{here}/exports/{export_format}" for export_format in formats}
-    return LinksAnswer(self=here, events=events, result=f"{here}/result", exports=exports)
+    return LinksAnswer(
+        self=here,
+        events=events,
+        result=f"{here}/result",
+        plots=f"{here}/plots",
+        report=f"{here}/report",
+        exports=exports,
+    )

@@ -1,4 +1,4 @@
-"""Routes that fetch the JSON documents of a job that succeeded."""
+"""Routes that fetch the documents of a job that succeeded."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -12,12 +12,18 @@ from service.api.problems import problem_responses
 from service.api.services import Offered, Services
 from service.jobs import Workspace
 
+HTML = "text/html"
+HTML_CONTENT: dict[str, Any] = {HTML: {"schema": {"type": "string"}}}
+
+PAGE_HEADERS = {"Content-Security-Policy": "default-src 'none'; style-src 'unsafe-inline'; sandbox"}
+"""A report brings its style with it, runs no script, and may do nothing in the name of whoever reads it."""
+
 Folder = TypeVar("Folder", bound=Workspace)
 
 
 @dataclass(frozen=True)
 class JobDocument(Generic[Folder]):
-    """A JSON document that a job leaves in its folder.
+    """A document that a job leaves in its folder.
 
     name : str
         last part of the path
@@ -27,6 +33,8 @@ class JobDocument(Generic[Folder]):
         of the route
     answer : dict
         of OpenAPI: what an answer with the document is
+    media_type : str
+        of its content
     """
 
     name: str
@@ -34,6 +42,7 @@ class JobDocument(Generic[Folder]):
     summary: str
     description: str
     answer: dict[str, Any]
+    media_type: str = "application/json"
 
 
 def add_document_routes(
@@ -80,4 +89,5 @@ def _add_document_route(
     )
     def get_document(identifier: Identifier, services: Offered) -> Response:
         content = document.read(finished(services, identifier))
-        return Response(require_document(content, identifier), media_type="application/json")
+        headers = PAGE_HEADERS if document.media_type == HTML else None
+        return Response(require_document(content, identifier), headers=headers, media_type=document.media_type)

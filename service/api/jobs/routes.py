@@ -23,6 +23,10 @@ SUBMISSION = (
 """Problems of handing anything in that comes with a robot file."""
 
 
+MOTION = ("busy", "leased", "lease-needed", "lease-lost", "not-armed")
+"""Problems of moving an arm that somebody else has, or that the lease does not let move."""
+
+
 def collection(request: Request, steps_below: int) -> str:
     """Path of the collection, seen from a request below it.
 

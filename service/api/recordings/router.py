@@ -16,13 +16,14 @@ from service.api.openapi import binary_part, form_body
 from service.api.problems import ProblemError, problem_responses
 from service.api.recordings.models import RecordingAnswer, RecordingListAnswer, RecordingReportAnswer
 from service.api.services import Offered
-from service.jobs import check_kept_recording
+from service.jobs import check_kept_recording, read_kept_samples
 from service.store import StoredRecording
 
 router = APIRouter(prefix="/recordings", tags=["recordings"], responses=problem_responses("invalid-request"))
 
 Name = Annotated[str, Path(description="name of the recording", examples=["log-2026-11-03.csv"])]
 JointCount = Annotated[int | None, Query(gt=0, le=1000, description="joints that the recording must have")]
+MostSamples = Annotated[int, Query(ge=2, le=1_000_000, description="samples to return, about")]
 
 _BODY = form_body({"file": binary_part("the recording: CSV, Parquet, MCAP or a rosbag2 database")}, required=["file"])
 
@@ -82,6 +83,30 @@ async def report_on_recording(name: Name, services: Offered, joint_count: JointC
         text = f"{name}: the process that looked into it ended unexpectedly; is the file damaged, or far too large?"
         raise ProblemError("worker-lost", text) from None
     return RecordingReportAnswer.model_validate(report)
+
+
+@router.get(
+    "/{name}/samples",
+    summary="Fetch samples of a recording for a plot",
+    response_class=Response,
+    responses={
+        200: {"content": {"application/octet-stream": {}}, "description": "columns of 32-bit floats behind a header"},
+        **problem_responses("not-found", "recording", "worker-lost"),
+    },
+)
+async def get_samples(name: Name, services: Offered, most: MostSamples = 100_000) -> Response:
+    """Time, positions and torques; of more samples than asked for, those that keep every column's look.
+
+    Length of the header (4 bytes, little-endian), the header (JSON: `columns`, `joint_count`, `effort`, `samples`,
+    `shown`), then each column as little-endian 32-bit floats; time counts from the first sample.
+    """
+    path = await run_in_threadpool(services.recordings.path, name)
+    try:
+        content = await asyncio.wrap_future(services.checks.submit(read_kept_samples, path, most))
+    except BrokenExecutor:
+        text = f"{name}: the process that read it ended unexpectedly; is the file damaged, or far too large?"
+        raise ProblemError("worker-lost", text) from None
+    return Response(content, media_type="application/octet-stream")
 
 
 @router.get(

@@ -1,5 +1,6 @@
 """Routes about runs."""
 
+from pathlib import Path
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
@@ -8,14 +9,16 @@ from starlette.concurrency import run_in_threadpool
 
 from service.api.downloads import file_answer
 from service.api.jobs.events import add_events_route
-from service.api.jobs.routes import SUBMISSION, Identifier, Limit, collection
+from service.api.jobs.routes import MOTION, SUBMISSION, Identifier, Limit, collection
 from service.api.jobs.submission import request_body
+from service.api.leases.holding import LeaseToken
 from service.api.openapi import binary_part
 from service.api.problems import ProblemError, problem_responses
+from service.api.robots.of_job import add_robot_route
 from service.api.runs.models import EXAMPLES, RecordingFormat, RunAnswer, RunListAnswer, RunRequest, StopAnswer
 from service.api.runs.status import describe, find_run, followed_run, require_recording
 from service.api.runs.submission import submit_run
-from service.api.services import Offered
+from service.api.services import Offered, Services
 
 router = APIRouter(prefix="/runs", tags=["runs"], responses=problem_responses("invalid-request"))
 
@@ -29,13 +32,14 @@ _PARTS = {"trajectory": binary_part("the motion: a trajectory document (.json), 
     status_code=202,
     summary="Begin a run",
     response_model=RunAnswer,
-    responses=problem_responses(*SUBMISSION, "not-found", "busy", "not-finished", "excitation", "queue-full"),
+    responses=problem_responses(*SUBMISSION, *MOTION, "not-found", "not-finished", "excitation", "queue-full"),
     openapi_extra=request_body(RunRequest, EXAMPLES, _PARTS),
 )
-async def hand_in(request: Request, response: Response, services: Offered) -> RunAnswer:
+async def hand_in(request: Request, response: Response, services: Offered, _lease: LeaseToken = None) -> RunAnswer:
     """The arm moves as soon as there is a motion: follow `Location` until it has ended, or stop it at any time.
 
-    One run at a time has an arm. Every command passes a guard that keeps the robot file's limits.
+    One run at a time has an arm. Where somebody has the arm's lease, only they move it; it stops when the lease ends.
+    Every command passes a guard that keeps the robot file's limits.
     """
     identifier = await submit_run(request, services)
     answer = await run_in_threadpool(describe, services, identifier, collection(request, 1))
@@ -106,3 +110,13 @@ def remove_run(identifier: Identifier, services: Offered) -> None:
 
 
 add_events_route(router, "a run", followed_run)
+
+
+def _robot(services: Services, identifier: str) -> tuple[Path, str | None]:
+    """Where the robot of a run lies."""
+    workspace = find_run(services, identifier)
+    order = workspace.read_request()
+    return workspace.robot, None if order is None else order.robot_file
+
+
+add_robot_route(router, "a run", _robot)

@@ -13,15 +13,18 @@ from service.api.documents import to_json_text
 from service.api.excitations.status import finished_excitation
 from service.api.form import PartRule
 from service.api.jobs.submission import Received, keep_robot, receive_request
+from service.api.leases.holding import permit_of
 from service.api.problems import ProblemError
 from service.api.robots.files import read_received_robot
 from service.api.runs.models import RunRequest
 from service.api.services import Services
 from service.errors import ExcitationError
 from service.jobs import (
+    BackendChoice,
     DesignedMotion,
     ExcitationDesignOptions,
     Motion,
+    Permit,
     RunRequestRecord,
     RunWorkspace,
     check_trajectory,
@@ -55,7 +58,7 @@ async def submit_run(request: Request, services: Services) -> str:
     ProblemError
         if the request is not as documented
     TauscopeError
-        if the robot or the motion is not valid, or somebody else has the arm
+        if the robot or the motion is not valid, somebody else has the arm, or the lease does not let it move
     """
     items = services.runs.items
     staged = await run_in_threadpool(items.stage)
@@ -66,12 +69,13 @@ async def submit_run(request: Request, services: Services) -> str:
         parts = {"trajectory": PartRule(most, workspace.trajectories, default_name="trajectory.json")}
         received = await receive_request(request, RunRequest, services.settings, workspace.robot, parts)
         wanted = await run_in_threadpool(_prepare, received, services, workspace)
+        permit = permit_of(request, services, wanted.backend.device(wanted.robot.name))
         if wanted.uploaded:
             checked = services.checks.submit(
                 check_trajectory, workspace.trajectories, workspace.robot / wanted.robot_file
             )
             await asyncio.wrap_future(checked)
-        return await run_in_threadpool(_hand_in, wanted, services, workspace)
+        return await run_in_threadpool(_hand_in, wanted, services, workspace, permit)
     finally:
         await run_in_threadpool(items.discard, staged)
 
@@ -83,6 +87,7 @@ class _Wanted:
     document: RunRequest
     robot_file: str
     robot: Robot
+    backend: BackendChoice
     uploaded: bool
 
 
@@ -108,13 +113,13 @@ def _prepare(received: Received[RunRequest], services: Services, workspace: RunW
         uploaded = True
     if uploaded and document.excitation is not None:
         raise ProblemError("invalid-request", "excitation and trajectory were both given; give one motion")
-    return _Wanted(document, robot_file, robot, uploaded)
+    backend = chosen_backend(services.settings, document.backend, robot)
+    return _Wanted(document, robot_file, robot, backend, uploaded)
 
 
-def _hand_in(wanted: _Wanted, services: Services, workspace: RunWorkspace) -> str:
+def _hand_in(wanted: _Wanted, services: Services, workspace: RunWorkspace, permit: Permit) -> str:
     """Settle what is moved, and how, and begin."""
-    document = wanted.document
-    backend = chosen_backend(services.settings, document.backend, wanted.robot)
+    document, backend = wanted.document, wanted.backend
     device = backend.device(wanted.robot.name)
     services.runs.claims.require_free(device)
     excitation, motion = _motion(wanted, services, workspace)
@@ -129,7 +134,7 @@ def _hand_in(wanted: _Wanted, services: Services, workspace: RunWorkspace) -> st
         )
     )
     try:
-        return services.runs.submit(workspace.folder, motion)
+        return services.runs.submit(workspace.folder, motion, permit=permit)
     except BaseException:
         if excitation is not None and document.excitation is None:
             services.jobs.cancel(services.excitations, excitation)

@@ -1,0 +1,1 @@
+"""Models of each robot over time: which is active, what drifts, what people should know."""

@@ -1,0 +1,1 @@
+"""Requests that may be repeated: with the same Idempotency-Key nothing is done twice."""

@@ -1,0 +1,135 @@
+"""Answers that are kept for those who ask again: one small file a request, written before anything is done."""
+
+import base64
+import hashlib
+import os
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from pydantic import Field, ValidationError
+
+from service.api.models import StrictModel
+from service.store import write_atomically
+from service.store.atomic import sync_folder
+
+LIFE_S = 24 * 3600.0
+"""How long an answer is kept [s]."""
+
+_TIDY_EVERY = 500
+
+
+class KeptAnswer(StrictModel):
+    """What was answered."""
+
+    fingerprint: str = Field(description="of the request's body, in hexadecimal")
+    status: int = Field(description="of the answer")
+    headers: tuple[tuple[str, str], ...] = Field(description="of the answer")
+    body: str = Field(description="of the answer, in base64")
+
+    def content(self) -> bytes:
+        """The body as it was sent."""
+        return base64.b64decode(self.body)
+
+
+class AnswerStore:
+    """Answers by the name of their request. Another store needs these three methods."""
+
+    def __init__(self, folder: Path, clock: Callable[[], float] = time.time) -> None:
+        """Open the store; its folder is made where it is missing, and answers that are too old go.
+
+        Parameters
+        ----------
+        folder : Path
+            holds the answers
+        clock : callable
+            seconds of the same era as the files' times
+        """
+        self._folder, self._clock = folder, clock
+        self._lock = threading.Lock()
+        self._begun = 0
+        folder.mkdir(parents=True, exist_ok=True)
+        self._tidy()
+
+    def begin(self, name: str) -> bool:
+        """Claim a request, durably, before anything is done.
+
+        Parameters
+        ----------
+        name : str
+            of the request, see `request_name`
+
+        Returns
+        -------
+        bool
+            False where the request was begun before
+
+        Raises
+        ------
+        OSError
+            if that cannot be written
+        """
+        with self._lock:
+            self._begun += 1
+            if self._begun % _TIDY_EVERY == 0:
+                self._tidy()
+        try:
+            descriptor = os.open(self._folder / name, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+        except FileExistsError:
+            return False
+        os.close(descriptor)
+        sync_folder(self._folder)
+        return True
+
+    def finish(self, name: str, answer: KeptAnswer | None) -> None:
+        """Keep the answer, or forget a request that did nothing.
+
+        Parameters
+        ----------
+        name : str
+            of the request
+        answer : KeptAnswer or None
+            what was answered; None to forget
+        """
+        if answer is None:
+            (self._folder / name).unlink(missing_ok=True)
+        else:
+            write_atomically(self._folder / name, answer.model_dump_json().encode())
+
+    def find(self, name: str) -> KeptAnswer | None:
+        """The answer to a request; None where there is none (yet).
+
+        Parameters
+        ----------
+        name : str
+            of the request
+        """
+        try:
+            return KeptAnswer.model_validate_json((self._folder / name).read_bytes())
+        except (OSError, ValidationError):
+            return None
+
+    def _tidy(self) -> None:
+        """Remove what is too old."""
+        for entry in self._folder.iterdir():
+            try:
+                if self._clock() - entry.stat().st_mtime > LIFE_S:
+                    entry.unlink(missing_ok=True)
+            except OSError:
+                continue
+
+
+def request_name(caller: str, path: str, key: str) -> str:
+    """What a request is called: nobody meets another caller's answers.
+
+    Parameters
+    ----------
+    caller : str
+        whose request
+    path : str
+        where it goes
+    key : str
+        its Idempotency-Key
+    """
+    return hashlib.sha256("\n".join((caller, path, key)).encode()).hexdigest()

@@ -1,0 +1,220 @@
+"""Taking a data folder and putting everything that the routes work with together; and letting go of it in order."""
+
+import shutil
+from collections.abc import Iterator, Mapping
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+
+from service.api.access.gate import Access
+from service.api.access.key_ring import KeyRing
+from service.api.access.keys import KeyFile
+from service.api.access.rate_limit import RateLimit
+from service.api.audit.log import AuditLog, AuditTrail
+from service.api.idempotency.answers import AnswerStore
+from service.api.operations.metrics import Metrics, TimedExecutor
+from service.api.pulse import Pulse
+from service.api.services import Services
+from service.api.settings import Settings
+from service.errors import TauscopeError
+from service.jobs import (
+    CampaignDesk,
+    ClusterExecutor,
+    DeviceClaims,
+    Housekeeping,
+    JobKind,
+    JobQueue,
+    Lease,
+    Leases,
+    ModelKeeper,
+    Repeater,
+    RunDesk,
+    ScheduleKeeper,
+    StartControl,
+    WorkerPool,
+    Workshop,
+    new_boot,
+    open_executor,
+    open_index,
+    run_diagnosis,
+    run_excitation,
+    run_identification,
+    start_control,
+)
+from service.store import FolderLock, ItemStore, RecordingStore, item_stores, site_identifier
+from service.store.database import Database, Index, ModelHistory, ScheduleBook
+
+REQUESTS_PER_S = 200.0
+"""How often a key may call in the long run, where the operator says nothing [1/s]."""
+
+
+@contextmanager
+def open_services(
+    settings: Settings, executor: Executor | None = None, start: StartControl | None = None
+) -> Iterator[Services]:
+    """Take the data folder, and end all work on leaving: first what moves, then the rest.
+
+    Parameters
+    ----------
+    settings : Settings
+        of the operator
+    executor : Executor or None
+        where the work is done; processes of our own where None
+    start : callable or None
+        starts the control process of a run; one of our own where None
+
+    Raises
+    ------
+    TauscopeError
+        if another service works with the data folder, or its database cannot be used
+    """
+    settings.data_folder.mkdir(parents=True, exist_ok=True)
+    access = _open_access(settings)
+    lock = FolderLock(settings.data_folder)
+    try:
+        site, database = site_identifier(settings.data_folder), Database(settings.database_address)
+    except BaseException:
+        lock.release()
+        raise
+    services = _assemble(_Ground(settings, access, database, site), executor, start)
+    _watch(services)
+    housekeeping = Housekeeping([services.index.sync, services.models.consider_new])
+    clock = Housekeeping([services.schedules.tick])  # apart: an interlock may take its time
+    housekeeping.start()
+    if settings.fires_schedules:
+        clock.start()
+    try:
+        with services.audit.writing():
+            services.audit.note("service", "began")
+            try:
+                with services.access.ring.watched():
+                    yield services
+            finally:
+                services.begin_to_close()
+                clock.close()
+                services.runs.close()
+                services.campaigns.close()
+                services.audit.note("service", "ended")
+    finally:
+        services.jobs.close()
+        services.checks.shutdown(wait=True, cancel_futures=True)
+        housekeeping.close()
+        database.close()
+        lock.release()
+
+
+@dataclass(frozen=True, eq=False)
+class _Ground:
+    """What everything else stands on."""
+
+    settings: Settings
+    access: Access
+    database: Database
+    site: str
+
+
+def _assemble(ground: _Ground, executor: Executor | None, start: StartControl | None) -> Services:
+    """Everything that the routes work with; nothing of it moves yet, and unfinished analysis goes on."""
+    settings, database, site = ground.settings, ground.database, ground.site
+    items, metrics, pulse = item_stores(settings.data_folder), Metrics(), Pulse()
+    recordings = RecordingStore(settings.recordings_folder)
+    recordings.tidy()
+    identifications, diagnoses, excitations = kinds = _kinds(settings, items)
+    pool = executor or open_executor(settings.workers)
+    jobs = JobQueue(
+        kinds,
+        TimedExecutor(pool, metrics.job_seconds),
+        slots=pool.width if isinstance(pool, ClusterExecutor) else settings.workers,
+        most_waiting=settings.max_waiting,
+    )
+    audit = AuditTrail(AuditLog(settings.data_folder))
+    claims = DeviceClaims(settings.max_arms)
+    leases = Leases(claims, settings.data_folder / "lease-number", on_end=partial(_note_end, audit))
+    start = start or partial(start_control, sim_socket=settings.sim_socket)
+    runs = RunDesk(items["run"], recordings, start, claims, pulse.is_felt, metrics.run_ended)
+    shop = Workshop(jobs, excitations, identifications, diagnoses, runs, recordings)
+    campaigns = CampaignDesk(items["campaign"], shop)
+    models = ModelKeeper(ModelHistory(database), site, items)
+    index = open_index(Index(database, site), items, recordings, settings.data_folder.name)
+    models.consider_new()
+    # What a schedule moves has no lease: it waits for its next time where somebody has one.
+    repeater = Repeater(shop, campaigns, partial(leases.permit, token=None, owner="schedule", is_needed=False))
+    return Services(
+        settings=settings,
+        recordings=recordings,
+        identifications=identifications,
+        diagnoses=diagnoses,
+        excitations=excitations,
+        jobs=jobs,
+        runs=runs,
+        campaigns=campaigns,
+        checks=executor or WorkerPool(1),
+        access=ground.access,
+        leases=leases,
+        audit=audit,
+        answers=AnswerStore(settings.data_folder / "idempotency"),
+        metrics=metrics,
+        pulse=pulse,
+        index=index,
+        models=models,
+        schedules=ScheduleKeeper(ScheduleBook(database, site, new_boot()), repeater, settings.data_folder),
+    )
+
+
+def _kinds(settings: Settings, items: Mapping[str, ItemStore]) -> tuple[JobKind, JobKind, JobKind]:
+    """Identifications, diagnoses and designed motions."""
+    where = {"server_recordings": settings.recordings_folder}
+    return (
+        JobKind(items["identification"], partial(run_identification, **where)),
+        JobKind(items["diagnosis"], partial(run_diagnosis, **where)),
+        JobKind(items["excitation"], run_excitation),
+    )
+
+
+def _watch(services: Services) -> None:
+    """Numbers that are asked for when somebody looks at the metrics."""
+    metrics, folder = services.metrics, services.settings.data_folder
+    metrics.loops.live = services.runs.lives
+    metrics.watch("tauscope_jobs_waiting", "Jobs that wait", services.jobs.waiting)
+    metrics.watch("tauscope_leases", "Leases that hold", lambda: len(services.leases.active()))
+    metrics.watch("tauscope_audit_lost", "Entries that the audit log did not take", lambda: services.audit.lost)
+    metrics.watch("tauscope_disk_free_bytes", "Room in the data folder", lambda: shutil.disk_usage(folder).free)
+
+
+def _note_end(audit: AuditTrail, lease: Lease, why: str) -> None:
+    """A lease has ended."""
+    audit.note("service", "lease ended", subject=lease.id, device=lease.device, holder=lease.holder, reason=why)
+
+
+def _open_access(settings: Settings) -> Access:
+    """The keys of the data folder; strangers find no service without keys at an address that they can reach."""
+    ring = KeyRing(KeyFile(settings.data_folder), is_required=not settings.is_local)
+    if not settings.is_local and not ring.has_valid_key():
+        hint = "make a key first (tauscope key add), or listen at 127.0.0.1"
+        raise TauscopeError(f"host {settings.host!r}: others could reach it, and there is no valid API key; {hint}")
+    rate = settings.requests_per_s or REQUESTS_PER_S
+    return Access(ring, RateLimit(rate, 2.0 * rate), limits_local=settings.requests_per_s is not None)
+
+
+def require_data_folder(settings: Settings) -> None:
+    """Make the data folder, and refuse one that cannot be worked with.
+
+    Parameters
+    ----------
+    settings : Settings
+        of the operator
+
+    Raises
+    ------
+    TauscopeError
+        if it cannot be made or written to, another service works with it, or it has no key where one is needed
+    """
+    folder = settings.data_folder
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        FolderLock(folder).release()
+        _open_access(settings)
+    except OSError as error:
+        text = f"{folder}: cannot be used as data folder ({error.strerror}); name a folder that can be written to"
+        raise TauscopeError(text) from None

@@ -1,0 +1,205 @@
+// A diagnosis as a story: where, what, how much, the proof, what next.
+
+import { download, getJson, post } from "./api.js";
+import { chance, figures, h, moment, number, percent, render, s, section, table, tabs, title, unit, withError } from "./dom.js";
+import { VARIABLES, heatMap } from "./heat.js";
+import { waiting } from "./identifications.js";
+import { jobList } from "./lists.js";
+import { group, plot, zoomButtons } from "./plots.js";
+
+export const showDiagnoses = jobList("diagnoses", "Diagnoses", "What a model leaves out, and how sure that is.",
+  (each) => (each.recordings ?? []).map((entry) => entry.name).join(", "));
+
+export const HEADLINES = {
+  consistent: "The model explains the recordings: nothing but noise is left.",
+  explained: "The findings explain all that the model left.",
+  partly_explained: "The findings explain part of what the model left; something remains.",
+  unexplained: "Something is missing that nothing in the catalogue explains.",
+  inconclusive: "These recordings cannot decide it.",
+};
+const AGAINST = { identified: "the best model that the data allow", model: "the robot file's model", simulation: "the simulator's recordings" };
+const CONFIRMED = new Map([[true, "seen again on held-out motion"], [false, "not seen on held-out motion"], [null, "no recording was held out"]]);
+
+export async function showDiagnosis(root, { id, signal, show }) {
+  const job = await getJson(`diagnoses/${id}`, signal);
+  const head = [h("p", { class: "eyebrow", text: "Diagnosis" }), h("h1", { text: job.robot ?? id }), h("p", { class: "meta", text: moment(job.created) })];
+  if (job.state !== "succeeded") return waiting(root, head, job, signal, show);
+  const [result, plots] = await Promise.all([getJson(job.links.result, signal), getJson(job.links.plots, signal)]);
+  const fit = result.fit.held_out ?? result.fit.train;
+  const ratio = (values) => values.map((rms, place) => rms / result.noise_std[place]);
+  const [before, after] = [ratio(fit.rms_before), ratio(fit.rms_after)];
+  const most = before.indexOf(Math.max(...before));
+  render(root, ...head,
+    h("p", { class: "headline", text: HEADLINES[result.verdict] }),
+    figures([
+      ["Verdict", result.verdict.replaceAll("_", " "), `compared with ${AGAINST[result.against]}`],
+      ["Findings", `${result.findings.length}`, [...new Set(result.findings.map((each) => title(each.effect)))].join(", ") || "nothing is named"],
+      ["Residual / noise", `${number(before[most], 3)} → ${number(after[most], 3)}`, `${result.joints[most]}, ${result.fit.held_out ? "held-out" : "its own"} motion`],
+      ["Noise known from", result.noise_method === "periods" ? "repetition" : "the residual", `band ${number(result.cutoff_hz, 3)} Hz`],
+    ]),
+    h("div", { class: "row" }, h("button", { type: "button", class: "primary", onclick: () => download(job.links.report, `diagnosis-${id}.html`), text: "Download the proof" }),
+      h("button", { type: "button", onclick: () => download(job.links.model, `model-${id}.json`), text: "Model with findings" }),
+      h("button", { type: "button", onclick: () => download(job.links.result, `diagnosis-${id}.json`), text: "JSON" })),
+    whereSection(result, plots), whatSection(result), howMuchSection(result), proofSection(plots), nextSection(job, result, signal), detectableSection(result));
+  return null;
+}
+
+function whereSection(result, plots) {
+  const place = h("div", {});
+  const joint = h("select", { id: "where-joint" }, result.joints.map((name) => h("option", { value: name, text: name })));
+  const variable = h("select", { id: "where-state" }, VARIABLES.map((name) => h("option", { value: name, text: name })));
+  const start = result.mismatch.findIndex((each) => each.significant);
+  joint.value = result.joints[Math.max(start, 0)];
+  variable.value = result.mismatch[Math.max(start, 0)]?.where?.variable ?? "velocity";
+  if (!variable.value) variable.value = "velocity";
+  const map = h("div", {});
+  const draw = (key) => render(map, heatMap(plots, result.joints, key, (name, state, bin) => {
+    joint.value = name;
+    variable.value = state;
+    look(bin);
+    const row = result.joints.indexOf(name);
+    for (const cell of map.querySelectorAll(".chosen")) cell.classList.remove("chosen");
+    map.querySelector(`[data-cell="${row}-${state}-${bin}"]`)?.classList.add("chosen");
+    place.scrollIntoView({ block: "nearest" });
+  }));
+  function look(bin = null) {
+    const own = plots.histograms.find((each) => each.joint === joint.value && each.variable === variable.value);
+    if (!own) { render(place, h("p", { class: "note", text: "It does not vary there." })); return; }
+    const middle = own.before.map((_, k) => (own.edges[k] + own.edges[k + 1]) / 2);
+    const curve = plots.curves.find((each) => each.joint === joint.value);
+    const range = bin === null ? null : [own.edges[bin], own.edges[bin + 1]];
+    const inside = (k) => {
+      const value = variable.value === "time" ? curve.time[k] : curve.states[variable.value]?.[k];
+      return range !== null && value >= range[0] && value <= range[1];
+    };
+    const series = [{ label: "without the findings", values: curve.before, colour: "--before" }, { label: "with them", values: curve.after, colour: "--after" }];
+    if (range) series.push({ label: `${variable.value} ${number(range[0], 3)} … ${number(range[1], 3)}`, values: curve.before.map((value, k) => (inside(k) ? value : null)), colour: "--c4", points: true });
+    render(place, 
+      plot({ label: `Rms of the residual of ${joint.value} by ${variable.value}`, raw: true, x: middle, xLabel: `${variable.value} [SI]`, yLabel: "Nm or N", series: [
+        { label: "without the findings", values: own.before, colour: "--before", width: 2 }, { label: "with them", values: own.after, colour: "--after", width: 2 },
+        { label: "noise", values: own.before.map(() => own.noise), colour: "--muted", dash: [5, 4] }] }).element,
+      plot({ label: `Residual of ${joint.value} over time${range ? ", the chosen part marked" : ""}`, raw: true, x: curve.time, xLabel: `time in ${curve.recording} [s]`, yLabel: "Nm or N", noise: 2 * own.noise, series }).element);
+  }
+  joint.onchange = variable.onchange = () => look();
+  draw("before");
+  look();
+  const significant = result.mismatch.filter((each) => each.significant);
+  return section("where", "Where",
+    significant.length ? h("ul", { class: "plain" }, significant.map((each) => h("li", { text: located(each) }))) : h("p", { text: "At no joint is there more than noise." }),
+    result.findings.length ? tabs("Map", ["Without the findings", "With them"], 0, (chosen) => draw(chosen ? "after" : "before")) : null,
+    map, h("p", { class: "note", text: "Each cell holds as many samples as any other of its row and group. Click one to see the residual there, or choose:" }),
+    h("form", { class: "sheet" }, h("label", { for: "where-joint" }, "Joint", joint), h("label", { for: "where-state" }, "State", variable)), place);
+}
+
+function located(entry) {
+  const where = entry.where ? `, ${(100 * entry.where.share).toFixed(0)} % of it at a ${entry.where.variable.replaceAll("_", " ")} of ${entry.where.range.map((v) => number(v, 2)).join(" to ")}` : "";
+  const when = entry.time ? `, ${(100 * entry.time.share).toFixed(0)} % between ${entry.time.range.map((v) => number(v, 3)).join(" and ")} s` : "";
+  return `${entry.joint}: ${number(entry.excess_rms, 3)} rms beyond the noise${where}${when}.`;
+}
+
+function whatSection(result) {
+  const total = result.findings.reduce((sum, each) => sum + each.gain, 0);
+  return section("what", "What", result.findings.length ? null : h("p", { text: "No effect of the catalogue is named." }),
+    result.findings.map((each, place) => h("article", { class: "card" },
+      h("p", { class: "rank", "aria-hidden": "true", text: `${place + 1}` }),
+      h("div", {}, h("h3", {}, title(each.effect), h("span", { text: each.joint ? ` at ${each.joint}` : " of the whole arm" })), h("p", { text: `${each.statement}.` }),
+        h("dl", {}, each.parameters.flatMap((q) => [h("dt", { text: q.name }), h("dd", { text: `${withError(q.value, 1.96 * q.std)}${unit(q.unit)} (95 %)` })]),
+          each.equation ? [h("dt", { text: "Torque" }), h("dd", { text: each.equation })] : null,
+          h("dt", { text: "Explains" }), h("dd", { text: `${percent(each.gain / total)} of what all findings explain` }),
+          h("dt", { text: "Held out" }), h("dd", { text: CONFIRMED.get(each.confirmed) }),
+          h("dt", { text: "Could also be" }), h("dd", { text: each.equivalent.join(", ") || "nothing: it stands alone" }))),
+      h("div", { class: "chance" }, h("strong", { text: chance(each.probability) }), "probable", h("div", { class: "meter", "aria-hidden": "true" }, h("span", { "width%": 100 * each.probability }))))));
+}
+
+function howMuchSection(result) {
+  const { train, held_out: heldOut } = result.fit;
+  const columns = ["joint", "without the findings", "with them", ...(heldOut ? ["held out, without", "held out, with"] : [])];
+  const rows = result.joints.map((name, place) => [name, ...[train.rms_before, train.rms_after, ...(heldOut ? [heldOut.rms_before, heldOut.rms_after] : [])].map((each) => number(each[place], 3))]);
+  const p = result.constancy.p_value;
+  return section("how-much", "How much",
+    h("h3", { text: "Residual rms at the recorded rate" }), table("Residual rms", columns, rows),
+    result.parameter_differences.length ? [h("h3", { text: "What the simulation has wrong" }), bars(result.parameter_differences.map((each) => [each.parameter, each.difference_in_std, `${number(each.simulation)} → ${number(each.real)}`]))] : null,
+    result.parameter_shifts.length ? [h("h3", { text: "What had been absorbed where" }), h("p", { class: "note", text: "How far estimates moved when the findings were added, in standard errors; within the shaded part nothing has moved." }),
+      bars(result.parameter_shifts.slice(0, 14).map((each) => [each.parameter, each.shift_in_std, `${number(each.before)} → ${number(each.after)}`]))] : null,
+    h("p", { class: "note", text: result.constancy.moved.length ? `Parameters do not all hold from one recording to the next: ${result.constancy.moved.map((each) => each.parameter).join(", ")} (p = ${number(p, 2)}).` : `The parameters hold from one recording to the next (p = ${number(p, 2)}).` }));
+}
+
+/** Standard errors as bars on a logarithmic axis to both sides. */
+function bars(entries) {
+  const scale = (value) => Math.sign(value) * Math.log1p(Math.abs(value));
+  const reach = Math.max(...entries.map(([, value]) => Math.abs(scale(value))), scale(4));
+  const at = (value) => 100 + (98 * scale(value)) / reach;
+  return h("div", { class: "bars" }, entries.map(([name, value, words]) => [h("span", { text: name }),
+    s("svg", { viewBox: "0 0 200 16", preserveAspectRatio: "none", role: "img", "aria-label": `${number(value, 3)} standard errors, ${words}` },
+      s("rect", { class: "zone", x: at(-1.96), width: at(1.96) - at(-1.96), y: 0, height: 16 }),
+      s("rect", { x: Math.min(at(value), 100), width: Math.abs(at(value) - 100), y: 4, height: 8 }), s("title", { text: words })), h("span", { text: number(value, 3) })]));
+}
+
+function proofSection(plots) {
+  const place = h("div", {});
+  function choose(joint) {
+    const curve = plots.overlays[joint];
+    const spectrum = plots.spectra.find((each) => each.joint === curve.joint);
+    const together = group();
+    const left = (values) => curve.measured.map((value, k) => value - values[k]);
+    render(place, zoomButtons(together),
+      plot({ label: `Torque of ${curve.joint}`, x: curve.time, xLabel: "time [s]", yLabel: "Nm or N", group: together, tall: true, series: [
+        { label: "measured", values: curve.measured, colour: "--measured", width: 4 }, { label: "model without the findings", values: curve.before, colour: "--before" }, { label: "with them", values: curve.after, colour: "--after" }] }).element,
+      plot({ label: "Residual", x: curve.time, xLabel: "time [s]", yLabel: "Nm or N", group: together, noise: 2 * curve.noise, series: [
+        { label: "without the findings", values: left(curve.before), colour: "--before" }, { label: "with them", values: left(curve.after), colour: "--after" }] }).element,
+      spectrum ? plot({ label: "Spectrum of the residual", raw: true, log: true, x: spectrum.frequency, xLabel: "frequency [Hz]", yLabel: "(Nm)²/Hz or N²/Hz", series: [
+        { label: "without the findings", values: spectrum.before, colour: "--before" }, { label: "with them", values: spectrum.after, colour: "--after" }, { label: "noise", values: spectrum.noise, colour: "--muted", dash: [5, 4] }] }).element : null);
+  }
+  if (!plots.overlays.length) return section("proof", "The proof", h("p", { text: "This diagnosis was made before proofs were kept." }));
+  const gains = plots.overlays.map((curve) => curve.measured.reduce((sum, value, k) => sum + (value - curve.before[k]) ** 2 - (value - curve.after[k]) ** 2, 0) / curve.noise ** 2);
+  const best = gains.indexOf(Math.max(...gains));
+  choose(best);
+  const unseen = plots.overlays[0].held_out;
+  return section("proof", "The proof", h("p", { class: "lead", text: unseen ? "On held-out motion, from which neither model was made; the stretch in which the findings help most." : "No recording was held out: this is the motion that the models were made from." }),
+    tabs("Joint", plots.overlays.map((each) => each.joint), best, choose), place);
+}
+
+function nextSection(job, result, signal) {
+  const next = result.next_experiment;
+  if (!next) return section("next", "What next", h("p", { text: "Nothing is open that another motion would decide." }));
+  const place = h("div", {});
+  const said = h("p", { role: "status", class: "note" });
+  const button = h("button", { type: "button", class: "primary", text: "Run it on the simulated arm", onclick: async () => {
+    button.disabled = true;
+    try {
+      const run = await post("runs", await nextRun(job));
+      location.hash = `#/runs/${run.id}`;
+    } catch (error) { said.textContent = error.message; button.disabled = false; }
+  } });
+  if (job.links.next_trajectory) {
+    getJson(job.links.next_trajectory, signal).then((trajectory) => render(place, h("p", { class: "note", text: `Planned: ${(trajectory.segments ?? []).length} segments, within the robot file's limits.` }))).catch(() => {});
+  }
+  return section("next", "What next", h("p", { text: `${next.why.charAt(0).toUpperCase()}${next.why.slice(1)}.` }),
+    next.separates.length ? h("p", { text: `It tells apart: ${next.separates.join(", ")}.` }) : null, place,
+    job.links.next_trajectory ? h("div", { class: "row" }, button, h("button", { type: "button", onclick: () => download(job.links.next_trajectory, `next-${job.id}.json`), text: "Save the motion" })) : null, said);
+}
+
+/** A run of the planned motion with the robot that was diagnosed. */
+async function nextRun(job) {
+  const [robot, trajectory] = await Promise.all([getJson(`diagnoses/${job.id}/robot`), getJson(job.links.next_trajectory)]);
+  const form = new FormData();
+  form.append("request", new Blob([JSON.stringify({ backend: { name: "sim" }, trajectory })], { type: "application/json" }));
+  appendRobot(form, robot);
+  return form;
+}
+
+/** The files of a robot as parts of a form. */
+export function appendRobot(form, robot) {
+  for (const file of robot.files) form.append(file.name === robot.robot_file ? "robot" : "urdf", new File([file.content], file.name));
+}
+
+function detectableSection(result) {
+  const places = [...result.joints, null].filter((name) => result.detectable.some((each) => each.joint === name));
+  const effects = [...new Set(result.detectable.map((each) => each.effect))];
+  const rows = effects.map((effect) => {
+    const own = places.map((name) => result.detectable.find((each) => each.effect === effect && each.joint === name));
+    return [title(effect), [...new Set(own.filter(Boolean).map((each) => each.unit))].join(", "), ...own.map((each) => (each ? number(each.minimum, 2) : ""))];
+  });
+  return section("detectable", "What would have been seen", h("p", { class: "lead", text: "The smallest size of each effect that nine of ten such data sets would have shown. What is smaller may be there and not be named." }),
+    table("Smallest visible size", ["effect", "unit", ...places.map((name) => name ?? "whole arm")], rows, 2));
+}

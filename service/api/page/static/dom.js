@@ -1,0 +1,118 @@
+// Elements made from text only: whatever a name holds, it is never read as markup.
+
+const LONG = 60; // letters of a cell that may fill several lines
+const SVG = "http://www.w3.org/2000/svg";
+
+function filled(element, properties, children) {
+  for (const [name, value] of Object.entries(properties ?? {})) {
+    if (value === undefined || value === null || value === false) continue;
+    if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
+    else if (name === "text") element.textContent = value;
+    else if (name === "width%") element.style.setProperty("width", `${value}%`); // the one style that data decide
+    else element.setAttribute(name, value === true ? "" : value);
+  }
+  for (const child of children.flat(Infinity)) {
+    if (child !== null && child !== undefined && child !== false) element.append(child);
+  }
+  return element;
+}
+
+/** An HTML element; children are elements or text. */
+export function h(tag, properties, ...children) {
+  return filled(document.createElement(tag), properties, children);
+}
+
+/** Put elements or text in place of what an element held; what is not there leaves nothing. */
+export function render(element, ...children) {
+  element.replaceChildren();
+  filled(element, {}, children);
+}
+
+/** An SVG element. */
+export function s(tag, properties, ...children) {
+  return filled(document.createElementNS(SVG, tag), properties, children);
+}
+
+/** A number to some significant digits, a dash where there is none. */
+export function number(value, digits = 4) {
+  if (value === null || value === undefined || !Number.isFinite(value)) return "–";
+  if (value === 0) return "0";
+  const size = Math.abs(value);
+  if (size < 1e-4 || size >= 1e7) return value.toExponential(digits - 1).replace("-", "−");
+  const decimals = Math.max(digits - 1 - Math.floor(Math.log10(size)), 0);
+  return value.toFixed(Math.min(decimals, 9)).replace("-", "−");
+}
+
+/** A unit behind its number; that of a ratio is not said. */
+export const unit = (name) => (name === "1" ? "" : ` ${name}`);
+
+/** A value and its standard error, to the error's second digit. */
+export function withError(value, std) {
+  if (!Number.isFinite(std) || std <= 0) return number(value);
+  const decimals = Math.min(Math.max(1 - Math.floor(Math.log10(std)), 0), 9);
+  return `${value.toFixed(decimals)} ± ${std.toFixed(decimals)}`.replaceAll("-", "−");
+}
+
+/** A chance in words: what is not certain is never said to be. */
+export function chance(value) {
+  return value > 0.99 && value < 1 ? "> 99 %" : `${(100 * value).toFixed(0)} %`;
+}
+
+export function percent(share) {
+  return Number.isFinite(share) ? `${(100 * share).toPrecision(2)} %` : "–";
+}
+
+/** A moment as people say it. */
+export function moment(text) {
+  if (!text) return "–";
+  return new Date(text).toLocaleString(undefined, { dateStyle: "medium", timeStyle: "short" });
+}
+
+/** An id such as load_dependent_friction as a heading. */
+export function title(id) {
+  const words = id.replaceAll("_", " ");
+  return words.charAt(0).toUpperCase() + words.slice(1);
+}
+
+export function bytes(count) {
+  return count < 1e6 ? `${(count / 1e3).toFixed(0)} kB` : `${(count / 1e6).toFixed(1)} MB`;
+}
+
+/** A table that scrolls by itself; `words` leading columns hold words, the others numbers. */
+export function table(caption, columns, rows, words = 1) {
+  const cell = (tag, place, content, scope) =>
+    h(tag, { class: place < words ? (content.length > LONG ? "word long" : "word") : null, scope }, content);
+  return h("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": caption },
+    h("table", {},
+      h("thead", {}, h("tr", {}, columns.map((name, place) => cell("th", place, name, "col")))),
+      h("tbody", {}, rows.map((row) => h("tr", {}, row.map((content, place) => cell("td", place, content)))))));
+}
+
+/** A state as a word with a mark of its own shape, for those who tell no colours apart. */
+export function state(name) {
+  const marks = { succeeded: "●", finished: "●", failed: "✕", damaged: "✕", interrupted: "✕", cancelled: "■", stopped: "■" };
+  const kind = ["succeeded", "finished"].includes(name) ? "good" : marks[name] ? "bad" : "live";
+  return h("span", { class: `state ${kind}` }, h("span", { "aria-hidden": "true" }, marks[name] ?? "◐"), ` ${name}`);
+}
+
+/** Large numbers at the top of a page. */
+export function figures(entries) {
+  return h("dl", { class: "figures" }, entries.map(([name, value, remark]) =>
+    h("div", {}, h("dt", { text: name }), h("dd", {}, value, remark ? h("small", { text: remark }) : null))));
+}
+
+export function section(id, heading, ...children) {
+  return h("section", { id, "aria-labelledby": `${id}-title` }, h("h2", { id: `${id}-title`, text: heading }), children);
+}
+
+/** A choice of one among several, as buttons. */
+export function tabs(label, names, chosen, choose) {
+  const buttons = names.map((name, place) => h("button", {
+    type: "button", "aria-pressed": place === chosen ? "true" : "false",
+    onclick: () => {
+      buttons.forEach((each, other) => each.setAttribute("aria-pressed", other === place ? "true" : "false"));
+      choose(place);
+    },
+  }, name));
+  return h("div", { class: "tabs", role: "group", "aria-label": label }, buttons);
+}

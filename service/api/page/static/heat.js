@@ -1,0 +1,48 @@
+// Where the residual is: joints × state, each cell the residual in it as a multiple of the noise.
+
+import { h, number, s } from "./dom.js";
+
+const LEVELS = [1.1, 1.3, 1.6, 2, 3, 5, 10];
+export const VARIABLES = ["velocity", "position", "load", "acceleration", "time"];
+const ROW = 24;
+const LABELS = 96;
+const GAP = 14;
+const WIDTH = 960;
+const TOP = 24;
+
+const level = (ratio) => LEVELS.filter((edge) => ratio > edge).length;
+
+/** The map; `choose(joint, variable, bin)` is told which cell was clicked. */
+export function heatMap(plots, joints, key, choose) {
+  const group = (WIDTH - LABELS - GAP * (VARIABLES.length - 1)) / VARIABLES.length;
+  const height = TOP + ROW * joints.length + 40;
+  const parts = [];
+  VARIABLES.forEach((variable, place) => {
+    const left = LABELS + place * (group + GAP);
+    parts.push(s("text", { x: left, y: TOP - 8, text: variable }));
+    const words = variable === "time" ? ["start", "end"] : ["lowest", "highest"];
+    parts.push(s("text", { class: "small", x: left, y: height - 26, text: words[0] }));
+    parts.push(s("text", { class: "small", x: left + group, y: height - 26, "text-anchor": "end", text: words[1] }));
+    joints.forEach((joint, row) => {
+      const own = plots.histograms.find((each) => each.joint === joint && each.variable === variable);
+      if (!own) return;
+      const step = group / own[key].length;
+      own[key].forEach((value, bin) => {
+        const ratio = value / own.noise;
+        const cell = s("rect", { class: `h${level(ratio)}`, x: left + bin * step, y: TOP + row * ROW, width: step, height: ROW - 3,
+          "data-cell": `${row}-${variable}-${bin}`, onclick: () => choose(joint, variable, bin) },
+        s("title", { text: `${joint}, ${variable} ${number(own.edges[bin], 3)} … ${number(own.edges[bin + 1], 3)}: ${number(ratio, 3)} × noise` }));
+        parts.push(cell);
+      });
+    });
+  });
+  joints.forEach((joint, row) => parts.push(s("text", { x: 0, y: TOP + row * ROW + 15, text: joint.length > 14 ? `${joint.slice(0, 13)}…` : joint })));
+  ["noise", ...LEVELS.map((edge) => `> ${edge} ×`)].forEach((word, place) => {
+    const x = LABELS + 84 * place;
+    parts.push(s("rect", { class: `h${place}`, x, y: height - 14, width: 16, height: 11 }));
+    parts.push(s("text", { class: "small", x: x + 21, y: height - 5, text: word }));
+  });
+  const label = `Residual by joint and state as a multiple of the noise, ${key === "before" ? "without" : "with"} the findings`;
+  return h("div", { class: "wide", tabindex: "0", role: "region", "aria-label": label },
+    s("svg", { class: "heat", viewBox: `0 0 ${WIDTH} ${height}`, role: "img", "aria-label": label }, parts));
+}

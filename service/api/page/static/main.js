@@ -1,0 +1,161 @@
+// The shell: which view is shown, whether the service can be reached, and the button that stops every arm.
+
+import { getJson, post, useKey } from "./api.js";
+import { h, render } from "./dom.js";
+import { recolour } from "./plots.js";
+import { showCampaign, showCampaigns, showNewCampaign } from "./campaigns.js";
+import { showDiagnoses, showDiagnosis } from "./diagnoses.js";
+import { showHistory } from "./history.js";
+import { showIdentification, showIdentifications } from "./identifications.js";
+import { showRecording, showRecordings } from "./recordings.js";
+import { showRun, showRuns } from "./runs.js";
+
+const VIEWS = [
+  [/^\/$/, showCampaigns], [/^\/new$/, showNewCampaign], [/^\/campaigns\/([^/]+)$/, showCampaign],
+  [/^\/runs$/, showRuns], [/^\/runs\/([^/]+)$/, showRun],
+  [/^\/recordings$/, showRecordings], [/^\/recordings\/([^/]+)$/, showRecording],
+  [/^\/identifications$/, showIdentifications], [/^\/identifications\/([^/]+)$/, showIdentification],
+  [/^\/history$/, showHistory], [/^\/diagnoses$/, showDiagnoses], [/^\/diagnoses\/([^/]+)$/, showDiagnosis],
+];
+const MENU = [["/", "Campaigns"], ["/runs", "Runs"], ["/recordings", "Recordings"], ["/identifications", "Identifications"], ["/diagnoses", "Diagnoses"], ["/history", "Over time"]];
+const PULSE_MS = 2000;
+const THEMES = ["auto", "light", "dark"];
+
+const content = document.getElementById("content");
+const stopButton = document.getElementById("stop");
+let leaving = new AbortController();
+let live = { runs: [], campaigns: [] };
+let reached = true;
+
+async function show() {
+  leaving.abort();
+  leaving = new AbortController();
+  const { signal } = leaving;
+  const path = decodeURI(location.hash.slice(1)).split("?")[0] || "/";
+  for (const link of document.querySelectorAll("#navigation a")) {
+    const target = link.getAttribute("href").slice(1);
+    const here = target === "/" ? ["/", "/new"].includes(path) || path.startsWith("/campaigns") : path.startsWith(target);
+    if (here) link.setAttribute("aria-current", "page");
+    else link.removeAttribute("aria-current");
+  }
+  const found = VIEWS.map(([pattern, view]) => [pattern.exec(path), view]).find(([match]) => match);
+  render(content, h("div", { class: "placeholder", "aria-busy": "true" }));
+  if (!found) {
+    render(content, h("h1", { text: "There is no such page" }), h("p", {}, h("a", { href: "#/", text: "Go to the campaigns" })));
+    return;
+  }
+  try {
+    await found[1](content, { id: found[0][1] && decodeURIComponent(found[0][1]), signal, show });
+  } catch (error) {
+    if (signal.aborted) return;
+    if (error.status === 401) await askForKey(error.message);
+    else render(content, h("h1", { text: "This cannot be shown" }), h("p", { role: "alert", text: error.message }),
+      h("button", { type: "button", onclick: show, text: "Try again" }));
+  }
+}
+
+function askForKey(message) {
+  if (document.querySelector("dialog[open]")) return Promise.resolve();
+  const input = h("input", { type: "password", autocomplete: "off", required: true, id: "key" });
+  const dialog = h("dialog", { "aria-labelledby": "key-title" },
+    h("h2", { id: "key-title", text: "An API key is needed" }), h("p", { class: "note", text: message }),
+    h("label", { for: "key" }, "Key", input),
+    h("div", { class: "row" }, h("button", { type: "button", class: "primary", text: "Go on", onclick: () => {
+      useKey(input.value);
+      dialog.close();
+      dialog.remove();
+      show();
+    } })));
+  document.body.append(dialog);
+  dialog.showModal();
+  return Promise.resolve();
+}
+
+/** Whether the service answers, and what moves. */
+async function pulse() {
+  const quick = AbortSignal.timeout(PULSE_MS * 1.5);
+  try {
+    const [runs, campaigns] = await Promise.all([getJson("runs?limit=8", quick), getJson("campaigns?limit=8", quick)]);
+    live = {
+      runs: runs.runs.filter((run) => !["finished", "stopped", "failed", "interrupted", "damaged"].includes(run.state)),
+      campaigns: campaigns.campaigns.filter((each) => ["queued", "waiting", "running"].includes(each.state)),
+    };
+    connection(true);
+  } catch (error) {
+    if (error.status === 401) {
+      connection(true);
+      await askForKey(error.message);
+    } else connection(error.status !== undefined);
+  }
+  setTimeout(pulse, PULSE_MS);
+}
+
+function connection(now) {
+  const shown = document.getElementById("link-state");
+  const moving = live.runs.length + live.campaigns.length;
+  shown.classList.toggle("lost", !now);
+  shown.textContent = now ? (moving ? "An arm is in use" : "Connected") : "Not connected";
+  if (now !== reached) {
+    notice(now ? "" : "The connection to the service is lost. What is shown may be old. Stop is tried again and again when pressed; to be sure, use the arm's own emergency stop.");
+    reached = now;
+    if (now) window.dispatchEvent(new Event("tauscope:back"));
+  }
+}
+
+function notice(text) {
+  document.getElementById("notice").textContent = text;
+}
+
+/** Stop everything that moves: what is known at once, then what a fresh list says; tried until the service has heard. */
+async function stopAll() {
+  stopButton.classList.add("pressed");
+  stopButton.textContent = "Stopping";
+  const asked = [...live.campaigns.map((each) => each.links.stop), ...live.runs.map((each) => each.links.stop)];
+  const ask = (path) => post(path, undefined, { keepalive: true, signal: AbortSignal.timeout(3000) }).catch((error) => {
+    if (error.status === undefined) throw error;
+  });
+  for (let attempt = 0; attempt < 60; attempt += 1) {
+    try {
+      await Promise.all(["stop", ...asked].map(ask));
+      const fresh = AbortSignal.timeout(3000);
+      const [runs, campaigns] = await Promise.all([getJson("runs?limit=20", fresh), getJson("campaigns?limit=20", fresh)]);
+      const going = [
+        ...campaigns.campaigns.filter((each) => ["queued", "waiting", "running"].includes(each.state)),
+        ...runs.runs.filter((run) => !["finished", "stopped", "failed", "interrupted", "damaged"].includes(run.state)),
+      ];
+      await Promise.all(going.map((each) => ask(each.links.stop)));
+      notice(going.length || asked.length ? "Stop was sent, and the service has taken it." : "Nothing was moving.");
+      break;
+    } catch {
+      notice("Stop could not be sent. It is tried again. Use the arm's own emergency stop now.");
+      await new Promise((done) => setTimeout(done, 500));
+    }
+  }
+  stopButton.classList.remove("pressed");
+  stopButton.textContent = "Stop";
+  setTimeout(() => { if (reached) notice(""); }, 6000);
+}
+
+function theme(choice) {
+  localStorage.setItem("tauscope-theme", choice);
+  if (choice === "auto") delete document.documentElement.dataset.theme;
+  else document.documentElement.dataset.theme = choice;
+  const button = document.getElementById("theme");
+  const [mark, word] = { auto: ["◐", "Auto"], light: ["○", "Light"], dark: ["●", "Dark"] }[choice];
+  render(button, mark, h("span", { class: "word", text: ` ${word}` }));
+  button.setAttribute("aria-label", `Colours: ${choice}`);
+  recolour();
+}
+
+document.getElementById("navigation").append(...MENU.map(([path, name]) => h("a", { href: `#${path}`, text: name })));
+document.getElementById("theme").addEventListener("click", () => {
+  theme(THEMES[(THEMES.indexOf(localStorage.getItem("tauscope-theme") ?? "auto") + 1) % THEMES.length]);
+});
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", recolour);
+stopButton.addEventListener("click", stopAll);
+window.addEventListener("hashchange", async () => { await show(); content.focus({ preventScroll: true }); window.scrollTo(0, 0); });
+window.addEventListener("tauscope:back", show);
+theme(localStorage.getItem("tauscope-theme") ?? "auto");
+getJson("/healthz").then(({ version }) => { document.getElementById("version").textContent = `Tauscope ${version}`; }).catch(() => {});
+show();
+pulse();

@@ -1,0 +1,108 @@
+// Runs: one as it goes on, with positions, torques, room to the limits and the loop's jitter.
+
+import { armDrawing } from "./arm.js";
+import { download, follow, getJson, post } from "./api.js";
+import { figures, h, moment, number, render, section, state, table } from "./dom.js";
+import { jobList } from "./lists.js";
+import { group, jointStyle, plot } from "./plots.js";
+
+const ENDS = ["finished", "stopped", "failed", "interrupted", "damaged"];
+const KEPT = 1500;
+const NEAR = 0.15;
+
+export const showRuns = jobList("runs", "Runs", "Motions that were played on an arm.", (run) => (run.campaign ? "part of a campaign" : run.backend?.name));
+
+export async function showRun(root, { id, signal, show }) {
+  const run = await getJson(`runs/${id}`, signal);
+  const monitor = ENDS.includes(run.state) ? null : liveMonitor(id);
+  const status = h("div", { class: "row", role: "status" }, state(run.state));
+  render(root, 
+    h("p", { class: "eyebrow", text: `Run · ${run.backend?.name ?? ""}` }), h("h1", { text: run.robot ?? id }), h("p", { class: "meta", text: moment(run.created) }), status,
+    run.problem ? h("p", { role: "alert", text: run.problem.detail }) : null,
+    monitor?.element,
+    monitor ? null : finished(run));
+  if (monitor) {
+    let current = run.state;
+    await follow(run.links.events, signal, (event) => {
+      monitor.take(event);
+      const next = event.state ?? event.step ?? current;
+      if (next !== current) { current = next; render(status, state(next)); }
+      if (event.kind === "ended") show();
+    });
+  }
+}
+
+function finished(run) {
+  const timing = run.timing;
+  return [
+    timing ? figures([
+      ["Rate", `${number(timing.achieved_rate_hz, 4)} Hz`, `of ${number(timing.rate_hz, 4)} Hz`],
+      ["Lateness, 99 %", `${number(timing.lateness_us.p99, 3)} µs`, `at most ${number(timing.lateness_us.max, 3)} µs`],
+      ["Missed cycles", `${timing.missed_periods}`, `of ${timing.cycles}`],
+      ["Samples", `${run.recording?.samples ?? 0}`, run.recording?.partial ? "not played to its end" : "complete"],
+    ]) : null,
+    run.recording?.name ? h("div", { class: "row" }, h("a", { class: "button primary", href: `#/recordings/${encodeURIComponent(run.recording.name)}`, text: "Look at the recording" }),
+      Object.entries(run.links.recordings).map(([format, path]) => h("button", { type: "button", onclick: () => download(path, `run-${run.id}.${format}`), text: format.toUpperCase() }))) : null,
+    run.worst_following?.length ? section("following", "Largest distance of arm and target", table("Following", ["joint", "distance [rad or m]"], run.worst_following.map((value, place) => [`${place + 1}`, number(value, 3)]))) : null,
+    h("p", {}, h("button", { type: "button", class: "quiet", onclick: async () => { await post(run.links.stop); }, text: "Send stop again" }), h("span", { class: "hint", text: " harmless: it has ended" })),
+  ];
+}
+
+/** What a run says while it goes on; `take(event)` feeds it. */
+export function liveMonitor(id) {
+  const bar = h("progress", { max: "100", value: "0", "aria-label": "Played" });
+  const words = h("p", { class: "meta", text: "Waiting for the arm" });
+  const joints = h("div", { class: "joints" });
+  const jitter = h("p", { class: "meta" });
+  const plots = h("div", {});
+  const pose = h("div", {});
+  const times = [];
+  let charts = null;
+  let drawing = null;
+  const rows = { position: [], effort: [] };
+
+  getJson(`runs/${id}/robot`).then(({ report }) => { drawing = armDrawing(report); render(pose, drawing.element); }).catch(() => {});
+
+  function begin(count) {
+    const together = group();
+    const make = (label, key, unit) => plot({ label, x: [0, 1], xLabel: "time [s]", yLabel: unit, raw: true, group: together,
+      series: Array.from({ length: count }, (_, joint) => ({ label: `joint ${joint + 1}`, values: [null, null], ...jointStyle(joint) })), key });
+    charts = { position: make("Position", "position", "rad or m"), effort: make("Torque", "effort", "Nm or N") };
+    for (const key of ["position", "effort"]) rows[key] = Array.from({ length: count }, () => []);
+    render(plots, charts.position.element, charts.effort.element);
+  }
+
+  function take(event) {
+    const data = event.figures ?? {};
+    if (event.step) words.textContent = event.step;
+    if (event.percent !== undefined && event.percent !== null) bar.value = event.percent;
+    if (!data.position) return;
+    if (!charts) begin(data.position.length);
+    if (times.length && data.time_s <= times[times.length - 1]) return;
+    times.push(data.time_s);
+    for (const key of ["position", "effort"]) data[key].forEach((value, joint) => rows[key][joint].push(value));
+    if (times.length > KEPT) { times.shift(); for (const key of ["position", "effort"]) rows[key].forEach((each) => each.shift()); }
+    if (times.length > 1) for (const key of ["position", "effort"]) charts[key].replace(times, rows[key]);
+    drawing?.pose(data.position);
+    words.textContent = `${number(data.time_s, 3)} of ${number(data.duration_s, 3)} s`;
+    jitter.textContent = `Loop: ${number(data.lateness_us?.p99, 3)} µs late at 99 %, ${number(data.lateness_us?.max, 3)} µs at most; ${data.missed_periods} cycles missed, ${data.lost_rows} rows lost.`;
+    render(joints, jointTable(data));
+  }
+
+  const element = h("section", { "aria-label": "Live" }, bar, words, h("div", { class: "split" }, pose, h("div", {}, joints, jitter)), plots);
+  return { element, take };
+}
+
+function jointTable(data) {
+  const gauge = (share) => h("span", { class: `gauge ${share > 1 - NEAR ? "near" : ""}`, "aria-hidden": "true" }, h("span", { "width%": Math.min(Math.max(100 * share, 0), 100) }));
+  const rows = data.position.map((value, joint) => {
+    const [low, high] = data.position_range.map((each) => each[joint]);
+    const bounded = low !== null && high !== null;
+    const place = bounded ? (value - low) / (high - low) : null;
+    const limit = data.torque_limit[joint];
+    const load = limit ? Math.abs(data.effort[joint]) / limit : null;
+    return [`${joint + 1}`, number(value, 4), bounded ? h("span", {}, gauge(2 * Math.abs(place - 0.5)), ` ${number(data.position_room[joint], 3)} left`) : "no limit",
+      number(data.effort[joint], 4), load === null ? "no limit" : h("span", {}, gauge(load), ` ${(100 * load).toFixed(0)} %`)];
+  });
+  return table("Joints now", ["joint", "position", "room to the limit", "torque", "of its limit"], rows);
+}

@@ -1,0 +1,1 @@
+"""What is repeated at set times."""
