@@ -43,6 +43,12 @@ class FrictionCurve:
     bin_velocity: Array
     bin_torque: Array
 
+    @property
+    def columns(self) -> dict[str, list[float]]:
+        """The curve as columns: velocity, friction, standard error."""
+        values = {"velocity": self.velocity, "friction": self.torque, "standard_error": self.std}
+        return {name: each.tolist() for name, each in values.items()}
+
 
 def friction_curve(identification: Identification, series: Sequence[TorqueSeries], joint: int) -> FrictionCurve:
     """The curve of one joint.

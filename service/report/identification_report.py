@@ -7,9 +7,10 @@ from markupsafe import Markup
 
 from service.identification import Identification, IdentificationDocument, document
 from service.recording import Recording
+from service.report.csv_text import csv_text
 from service.report.friction_curve import friction_curve
 from service.report.friction_figure import friction_figure
-from service.report.page import Drawing, KeyFigure, Page, Part, Section, render
+from service.report.page import Drawing, KeyFigure, Numbers, Page, Part, Section, render
 from service.report.parameter_figure import parameter_figure
 from service.report.provenance import Provenance
 from service.report.quantities import ABSENT, counted, percent, significant, torque_unit, velocity_unit
@@ -24,7 +25,7 @@ from service.report.tables import (
     link_table,
     rotor_table,
 )
-from service.report.torque_figure import torque_figure
+from service.report.torque_figure import torque_columns, torque_figure
 from service.report.words import band_words, cautions, fit_sentences, masked_samples, noise_ratio, noise_words
 
 MOST_SERIES = 6
@@ -132,7 +133,9 @@ def _torque_section(
         svg = torque_figure(f"{kind}-{joint + 1}", series, joint, result.noise_std[joint], unit)
         label = f"Torque of {name}, measured and predicted, and their difference"
         caption = f"{name}: torque at the recorded rate above, what the model leaves below; right, the shaded tenth."
-        parts.append(Part(title=name, figure=Drawing(Markup(svg), label, caption)))  # noqa: S704 - as above
+        drawing = Drawing(Markup(svg), label, caption)  # noqa: S704 - as above
+        numbers = Numbers(f"Numbers of {name}", text=csv_text(torque_columns(series, joint)))
+        parts.append(Part(title=name, figure=drawing, numbers=numbers))
     length = series.time[-1] - series.time[0]
     shown = f"{series.recording}, {significant(length, 3)} s at {significant(series.rate_hz, 4)} Hz"
     if series.repetitions > 1:
@@ -154,7 +157,11 @@ def _friction_section(
         "Solid where recordings exist, between the upright lines; dashed beyond. The band follows from the standard"
         " errors alone; the dots are the recordings' own: measured torque less that of the rigid body.",
     )
-    parts = [Part(figure=figure), Part(table=friction_table(result), note=_FRICTION_EQUATION)]
+    curve_numbers = [
+        Part(numbers=Numbers(f"Numbers of {name}", text=csv_text(curve.columns)))
+        for name, curve in zip(result.joints, curves, strict=True)
+    ]
+    parts = [Part(figure=figure), *curve_numbers, Part(table=friction_table(result), note=_FRICTION_EQUATION)]
     if result.rotor_inertia:
         parts.append(Part(title="Reflected rotor inertia", table=rotor_table(result)))
     return Section("friction", "Friction", parts)

@@ -27,15 +27,60 @@ class Drawing:
 
 
 @dataclass(frozen=True)
+class Numbers:
+    """What a figure was drawn from, folded away: a table to read, or comma-separated text to copy.
+
+    title : str
+        what they are
+    table : Table or None
+        as cells
+    text : str or None
+        a heading line, then a line a sample
+    """
+
+    title: str
+    table: Table | None = None
+    text: str | None = None
+
+
+@dataclass(frozen=True)
+class Card:
+    """One thing of several that are ranked.
+
+    title, place : str
+        what it is, and where
+    probability : float
+        from 0 to 1
+    chance : str
+        the same in words
+    statement : str
+        in plain words
+    facts : sequence of (str, str)
+        what is known about it
+    """
+
+    title: str
+    place: str
+    probability: float
+    chance: str
+    statement: str
+    facts: Sequence[tuple[str, str]]
+
+
+@dataclass(frozen=True)
 class Part:
     """A piece of a section; what is None is left out.
 
     title : str or None
         heading
+    card : Card or None
+        one of several findings
     figure : Drawing or None
         drawing
     table : Table or None
         numbers
+    numbers : Numbers or None
+        what the figure was drawn from
     command : str or None
         what to type
     note : str or None
@@ -43,8 +88,10 @@ class Part:
     """
 
     title: str | None = None
+    card: Card | None = None
     figure: Drawing | None = None
     table: Table | None = None
+    numbers: Numbers | None = None
     command: str | None = None
     note: str | None = None
 
@@ -104,6 +151,8 @@ class Page:
         what made it
     kind : str
         what the page is about, in a word
+    headline : str or None
+        the answer in a few words
     """
 
     robot: str
@@ -114,6 +163,7 @@ class Page:
     sections: Sequence[Section]
     footer: str
     kind: str = "identification"
+    headline: str | None = None
 
     @property
     def contents(self) -> list[tuple[str, str]]:
@@ -134,7 +184,7 @@ def render(page: Page) -> str:
     environment = Environment(
         loader=PackageLoader("service.report"), autoescape=True, undefined=StrictUndefined, finalize=_printable
     )
-    return environment.get_template("identification.html").render(page=page) + "\n"
+    return environment.get_template("report.html").render(page=page) + "\n"
 
 
 def _printable(value: object) -> object:

@@ -20,7 +20,7 @@ class InputFile:
     """One file that was read.
 
     role : str
-        ``robot``, ``urdf``, ``recording`` or ``held out``
+        ``robot``, ``urdf``, ``recording``, ``held out`` or ``compared with``
     path : str
         as the user gave it
     size_bytes : int
@@ -62,6 +62,7 @@ def record_provenance(
     recordings: Sequence[str],
     held_out: Sequence[str],
     created: datetime,
+    compared: Sequence[str] = (),
 ) -> Provenance:
     """Hash all inputs and note the versions.
 
@@ -75,6 +76,8 @@ def record_provenance(
         paths of the recordings
     created : datetime
         when the result was made
+    compared : sequence of str
+        paths of recordings or a model that they were compared with
 
     Returns
     -------
@@ -89,9 +92,14 @@ def record_provenance(
     given = [("robot", str(robot.source))] if robot.source else []
     given += [("urdf", str(robot.urdf))] if robot.urdf else []
     given += [("recording", path) for path in recordings] + [("held out", path) for path in held_out]
+    given += [("compared with", path) for path in compared]
     inputs = tuple(entry for role, path in given for entry in input_files(role, path))
-    versions = (("Python", platform.python_version()), *((name, installed_version(name)) for name in LIBRARIES))
-    return Provenance(tuple(command), inputs, versions, created)
+    return Provenance(tuple(command), inputs, versions(), created)
+
+
+def versions() -> tuple[tuple[str, str], ...]:
+    """Name and version of what can change a figure."""
+    return (("Python", platform.python_version()), *((name, installed_version(name)) for name in LIBRARIES))
 
 
 def installed_version(package: str) -> str:

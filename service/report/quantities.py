@@ -121,6 +121,48 @@ def velocity_unit(joint_type: JointType) -> str:
     return "m/s" if joint_type is JointType.PRISMATIC else "rad/s"
 
 
+def state_unit(variable: str, joint_type: JointType) -> str:
+    """Unit of a variable that a residual may depend on.
+
+    Parameters
+    ----------
+    variable : str
+        ``velocity``, ``position``, ``load``, ``acceleration``, ``time``, ``temperature`` or ``motor_position``
+    joint_type : JointType
+        how the joint moves
+    """
+    position = "m" if joint_type is JointType.PRISMATIC else "rad"
+    units = {"velocity": f"{position}/s", "position": position, "acceleration": f"{position}/s²", "time": "s"}
+    return {**units, "load": torque_unit(joint_type), "temperature": "°C", "motor_position": "rad"}.get(variable, "")
+
+
+def chance(probability: float) -> str:
+    """A probability as per cent; what is not certain is never said to be.
+
+    Parameters
+    ----------
+    probability : float
+        from 0 to 1
+    """
+    return "> 99 %" if 0.99 < probability < 1.0 else f"{100.0 * probability:.0f} %"
+
+
+def power_of_ten(value: float) -> str:
+    """A number on a logarithmic axis.
+
+    Parameters
+    ----------
+    value : float
+        a power of ten, or one with a sign, or zero
+    """
+    if 1e-3 < abs(value) < 1e4 or value == 0.0:
+        return f"{value:g}".replace("-", "\N{MINUS SIGN}")
+    exponent = round(math.log10(abs(value)))
+    digits = str(exponent).translate(str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻"))
+    sign = "\N{MINUS SIGN}" if value < 0.0 else ""
+    return f"{sign}10{digits}"
+
+
 def base_parameter_unit(terms: Iterable[str]) -> str:
     """Unit of a combination of standard parameters: that of its first, whose coefficient is one.
 

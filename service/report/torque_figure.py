@@ -61,6 +61,21 @@ def torque_figure(name: str, series: TorqueSeries, joint: int, noise_std: float,
     return draw_svg(name, HEIGHT_INCHES, draw)
 
 
+def torque_columns(series: TorqueSeries, joint: int) -> dict[str, list[float]]:
+    """Numbers of the drawing: the samples that keep the residual's look.
+
+    Parameters
+    ----------
+    series : TorqueSeries
+        what is drawn
+    joint : int
+        joint index, from 0
+    """
+    kept = envelope_indices(series.residual[:, joint], MOST_POINTS_ENLARGED)
+    columns = {"time": series.time, "measured": series.measured[:, joint], "model": series.predicted[:, joint]}
+    return {name: values[kept].tolist() for name, values in columns.items()}
+
+
 def worst_part(residual: Array, share: float) -> slice:
     """The stretch of this share of a residual whose mean square is greatest.
 

@@ -1,0 +1,127 @@
+"""The whole story in a browser: from a robot file to a verdict, on the simulated arm."""
+
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import expect
+
+from browser.conftest import Visit
+from jobs.paper_files import PAPER_ROBOT
+
+pytestmark = [pytest.mark.system, pytest.mark.slow, pytest.mark.timeout(600)]
+
+CAMPAIGN_MS = 400_000
+
+
+@pytest.fixture(scope="module")
+def address() -> dict[str, str]:
+    """Where the campaign is that the first test begins."""
+    return {}
+
+
+def test_a_campaign_is_begun_watched_and_ends_with_a_finding(
+    visit: Visit, tmp_path: Path, address: dict[str, str]
+) -> None:
+    page = visit.page
+    visit.go("/")
+    expect(page.get_by_text("No campaign yet")).to_be_visible()
+    page.get_by_role("link", name="New campaign").click()
+    page.get_by_label("Robot file").set_input_files(PAPER_ROBOT)
+    expect(page.get_by_role("img", name="Kinematic chain of paper-arm")).to_be_visible()
+    page.get_by_label("The simulated arm conceals").select_option("a spring")
+    page.get_by_label("Motion").select_option("short")
+    visit.keep("page-new-campaign", tmp_path)
+    assert visit.barriers() == []
+    page.get_by_role("button", name="Begin").click()
+    expect(page.get_by_role("heading", name="paper-arm")).to_be_visible()
+    expect(page.get_by_text("Waiting for the arm").or_(page.get_by_text(" of ").first).first).to_be_visible(
+        timeout=CAMPAIGN_MS
+    )
+    expect(page.get_by_text("The findings explain all that the model left.")).to_be_visible(timeout=CAMPAIGN_MS)
+    expect(page.get_by_text("Joint spring at joint1")).to_be_visible()
+    visit.keep("page-campaign", tmp_path)
+    assert visit.barriers() == []
+    address["campaign"] = page.url
+
+
+def test_the_diagnosis_is_a_story_that_can_be_looked_into(
+    visit: Visit, tmp_path: Path, address: dict[str, str]
+) -> None:
+    page = visit.page
+    page.goto(address["campaign"])
+    page.get_by_role("link", name="Read the diagnosis").click()
+    headings = page.get_by_role("heading", level=2)
+    expect(headings.first).to_have_text("Where")
+    assert headings.all_inner_texts()[:5] == ["Where", "What", "How much", "The proof", "What next"]
+    expect(page.locator(".canvas canvas").first).to_be_visible()
+    assert visit.barriers() == []
+    visit.keep("page-diagnosis", tmp_path)
+    page.locator('[data-cell="0-position-3"]').click()
+    expect(page.locator("#where-joint")).to_have_value("joint1")
+    expect(page.get_by_text("the chosen part marked")).to_be_visible()
+    proof = page.locator("#proof")
+    proof.scroll_into_view_if_needed()
+    proof.get_by_role("button", name="joint2").click()
+    expect(proof.get_by_text("Torque of joint2")).to_be_visible()
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Download the proof").click()
+    report = Path(download.value.path()).read_text(encoding="utf-8")
+    assert "Joint spring" in report
+    assert "<script" not in report
+
+
+def test_the_identification_and_the_recording_are_shown(visit: Visit, tmp_path: Path, address: dict[str, str]) -> None:
+    page = visit.page
+    page.goto(address["campaign"])
+    page.get_by_role("link", name="Read the identification").click()
+    expect(page.get_by_role("heading", name="Friction", level=2)).to_be_visible()
+    expect(page.locator(".canvas canvas").nth(2)).to_be_visible()
+    assert visit.barriers() == []
+    visit.keep("page-identification", tmp_path)
+    page.go_back()
+    page.get_by_role("link", name="Recording", exact=True).first.click()
+    expect(page.get_by_text("repeated motion")).to_be_visible()
+    expect(page.locator(".canvas canvas").nth(1)).to_be_visible()
+    assert visit.barriers() == []
+
+
+@pytest.mark.parametrize(
+    ("name", "width", "height", "scheme"),
+    [("phone", 320, 720, "light"), ("tablet", 834, 1112, "dark"), ("4k", 3840, 2160, "dark")],
+)
+def test_every_screen_holds_it_without_a_sideways_scroll(
+    visit: Visit, tmp_path: Path, address: dict[str, str], name: str, width: int, height: int, scheme: str
+) -> None:
+    page = visit.page
+    page.set_viewport_size({"width": width, "height": height})
+    page.emulate_media(color_scheme="dark" if scheme == "dark" else "light")
+    page.goto(address["campaign"])
+    page.get_by_role("link", name="Read the diagnosis").click()
+    expect(page.locator(".canvas canvas").first).to_be_visible()
+    assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
+    expect(page.get_by_role("button", name="Stop")).to_be_in_viewport()
+    assert visit.barriers() == []
+    visit.keep(f"page-{name}", tmp_path)
+
+
+def test_it_is_worked_by_keyboard_alone(visit: Visit, address: dict[str, str]) -> None:
+    page = visit.page
+    visit.go("/")
+    expect(page.get_by_role("link", name="New campaign")).to_be_visible()
+    page.keyboard.press("Tab")
+    expect(page.get_by_role("link", name="Skip to the content")).to_be_focused()
+    names = []
+    for _ in range(12):
+        page.keyboard.press("Tab")
+        names.append(page.evaluate("document.activeElement.textContent"))
+    assert "Stop" in names
+    assert "New campaign" in names
+    page.goto(address["campaign"])
+    page.get_by_role("link", name="Read the identification").click()
+    plot = page.locator(".canvas").first
+    expect(plot.locator("canvas")).to_be_visible()
+    plot.focus()
+    before = plot.screenshot()
+    page.keyboard.press("+")
+    page.wait_for_timeout(100)  # two frames: the plot is thinned and drawn anew
+    assert plot.screenshot() != before
