@@ -12,7 +12,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test test-slow bench lint format lock clean
+.PHONY: help venv demo page prove test test-slow bench lint format lock clean
 
 help: ## say what there is
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 20
@@ -29,12 +29,19 @@ $(INSTALLED): constraints-dev.txt pyproject.toml
 demo: $(INSTALLED) ## a whole campaign on the paper's arm, simulated; look into demo-output/
 	$(BIN)/tauscope demo --out demo-output
 
+prove: $(INSTALLED) ## concealed effects: the quick set, and its page with pictures; look into proof-output/
+	$(BIN)/tauscope prove --out proof-output
+
+page: $(INSTALLED) ## the page at http://127.0.0.1:8000 with what `make demo` has made; Ctrl-C ends it
+	@test -d demo-output/service || { echo "nothing to show yet: run make demo first" >&2; exit 1; }
+	$(BIN)/tauscope serve --data demo-output/service
+
 test: $(INSTALLED) ## the quick tests
 	$(BIN)/pytest -n 2 $(PYTEST_FLAGS)
 
 test-slow: $(INSTALLED) ## the tests that take long or need something of the host
 	$(BIN)/pytest -n 2 -m "(slow or system) and not realtime" $(PYTEST_FLAGS)
-	$(BIN)/pytest -m realtime $(PYTEST_FLAGS)
+	$(BIN)/pytest -m realtime --reruns 2 --only-rerun MachineStoodStill $(PYTEST_FLAGS)
 
 bench: $(INSTALLED) ## time and memory; leave the machine alone meanwhile
 	@set -e; for script in tests/benchmarks/benchmark_*.py; do echo "== $$script"; $(BIN)/python $$script; done
@@ -59,5 +66,5 @@ lock: ## resolve the versions anew from pyproject.toml; UPGRADE=1 takes the newe
 	$(COMPILE) --all-extras --group build --constraints constraints-dev.txt --output-file constraints.txt
 
 clean: ## remove what was made, but not .venv
-	rm -rf build dist demo-output .pytest_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf build dist demo-output proof-output .pytest_cache .ruff_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -not -path './.venv/*' -prune -exec rm -rf {} +

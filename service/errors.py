@@ -10,6 +10,7 @@ TauscopeError
 ├── ExcitationError       (ValueError)    excitation          no motion within the limits, or a trajectory is not valid
 ├── ScenarioError         (ValueError)    scenario            the simulated arm's scenario file is not valid
 ├── AcquisitionError      (RuntimeError)  acquisition         a run cannot start, or ended before its time
+├── StoreError            (RuntimeError)  store               the database or the data folder cannot be used
 ├── NotFoundError         (LookupError)   not-found           nothing of that name is kept here
 └── LimitExceededError    (ValueError)    limit-exceeded      an upload or a request is larger than allowed
 
@@ -79,6 +80,12 @@ class AcquisitionError(TauscopeError, RuntimeError):
     """A run cannot start, or ended before its time."""
 
     code = "acquisition"
+
+
+class StoreError(TauscopeError, RuntimeError):
+    """The database or the data folder cannot be used: unreachable, damaged, locked, or of a newer form."""
+
+    code = "store"
 
 
 class NotFoundError(TauscopeError, LookupError):

@@ -35,6 +35,9 @@ RATE_HZ = 250.0
 AT_REST = 5e-3
 """Speed below which a joint counts as resting: what is left is the integral's creep against friction [rad/s]."""
 
+SETTLED = 5e-4
+"""How far a joint moves within 0.4 s that has settled: what is left is the integral's hunting about stiction [rad]."""
+
 
 @dataclass(frozen=True, eq=False)
 class Watched:
@@ -59,14 +62,16 @@ class Rig(Protocol):
 
     `position_resolution` [rad] and `torque_resolution` [Nm] are the smallest steps that the drives know; 0 where there
     is none. `swing` is how far position loops that the backend does not tune carry a joint past a place, or leave it
-    short of it [rad]. `is_real_time` says whether its clock is the machine's, `tells_temperature` whether its drives
-    measure theirs.
+    short of it [rad]. `answers_within` is the number of cycles in which every drive answers at least once: 1, unless
+    frames are lost on purpose. `is_real_time` says whether its clock is the machine's, `tells_temperature` whether its
+    drives measure theirs.
     """
 
     robot: Robot
     position_resolution: float
     torque_resolution: float
     swing: float
+    answers_within: int
     is_real_time: bool
     tells_temperature: bool
 
@@ -119,6 +124,7 @@ class ExactRig:
     position_resolution = 0.0
     torque_resolution = 0.0
     swing = 0.0
+    answers_within = 1
     tells_temperature = True
 
     def torque(self, effort: Array) -> Array:
@@ -268,6 +274,27 @@ def drive(
         clock.wait_until_ns(begin + round(cycle * 1e9 / rate_hz))
         states.append(rig.backend.exchange(command((clock.now_ns() - begin) * 1e-9)))
     return states
+
+
+def ask(
+    rig: Rig, command: Setpoint, is_answered: Callable[[ArmState], bool] = lambda state: bool(state.fresh.all())
+) -> ArmState:
+    """One cycle; on a bus that loses frames as many as that may take, until all drives have answered it."""
+    state = rig.backend.exchange(command)
+    for _ in range(rig.answers_within - 1):
+        if is_answered(state):
+            break
+        state = rig.backend.exchange(command)
+    return state
+
+
+def settled(rig: Rig) -> Array:
+    """Where a stopped arm stays: it is not only slow, the integrals of its loops have come to rest."""
+    for _ in range(round(PATIENCE_S / 0.4)):
+        seen = rig.watch(0.4).position
+        if np.ptp(seen, axis=0).max() < SETTLED:
+            return seen[-1]
+    pytest.fail(f"the arm does not come to rest within {PATIENCE_S} s")
 
 
 def slide(start: Array, speed: float) -> Callable[[float], Setpoint]:

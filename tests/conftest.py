@@ -9,6 +9,8 @@ from hypothesis import settings
 
 from shared_data import ABSENT, SHARED_DATA
 
+pytest_plugins = ["standstill"]
+
 # Deadlines measure the machine, not the code; on CI the same examples are drawn on every run.
 settings.register_profile("ci", derandomize=True, deadline=None, print_blob=True)
 settings.register_profile("dev", deadline=None)

@@ -15,6 +15,7 @@ from typing import Any
 from fastapi import APIRouter, BackgroundTasks, FastAPI, Request, Response
 from fastapi.routing import APIRoute
 from pydantic import BaseModel
+from sqlalchemy.orm import DeclarativeBase
 
 _ENTRY = re.compile(r"^(?P<names>\*{0,2}\w+(?:, \*{0,2}\w+)*) :(?: |$)")
 _UNDERLINE = re.compile(r"^-{3,}$")
@@ -138,7 +139,7 @@ def _has_fields(cls: type) -> bool:
 
 
 def _has_generated_constructor(cls: type) -> bool:
-    return _has_fields(cls) or issubclass(cls, enum.Enum) or getattr(cls, "_is_protocol", False)
+    return _has_fields(cls) or issubclass(cls, enum.Enum | DeclarativeBase) or getattr(cls, "_is_protocol", False)
 
 
 def _is_generated_docstring(cls: type) -> bool:
@@ -147,7 +148,7 @@ def _is_generated_docstring(cls: type) -> bool:
 
 
 def _undocumented_fields(cls: type) -> Iterator[str]:
-    """Own public fields of a data class, named tuple or pydantic model that no docstring names."""
+    """Own public fields of a data class, named tuple, table or pydantic model that no docstring names."""
     named = set(re.findall(r"\w+", cls.__doc__ or "")) | _fields_with_own_docstring(cls)
     for name in _own_fields(cls):
         if not name.startswith("_") and name not in named:
@@ -160,6 +161,8 @@ def _own_fields(cls: type) -> Iterable[str]:
         return [name for name, field in cls.model_fields.items() if name in own and not field.description]
     if dataclasses.is_dataclass(cls):
         return [field.name for field in dataclasses.fields(cls) if field.name in own]
+    if issubclass(cls, DeclarativeBase):
+        return own
     return getattr(cls, "_fields", ())
 
 

@@ -1,5 +1,7 @@
 """The examples of the error pages are what Tauscope says: each is provoked, and its page must hold the message."""
 
+import sqlite3
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +15,8 @@ from service.excitation import ExcitationOptions, Workspace, design_excitation, 
 from service.identification.compensation.drive_units import drive_units
 from service.recording import EffortKind, read_recording
 from service.robot import Joint, read_robot
+from service.store import site_identifier
+from service.store.database import Database
 from shared_data import REPOSITORY
 
 ROBOT = """\
@@ -146,6 +150,27 @@ def test_run_examples(case: str, tmp_path: Path) -> None:
     record = run_trajectory(robot, motion, connection(arm), tmp_path / "run")
     assert record.problem is not None
     assert_on_page(AcquisitionError(record.problem.detail), record.problem.code)
+
+
+@pytest.mark.parametrize("case", ["damaged", "locked", "newer", "site"])
+def test_store_examples(case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("service.store.database.engine.PATIENCE_S", 0.02)
+    Path("data").mkdir()
+    path = Path("data/tauscope.db")
+    with closing(sqlite3.connect(path, isolation_level=None)) as other:
+        if case == "damaged":
+            path.write_bytes(b"no database" * 500)
+        elif case == "locked":
+            other.execute("BEGIN IMMEDIATE")
+        elif case == "newer":
+            Database(path).close()
+            other.execute("UPDATE alembic_version SET version_num = '9999'")
+        else:
+            Path("data/site.json").write_bytes(b"{}")
+        with pytest.raises(TauscopeError) as raised:
+            site_identifier(Path("data")) if case == "site" else Database(path)
+    assert_on_page(raised.value, "store")
 
 
 def test_backend_example() -> None:

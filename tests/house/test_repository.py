@@ -15,7 +15,7 @@ from shared_data import REPOSITORY
 
 PACKAGES = [
     *(f"service/{name}" for name in ("robot", "recording", "dynamics", "excitation", "identification", "diagnosis")),
-    *(f"service/{name}" for name in ("acquisition", "report", "store", "jobs", "api")),
+    *(f"service/{name}" for name in ("acquisition", "report", "store", "jobs", "api", "client")),
     "drivers",
     "sim_backend",
 ]
@@ -151,3 +151,26 @@ def test_links_in_the_documentation_lead_somewhere() -> None:
         if not target.startswith(("http://", "https://")) and not (REPOSITORY / name.parent / target).exists()
     ]
     assert not broken, "\n" + "\n".join(broken)
+
+
+UNSAFE = re.compile(r"^\s*(?:import|from) (?:pickle|dill|shelve|marshal|joblib|cloudpickle)\b|allow_pickle=True", re.M)
+
+
+def test_nothing_that_arrives_is_unpickled() -> None:
+    sources = [path for name in ("service", "drivers", "sim_backend") for path in (REPOSITORY / name).rglob("*.py")]
+    assert len(sources) > 300
+    assert not [path for path in sources if UNSAFE.search(path.read_text(encoding="utf-8"))]
+    assert UNSAFE.search("import pick" + "le\n")
+
+
+def test_every_test_that_a_promise_names_is_there() -> None:
+    named = re.findall(
+        r"`(tests/[\w/]+\.py)::(\w+)`", (REPOSITORY / "docs" / "reliability.md").read_text(encoding="utf-8")
+    )
+    assert len(named) > 40
+    missing = [
+        f"{file}::{test}"
+        for file, test in named
+        if not (REPOSITORY / file).is_file() or f"def {test}(" not in (REPOSITORY / file).read_text(encoding="utf-8")
+    ]
+    assert not missing
