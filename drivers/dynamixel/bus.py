@@ -2,8 +2,8 @@
 
 import struct
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from drivers.clock import Clock, MonotonicClock
 from drivers.dynamixel import packets
@@ -65,7 +65,7 @@ class ServoBus:
         self._clock = MonotonicClock() if clock is None else clock
         self.return_delay_s = FACTORY_RETURN_DELAY_S
         self.discarded_bytes = 0
-        self._missed_ns: dict[int, int] = {}
+        self._missed_ns: dict[tuple[int, int], int] = {}
         self._answered_ns = 0
 
     def ping(self, servo: int) -> tuple[int, int] | None:
@@ -206,8 +206,13 @@ class ServoBus:
         encoded = {servo: encode_items(items, own) for servo, own in values.items()}
         self.port.send(packets.encode_sync_write(encoded, items[0].address))
 
-    def sync_read(self, servos: Sequence[int], block: Block, *, fast: bool = False, patience_s: float = 0.0) -> Answers:
+    def sync_read(
+        self, servos: Sequence[int], block: Block, *, fast: bool = False, patience_s: float = 0.0, spare: int = 0
+    ) -> Answers:
         """Read the same block of many servos.
+
+        Nothing in an answer says to which question it belongs. Where an earlier one was not answered in time, as many
+        bytes before the block as make another length are read with it, so that what comes late has the wrong length.
 
         Parameters
         ----------
@@ -219,29 +224,41 @@ class ServoBus:
             ask for one packet for all
         patience_s : float
             how much longer to wait than in the control loop [s]
+        spare : int
+            bytes before the block that can be read as well
         """
-        owed = self._owed(servos)
-        if owed:
+        if any(self._owed(servos, block.length + surplus) for surplus in range(spare + 1)):
             self.port.drain()
-        request = packets.encode_sync_read(servos, block.address, block.length, fast=fast)
+        surplus = min(range(spare + 1), key=lambda surplus: self._last_missed_ns(servos, block.length + surplus))
+        length = block.length + surplus
+        owed = self._owed(servos, length)
+        request = packets.encode_sync_read(servos, block.address - surplus, length, fast=fast)
         # Taken before: who is woken by the bytes may run before this process does again.
         asked_ns = self._clock.now_ns() + round(len(request) * BITS_PER_BYTE * 1e9 / self.port.baudrate)
         self.port.send(request)
         self._answered_ns = asked_ns
         receive = self._receive_fast if fast else self._receive_each
         waits_s = len(servos) * self.return_delay_s + patience_s
-        found = receive(servos, block.length, len(request), waits_s, owed)
-        now_ns = time.monotonic_ns()
-        self._missed_ns |= {servo: now_ns for servo in servos if servo not in found}
-        answer_bytes = _fast_bytes(servos, block.length) if fast else len(servos) * (_STATUS_BYTES + block.length)
+        found = receive(servos, length, len(request), waits_s, owed)
+        answer_bytes = _fast_bytes(servos, length) if fast else len(servos) * (_STATUS_BYTES + length)
         usual_s = answer_bytes * BITS_PER_BYTE / self.port.baudrate + len(servos) * self.return_delay_s
         late_ns = self._answered_ns - asked_ns - round((usual_s + self.port.latency_s) * 1e9)
-        return Answers(asked_ns, max(0, late_ns), found)
+        wanted = {servo: replace(status, data=status.data[surplus:]) for servo, status in found.items()}
+        return Answers(asked_ns, max(0, late_ns), wanted)
 
-    def _owed(self, servos: Sequence[int]) -> set[int]:
-        """Servos whose answer to an earlier question may still be under way."""
+    def _owed(self, servos: Sequence[int], length: int) -> set[int]:
+        """Servos whose answer of this length to an earlier question may still be under way."""
         since_ns = time.monotonic_ns() - _LATEST_ANSWER_NS
-        return {servo for servo in servos if self._missed_ns.get(servo, 0) > since_ns}
+        return {servo for servo in servos if self._missed_ns.get((servo, length), 0) > since_ns}
+
+    def _last_missed_ns(self, servos: Sequence[int], length: int) -> int:
+        """When the last answer of this length was missed that may still be under way; zero where none is."""
+        return max((self._missed_ns[servo, length] for servo in self._owed(servos, length)), default=0)
+
+    def _miss(self, servos: Collection[int], length: int) -> None:
+        """Note who has not answered at all: that answer may come yet."""
+        now_ns = time.monotonic_ns()
+        self._missed_ns |= {(servo, length): now_ns for servo in servos}
 
     def _receive_each(
         self, servos: Sequence[int], length: int, sent: int, waits_s: float, owed: set[int]
@@ -263,6 +280,7 @@ class ServoBus:
                     break
                 deadline = min(deadline, time.monotonic_ns() + _AFTERTHOUGHT_NS)
         self.discarded_bytes += parser.discarded
+        self._miss(turns.unheard, length)
         return turns.answers
 
     def _receive_fast(
@@ -284,11 +302,13 @@ class ServoBus:
         self.discarded_bytes += parser.discarded
         if not packets_found:
             packets_found = [packets.decode_fast(parser.pending, servos, length)]
-        return {status.servo: status for status in packets_found[0]} if len(packets_found) == 1 else {}
+        answers = {status.servo: status for status in packets_found[0]} if len(packets_found) == 1 else {}
+        self._miss(set(servos) - answers.keys(), length)
+        return answers
 
     def _ask(self, servo: int, request: bytes, length: int, patience_s: float) -> Status | None:
         """Send an instruction to one servo and wait for its answer."""
-        if self._owed([servo]):
+        if self._owed([servo], length):
             self.port.drain()
         self.port.send(request)
         delay_s = self.return_delay_s + patience_s
@@ -300,7 +320,7 @@ class ServoBus:
                 if status is not None and status.servo == servo and (len(status.data) == length or status.refusal):
                     return status
         self.discarded_bytes += parser.discarded
-        self._missed_ns[servo] = time.monotonic_ns()
+        self._miss([servo], length)
         return None
 
 

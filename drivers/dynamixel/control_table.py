@@ -25,6 +25,9 @@ _SIGNED = re.compile(
 STATE_ITEMS = ("Present Current", "Present Velocity", "Present Position")
 """What every cycle reads; one contiguous block on every family."""
 
+BYTES_BEFORE_STATE = 3
+"""Bytes of other items right before that block, on every family."""
+
 
 @dataclass(frozen=True)
 class Item:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.dynamixel.bus import ATTEMPTS, PATIENCE_S, Answers, ServoBus
-from drivers.dynamixel.control_table import STATE_ITEMS, Block, Item
+from drivers.dynamixel.control_table import BYTES_BEFORE_STATE, STATE_ITEMS, Block, Item
 from drivers.dynamixel.servo import JointServo
 
 Array = NDArray[np.float64]
@@ -175,7 +175,11 @@ class ServoGroup:
         """Answers of all families, as if to one question: asked when the first was, late as the latest."""
         found = [
             self._bus.sync_read(
-                [self.servos[index].servo for index in members], block, fast=fast, patience_s=patience_s
+                [self.servos[index].servo for index in members],
+                block,
+                fast=fast,
+                patience_s=patience_s,
+                spare=BYTES_BEFORE_STATE,
             )
             for block, members in self._families
         ]

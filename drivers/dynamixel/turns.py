@@ -9,8 +9,8 @@ class Turns:
     """Keeps the answers of a Sync Read apart from late answers to an earlier one, which look the same.
 
     Servos answer in turn. An answer that comes out of turn says that it, or one before it, is a late one: both are let
-    go. So are two answers of one servo that differ; of two that are equal, one is kept. A servo that owes an answer to
-    an earlier question is not believed alone: what comes from nobody else is likely what it owes.
+    go. So are two answers of one servo that differ; of two that are equal, one is kept. Servos that owe an answer to
+    an earlier question are not believed among themselves: what comes from nobody else is likely what they owe.
     """
 
     def __init__(self, servos: Sequence[int], owed: Collection[int] = ()) -> None:
@@ -27,6 +27,7 @@ class Turns:
         self._owed = frozenset(owed)
         self._found: dict[int, Status] = {}
         self._contradicted: set[int] = set()
+        self._heard: set[int] = set()
         self._last = -1
 
     @property
@@ -37,9 +38,12 @@ class Turns:
     @property
     def answers(self) -> dict[int, Status]:
         """What can be believed, by ID."""
-        if len(self._place) > 1 and len(self._found) == 1 and self._found.keys() <= self._owed:
-            return {}
-        return dict(self._found)
+        return {} if self._found.keys() <= self._owed else dict(self._found)
+
+    @property
+    def unheard(self) -> set[int]:
+        """Servos of which nothing has come, be it believed or not."""
+        return self._place.keys() - self._heard
 
     def take(self, status: Status) -> None:
         """Take an answer.
@@ -51,6 +55,8 @@ class Turns:
         """
         servo = status.servo
         place = self._place.get(servo)
+        if place is not None:
+            self._heard.add(servo)
         if place is None or servo in self._contradicted or self._found.get(servo) == status:
             return
         if servo in self._found:

@@ -81,18 +81,10 @@ def test_late_answers_are_never_taken_for_new_ones(three: Bench) -> None:
     trace = three.emulator.trace()
     truth = np.array([entry["position"] for entry in trace])
     instants = np.array([entry["monotonic_ns"] for entry in trace])
-    told = [state for state in states if not stood_still(instants, state.time_ns)]
-    assert len(told) > len(states) // 2
-    for state in told:
+    for state in states:
         near = truth[np.abs(instants - state.time_ns).argmin()]
-        # An answer that is 60 ms late would be 0.05 rad off; a busy machine takes some milliseconds.
+        # An answer that is 60 ms late is 0.05 rad off; a busy machine takes some milliseconds.
         np.testing.assert_allclose(state.position[state.fresh], near[state.fresh], atol=0.03)
-
-
-def stood_still(instants: np.ndarray, time_ns: int) -> bool:
-    """Whether the emulator's process was not run for long around an instant: answers are late then by themselves."""
-    around = instants[(instants > time_ns - 200_000_000) & (instants < time_ns + 20_000_000)]
-    return bool(np.diff(around).max() > 20_000_000)
 
 
 def test_silent_servo_costs_only_its_own_samples(three: Bench) -> None:

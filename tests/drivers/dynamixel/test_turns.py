@@ -68,6 +68,13 @@ def test_owed_answer_beside_another_is_believed() -> None:
     assert list(take(fresh(2), fresh(3), owed=(3,)).answers) == [2, 3]
 
 
+@pytest.mark.parametrize("owed", [(1, 3), (1, 2, 3, 4)])
+def test_owed_answers_without_another_are_not_believed(owed: tuple[int, ...]) -> None:
+    turns = take(stale(1), stale(3), owed=owed)
+    assert turns.answers == {}
+    assert turns.unheard == {2, 4}
+
+
 def test_a_whole_round_of_late_answers_before_the_new_one_is_not_believed() -> None:
     everybody = (1, 2, 3, 4)
     turns = take(*map(stale, everybody), *map(fresh, everybody), owed=everybody)
