@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from service.diagnosis.catalogue import TimeLocalEffect
+from service.diagnosis.catalogue import Effect, TimeLocalEffect
 from service.diagnosis.choice import Option, Selection
 from service.diagnosis.confirmation import HeldOut
 from service.diagnosis.fit import Fit, Fitter
@@ -14,6 +14,7 @@ from service.diagnosis.model import ExtendedModel, with_terms
 from service.diagnosis.observations import Observations
 from service.diagnosis.residual import raw_squares
 from service.diagnosis.screening import Screen
+from service.diagnosis.shape_error import standings
 from service.diagnosis.term import Term
 from service.recording.recording import Array
 
@@ -43,7 +44,7 @@ class Finding:
     gain : float
         what they take off the residual's energy beside all other findings [noise variances]
     probability : float
-        that it is this effect and not one of its equivalents
+        that it is this effect, and neither one of its equivalents nor an error of a larger effect's curve
     before, after : FitSizes
         residuals of the model without it, and with all findings
     alternatives : tuple of Option
@@ -52,6 +53,8 @@ class Finding:
         by motion that was not used; None where there was none
     in_model : bool
         whether the terms stand in the final model beside its nominal part, and not within that
+    behind : Effect or None
+        the effect that leads at its joint, of whose curve it may be an error
     """
 
     terms: tuple[Term, ...]
@@ -63,6 +66,7 @@ class Finding:
     alternatives: tuple[Option, ...] = ()
     confirmed: bool | None = None
     in_model: bool = True
+    behind: Effect | None = None
 
     @property
     def place(self) -> tuple[str, int | None]:
@@ -116,10 +120,10 @@ def selected_findings(
     for place, term in enumerate(fit.model.terms):
         groups.setdefault((term.effect.id, term.effect.joint), []).append(place)
     after = sizes(fit.model, fitter, held_out)
+    all_without = [_without(fit, places, fitter) for places in groups.values()]
+    own = standings(groups, selection.nominal, fit, all_without, fitter, inflation)
     found = []
-    for places in groups.values():
-        others = [term for place, term in enumerate(fit.model.terms) if place not in places]
-        without = fitter.fit(with_terms(fit.model, others))
+    for places, without, standing in zip(groups.values(), all_without, own, strict=True):
         slices = fit.model.term_places()
         terms = tuple(fit.model.terms[place] for place in places)
         choices = [selection.choices[place] for place in places]
@@ -132,14 +136,23 @@ def selected_findings(
                     _spread_out(t, covariance[slices[p], slices[p]]) for t, p in zip(terms, places, strict=True)
                 ),
                 gain=without.energy - fit.energy,
-                probability=probability_among(chosen.score, [each.score for each in alternatives], inflation),
+                probability=standing.certainty
+                * probability_among(chosen.score, [each.score for each in alternatives], inflation),
                 before=sizes(without.model, fitter, held_out),
                 after=after,
                 alternatives=alternatives,
                 confirmed=any(choice.confirmation is not None for choice in choices) or None,
+                behind=standing.behind,
             )
         )
     return in_order(found)
+
+
+def _without(fit: Fit, places: Sequence[int], fitter: Fitter) -> Fit:
+    """The model fitted anew without some of its terms."""
+    return fitter.fit(
+        with_terms(fit.model, [term for place, term in enumerate(fit.model.terms) if place not in places])
+    )
 
 
 def _likely(options: Sequence[Option], without: Fit, screen: Screen, held_out: HeldOut | None) -> tuple[Option, ...]:

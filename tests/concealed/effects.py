@@ -5,7 +5,7 @@ power of it, which is only needed to find the size of a wanted s in few passages
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -42,6 +42,11 @@ class Ground:
     duration: float
     shortest: float
 
+    @property
+    def coulomb(self) -> float:
+        """The joint's Coulomb friction [Nm]."""
+        return (self.robot.model.friction or ())[self.joint].stiction
+
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
@@ -75,6 +80,10 @@ class Drawn:
     largest: float = np.inf
 
 
+LARGEST_ASYMMETRY = 0.9
+"""Part of its Coulomb friction by which a joint's differs with direction: at more than all of it, friction drives."""
+
+
 def _law(effect: str, ground: Ground, key: str, size: float, **more: object) -> Drawn:
     """An effect of one joint with an amplitude."""
     return Drawn(
@@ -91,7 +100,8 @@ def _sign(rng: np.random.Generator) -> float:
 
 
 def asymmetric_coulomb(g: Ground, rng: np.random.Generator) -> Drawn:
-    return _law("asymmetric_coulomb", g, "amplitude", 0.8 * g.noise * _sign(rng))
+    drawn = _law("asymmetric_coulomb", g, "amplitude", 0.8 * g.noise * _sign(rng))
+    return replace(drawn, largest=LARGEST_ASYMMETRY * g.coulomb)
 
 
 def asymmetric_viscous(g: Ground, rng: np.random.Generator) -> Drawn:

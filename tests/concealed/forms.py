@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
 
-from concealed.effects import Ground
+from concealed.effects import LARGEST_ASYMMETRY, Ground
 from concealed.forward import FINE, Passage
 from concealed.motions import RATE_HZ
 
@@ -62,7 +62,8 @@ class Along:
 
 def easier_one_way(a: Along) -> Array:
     """Coulomb friction that differs with direction, fading in with speed."""
-    return np.asarray(a.amplitude * (1.0 - np.exp(-np.abs(a.velocity) / 0.02)))
+    amplitude = min(a.amplitude, LARGEST_ASYMMETRY * a.ground.coulomb)
+    return np.asarray(amplitude * (1.0 - np.exp(-np.abs(a.velocity) / 0.02)))
 
 
 def saturating_drag(a: Along) -> Array:
@@ -129,9 +130,11 @@ def soft_saturation(a: Along) -> Array:
 
 
 def sluggish_sensor(a: Along) -> Array:
-    """A torque channel behind a low-pass filter of first order."""
-    kept = np.exp(-STEP_S / max(0.002 * a.size, 1e-6))
-    late, _ = signal.lfilter([1.0 - kept], [1.0, -kept], a.torque, zi=[kept * a.torque[0]])
+    """A torque channel behind a low-pass filter of second order, critically damped."""
+    kept = np.exp(-STEP_S / max(0.001 * a.size, 1e-6))
+    late = a.torque
+    for _ in range(2):
+        late, _ = signal.lfilter([1.0 - kept], [1.0, -kept], late, zi=[kept * late[0]])
     return np.asarray(late - a.torque)
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from arms import random_parameters, ur5_like
 from pinocchio_arm import pinocchio_model
 from service.diagnosis.catalogue import Effect, Setting, Signals, catalogue, possible_effects
+from service.diagnosis.catalogue.time_delay import Lag
 from service.robot import Robot
 
 Array = NDArray[np.float64]
@@ -194,6 +195,26 @@ def test_a_late_torque_is_the_shifted_torque_to_first_order() -> None:
     smooth = np.abs(SIGNALS.velocity).min(axis=0) > 0.1  # the friction's steps are no first-order matter
     error = (late - SIGNALS.torque - found)[:, smooth]
     assert np.abs(error).max() < 0.1 * np.abs(found[:, smooth]).max()
+
+
+@pytest.mark.parametrize("joint", [None, 2])
+@pytest.mark.parametrize("constant", [0.004, 0.05])
+def test_a_filtered_torque_follows_the_filter_s_equation(joint: int | None, constant: float) -> None:
+    lag = next(each for each in possible_effects(setting()) if isinstance(each, Lag) and each.joint == joint)
+    chosen = slice(None) if joint is None else slice(joint, joint + 1)
+    torque = SIGNALS.torque[chosen]
+    filtered, kept = np.empty_like(torque), np.exp(-1.0 / (RATE * constant))
+    state = torque[:, 0]
+    for _ in range(4):  # period after period, until it repeats
+        for k, now in enumerate(torque.T):
+            state = now + (state - now) * kept
+            filtered[:, k] = state
+    found = lag.columns(replace(SIGNALS, periodic=True), np.array([[constant]]))[0, 0]
+    np.testing.assert_allclose(found * constant, filtered - torque, atol=1e-9 * np.abs(torque).max())
+    slow = np.abs(np.gradient(torque, axis=1)).max() * RATE  # settled at first where it does not repeat
+    once = lag.columns(replace(SIGNALS, periodic=False), np.array([[constant]]))[0, 0]
+    assert np.abs(once[:, 0]).max() == 0.0
+    assert np.abs(once - found)[:, -1].max() * constant < 1e-6 * slow
 
 
 def test_a_tilted_base_is_gravity_in_another_direction() -> None:

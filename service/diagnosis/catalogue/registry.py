@@ -27,7 +27,8 @@ from service.diagnosis.catalogue.presliding_hysteresis import PreslidingHysteres
 from service.diagnosis.catalogue.rotor_inertia import RotorInertia
 from service.diagnosis.catalogue.setting import Setting
 from service.diagnosis.catalogue.stribeck_friction import StribeckFriction
-from service.diagnosis.catalogue.torque_sensing import TimeDelay, TorqueGainError, TorqueSaturation
+from service.diagnosis.catalogue.time_delay import TimeDelay
+from service.diagnosis.catalogue.torque_sensing import TorqueGainError, TorqueSaturation
 from service.errors import IdentificationError
 
 ENTRY_POINT_GROUP = "tauscope.effects"

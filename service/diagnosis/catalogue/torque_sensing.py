@@ -1,4 +1,4 @@
-"""What is wrong with the recorded torque itself: scaled, compressed at high load, or late."""
+"""What is wrong with the size of the recorded torque: scaled, or compressed at high load."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -124,58 +124,3 @@ class TorqueSaturation(Effect):
         slope = np.array([-0.5 * level / share**1.5, 1.0 / np.sqrt(share)])
         std = float(np.sqrt(max(slope @ covariance @ slope, 0.0)))
         return (Quantity("c", level / np.sqrt(share), std, self.unit("{tau}", setting)),)
-
-
-class TimeDelay(Effect):
-    """τ_recorded(t) = τ(t - d), to first order -d dτ/dt."""
-
-    id: ClassVar[str] = "time_delay"
-    equation: ClassVar[str] = "tau_recorded(t) = tau(t - d)"
-    meaning: ClassVar[str] = "the torque channel is late against the positions (early where d is negative)"
-    remedy: ClassVar[str] = "shift the torque channel by d"
-    revealing_motion: ClassVar[str] = "fast motion with quick changes of torque"
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("d", "s"),)
-
-    @classmethod
-    def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """The whole arm, and every joint of an arm with several.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
-        joints = setting.joints if setting.robot.joint_count > 1 else ()
-        return [cls(None), *(cls(joint) for joint in joints)]
-
-    def columns(self, signals: Signals, shapes: Array) -> Array:
-        """-dτ/dt of the model's torque.
-
-        Parameters
-        ----------
-        signals : Signals
-            one piece of motion
-        shapes : (1, 0) float64
-            none
-        """
-        torque = signals.torque[list(self.touched(len(signals.torque)))]
-        # Over two samples: where friction steps from one sample to the next, a finer slope is no torque that anybody
-        # records.
-        return -np.gradient(torque, 1.0 / signals.rate_hz, axis=-1)[None, None]
-
-    def torque_of(self, signals: Signals, coefficients: Array, shape: Array) -> Array:
-        """τ(t - d) - τ(t): friction's step arrives late, it does not become a spike.
-
-        Parameters
-        ----------
-        signals : Signals
-            one piece of motion
-        coefficients : (1,) float64
-            d [s]
-        shape : (0,) float64
-            none
-        """
-        torque = signals.torque[list(self.touched(len(signals.torque)))]
-        instants = np.arange(torque.shape[1]) / signals.rate_hz
-        late = [np.interp(instants - float(coefficients[0]), instants, row) for row in torque]
-        return np.stack(late) - torque

@@ -1,0 +1,101 @@
+"""How far a finding beside a larger one may be no more than an error of that one's curve.
+
+A law of the catalogue has one formula, what an arm does has its own. What the formula leaves of it is as significant as
+the recordings are long, and another law takes it up that is not there. Nothing in these recordings tells that from a
+second effect but its size: such errors are small parts of what the larger law explains. Where effects meet at a joint,
+the one that alone explains most there leads; each other one has a share s of all that is explained there, and is
+certain by s²/(s² + `SHAPE_ERROR`²).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from service.diagnosis.catalogue import Effect
+from service.diagnosis.fit import Fit, Fitter
+from service.diagnosis.model import with_terms
+from service.recording.recording import Array
+
+SHAPE_ERROR = 0.1
+"""Share of what is explained at a joint that an error of the leading law's curve may well have; on arms that conceal
+other formulas than the catalogue's it is 0.03 to 0.16 where another law is taken for it at all."""
+
+EXPECTED = ("rotor_inertia",)
+"""Effects that every geared joint may have: they need no share to be believed."""
+
+WORTH_SHARING = 20.0
+"""Energy that findings take off a joint's residual from which it counts as explained at all [noise variances]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """A finding beside the others at its joints.
+
+    certainty : float
+        chance that it is more than an error of another one's curve
+    behind : Effect or None
+        the one that leads where its own share is largest; None where it leads itself, or meets no other
+    """
+
+    certainty: float = 1.0
+    behind: Effect | None = None
+
+
+LEADING = Standing()
+
+
+def standings(
+    groups: Mapping[tuple[str, int | None], Sequence[int]],
+    nominal: Fit,
+    fit: Fit,
+    without: Sequence[Fit],
+    fitter: Fitter,
+    inflation: float,
+) -> list[Standing]:
+    """What each finding is beside the others.
+
+    Parameters
+    ----------
+    groups : mapping of (str, int or None) to sequence of int
+        places of each finding's terms in the final model
+    nominal, fit : Fit
+        models without and with all findings
+    without : sequence of Fit
+        models each without one of the findings
+    fitter : Fitter
+        of the training recordings
+    inflation : float
+        factor by which the residual exceeds the modelled noise
+    """
+    joints = len(fit.projection.residual)
+    effects = [fit.model.terms[places[0]].effect for places in groups.values()]
+    touched = [effect.touched(joints) for effect in effects]
+    meeting = [sum(joint in own for own in touched) > 1 for joint in range(joints)]
+    if not any(meeting):
+        return [LEADING] * len(touched)
+    after = _energies(fit)
+    explained = _energies(nominal) - after
+    counts = np.array(meeting) & (explained > WORTH_SHARING * inflation)
+    leads = np.argmax([_alone(places, nominal, fit, fitter) for places in groups.values()], axis=0)
+    found = []
+    for number, effect in enumerate(effects):
+        own = list(touched[number])
+        if effect.id in EXPECTED or not counts[own].all() or (leads[own] == number).any():
+            found.append(LEADING)
+            continue
+        shares = (_energies(without[number])[own] - after[own]) / explained[own]
+        share, joint = max(float(shares.max()), 0.0), own[int(shares.argmax())]
+        found.append(Standing(share**2 / (share**2 + SHAPE_ERROR**2), effects[int(leads[joint])]))
+    return found
+
+
+def _alone(places: Sequence[int], nominal: Fit, fit: Fit, fitter: Fitter) -> Array:
+    """Energy that one finding alone takes off each joint's residual, (n,)."""
+    only = fitter.fit(with_terms(fit.model, [fit.model.terms[place] for place in places]))
+    return _energies(nominal) - _energies(only)
+
+
+def _energies(fit: Fit) -> Array:
+    """Energy of each joint's residual, (n,) [noise variances]."""
+    return np.array([float(rows @ rows) for rows in fit.projection.residual])
