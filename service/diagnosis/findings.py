@@ -10,11 +10,11 @@ from service.diagnosis.choice import Option, Selection
 from service.diagnosis.confirmation import HeldOut
 from service.diagnosis.fit import Fit, Fitter
 from service.diagnosis.interleaved import interleaved_confirmation
-from service.diagnosis.model import ExtendedModel, with_terms
+from service.diagnosis.model import ExtendedModel
 from service.diagnosis.observations import Observations
 from service.diagnosis.residual import raw_squares
 from service.diagnosis.screening import Screen
-from service.diagnosis.shape_error import standings
+from service.diagnosis.shape_error import groups_of, standings, without_group
 from service.diagnosis.term import Term
 from service.recording.recording import Array
 
@@ -116,12 +116,10 @@ def selected_findings(
     """
     fit = selection.fit
     covariance = fitter.covariance(fit) * inflation
-    groups: dict[tuple[str, int | None], list[int]] = {}
-    for place, term in enumerate(fit.model.terms):
-        groups.setdefault((term.effect.id, term.effect.joint), []).append(place)
+    groups = groups_of(fit.model)
     after = sizes(fit.model, fitter, held_out)
-    all_without = [_without(fit, places, fitter) for places in groups.values()]
-    own = standings(groups, selection.nominal, fit, all_without, fitter, inflation)
+    all_without = [without_group(fit, places, fitter) for places in groups.values()]
+    own = standings(selection.nominal, fit, all_without, fitter, inflation)
     found = []
     for places, without, standing in zip(groups.values(), all_without, own, strict=True):
         slices = fit.model.term_places()
@@ -146,13 +144,6 @@ def selected_findings(
             )
         )
     return in_order(found)
-
-
-def _without(fit: Fit, places: Sequence[int], fitter: Fitter) -> Fit:
-    """The model fitted anew without some of its terms."""
-    return fitter.fit(
-        with_terms(fit.model, [term for place, term in enumerate(fit.model.terms) if place not in places])
-    )
 
 
 def _likely(options: Sequence[Option], without: Fit, screen: Screen, held_out: HeldOut | None) -> tuple[Option, ...]:

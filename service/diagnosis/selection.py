@@ -16,6 +16,7 @@ from service.diagnosis.model import ExtendedModel, with_terms
 from service.diagnosis.outside import where_held_out_shows
 from service.diagnosis.proxies import proxies
 from service.diagnosis.screening import Candidate, Screen, model_signals
+from service.diagnosis.shape_error import HARDLY, groups_of, standings, without_group
 from service.diagnosis.table import Table, fitted_option
 from service.diagnosis.term import Term
 
@@ -108,6 +109,7 @@ class Selector:
         fit, choices = self._without_superfluous(fit, choices)
         fit, choices = self._without_proxies(nominal, fit, choices)
         fit, choices = self._settled(fit, choices)
+        fit, choices = self._without_errors_of_larger_ones(nominal, fit, choices)
         return Selection(nominal, fit, tuple(choices), tuple(rejected))
 
     def continued(self, selection: Selection, progress: Callable[[str], None]) -> Selection:
@@ -125,6 +127,7 @@ class Selector:
             return selection
         fit, choices = self._without_superfluous(fit, choices)
         fit, choices = self._without_proxies(selection.nominal, fit, choices)
+        fit, choices = self._without_errors_of_larger_ones(selection.nominal, fit, choices)
         return Selection(selection.nominal, fit, tuple(choices), (*selection.rejected, *rejected))
 
     def _grown(
@@ -284,7 +287,21 @@ class Selector:
     def _without_proxies(self, nominal: Fit, fit: Fit, choices: list[Choice]) -> tuple[Fit, list[Choice]]:
         """Drop what only stands in for an effect that the catalogue does not have."""
         rows = self.screen.observations
-        dropped = proxies(nominal, fit, choices, rows, pure_error=self.pure_error)
+        return self._without(proxies(nominal, fit, choices, rows, pure_error=self.pure_error), fit, choices)
+
+    def _without_errors_of_larger_ones(self, nominal: Fit, fit: Fit, choices: list[Choice]) -> tuple[Fit, list[Choice]]:
+        """Drop what is hardly more than an error of the formula of a larger effect at the same joint."""
+        groups = list(groups_of(fit.model).values())
+        if len(groups) < 2:
+            return fit, choices
+        without = [without_group(fit, places, self.fitter) for places in groups]
+        found = standings(nominal, fit, without, self.fitter, self.admission.inflation(fit))
+        pairs = zip(groups, found, strict=True)
+        dropped = [place for places, standing in pairs if standing.certainty < HARDLY for place in places]
+        return self._without(dropped, fit, choices)
+
+    def _without(self, dropped: Sequence[int], fit: Fit, choices: list[Choice]) -> tuple[Fit, list[Choice]]:
+        """The model fitted anew without some choices."""
         if not dropped:
             return fit, choices
         kept = [place for place in range(len(choices)) if place not in dropped]

@@ -4,7 +4,7 @@ A law of the catalogue has one formula, what an arm does has its own. What the f
 the recordings are long, and another law takes it up that is not there. Nothing in these recordings tells that from a
 second effect but its size: such errors are small parts of what the larger law explains. Where effects meet at a joint,
 the one that alone explains most there leads; each other one has a share s of all that is explained there, and is
-certain by s²/(s² + `SHAPE_ERROR`²).
+certain by s²/(s² + `SHAPE_ERROR`²), and below `HARDLY` no finding at all.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,13 +13,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from service.diagnosis.catalogue import Effect
+from service.diagnosis.choice import Place
 from service.diagnosis.fit import Fit, Fitter
-from service.diagnosis.model import with_terms
+from service.diagnosis.model import ExtendedModel, with_terms
 from service.recording.recording import Array
 
 SHAPE_ERROR = 0.1
 """Share of what is explained at a joint that an error of the leading law's curve may well have; on arms that conceal
 other formulas than the catalogue's it is 0.03 to 0.16 where another law is taken for it at all."""
+
+HARDLY = 0.1
+"""Certainty below which a finding is none."""
 
 EXPECTED = ("rotor_inertia",)
 """Effects that every geared joint may have: they need no share to be believed."""
@@ -45,30 +49,56 @@ class Standing:
 LEADING = Standing()
 
 
-def standings(
-    groups: Mapping[tuple[str, int | None], Sequence[int]],
-    nominal: Fit,
-    fit: Fit,
-    without: Sequence[Fit],
-    fitter: Fitter,
-    inflation: float,
-) -> list[Standing]:
-    """What each finding is beside the others.
+Groups = Mapping[Place, Sequence[int]]
+"""Effects and joints, and where in a model their terms stand."""
+
+
+def groups_of(model: ExtendedModel) -> Groups:
+    """The terms of each effect at each place: several orders of a periodic torque are one finding.
 
     Parameters
     ----------
-    groups : mapping of (str, int or None) to sequence of int
-        places of each finding's terms in the final model
+    model : ExtendedModel
+        with all of them
+    """
+    groups: dict[Place, list[int]] = {}
+    for place, term in enumerate(model.terms):
+        groups.setdefault((term.effect.id, term.effect.joint), []).append(place)
+    return groups
+
+
+def without_group(fit: Fit, places: Sequence[int], fitter: Fitter) -> Fit:
+    """The model fitted anew without some of its terms.
+
+    Parameters
+    ----------
+    fit : Fit
+        the model
+    places : sequence of int
+        of the terms that are left out
+    fitter : Fitter
+        of the training recordings
+    """
+    return fitter.fit(
+        with_terms(fit.model, [term for place, term in enumerate(fit.model.terms) if place not in places])
+    )
+
+
+def standings(nominal: Fit, fit: Fit, without: Sequence[Fit], fitter: Fitter, inflation: float) -> list[Standing]:
+    """What each group of terms is beside the others.
+
+    Parameters
+    ----------
     nominal, fit : Fit
-        models without and with all findings
+        models without and with all of them
     without : sequence of Fit
-        models each without one of the findings
+        models each without one of the groups
     fitter : Fitter
         of the training recordings
     inflation : float
         factor by which the residual exceeds the modelled noise
     """
-    joints = len(fit.projection.residual)
+    joints, groups = len(fit.projection.residual), groups_of(fit.model)
     effects = [fit.model.terms[places[0]].effect for places in groups.values()]
     touched = [effect.touched(joints) for effect in effects]
     meeting = [sum(joint in own for own in touched) > 1 for joint in range(joints)]

@@ -130,11 +130,10 @@ def soft_saturation(a: Along) -> Array:
 
 
 def sluggish_sensor(a: Along) -> Array:
-    """A torque channel behind a low-pass filter of second order, critically damped."""
-    kept = np.exp(-STEP_S / max(0.001 * a.size, 1e-6))
-    late = a.torque
-    for _ in range(2):
-        late, _ = signal.lfilter([1.0 - kept], [1.0, -kept], late, zi=[kept * late[0]])
+    """A torque channel behind a Butterworth filter of third order."""
+    cutoff = 1.0 / (2.0 * np.pi * 0.001 * max(a.size, 0.1))
+    sections = signal.butter(3, min(cutoff, 0.4 / STEP_S), fs=1.0 / STEP_S, output="sos")
+    late, _ = signal.sosfilt(sections, a.torque, zi=signal.sosfilt_zi(sections) * a.torque[0])
     return np.asarray(late - a.torque)
 
 

@@ -198,23 +198,25 @@ def test_a_late_torque_is_the_shifted_torque_to_first_order() -> None:
 
 
 @pytest.mark.parametrize("joint", [None, 2])
-@pytest.mark.parametrize("constant", [0.004, 0.05])
-def test_a_filtered_torque_follows_the_filter_s_equation(joint: int | None, constant: float) -> None:
+@pytest.mark.parametrize(("constant", "order"), [(0.004, 1), (0.05, 1), (0.01, 2)])
+def test_a_filtered_torque_follows_the_filter_s_equation(joint: int | None, constant: float, order: int) -> None:
     lag = next(each for each in possible_effects(setting()) if isinstance(each, Lag) and each.joint == joint)
     chosen = slice(None) if joint is None else slice(joint, joint + 1)
     torque = SIGNALS.torque[chosen]
     filtered, kept = np.empty_like(torque), np.exp(-1.0 / (RATE * constant))
-    state = torque[:, 0]
+    states = [torque[:, 0]] * order
     for _ in range(4):  # period after period, until it repeats
-        for k, now in enumerate(torque.T):
-            state = now + (state - now) * kept
-            filtered[:, k] = state
-    found = lag.columns(replace(SIGNALS, periodic=True), np.array([[constant]]))[0, 0]
-    np.testing.assert_allclose(found * constant, filtered - torque, atol=1e-9 * np.abs(torque).max())
+        for k in range(torque.shape[1]):
+            passed = torque[:, k]
+            for stage, state in enumerate(states):
+                passed = states[stage] = passed + (state - passed) * kept
+            filtered[:, k] = passed
+    found = lag.columns(replace(SIGNALS, periodic=True), np.array([[constant, order]]))[0, 0]
+    np.testing.assert_allclose(found, filtered - torque, atol=1e-9 * np.abs(torque).max())
     slow = np.abs(np.gradient(torque, axis=1)).max() * RATE  # settled at first where it does not repeat
-    once = lag.columns(replace(SIGNALS, periodic=False), np.array([[constant]]))[0, 0]
+    once = lag.columns(replace(SIGNALS, periodic=False), np.array([[constant, order]]))[0, 0]
     assert np.abs(once[:, 0]).max() == 0.0
-    assert np.abs(once - found)[:, -1].max() * constant < 1e-6 * slow
+    assert np.abs(once - found)[:, -1].max() < 1e-6 * slow * constant
 
 
 def test_a_tilted_base_is_gravity_in_another_direction() -> None:

@@ -6,13 +6,18 @@ from typing import ClassVar
 import numpy as np
 from scipy import signal
 
-from service.diagnosis.catalogue.effect import Coefficient, Effect, Shape
+from service.diagnosis.catalogue.effect import Coefficient, Effect, Quantity, Shape, mesh
 from service.diagnosis.catalogue.setting import Setting
 from service.diagnosis.catalogue.signals import Signals
 from service.recording.recording import Array
 
+LARGEST_SHARE = 2.0
+"""One where all of the torque is filtered; sharper filters of higher order look like more. Beyond two it amplifies."""
+
 LAGS = np.array([0.25, 0.5, 1.0, 2.0, 4.0])
 """Time constants looked at, relative to that of the band: one that is much shorter is a delay."""
+
+ORDERS = np.array([1.0, 2.0])
 
 
 class TimeDelay(Effect):
@@ -36,7 +41,9 @@ class TimeDelay(Effect):
         """
         places = (None, *(setting.joints if setting.robot.joint_count > 1 else ()))
         constants = LAGS / (2.0 * np.pi * setting.cutoff_hz)
-        lags = [Lag(place, constants[:, None], 0.3 * constants[:1], 2.0 * constants[-1:]) for place in places]
+        lower = np.array([0.3 * constants[0], ORDERS[0]])
+        upper = np.array([2.0 * constants[-1], ORDERS[-1]])
+        lags = [Lag(place, mesh(constants, ORDERS), lower, upper) for place in places]
         return [*(cls(place) for place in places), *lags]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
@@ -73,30 +80,34 @@ class TimeDelay(Effect):
 
 
 class Lag(TimeDelay):
-    """T dτ_recorded/dt + τ_recorded = τ: a filter of first order, as sensors and drives have it.
+    """τ_recorded = τ + a (τ_T - τ): a low-pass filter with n equal time constants T, as sensors and drives have it.
 
-    Column of d: (τ_T - τ)/T, with τ_T the filtered torque; a filter that is all of that has d = T.
+    All of the torque passes a filter with a = 1; reported is d = a n T, by which slow changes are late.
     """
 
-    equation: ClassVar[str] = "tau_recorded = tau + d/T (tau_T - tau), T dtau_T/dt + tau_T = tau"
+    equation: ClassVar[str] = "tau_recorded = tau + d/(n T) (tau_T - tau), (1 + T d/dt)^n tau_T = tau"
     meaning: ClassVar[str] = "the torque channel is low-pass filtered, and so late against the positions"
     remedy: ClassVar[str] = "filter the positions alike, or undo the filter of time constant T"
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("d", "s", positive=True),)
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("T", "s", logarithmic=True),)
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("a", "1", positive=True, largest=LARGEST_SHARE),)
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("T", "s", logarithmic=True), Shape("n", "1", fixed=True))
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """What the filter takes off the model's torque, by its time constant.
+        """What the filter takes off the model's torque.
 
         Parameters
         ----------
         signals : Signals
             one piece of motion
-        shapes : (g, 1) float64
-            T [s]
+        shapes : (g, 2) float64
+            T [s], n
         """
         torque = signals.torque[list(self.touched(len(signals.torque)))]
-        filtered = np.stack([low_passed(torque, float(constant), signals) for constant in shapes[:, 0]])
-        return ((filtered - torque) / shapes[:, :, None])[:, None]
+        filtered = np.stack([low_passed(torque, float(constant), round(order), signals) for constant, order in shapes])
+        return (filtered - torque)[:, None]
+
+    def rough_grid(self) -> Array:
+        """None: what it looks like is roughly what a delay looks like."""
+        return self.grid[:0]
 
     def torque_of(self, signals: Signals, coefficients: Array, shape: Array) -> Array:
         """Its column: for a given time constant it is linear.
@@ -106,30 +117,60 @@ class Lag(TimeDelay):
         signals : Signals
             one piece of motion
         coefficients : (1,) float64
-            d [s]
-        shape : (1,) float64
-            T [s]
+            a
+        shape : (2,) float64
+            T [s], n
         """
         return Effect.torque_of(self, signals, coefficients, shape)
 
+    def quantities(
+        self, setting: Setting, coefficients: Array, shape: Array, covariance: Array
+    ) -> tuple[Quantity, ...]:
+        """The mean delay d = a n T, T and n: what is late is known well also where a and T are not.
 
-def low_passed(torque: Array, constant: float, signals: Signals) -> Array:
-    """Torque behind a filter of first order, exact for torque that is constant within a sample, (m, N).
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        coefficients : (1,) float64
+            a
+        shape : (2,) float64
+            T [s], n
+        covariance : (3, 3) float64
+            of all
+        """
+        share, constant, order = float(coefficients[0]), float(shape[0]), float(shape[1])
+        slope = order * np.array([constant, share, 0.0])
+        std = float(np.sqrt(max(slope @ covariance @ slope, 0.0)))
+        own = float(np.sqrt(max(covariance[1, 1], 0.0)))
+        return (
+            Quantity("d", order * share * constant, std, "s"),
+            Quantity("T", constant, own, "s"),
+            Quantity("n", order, 0.0, "1"),
+        )
+
+
+def low_passed(torque: Array, constant: float, order: int, signals: Signals) -> Array:
+    """Torque behind a filter, exact for torque that is constant within a sample, (m, N).
 
     Parameters
     ----------
     torque : (m, N) float64
         before it [Nm or N]
     constant : float
-        time constant T of the filter [s]
+        each time constant T of the filter [s]
+    order : int
+        how many there are
     signals : Signals
         the piece of motion, which begins settled, or as its period ends
     """
     kept = float(np.exp(-1.0 / (constant * signals.rate_hz)))
-    numerator, denominator = [1.0 - kept], [1.0, -kept]
-    if not signals.periodic:
-        return signal.lfilter(numerator, denominator, torque, zi=kept * torque[:, :1])[0]
-    once, _ = signal.lfilter(numerator, denominator, torque, zi=np.zeros((len(torque), 1)))
-    # A period later the filter stands as it stood: y₀ kept^N + the response to one period is y₀ again.
-    start = once[:, -1:] / (1.0 - kept ** torque.shape[1])
-    return signal.lfilter(numerator, denominator, torque, zi=kept * start)[0]
+    filtered = torque
+    for _ in range(order):
+        before = filtered[:, :1]
+        if signals.periodic:
+            # A period later the filter stands as it stood: y₀ kept^N + the response to one period is y₀ again.
+            once, _ = signal.lfilter([1.0 - kept], [1.0, -kept], filtered, zi=np.zeros_like(before))
+            before = once[:, -1:] / (1.0 - kept ** torque.shape[1])
+        filtered, _ = signal.lfilter([1.0 - kept], [1.0, -kept], filtered, zi=kept * before)
+    return filtered

@@ -188,7 +188,7 @@ ENTRIES: Mapping[str, Any] = {
     "rotor_inertia": lambda t, s, c, d: [{"inertia": c[0]}],
     "torque_gain_error": lambda t, s, c, d: [{"gain": 1.0 + c[0]}],
     "torque_saturation": _saturation,
-    "time_delay": lambda t, s, c, d: [{"delay": c[0]}],
+    "time_delay": lambda t, s, c, d: [{"delay": c[0] * s[0] * s[1] if s else c[0]}],  # a filter's to first order
     "base_tilt": _tilt,
     "kinematic_error": _displacement,
     "external_contact": _contact,
