@@ -13,7 +13,7 @@ TRAIN, HELD_OUT = (1, 2, 3), (11, 12)
 FEW, MANY = 4.2, 150.0
 CLIP = 1.4
 LAG = 0.02
-RATE = 100.0
+RATE, STEPS = 100.0, 50
 
 
 def spring(arm: SimulatedArm, rigid: Array) -> Array:
@@ -66,11 +66,12 @@ def wrist(arm: SimulatedArm, rigid: Array) -> Array:
 
 def filtered(arm: SimulatedArm, rigid: Array) -> Array:
     """Joint 2's torque behind a filter of first order that has settled into the motion's period."""
-    torque, state, kept = arm.exact.torque_exact[:, 1], 0.0, np.exp(-1.0 / (RATE * LAG))
+    torque, state = arm.exact.torque_exact[:, 1], 0.0
     late = np.empty(len(torque))
     for _ in range(2):
         for k in range(len(torque)):
-            state = torque[k] + (state - torque[k]) * kept
+            for part in (np.arange(STEPS) + 0.5) / STEPS:
+                state += (torque[k - 1] + part * (torque[k] - torque[k - 1]) - state) / (RATE * STEPS * LAG)
             late[k] = state
     return at_joint(1, late - torque)
 
@@ -101,7 +102,7 @@ CASES: dict[str, tuple[EffectTorque, str, str, dict[str, float]]] = {
     "few teeth": (few_teeth, "cogging", "joint1", {"order": FEW, "amplitude": 0.5, "phase": 0.4}),
     "many teeth": (many_teeth, "cogging", "joint1", {"order": MANY, "amplitude": 1.2, "phase": 0.4}),
     "clipped": (clipped, "torque_saturation", "joint1", {"c": CLIP, "a": 1.0}),
-    "filtered": (filtered, "time_delay", "joint2", {"d": LAG, "T": LAG}),
+    "filtered": (filtered, "time_delay", "joint2", {"d": LAG}),
     "wrist": (wrist, "friction_coupling", "joint3", {"f": 0.6}),
 }
 

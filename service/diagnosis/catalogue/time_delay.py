@@ -1,12 +1,13 @@
 """A torque channel that is late against the positions: by a delay, or behind a low-pass filter."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 from scipy import signal
 
-from service.diagnosis.catalogue.effect import Coefficient, Effect, Quantity, Shape, mesh
+from service.diagnosis.catalogue.effect import Coefficient, Effect, Quantity, Shape
 from service.diagnosis.catalogue.setting import Setting
 from service.diagnosis.catalogue.signals import Signals
 from service.recording.recording import Array
@@ -17,7 +18,7 @@ LARGEST_SHARE = 2.0
 LAGS = np.array([0.25, 0.5, 1.0, 2.0, 4.0])
 """Time constants looked at, relative to that of the band: one that is much shorter is a delay."""
 
-ORDERS = np.array([1.0, 2.0])
+ORDERS = (1, 2)
 
 
 class TimeDelay(Effect):
@@ -41,9 +42,8 @@ class TimeDelay(Effect):
         """
         places = (None, *(setting.joints if setting.robot.joint_count > 1 else ()))
         constants = LAGS / (2.0 * np.pi * setting.cutoff_hz)
-        lower = np.array([0.3 * constants[0], ORDERS[0]])
-        upper = np.array([2.0 * constants[-1], ORDERS[-1]])
-        lags = [Lag(place, mesh(constants, ORDERS), lower, upper) for place in places]
+        grid, lower, upper = constants[:, None], 0.3 * constants[:1], 2.0 * constants[-1:]
+        lags = [Lag(place, grid, lower, upper, order=order) for place in places for order in ORDERS]
         return [*(cls(place) for place in places), *lags]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
@@ -79,17 +79,23 @@ class TimeDelay(Effect):
         return np.stack(late) - torque
 
 
+@dataclass(frozen=True, eq=False)
 class Lag(TimeDelay):
     """τ_recorded = τ + a (τ_T - τ): a low-pass filter with n equal time constants T, as sensors and drives have it.
 
     All of the torque passes a filter with a = 1; reported is d = a n T, by which slow changes are late.
+
+    order : int
+        n
     """
 
     equation: ClassVar[str] = "tau_recorded = tau + d/(n T) (tau_T - tau), (1 + T d/dt)^n tau_T = tau"
     meaning: ClassVar[str] = "the torque channel is low-pass filtered, and so late against the positions"
     remedy: ClassVar[str] = "filter the positions alike, or undo the filter of time constant T"
     coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("a", "1", positive=True, largest=LARGEST_SHARE),)
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("T", "s", logarithmic=True), Shape("n", "1", fixed=True))
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("T", "s", logarithmic=True),)
+
+    order: int = 1
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """What the filter takes off the model's torque.
@@ -98,11 +104,11 @@ class Lag(TimeDelay):
         ----------
         signals : Signals
             one piece of motion
-        shapes : (g, 2) float64
-            T [s], n
+        shapes : (g, 1) float64
+            T [s]
         """
         torque = signals.torque[list(self.touched(len(signals.torque)))]
-        filtered = np.stack([low_passed(torque, float(constant), round(order), signals) for constant, order in shapes])
+        filtered = np.stack([low_passed(torque, float(constant), self.order, signals) for constant in shapes[:, 0]])
         return (filtered - torque)[:, None]
 
     def rough_grid(self) -> Array:
@@ -118,8 +124,8 @@ class Lag(TimeDelay):
             one piece of motion
         coefficients : (1,) float64
             a
-        shape : (2,) float64
-            T [s], n
+        shape : (1,) float64
+            T [s]
         """
         return Effect.torque_of(self, signals, coefficients, shape)
 
@@ -134,24 +140,24 @@ class Lag(TimeDelay):
             the arm
         coefficients : (1,) float64
             a
-        shape : (2,) float64
-            T [s], n
-        covariance : (3, 3) float64
-            of all
+        shape : (1,) float64
+            T [s]
+        covariance : (2, 2) float64
+            of both
         """
-        share, constant, order = float(coefficients[0]), float(shape[0]), float(shape[1])
-        slope = order * np.array([constant, share, 0.0])
+        share, constant = float(coefficients[0]), float(shape[0])
+        slope = self.order * np.array([constant, share])
         std = float(np.sqrt(max(slope @ covariance @ slope, 0.0)))
         own = float(np.sqrt(max(covariance[1, 1], 0.0)))
         return (
-            Quantity("d", order * share * constant, std, "s"),
+            Quantity("d", self.order * share * constant, std, "s"),
             Quantity("T", constant, own, "s"),
-            Quantity("n", order, 0.0, "1"),
+            Quantity("n", self.order, 0.0, "1"),
         )
 
 
 def low_passed(torque: Array, constant: float, order: int, signals: Signals) -> Array:
-    """Torque behind a filter, exact for torque that is constant within a sample, (m, N).
+    """Torque behind a filter, exact for torque that is linear from sample to sample, (m, N).
 
     Parameters
     ----------
@@ -164,13 +170,16 @@ def low_passed(torque: Array, constant: float, order: int, signals: Signals) -> 
     signals : Signals
         the piece of motion, which begins settled, or as its period ends
     """
-    kept = float(np.exp(-1.0 / (constant * signals.rate_hz)))
+    samples = constant * signals.rate_hz
+    kept = float(np.exp(-1.0 / samples))
+    now, before = 1.0 - (1.0 - kept) * samples, (1.0 - kept) * samples - kept
     filtered = torque
     for _ in range(order):
-        before = filtered[:, :1]
+        last, start = filtered[:, :1], filtered[:, :1]
         if signals.periodic:
             # A period later the filter stands as it stood: y₀ kept^N + the response to one period is y₀ again.
-            once, _ = signal.lfilter([1.0 - kept], [1.0, -kept], filtered, zi=np.zeros_like(before))
-            before = once[:, -1:] / (1.0 - kept ** torque.shape[1])
-        filtered, _ = signal.lfilter([1.0 - kept], [1.0, -kept], filtered, zi=kept * before)
+            last = filtered[:, -1:]
+            once, _ = signal.lfilter([now, before], [1.0, -kept], filtered, zi=before * last)
+            start = once[:, -1:] / (1.0 - kept ** torque.shape[1])
+        filtered, _ = signal.lfilter([now, before], [1.0, -kept], filtered, zi=before * last + kept * start)
     return filtered

@@ -152,6 +152,11 @@ def _saturation(term: Term, shape: Sequence[float], own: Sequence[float], diagno
     return [{"level": level, "shape": "clip" if clips else "compression"}]
 
 
+def _delay(term: Term, shape: Sequence[float], own: Sequence[float], diagnosis: Diagnosis) -> list[Entry]:
+    """A filter's delay a n T stands for it: to first order they are one."""
+    return [{"delay": own[0] * shape[0] * getattr(term.effect, "order", 1) if shape else own[0]}]
+
+
 def _displacement(term: Term, shape: Sequence[float], own: Sequence[float], diagnosis: Diagnosis) -> list[Entry]:
     link, axis = (int(each) for each in shape)
     return [{"link": link, "translation": [own[0] if number == axis else 0.0 for number in (1, 2, 3)]}]
@@ -188,7 +193,7 @@ ENTRIES: Mapping[str, Any] = {
     "rotor_inertia": lambda t, s, c, d: [{"inertia": c[0]}],
     "torque_gain_error": lambda t, s, c, d: [{"gain": 1.0 + c[0]}],
     "torque_saturation": _saturation,
-    "time_delay": lambda t, s, c, d: [{"delay": c[0] * s[0] * s[1] if s else c[0]}],  # a filter's to first order
+    "time_delay": _delay,
     "base_tilt": _tilt,
     "kinematic_error": _displacement,
     "external_contact": _contact,
