@@ -3,8 +3,6 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from service.diagnosis.admission import Admission
 from service.diagnosis.catalogue import TimeLocalEffect
 from service.diagnosis.choice import Choice, Option, Place, Selection, distinct, is_physical, outsized, place_of
@@ -14,9 +12,8 @@ from service.diagnosis.fit import Fit, Fitter
 from service.diagnosis.interleaved import interleaved_confirmation
 from service.diagnosis.model import ExtendedModel, with_terms
 from service.diagnosis.outside import where_held_out_shows
-from service.diagnosis.proxies import proxies
+from service.diagnosis.pruning import without_errors_of_larger_ones, without_proxies, without_superfluous
 from service.diagnosis.screening import Candidate, Screen, model_signals
-from service.diagnosis.shape_error import HARDLY, groups_of, standings, without_group
 from service.diagnosis.table import Table, fitted_option
 from service.diagnosis.term import Term
 
@@ -106,10 +103,10 @@ class Selector:
                 choices.append(Choice((option,), confirmation, p_value, was_given=True))
                 fit = option.fit
         fit, choices, rejected = self._grown(fit, choices, [], progress)
-        fit, choices = self._without_superfluous(fit, choices)
-        fit, choices = self._without_proxies(nominal, fit, choices)
+        fit, choices = without_superfluous(fit, choices, self.fitter, self.admission)
+        fit, choices = without_proxies(nominal, fit, choices, self.fitter, self.admission)
         fit, choices = self._settled(fit, choices)
-        fit, choices = self._without_errors_of_larger_ones(nominal, fit, choices)
+        fit, choices = without_errors_of_larger_ones(nominal, fit, choices, self.fitter, self.admission)
         return Selection(nominal, fit, tuple(choices), tuple(rejected))
 
     def continued(self, selection: Selection, progress: Callable[[str], None]) -> Selection:
@@ -125,9 +122,9 @@ class Selector:
         fit, choices, rejected = self._grown(selection.fit, list(selection.choices), [], progress)
         if len(choices) == len(selection.choices):
             return selection
-        fit, choices = self._without_superfluous(fit, choices)
-        fit, choices = self._without_proxies(selection.nominal, fit, choices)
-        fit, choices = self._without_errors_of_larger_ones(selection.nominal, fit, choices)
+        fit, choices = without_superfluous(fit, choices, self.fitter, self.admission)
+        fit, choices = without_proxies(selection.nominal, fit, choices, self.fitter, self.admission)
+        fit, choices = without_errors_of_larger_ones(selection.nominal, fit, choices, self.fitter, self.admission)
         return Selection(selection.nominal, fit, tuple(choices), (*selection.rejected, *rejected))
 
     def _grown(
@@ -283,45 +280,3 @@ class Selector:
         if self.held_out is None:
             return None
         return self.held_out.confirm(fit, option.fit, self.fitter)
-
-    def _without_proxies(self, nominal: Fit, fit: Fit, choices: list[Choice]) -> tuple[Fit, list[Choice]]:
-        """Drop what only stands in for an effect that the catalogue does not have."""
-        rows = self.screen.observations
-        return self._without(proxies(nominal, fit, choices, rows, pure_error=self.pure_error), fit, choices)
-
-    def _without_errors_of_larger_ones(self, nominal: Fit, fit: Fit, choices: list[Choice]) -> tuple[Fit, list[Choice]]:
-        """Drop what is hardly more than an error of the formula of a larger effect at the same joint."""
-        groups = list(groups_of(fit.model).values())
-        if len(groups) < 2:
-            return fit, choices
-        without = [without_group(fit, places, self.fitter) for places in groups]
-        found = standings(nominal, fit, without, self.fitter, self.admission.inflation(fit))
-        pairs = zip(groups, found, strict=True)
-        dropped = [place for places, standing in pairs if standing.certainty < HARDLY for place in places]
-        return self._without(dropped, fit, choices)
-
-    def _without(self, dropped: Sequence[int], fit: Fit, choices: list[Choice]) -> tuple[Fit, list[Choice]]:
-        """The model fitted anew without some choices."""
-        if not dropped:
-            return fit, choices
-        kept = [place for place in range(len(choices)) if place not in dropped]
-        terms = [fit.model.terms[place] for place in kept]
-        return self.fitter.fit(with_terms(fit.model, terms)), [choices[place] for place in kept]
-
-    def _without_superfluous(self, fit: Fit, choices: list[Choice]) -> tuple[Fit, list[Choice]]:
-        """Drop terms that the others have made superfluous, the weakest first."""
-        while choices:
-            gains = []
-            for place in range(len(choices)):
-                terms = [term for other, term in enumerate(fit.model.terms) if other != place]
-                without = self.fitter.fit(with_terms(fit.model, terms))
-                gains.append((without.energy - fit.energy, without))
-            weakest = int(np.argmin([gain for gain, _ in gains]))
-            candidate = choices[weakest].options[0].candidate
-            level = self.admission.level
-            inflation = self.admission.inflation(fit)
-            if replace(candidate, gain=max(gains[weakest][0], 0.0)).p_value(inflation, refined=True) < level:
-                break
-            fit = gains[weakest][1]
-            choices = [choice for place, choice in enumerate(choices) if place != weakest]
-        return fit, choices
