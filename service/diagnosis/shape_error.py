@@ -2,9 +2,11 @@
 
 A law of the catalogue has one formula, what an arm does has its own. What the formula leaves of it is as significant as
 the recordings are long, and another law takes it up that is not there. Nothing in these recordings tells that from a
-second effect but its size: such errors are small parts of what the larger law explains. Where effects meet at a joint,
-the one that alone explains most there leads; each other one has a share s of all that is explained there, and is
-certain by s²/(s² + `SHAPE_ERROR`²), and below `HARDLY` no finding at all.
+second effect but its size, and what it depends on: such errors are small parts of what the larger law explains, and
+functions of the same quantities; only for a very small part is it chance that makes them look like functions of others.
+Where effects meet at a joint, the one that alone explains most there leads; each other one has a share s of all that is
+explained there, and is certain by s²/(s² + e²) with e = `SHAPE_ERROR`, or `LIKENESS` where it depends on something that
+the leading one does not depend on. Below `HARDLY` it is no finding at all.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,6 +23,9 @@ from service.recording.recording import Array
 SHAPE_ERROR = 0.1
 """Share of what is explained at a joint that an error of the leading law's curve may well have; on arms that conceal
 other formulas than the catalogue's it is 0.03 to 0.16 where another law is taken for it at all."""
+
+LIKENESS = 0.02
+"""The same for an effect that depends on what the leading one does not: along a motion all quantities are related."""
 
 HARDLY = 0.1
 """Certainty below which a finding is none."""
@@ -116,8 +121,17 @@ def standings(nominal: Fit, fit: Fit, without: Sequence[Fit], fitter: Fitter, in
             continue
         shares = (_energies(without[number])[own] - after[own]) / explained[own]
         share, joint = max(float(shares.max()), 0.0), own[int(shares.argmax())]
-        found.append(Standing(share**2 / (share**2 + SHAPE_ERROR**2), effects[int(leads[joint])]))
+        leading = effects[int(leads[joint])]
+        error = SHAPE_ERROR if _is_of_the_same(effect, leading) else LIKENESS
+        found.append(Standing(share**2 / (share**2 + error**2), leading))
     return found
+
+
+def _is_of_the_same(effect: Effect, leading: Effect) -> bool:
+    """Whether an effect depends on nothing that a leading one does not depend on."""
+    if effect.arguments is None or leading.arguments is None:
+        return True
+    return effect.arguments <= leading.arguments
 
 
 def _alone(places: Sequence[int], nominal: Fit, fit: Fit, fitter: Fitter) -> Array:

@@ -15,6 +15,7 @@ class AsymmetricCoulomb(Effect):
     """τ = a |A(q̇)|: Coulomb friction is larger by a one way and smaller by a the other."""
 
     id: ClassVar[str] = "asymmetric_coulomb"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"velocity"})
     equation: ClassVar[str] = "tau = a |sgn(qd)|, sgn smoothed: Coulomb friction F_c + a forwards, F_c - a backwards"
     meaning: ClassVar[str] = "Coulomb friction differs with the direction of motion"
     remedy: ClassVar[str] = "use a Coulomb level for each direction"
@@ -50,6 +51,7 @@ class AsymmetricViscous(Effect):
 
     of_motion_alone: ClassVar[bool] = True
     id: ClassVar[str] = "asymmetric_viscous"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"velocity"})
     equation: ClassVar[str] = "tau = b |qd|: viscous friction F_v + b forwards, F_v - b backwards"
     meaning: ClassVar[str] = "viscous friction differs with the direction of motion"
     remedy: ClassVar[str] = "use a viscous coefficient for each direction"

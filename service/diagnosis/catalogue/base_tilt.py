@@ -32,6 +32,7 @@ class BaseTilt(Effect):
     """τ = ∂τ/∂g (|g| α_1 e_1 + |g| α_2 e_2), e_1 and e_2 across gravity."""
 
     id: ClassVar[str] = "base_tilt"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "others"})
     equation: ClassVar[str] = "tau = dtau/dg (|g| (alpha_1 e_1 + alpha_2 e_2)), e_1 and e_2 across gravity"
     meaning: ClassVar[str] = "gravity points elsewhere in the base frame than the robot file says"
     remedy: ClassVar[str] = "level the base, or correct gravity in the robot file"

@@ -74,6 +74,7 @@ class JointElasticity(Effect):
     """q_link = q - τ_rb / k."""
 
     id: ClassVar[str] = "joint_elasticity"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "velocity", "acceleration", "load"})
     equation: ClassVar[str] = "q_link = q - c tau_rb, c = 1/stiffness"
     meaning: ClassVar[str] = "the transmission gives way under load"
     remedy: ClassVar[str] = "model the joint as two masses with a stiffness between them"
@@ -124,6 +125,7 @@ class Backlash(Effect):
     """q_link = q - b/2 tanh(τ_rb / ε)."""
 
     id: ClassVar[str] = "backlash"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "velocity", "acceleration", "load"})
     equation: ClassVar[str] = "q_link = q - b/2 tanh(tau_rb/epsilon)"
     meaning: ClassVar[str] = "the transmission has play when the load changes sign"
     remedy: ClassVar[str] = "take up the play, or model a dead zone"

@@ -104,6 +104,8 @@ class Effect(ABC):
     An effect that is `screened` is looked for beside the nominal model; any other becomes a finding by comparison with
     a given model.
     One that does not do the same whenever the motion does, that does not `repeats_with_motion`, passes for noise there.
+    What its law depends on are its `arguments`: ``position``, ``velocity``, ``acceleration`` of its joint, the ``load``
+    on its transmission, ``time``, the ``others``' motion; None where it acts on whatever torque there is.
     """
 
     id: ClassVar[str]
@@ -118,6 +120,7 @@ class Effect(ABC):
     swallows: ClassVar[bool] = False
     screened: ClassVar[bool] = True
     repeats_with_motion: ClassVar[bool] = True
+    arguments: ClassVar[frozenset[str] | None] = None
 
     joint: int | None
     grid: Array = field(default_factory=lambda: NO_SHAPE)

@@ -28,6 +28,7 @@ class JointSpring(Effect):
 
     of_motion_alone: ClassVar[bool] = True
     id: ClassVar[str] = "joint_spring"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"position"})
     equation: ClassVar[str] = "tau = k (q - q_0)"
     meaning: ClassVar[str] = "an elastic torque grows linearly with the angle"
     remedy: ClassVar[str] = "add a spring to the joint"
@@ -68,6 +69,7 @@ class CableForce(Effect):
 
     of_motion_alone: ClassVar[bool] = True
     id: ClassVar[str] = "cable_force"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"position"})
     equation: ClassVar[str] = "tau = +-k max(+-(q - q_t), 0)^p"
     meaning: ClassVar[str] = "a one-sided elastic torque sets in past an angle"
     remedy: ClassVar[str] = "re-route the hose or cable, or model its pull past the angle"

@@ -35,6 +35,7 @@ class ExternalContact(TimeLocalEffect):
     """τ = J(q)ᵀ F w(t), F at the origin of the last link's frame in base axes."""
 
     id: ClassVar[str] = "external_contact"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"time"})
     equation: ClassVar[str] = "tau = J(q)^T F w(t), or tau_j = c w(t); w = 1 or a half sine from t_0 to t_1"
     meaning: ClassVar[str] = "the arm touches something for a while"
     remedy: ClassVar[str] = "clear what it touches, or leave that stretch of the recording out"

@@ -27,6 +27,7 @@ class FrictionCoupling(Effect):
     """
 
     id: ClassVar[str] = "friction_coupling"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"velocity", "others"})
     equation: ClassVar[str] = "tau_j = f sgn(v) + w v, tau_k = +-tau_j, v = qd_j +- qd_k"
     meaning: ClassVar[str] = "two joints share friction on the sum or difference of their motion"
     remedy: ClassVar[str] = "add Coulomb and viscous friction of the coupled motor's own speed"

@@ -32,6 +32,7 @@ class FrictionDrift(Effect):
 
     repeats_with_motion: ClassVar[bool] = False
     id: ClassVar[str] = "friction_drift"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"velocity", "time"})
     equation: ClassVar[str] = (
         "tau = (f sgn(qd) + w qd) h, T dh/dt = p / (1 - exp(-D/T)) - h, p = 1 or friction's own power / 1 W"
     )

@@ -27,6 +27,7 @@ class KinematicError(Effect):
     """τ = ∂τ/∂d d: the frame of one link lies d farther along one axis, of those before its last turn."""
 
     id: ClassVar[str] = "kinematic_error"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "velocity", "acceleration", "others"})
     equation: ClassVar[str] = "tau = dtau/dd d, d the displacement of one link's frame along one of its axes"
     meaning: ClassVar[str] = "a link length or frame is wrong"
     remedy: ClassVar[str] = "measure the arm's geometry, and correct the robot file by d"

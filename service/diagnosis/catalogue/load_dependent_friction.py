@@ -15,6 +15,7 @@ class LoadDependentFriction(Effect):
     """τ = μ |τ_rb| A(q̇), τ_rb the rigid-body torque."""
 
     id: ClassVar[str] = "load_dependent_friction"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"load", "velocity"})
     equation: ClassVar[str] = "tau = mu |tau_rb| sgn(qd)"
     meaning: ClassVar[str] = "friction grows with the transmitted torque"
     remedy: ClassVar[str] = "add mu times the magnitude of the rigid-body torque to the Coulomb level"

@@ -23,6 +23,7 @@ class NonlinearViscous(Effect):
 
     of_motion_alone: ClassVar[bool] = True
     id: ClassVar[str] = "nonlinear_viscous"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"velocity"})
     equation: ClassVar[str] = "tau = c sgn(qd) |qd|^p"
     meaning: ClassVar[str] = "friction grows with a power of speed other than one"
     remedy: ClassVar[str] = "replace the viscous line by a power of speed"

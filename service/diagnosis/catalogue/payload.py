@@ -26,6 +26,7 @@ class Payload(Effect):
     """τ = m Φ_body(r), the torque of a point mass at r of the last link."""
 
     id: ClassVar[str] = "payload"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "velocity", "acceleration", "others"})
     equation: ClassVar[str] = "tau = m Phi_body(q, qd, qdd; r)"
     meaning: ClassVar[str] = "a mass is fixed to the tool that the model does not have"
     remedy: ClassVar[str] = "add the body to the last link (or correct the last link's own mass: torque cannot tell)"

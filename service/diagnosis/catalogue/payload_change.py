@@ -30,6 +30,7 @@ class PayloadChange(TimeLocalEffect):
     """τ = m Φ_body(r) w(t), Φ_body the torque of a point mass at r of the last link."""
 
     id: ClassVar[str] = "payload_change"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "velocity", "acceleration", "others", "time"})
     equation: ClassVar[str] = "tau = m Phi_body(q, qd, qdd; r) w(t), w = 1 from t_on to t_off"
     meaning: ClassVar[str] = "a mass at the tool is picked up or dropped"
     remedy: ClassVar[str] = "record with one payload at a time, or add the body to the last link while it is carried"

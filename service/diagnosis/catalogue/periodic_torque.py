@@ -190,6 +190,7 @@ class Cogging(_Periodic):
 
     of_motion_alone: ClassVar[bool] = True
     id: ClassVar[str] = "cogging"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"position"})
     equation: ClassVar[str] = "tau = sum a sin(k q + phi)"
     meaning: ClassVar[str] = "torque repeats with the angle, whatever the load"
     remedy: ClassVar[str] = "compensate the torque over the motor's angle"
@@ -215,6 +216,7 @@ class TorqueRipple(_Periodic):
     """τ = τ_rb Σ a sin(k q + φ)."""
 
     id: ClassVar[str] = "torque_ripple"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "load"})
     equation: ClassVar[str] = "tau = tau_rb sum a sin(k q + phi)"
     meaning: ClassVar[str] = "torque repeats with the angle, in proportion to the load"
     remedy: ClassVar[str] = "correct the torque constant over the motor's angle"

@@ -41,6 +41,7 @@ class ViscousFriction(PlainTerm):
     """τ = c q̇."""
 
     id: ClassVar[str] = "viscous_friction"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"velocity"})
     term: ClassVar[str] = "viscous"
     equation: ClassVar[str] = "tau = c qd"
     meaning: ClassVar[str] = "viscous friction is missing from the given model"
@@ -65,6 +66,7 @@ class CoulombFriction(PlainTerm):
     """τ = f A(q̇)."""
 
     id: ClassVar[str] = "coulomb_friction"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"velocity"})
     term: ClassVar[str] = "stiction"
     equation: ClassVar[str] = "tau = f sgn(qd)"
     meaning: ClassVar[str] = "Coulomb friction is missing from the given model"
@@ -89,6 +91,7 @@ class TorqueOffset(PlainTerm):
     """τ = c."""
 
     id: ClassVar[str] = "torque_offset"
+    arguments: ClassVar[frozenset[str] | None] = frozenset()
     term: ClassVar[str] = "offset"
     equation: ClassVar[str] = "tau = c"
     meaning: ClassVar[str] = "the torque has a constant part, which the robot file's friction does not declare"
@@ -113,6 +116,7 @@ class StribeckTerm(PlainTerm):
     """τ = s A(δ q̇): what the nominal model has as the catalogue's Stribeck friction."""
 
     id: ClassVar[str] = "stribeck_friction"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"velocity"})
     term: ClassVar[str] = "stribeck"
     equation: ClassVar[str] = "tau = s (2/pi) atan(delta qd)"
     meaning: ClassVar[str] = "a Stribeck term is missing from the given model"

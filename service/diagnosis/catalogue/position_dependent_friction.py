@@ -16,6 +16,7 @@ class PositionDependentFriction(Effect):
     """τ = A(q̇) (a cos q + b sin q)."""
 
     id: ClassVar[str] = "position_dependent_friction"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "velocity"})
     equation: ClassVar[str] = "tau = sgn(qd) (a cos q + b sin q)"
     meaning: ClassVar[str] = "the friction level varies with the joint's angle"
     remedy: ClassVar[str] = "let the Coulomb level vary with the joint's angle"

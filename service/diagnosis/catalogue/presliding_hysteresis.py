@@ -59,6 +59,7 @@ class PreslidingHysteresis(Effect):
     """τ = F (z - A(q̇)), z the bristles' deflection."""
 
     id: ClassVar[str] = "presliding_hysteresis"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "velocity"})
     equation: ClassVar[str] = "tau = F (z - sgn(qd)), dz/dt = qd/x_s - |qd| z/x_s"
     meaning: ClassVar[str] = "friction rises over a distance after each reversal instead of stepping"
     remedy: ClassVar[str] = "replace the Coulomb step by a Dahl or LuGre bristle"

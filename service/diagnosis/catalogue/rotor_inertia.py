@@ -14,6 +14,7 @@ class RotorInertia(Effect):
 
     of_motion_alone: ClassVar[bool] = True
     id: ClassVar[str] = "rotor_inertia"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"acceleration"})
     equation: ClassVar[str] = "tau = I_a qdd"
     meaning: ClassVar[str] = "the motor's reflected inertia is left out"
     remedy: ClassVar[str] = "add the armature inertia to the joint"

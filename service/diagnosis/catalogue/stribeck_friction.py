@@ -20,6 +20,7 @@ class StribeckFriction(Effect):
     """τ = s A(q̇) exp(-(|q̇|/v_s)^α)."""
 
     id: ClassVar[str] = "stribeck_friction"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"velocity"})
     equation: ClassVar[str] = "tau = s sgn(qd) exp(-(|qd|/v_s)^alpha)"
     meaning: ClassVar[str] = "friction rises towards zero velocity more than the model's curve"
     remedy: ClassVar[str] = "add a Stribeck term"
