@@ -1,10 +1,9 @@
 """``tauscope prove``: its arguments, and the way to the trials, which only a clone of the repository has."""
 
 import os
-import subprocess
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NoReturn
 
 import typer
 
@@ -53,11 +52,11 @@ def prove(
     words += ["--full"] if full else []
     words += [] if jobs is None else ["--jobs", str(jobs)]
     words += [] if page is None else ["--page", str(page)]
-    raise typer.Exit(tried(REPOSITORY, words))
+    become_trials(REPOSITORY, words)
 
 
-def tried(repository: Path, words: list[str]) -> int:
-    """Run the trials of a clone in a process of its own; the exit status.
+def become_trials(repository: Path, words: list[str]) -> NoReturn:
+    """Run the trials of a clone in the place of this program: what ends it ends them, and their exit status is its own.
 
     Parameters
     ----------
@@ -65,11 +64,6 @@ def tried(repository: Path, words: list[str]) -> int:
         the clone
     words : list of str
         arguments of `concealed.proof`
-
-    Returns
-    -------
-    int
-        exit status
 
     Raises
     ------
@@ -83,5 +77,6 @@ def tried(repository: Path, words: list[str]) -> int:
             " run `make prove` there"
         )
     path = os.pathsep.join([str(repository), str(tests), *filter(None, [os.environ.get("PYTHONPATH")])])
+    sys.stdout.flush()
     command = [sys.executable, "-m", "concealed.proof", *words]
-    return subprocess.run(command, env={**os.environ, "PYTHONPATH": path}, check=False).returncode  # noqa: S603 - our own
+    os.execve(sys.executable, command, {**os.environ, "PYTHONPATH": path})  # noqa: S606 - our own
