@@ -29,9 +29,6 @@ from service.diagnosis.verdict import Verdict
 SHIFTS_FROM = 3.0
 """Standard errors from which a parameter's shift is told."""
 
-BARELY = 0.9
-"""Probability below which it is told that a finding may be an error of another one's formula."""
-
 UNKNOWN = "unknown"
 
 
@@ -196,7 +193,7 @@ def _statement(finding: Finding, quantities: Sequence[Quantity], others: Sequenc
         names_of_recordings = diagnosis.fitter.observations.names
         when = f", {term.effect.when(term.coefficients, term.shape, names_of_recordings, diagnosis.setting.durations)}"
     doubt = f"; these data cannot tell it from {', '.join(others)}" if others else ""
-    if finding.behind is not None and finding.probability < BARELY:
+    if finding.behind is not None:
         doubt += (
             f"; beside {finding.behind.name(names)} it is so small that it may be an error of that effect's formula"
         )

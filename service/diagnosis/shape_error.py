@@ -27,6 +27,9 @@ other formulas than the catalogue's it is 0.03 to 0.16 where another law is take
 LIKENESS = 0.02
 """The same for an effect that depends on what the leading one does not: along a motion all quantities are related."""
 
+PLAIN = 0.9
+"""Certainty from which a finding is not doubted."""
+
 HARDLY = 0.1
 """Certainty below which a finding is none."""
 
@@ -44,7 +47,7 @@ class Standing:
     certainty : float
         chance that it is more than an error of another one's curve
     behind : Effect or None
-        the one that leads where its own share is largest; None where it leads itself, or meets no other
+        the one that leads where its own share is largest; None where it leads itself, meets no other, or is plain
     """
 
     certainty: float = 1.0
@@ -123,7 +126,8 @@ def standings(nominal: Fit, fit: Fit, without: Sequence[Fit], fitter: Fitter, in
         share, joint = max(float(shares.max()), 0.0), own[int(shares.argmax())]
         leading = effects[int(leads[joint])]
         error = SHAPE_ERROR if _is_of_the_same(effect, leading) else LIKENESS
-        found.append(Standing(share**2 / (share**2 + error**2), leading))
+        certainty = share**2 / (share**2 + error**2)
+        found.append(Standing(certainty, leading if certainty < PLAIN else None))
     return found
 
 
