@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from arms import random_parameters, ur5_like
 from pinocchio_arm import pinocchio_model
 from service.diagnosis.catalogue import Effect, Setting, Signals, catalogue, possible_effects
-from service.diagnosis.catalogue.time_delay import Lag
+from service.diagnosis.catalogue.time_delay import Lag, Shift
 from service.robot import Robot
 
 Array = NDArray[np.float64]
@@ -221,6 +221,18 @@ def test_a_filtered_torque_follows_the_filter_s_equation(joint: int | None, cons
     once = lag.columns(replace(SIGNALS, periodic=False), np.array([[constant]]))[0, 0]
     assert np.abs(once[:, 0]).max() < 1e-12 * np.abs(torque).max()
     assert np.abs(once - found)[:, -1].max() < 1e-6 * slow * constant
+
+
+@pytest.mark.parametrize("joint", [None, 2])
+def test_a_shifted_torque_is_late_by_its_delay(joint: int | None) -> None:
+    shift = next(each for each in possible_effects(setting()) if type(each) is Shift and each.joint == joint)
+    torque = SIGNALS.torque if joint is None else SIGNALS.torque[joint : joint + 1]
+    found = shift.columns(replace(SIGNALS, periodic=True), np.array([[0.007], [0.0105]]))[:, 0]
+    between = 0.5 * (np.roll(torque, 10, axis=1) + np.roll(torque, 11, axis=1))
+    np.testing.assert_allclose(found[0], np.roll(torque, 7, axis=1) - torque, atol=1e-9 * np.abs(torque).max())
+    np.testing.assert_allclose(found[1], between - torque, atol=1e-9 * np.abs(torque).max())
+    once = shift.columns(replace(SIGNALS, periodic=False), np.array([[0.007]]))[0, 0]
+    np.testing.assert_allclose(once[:, 7:], found[0][:, 7:], atol=1e-9 * np.abs(torque).max())
 
 
 def test_a_tilted_base_is_gravity_in_another_direction() -> None:

@@ -43,8 +43,9 @@ class TimeDelay(Effect):
         places = (None, *(setting.joints if setting.robot.joint_count > 1 else ()))
         constants = LAGS / (2.0 * np.pi * setting.cutoff_hz)
         grid, lower, upper = constants[:, None], 0.3 * constants[:1], 2.0 * constants[-1:]
-        lags = [Lag(place, grid, lower, upper, order=order) for place in places for order in ORDERS]
-        return [*(cls(place) for place in places), *lags]
+        late: list[Effect] = [Shift(place, grid, lower, upper) for place in places]
+        late += [Lag(place, grid, lower, upper, order=order) for place in places for order in ORDERS]
+        return [*(cls(place) for place in places), *late]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """-dτ/dt of the model's torque.
@@ -79,26 +80,31 @@ class TimeDelay(Effect):
         return np.stack(late) - torque
 
 
-@dataclass(frozen=True, eq=False)
-class Lag(TimeDelay):
-    """τ_recorded = τ + a (τ_T - τ): a low-pass filter with n equal time constants T, as sensors and drives have it.
+class Shift(TimeDelay):
+    """τ_recorded = τ + a (τ_T - τ), τ_T(t) = τ(t - T): a delay that is no small matter for the band.
 
-    All of the torque passes a filter with a = 1; reported is d = a n T, by which slow changes are late.
-
-    order : int
-        n
+    All of the torque is late with a = 1; reported is d = a T, by which slow changes are late.
     """
 
-    equation: ClassVar[str] = "tau_recorded = tau + d/(n T) (tau_T - tau), (1 + T d/dt)^n tau_T = tau"
-    meaning: ClassVar[str] = "the torque channel is low-pass filtered, and so late against the positions"
-    remedy: ClassVar[str] = "filter the positions alike, or undo the filter of time constant T"
     coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("a", "1", positive=True, largest=LARGEST_SHARE),)
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("T", "s", logarithmic=True),)
 
-    order: int = 1
+    def late(self, torque: Array, constant: float, signals: Signals) -> Array:
+        """Torque (m, N) as it is recorded with a = 1.
+
+        Parameters
+        ----------
+        torque : (m, N) float64
+            as it is [Nm or N]
+        constant : float
+            T [s]
+        signals : Signals
+            the piece of motion
+        """
+        return shifted(torque, constant, signals)
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """What the filter takes off the model's torque.
+        """What is recorded less what is there.
 
         Parameters
         ----------
@@ -108,15 +114,15 @@ class Lag(TimeDelay):
             T [s]
         """
         torque = signals.torque[list(self.touched(len(signals.torque)))]
-        filtered = np.stack([low_passed(torque, float(constant), self.order, signals) for constant in shapes[:, 0]])
-        return (filtered - torque)[:, None]
+        recorded = np.stack([self.late(torque, float(constant), signals) for constant in shapes[:, 0]])
+        return (recorded - torque)[:, None]
 
     def rough_grid(self) -> Array:
-        """None: what it looks like is roughly what a delay looks like."""
+        """None: what it looks like is roughly what a small delay looks like."""
         return self.grid[:0]
 
     def torque_of(self, signals: Signals, coefficients: Array, shape: Array) -> Array:
-        """Its column: for a given time constant it is linear.
+        """Its column: for a given T it is linear.
 
         Parameters
         ----------
@@ -132,7 +138,7 @@ class Lag(TimeDelay):
     def quantities(
         self, setting: Setting, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
-        """The mean delay d = a n T, T and n: what is late is known well also where a and T are not.
+        """The mean delay d = a T: it is known well also where a and T are not.
 
         Parameters
         ----------
@@ -146,14 +152,80 @@ class Lag(TimeDelay):
             of both
         """
         share, constant = float(coefficients[0]), float(shape[0])
-        slope = self.order * np.array([constant, share])
-        std = float(np.sqrt(max(slope @ covariance @ slope, 0.0)))
+        slope = np.array([constant, share])
+        return (Quantity("d", share * constant, float(np.sqrt(max(slope @ covariance @ slope, 0.0))), "s"),)
+
+
+@dataclass(frozen=True, eq=False)
+class Lag(Shift):
+    """The same with τ_T behind a low-pass filter with n equal time constants T, as sensors and drives have it.
+
+    Reported are d = a n T, T and n.
+
+    order : int
+        n
+    """
+
+    equation: ClassVar[str] = "tau_recorded = tau + d/(n T) (tau_T - tau), (1 + T d/dt)^n tau_T = tau"
+    meaning: ClassVar[str] = "the torque channel is low-pass filtered, and so late against the positions"
+    remedy: ClassVar[str] = "filter the positions alike, or undo the filter of time constant T"
+
+    order: int = 1
+
+    def late(self, torque: Array, constant: float, signals: Signals) -> Array:
+        """Torque (m, N) behind the filter.
+
+        Parameters
+        ----------
+        torque : (m, N) float64
+            before it [Nm or N]
+        constant : float
+            T [s]
+        signals : Signals
+            the piece of motion
+        """
+        return low_passed(torque, constant, self.order, signals)
+
+    def quantities(
+        self, setting: Setting, coefficients: Array, shape: Array, covariance: Array
+    ) -> tuple[Quantity, ...]:
+        """The mean delay, T and n.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        coefficients : (1,) float64
+            a
+        shape : (1,) float64
+            T [s]
+        covariance : (2, 2) float64
+            of both
+        """
+        (each,) = super().quantities(setting, coefficients, shape, covariance)
         own = float(np.sqrt(max(covariance[1, 1], 0.0)))
         return (
-            Quantity("d", self.order * share * constant, std, "s"),
-            Quantity("T", constant, own, "s"),
+            Quantity("d", self.order * each.value, self.order * each.std, "s"),
+            Quantity("T", float(shape[0]), own, "s"),
             Quantity("n", self.order, 0.0, "1"),
         )
+
+
+def shifted(torque: Array, delay: float, signals: Signals) -> Array:
+    """Torque that is late, linear from sample to sample, (m, N).
+
+    Parameters
+    ----------
+    torque : (m, N) float64
+        as it is [Nm or N]
+    delay : float
+        [s]
+    signals : Signals
+        the piece of motion, which begins at rest, or as its period ends
+    """
+    instants = np.arange(torque.shape[1]) / signals.rate_hz
+    period = torque.shape[1] / signals.rate_hz if signals.periodic else None
+    return np.stack([np.interp(instants - delay, instants, row, period=period) for row in torque])
 
 
 def low_passed(torque: Array, constant: float, order: int, signals: Signals) -> Array:
