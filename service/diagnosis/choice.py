@@ -102,7 +102,9 @@ def is_physical(option: Option, before: Fit) -> bool:
     """
     term = option.fit.model.terms[-1]
     signs = zip(term.effect.coefficients, term.coefficients, strict=True)
-    possible = all(abs(value) <= each.largest and (value >= 0.0 or not each.positive) for each, value in signs)
+    possible = all(
+        each.smallest <= abs(value) <= each.largest and (value >= 0.0 or not each.positive) for each, value in signs
+    )
     return option.gain > 0.0 and possible and not driving(option.fit) - driving(before)
 
 

@@ -33,12 +33,15 @@ class Coefficient:
         whether physics allows no negative value
     largest : float
         magnitude beyond which nothing real has it
+    smallest : float
+        magnitude below which it stands for something else
     """
 
     name: str
     unit: str
     positive: bool = False
     largest: float = np.inf
+    smallest: float = 0.0
 
 
 @dataclass(frozen=True)

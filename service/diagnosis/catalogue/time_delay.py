@@ -15,6 +15,9 @@ from service.recording.recording import Array
 LARGEST_SHARE = 2.0
 """One where all of the torque is filtered; sharper filters of higher order look like more. Beyond two it amplifies."""
 
+SMALLEST_SHARE = 0.5
+"""A channel is late as a whole: where less than half of its torque seems to be, noise or something else does."""
+
 LAGS = np.array([0.25, 0.5, 1.0, 2.0, 4.0])
 """Time constants looked at, relative to that of the band: one that is much shorter is a delay."""
 
@@ -86,7 +89,9 @@ class Shift(TimeDelay):
     All of the torque is late with a = 1; reported is d = a T, by which slow changes are late.
     """
 
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("a", "1", positive=True, largest=LARGEST_SHARE),)
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (
+        Coefficient("a", "1", positive=True, largest=LARGEST_SHARE, smallest=SMALLEST_SHARE),
+    )
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("T", "s", logarithmic=True),)
 
     def late(self, torque: Array, constant: float, signals: Signals) -> Array:
