@@ -78,9 +78,7 @@ class TimeDelay(Effect):
             none
         """
         torque = signals.torque[list(self.touched(len(signals.torque)))]
-        instants = np.arange(torque.shape[1]) / signals.rate_hz
-        late = [np.interp(instants - float(coefficients[0]), instants, row) for row in torque]
-        return np.stack(late) - torque
+        return shifted(torque, float(coefficients[0]), signals) - torque
 
 
 class Shift(TimeDelay):
