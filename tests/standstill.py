@@ -5,6 +5,7 @@ of mark `realtime` that fails while that was seen to happen raises `MachineStood
 (``make test-slow``). A test that fails without it has failed.
 """
 
+import os
 import threading
 import time
 from collections.abc import Generator
@@ -23,28 +24,36 @@ class MachineStoodStillError(Exception):
 
 
 class Onlooker:
-    """Sleeps for short whiles and notes the longest by which it overslept."""
+    """Sleeps for short whiles on every processor, each may stand still alone, and notes the longest oversleeping."""
 
     def __init__(self) -> None:
-        self.longest_s = 0.0
+        self._longest_s = dict.fromkeys(os.sched_getaffinity(0), 0.0)
         self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._look, daemon=True)
+        self._threads = [threading.Thread(target=self._look, args=(cpu,), daemon=True) for cpu in self._longest_s]
 
     def __enter__(self) -> Self:
-        self._thread.start()
+        for thread in self._threads:
+            thread.start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._ended.set()
-        self._thread.join()
+        for thread in self._threads:
+            thread.join()
 
-    def _look(self) -> None:
+    @property
+    def longest_s(self) -> float:
+        """For how long one of the processors stood still [s]."""
+        return max(self._longest_s.values())
+
+    def _look(self, cpu: int) -> None:
+        os.sched_setaffinity(0, {cpu})
         before = time.monotonic()
         while not self._ended.wait(PERIOD_S):
             now = time.monotonic()
-            self.longest_s = max(self.longest_s, now - before - PERIOD_S)
+            self._longest_s[cpu] = max(self._longest_s[cpu], now - before - PERIOD_S)
             before = now
 
 

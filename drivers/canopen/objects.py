@@ -66,7 +66,6 @@ LOWEST_POSITION = DriveObject("Software position limit, lowest", 0x607D, 1, 32, 
 HIGHEST_POSITION = DriveObject("Software position limit, highest", 0x607D, 2, 32, signed=True)
 INTERPOLATION_VALUE = DriveObject("Interpolation time period, value", 0x60C2, 1, 8)
 INTERPOLATION_EXPONENT = DriveObject("Interpolation time period, exponent", 0x60C2, 2, 8, signed=True)
-LARGEST_SPEED = DriveObject("Max motor speed", 0x6080, 0, 32)
 SUPPORTED_MODES = DriveObject("Supported drive modes", 0x6502, 0, 32)
 
 CYCLIC_POSITION = 8

@@ -55,6 +55,9 @@ def stop_in_cycle(session: Session, mode: ControlMode, goal: Goal) -> bool:
 def stop_promptly(session: Session, mode: ControlMode, goal: Goal) -> ArmState:
     """Tell all drives to stop within a cycle of the control loop, and again where one may not have heard it.
 
+    Those that missed the master have stopped by themselves and answer no SYNC: they are asked by service data, for
+    what they told last is from before.
+
     Parameters
     ----------
     session : Session
@@ -68,8 +71,10 @@ def stop_promptly(session: Session, mode: ControlMode, goal: Goal) -> ArmState:
     for _ in range(PROMPT_CYCLES):
         state = session.cycle(mode, goal, still, session.answer_ns)
         if all(has_stopped(node, goal) for node in session.nodes):
+            return state
+        if all(node.is_deaf for node in session.nodes):
             break
-    return state
+    return session.read_by_service_data() if any(node.is_deaf for node in session.nodes) else state
 
 
 def stop_one_by_one(nodes: Sequence[DriveNode], goal: Goal, *, is_stopped: bool) -> list[Fault]:

@@ -70,8 +70,10 @@ def recover_runs(folder: Path, *, patience_s: float = PATIENCE_S) -> tuple[RunRe
     return tuple(record for record in recovered if record is not None)
 
 
-def recover_run(folder: Path, *, is_own: bool = False, patience_s: float = PATIENCE_S) -> RunRecord | None:
-    """Show a run as interrupted if nobody carries it out any more.
+def recover_run(
+    folder: Path, *, is_own: bool = False, was_asked_to_stop: bool = False, patience_s: float = PATIENCE_S
+) -> RunRecord | None:
+    """Show a run as interrupted if nobody carries it out any more, or as stopped where that kept it from beginning.
 
     Parameters
     ----------
@@ -79,6 +81,8 @@ def recover_run(folder: Path, *, is_own: bool = False, patience_s: float = PATIE
         the run's
     is_own : bool
         whether the caller is the run's owner, and knows that its control process has ended
+    was_asked_to_stop : bool
+        whether the owner had asked it to: a process that is still being loaded then ends without a word
     patience_s : float
         time that a control process whose owner is gone gets to stop its arm [s]
 
@@ -105,7 +109,11 @@ def recover_run(folder: Path, *, is_own: bool = False, patience_s: float = PATIE
     try:
         # It may have come to its end in the meantime.
         record = read_record(folder)
-        return None if record.state.is_end else _interrupted(folder, record)
+        if record.state.is_end:
+            return None
+        if was_asked_to_stop and record.state is RunState.CREATED:
+            return _written(folder, record.moved(RunState.STOPPING).moved(RunState.STOPPED))
+        return _interrupted(folder, record)
     finally:
         lock.release()
 
@@ -121,7 +129,7 @@ def _see_to_its_end(control: ProcessName, patience_s: float) -> None:
 
 
 def _interrupted(folder: Path, record: RunRecord) -> RunRecord:
-    """Save what there is and write the end."""
+    """Save what there is and write the end of a run whose process is gone."""
     recording = None
     journal = folder / JOURNAL_FILE
     if journal.exists():
@@ -129,7 +137,11 @@ def _interrupted(folder: Path, record: RunRecord) -> RunRecord:
         recording = save_recording(folder, is_whole=False, lost_rows=UNKNOWN_LOSS)
     detail = _NEVER_MOVED if record.state in _WITHOUT_POWER and recording is None else _GONE
     problem = record.problem or RunProblem(code=INTERRUPTED, detail=detail)
-    record = record.moved(RunState.INTERRUPTED, problem=problem, recording=recording)
+    return _written(folder, record.moved(RunState.INTERRUPTED, problem=problem, recording=recording))
+
+
+def _written(folder: Path, record: RunRecord) -> RunRecord:
+    """Keep a record."""
     try:
         write_record(folder, record)
     except OSError as error:

@@ -98,7 +98,7 @@ class RunProcess:
         os.set_blocking(self._commands.fileno(), False)
         self._record: RunRecord | None = None
         self._problem: AcquisitionError | None = None
-        self._has_ended = threading.Event()
+        self._has_ended, self._stop_asked = threading.Event(), threading.Event()
         self._watcher = threading.Thread(target=self._watch, name=f"run {folder.name}", daemon=True)
         self._watcher.start()
 
@@ -118,6 +118,7 @@ class RunProcess:
 
     def stop(self) -> None:
         """Ask the run to stop, in every way at once; returns at once, and may be called at any time and again."""
+        self._stop_asked.set()
         self._send(STOP)
         with suppress(OSError):  # it has ended
             self._process.send_signal(signal.SIGTERM)
@@ -185,7 +186,9 @@ class RunProcess:
         self._commands.close()
         self._events.close()
         try:
-            self._record = recover_run(self.folder, is_own=True) or read_record(self.folder)
+            was_asked_to_stop = self._stop_asked.is_set()
+            ended = recover_run(self.folder, is_own=True, was_asked_to_stop=was_asked_to_stop)
+            self._record = ended or read_record(self.folder)
         except AcquisitionError as error:
             self._problem = error
         self._has_ended.set()

@@ -18,6 +18,9 @@ Array = NDArray[np.float64]
 ACCELERATION = 20.0
 """With which a joint catches up with targets that leapt: what arms of this size have torque for [rad/s² or m/s²]."""
 
+FASTEST = 1.25
+"""Of a joint's speed limit: the voltage of its motor lets it turn no faster."""
+
 TRACKING = (AxisMode.POSITION, AxisMode.HOLDING)
 """What is done by tracking a target: the master's, or the place where the joint comes to rest."""
 
@@ -67,6 +70,8 @@ class DrivenArm:
         self._plant = scenario.plant(robot)
         self._plant.place(position)
         self._servo = Servo(robot, InertiaSchedule(robot, scenario.effects), period_s)
+        limits = (joint.limits.velocity for joint in robot.joints)
+        self._fastest = np.array([np.inf if limit is None else FASTEST * limit for limit in limits])
         self._torque_noise, self._rng = torque_noise, np.random.default_rng(0)
         self._drives = drives
         self._period_s = period_s
@@ -79,7 +84,7 @@ class DrivenArm:
     @property
     def motion(self) -> tuple[Array, Array]:
         """Position and velocity of the motors, in joint units, each (n,)."""
-        return self._plant.state.motor_position, self._plant.state.motor_velocity
+        return self._plant.motor_motion
 
     def take_targets(self, time_s: float) -> None:
         """Let the drives take over the targets that SYNC made valid.
@@ -159,7 +164,10 @@ class DrivenArm:
         """A target for joints, which begins where their last one was."""
         period = kind[1] / self._period_s or None
         acceleration = np.full(len(joints), ACCELERATION)
-        return Target(self._goal[joints], self._goal_rate[joints], acceleration, self._period_s, period)
+        target = Target(self._goal[joints], self._goal_rate[joints], acceleration, self._period_s, period)
+        unlimited = np.full(len(joints), np.inf)
+        target.limit(-unlimited, unlimited, self._fastest[joints])
+        return target
 
     def _torque_of(self, demands: Sequence[AxisDemand]) -> Array:
         """Torque of the position loops where a target is tracked, else what is demanded."""

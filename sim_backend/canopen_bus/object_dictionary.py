@@ -170,8 +170,8 @@ class ObjectDictionary:
         entry.value = value
 
     def _entry(self, index: int, subindex: int) -> Entry:
-        entry = self.entries.get((index, subindex))
-        if entry is None:
+        try:
+            return self.entries[index, subindex]
+        except KeyError:
             known = any(place[0] == index for place in self.entries)
-            raise AbortError(Abort.NO_SUBINDEX if known else Abort.NO_OBJECT)
-        return entry
+            raise AbortError(Abort.NO_SUBINDEX if known else Abort.NO_OBJECT) from None

@@ -2,7 +2,6 @@
 
 import argparse
 import contextlib
-import gc
 import json
 import os
 import signal
@@ -16,11 +15,9 @@ from service.robot import Robot, read_robot, robot_from_dict
 from sim_backend.device.device import SimulatedDevice
 from sim_backend.device.server import DeviceServer
 from sim_backend.device.trace import TraceWriter
+from sim_backend.own_process import take_precedence
 from sim_backend.scenario import Scenario
 from sim_backend.scenario_file import read_scenario
-
-PRIORITY = -10
-"""Nice level that the process asks for."""
 
 READY = "ready"
 """Line on standard output once hosts can connect."""
@@ -70,19 +67,8 @@ def _serve(server: DeviceServer) -> None:
     # whoever started the device may go: nothing is written to them any longer
     with open(os.devnull, "w") as nowhere:
         os.dup2(nowhere.fileno(), sys.stdout.fileno())
-    _take_precedence()
-    gc.collect()
-    gc.freeze()
+    take_precedence()
     server.run()
-
-
-def _take_precedence() -> None:
-    """Ask to be put before other programs, as a real arm never has to wait for them; not granted to every user."""
-    with contextlib.suppress(OSError):
-        os.setpriority(os.PRIO_PROCESS, 0, PRIORITY)
-    # a session has its own share of the processor where the kernel groups processes by session
-    with contextlib.suppress(OSError):
-        Path("/proc/self/autogroup").write_text(str(PRIORITY), encoding="ascii")
 
 
 def _listener(path: Path) -> socket.socket:

@@ -25,7 +25,10 @@ _INTERVALS = 15
 _CHANGE_OF_PACE = 0.1
 _FIRST_PERIOD = 4.0
 _TOLD = 20
-"""A period that was told counts as much as one that was found from so many arrivals."""
+"""A grid whose period was told begins as one that rests on so many arrivals."""
+
+_OFF_THE_GRID = 15
+"""After so many arrivals in a row that are off the grid on the same side, it is the grid that is wrong."""
 
 
 class SetpointSpline:
@@ -54,6 +57,7 @@ class SetpointSpline:
         self._arrival: float | None = None
         self._grid = 0.0
         self._arrivals = 0
+        self._off = 0
         self._weights = np.empty((2, 4))
 
     def add(self, position: Array, arrival: float) -> None:
@@ -155,7 +159,7 @@ class SetpointSpline:
             return self._begin_grid(arrival)
         unit = usual if learning else self._period
         cycles = self._cycles((arrival - self._grid) / unit)
-        if cycles > _MOST_SKIPPED:
+        if cycles > _MOST_SKIPPED or abs(self._off) >= _OFF_THE_GRID:
             return self._begin_grid(arrival)
         self._lock(arrival, cycles, learning)
         return cycles
@@ -168,17 +172,24 @@ class SetpointSpline:
 
     def _begin_grid(self, arrival: float) -> int:
         """Let an arrival be the first of the grid."""
-        self._grid, self._arrivals = arrival, _TOLD if self._is_told else 1
+        self._grid, self._arrivals, self._off = arrival, _TOLD if self._is_told else 1, 0
         return 1
 
     def _lock(self, arrival: float, cycles: int, learning: bool) -> None:
-        """Fit a straight line to the arrivals, by least squares with a memory of limited length."""
+        """Fit a straight line to the arrivals, by least squares with a memory of limited length.
+
+        Its slope is the host's period, unless that was told: a few late arrivals at first would make it run away from
+        those that follow.
+        """
         self._arrivals = n = min(self._arrivals + 1, _MEMORY)
         self._grid += cycles * self._period
         late = arrival - self._grid
         if not learning:
             # a stall says nothing of the host's clock
             largest = _LARGEST_ERROR * self._period
+            side = int(np.sign(late)) if abs(late) > largest else 0
+            self._off = self._off + side if side * self._off > 0 else side
             late = min(max(late, -largest), largest)
         self._grid += 2.0 * (2 * n - 1) / (n * (n + 1)) * late
-        self._period = max(1.0, self._period + 6.0 / (n * (n + 1)) * late / max(cycles, 1))
+        if not self._is_told:
+            self._period = max(1.0, self._period + 6.0 / (n * (n + 1)) * late / max(cycles, 1))

@@ -10,12 +10,13 @@ import time
 from pathlib import Path
 from typing import Any
 
+from sim_backend.emulation.arrivals import Arrivals
 from sim_backend.emulation.emulator import EmulatorOrder
+from sim_backend.own_process import take_precedence
 
 _PERIOD_S = 0.001
 _TRACE_PERIOD_S = 0.002
 _LONGEST_MESSAGE = 65_536
-_PRIORITY = 40
 _ROUNDING_S = 1e-9
 """What is due is not put off because a sum of steps falls short of it by its rounding."""
 
@@ -43,19 +44,21 @@ class EmulatorServer:
             None if order.trace is None else os.open(order.trace, os.O_CREAT | os.O_APPEND | os.O_WRONLY, 0o644)
         )
         self._begin()
+        self._arrivals = None if order.stepped else Arrivals(self._port)
         self._running = True
         self._master_is_there = True
 
     def run(self) -> None:
         """Serve."""
-        _ask_for_real_time()
-        print("ready", flush=True)  # noqa: T201 (whoever started this waits for the line)
+        take_precedence()
         try:
-            while self._running:
-                self._wait()
-                self._serve_master()
-                self._serve_test()
-                self._write_trace()
+            with self._arrivals or contextlib.nullcontext():
+                print("ready", flush=True)  # noqa: T201 (whoever started this waits for the line)
+                while self._running:
+                    self._wait()
+                    self._serve_master()
+                    self._serve_test()
+                    self._write_trace()
         finally:
             self._port.close()
             Path(self._order.control).unlink(missing_ok=True)
@@ -72,13 +75,15 @@ class EmulatorServer:
 
     @property
     def _now_s(self) -> float:
-        return self._stepped_s if self._order.stepped else (time.monotonic_ns() - self._start_ns) * 1e-9
+        return self._stepped_s if self._order.stepped else self._instant(time.monotonic_ns())
 
     def _wait(self) -> None:
         """Until something comes, an answer is due, or the physics want their step."""
         wait_s = min(_PERIOD_S, max(0.0, self._emulator.next_due_s - self._now_s))
         sources: list[Any] = [self._tests, sys.stdin]
-        if self._master_is_there:
+        if self._arrivals is not None:
+            sources.append(self._arrivals)
+        elif self._master_is_there:
             sources.append(self._port)
         if self._test is not None:
             sources.append(self._test)
@@ -88,13 +93,30 @@ class EmulatorServer:
 
     def _serve_master(self) -> None:
         """Take what the master sent, let time pass, send what has arrived at the master."""
-        received = self._port.read()
-        self._master_is_there = received is not None
-        if received and self._emulator.hears(self._port.baud):
-            self._emulator.receive(received, self._now_s)
-        self._emulator.advance_to(self._now_s)
+        pieces, now_s = self._received()
+        for piece, arrival_s in pieces:
+            if self._emulator.hears(self._port.baud):
+                self._emulator.receive(piece, arrival_s)
+        self._emulator.advance_to(now_s)
+        self._send()
+
+    def _send(self) -> None:
+        """What has arrived at the master by now."""
         if arrived := self._emulator.due(self._now_s + (_AT_ONCE_S if self._order.stepped else 0.0)):
             self._port.write(arrived)
+
+    def _received(self) -> tuple[list[tuple[bytes, float]], float]:
+        """What the master sent since the last call, each piece with its instant, and until when that is all [s]."""
+        if self._arrivals is not None:
+            pieces, until_ns = self._arrivals.take()
+            return [(piece, self._instant(at_ns)) for piece, at_ns in pieces], self._instant(until_ns)
+        piece = self._port.read()
+        self._master_is_there = piece is not None
+        return [(piece, self._stepped_s)] if piece else [], self._stepped_s
+
+    def _instant(self, monotonic_ns: int) -> float:
+        """By the devices' clock [s]."""
+        return max(0.0, (monotonic_ns - self._start_ns) * 1e-9)
 
     def _serve_test(self) -> None:
         """Answer the test, a line of JSON each way."""
@@ -114,7 +136,10 @@ class EmulatorServer:
         for line in lines:
             request = json.loads(line)
             if "advance_to" in request:
+                # what the master sent before that came before, and what is due comes before the answer
+                self._serve_master()
                 self._step_to(request["advance_to"])
+                self._send()
             if "reset" in request:
                 self._begin()
             answer = self._emulator.answer(request) or self._describe()
@@ -139,12 +164,6 @@ class EmulatorServer:
             return
         self._next_trace_s = self._emulator.now_s + _TRACE_PERIOD_S
         os.write(self._trace, json.dumps(self._describe()).encode() + b"\n")
-
-
-def _ask_for_real_time() -> None:
-    """Devices do not wait for other programs; where the system does not permit that, the machine has to be quiet."""
-    with contextlib.suppress(OSError):
-        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(_PRIORITY))
 
 
 def _listen(path: str) -> socket.socket:

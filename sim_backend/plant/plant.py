@@ -95,6 +95,12 @@ class Plant:
         return self._coordinates.joint_count
 
     @property
+    def motor_motion(self) -> tuple[Array, Array]:
+        """Position and velocity of the motors, in joint units, each (n,) [rad or m, rad/s or m/s]."""
+        size, motors = self._coordinates.size, self._motors
+        return self._vector[:size][motors], self._vector[size : 2 * size][motors]
+
+    @property
     def state(self) -> PlantState:
         """Where the plant is."""
         count = self.joint_count

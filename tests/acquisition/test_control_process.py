@@ -162,6 +162,15 @@ def _percent(events: Events) -> float:
 
 
 @pytest.mark.slow
+def test_a_stop_while_the_process_is_still_being_loaded(tmp_path: Path) -> None:
+    run, events = start(tmp_path / "run")
+    run.stop()
+    record = run.wait(60)
+    assert states(record) == ["created", "stopping", "stopped"]
+    assert record.problem is None
+    assert events == []
+
+
 def test_an_order_that_cannot_be_carried_out(tmp_path: Path) -> None:
     run, events = start(tmp_path / "run", settings={"virtual": True})
     run.wait(60)

@@ -19,7 +19,7 @@ import pytest
 
 from acquisition.control_runs import wait_for
 from acquisition.doubles import point_robot, short_motion
-from kills import KILLS
+from kills import KILLS, killed_often
 from service.acquisition import BackendOrder, RunOptions, RunOrder, RunRecord, RunState, read_record, recover_runs
 from service.acquisition.spawning import child_environment
 from service.excitation import write_trajectory
@@ -150,17 +150,6 @@ STARVED = {"late", "stale-state", "velocity", "fault"}
 """Rules by which a run may end before it is killed, where other processes take the device's processor time."""
 
 
-def kill(site: Site, victim: str, how: signal.Signals, rng: np.random.Generator, times: int) -> list[str]:
-    """The last states that were told before each of so many kills of runs that went on until then."""
-    states: list[str] = []
-    for _ in range(2 * times + 3):
-        state = kill_once(site, victim, how, rng)
-        states += [] if state is None else [state]
-        if len(states) == times:
-            return states
-    pytest.fail(f"only {len(states)} of {times} runs went on until they were killed: the machine is too busy")
-
-
 def kill_once(site: Site, victim: str, how: signal.Signals, rng: np.random.Generator) -> str | None:
     """Kill or freeze once, check all that was promised.
 
@@ -252,7 +241,8 @@ CASES = [("control", signal.SIGKILL), ("control", signal.SIGSTOP), ("owner", sig
 @pytest.mark.timeout(120)
 @pytest.mark.parametrize(("victim", "how"), CASES[1:3])
 def test_the_arm_stops_and_the_run_is_interrupted(site: Site, victim: str, how: signal.Signals) -> None:
-    kill(site, victim, how, np.random.default_rng([1, CASES.index((victim, how))]), times=1)
+    rng = np.random.default_rng([1, CASES.index((victim, how))])
+    killed_often(lambda: kill_once(site, victim, how, rng), times=1)
 
 
 @pytest.mark.realtime
@@ -260,5 +250,5 @@ def test_the_arm_stops_and_the_run_is_interrupted(site: Site, victim: str, how: 
 @pytest.mark.parametrize(("victim", "how"), CASES)
 def test_fifty_times_each(site: Site, victim: str, how: signal.Signals) -> None:
     rng = np.random.default_rng([2, CASES.index((victim, how))])
-    states = kill(site, victim, how, rng, times=KILLS)
+    states = killed_often(lambda: kill_once(site, victim, how, rng))
     assert states.count("state running") >= KILLS // 2, states

@@ -26,7 +26,12 @@ if SOCKETCAN := os.environ.get("TAUSCOPE_SOCKETCAN"):
     answers_within = int(os.environ.get("TAUSCOPE_ANSWERS_WITHIN", "1"))
     ALL_RIGS["socketcan"] = partial(canopen_rigs, interface=SOCKETCAN, stepped=True, answers_within=answers_within)
 
-MARKS = {"dynamixel": [pytest.mark.realtime], "canopen": [pytest.mark.realtime], "canopen-stepped": [pytest.mark.slow]}
+MARKS = {
+    "real-time": [pytest.mark.realtime],
+    "dynamixel": [pytest.mark.realtime],
+    "canopen": [pytest.mark.realtime],
+    "canopen-stepped": [pytest.mark.slow],
+}
 MAKERS = [pytest.param(name, marks=MARKS.get(name, [])) for name in ALL_RIGS]
 
 

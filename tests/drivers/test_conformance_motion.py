@@ -22,6 +22,9 @@ from arm_rigs import (
 )
 from drivers import ControlMode, StopPolicy
 
+CAUGHT_WITHIN_S = 0.1
+"""Time at its largest speed in which a falling joint has come as far as it ever will once it is caught [s]."""
+
 
 @pytest.mark.parametrize("mode", list(ControlMode))
 def test_enabling_never_moves_the_arm(rig: Rig, mode: ControlMode) -> None:
@@ -81,12 +84,18 @@ def test_a_damped_arm_sinks_slowly_and_a_free_one_falls(rig: Rig) -> None:
 def test_an_arm_that_falls_is_caught_by_enabling_it(rig: Rig) -> None:
     enable(rig)
     rig.backend.stop(StopPolicy.TORQUE_OFF)
-    rig.watch(0.15)
+    fallen = rig.watch(0.15).position[-1]
     rig.backend.enable(ControlMode.POSITION, wide_limits(rig.robot), StopPolicy.HOLD, 2.5)
-    caught = rig.look()
     seen = rig.watch(1.2)
     assert np.abs(seen.velocity[-1]).max() < AT_REST
-    assert np.abs(seen.position[-1] - caught).max() < 0.3
+    # from the first instant seen with the drives in command: the arm goes on falling until the last of them has been
+    # commissioned, and a slow machine looks late
+    moved = np.abs(seen.position[-1] - seen.position[0])
+    assert np.all(moved < CAUGHT_WITHIN_S * np.abs(seen.velocity).max(axis=0) + 1e-3 + rig.swing)
+    shoulder = 1
+    fell, end = abs(fallen - START)[shoulder], abs(seen.position[-1] - START)[shoulder]
+    assert fell > 0.02 + rig.swing
+    assert end > fell - 1e-3 - rig.swing, "it is not carried back to where it began"
 
 
 def test_a_moving_arm_that_is_stopped_comes_to_rest_where_it_was_going(rig: Rig) -> None:
@@ -116,10 +125,12 @@ def test_a_far_target_is_approached_at_the_speed_limit(rig: Rig) -> None:
     # loops that swing answer the step with which it begins by more than the limit
     begin = len(states) // 4 if rig.swing > 0.0 else 0
     velocity = np.array([state.velocity for state in states[begin:]])
-    # a drive that misses a target, or gets it late, makes good for it with the next: as fast as allowed in the mean
-    # over a few of them
+    # a drive that misses a target, or takes it late, makes good for it with the next: as fast as allowed in the mean
+    # over a few of them. An emulated one may be the late one itself, which shows in its answers.
+    cycle_ns = 1e9 / RATE_HZ
     waited = np.diff([state.time_ns for state in states])
-    span = 1 if rig.answers_within == 1 and waited.max() < 1.5e9 / RATE_HZ else 10
+    is_late = waited.max() > 1.5 * cycle_ns or max(state.late_ns for state in states) > 0.5 * cycle_ns
+    span = 10 if is_late or rig.answers_within > 1 else 1
     speed = np.abs([np.nanmean(velocity[k : k + span], axis=0) for k in range(len(velocity) - span + 1)])
     assert np.nanmax(speed) < 1.3 * 0.5
     assert np.nanmax(speed) > 0.8 * 0.5

@@ -6,6 +6,7 @@ import signal
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from acquisition.doubles import short_motion
 from arm_rigs import START
 from hardware_emulated.canopen_rig import ANSWER_PATIENCE_S
 from hardware_emulated.canopen_robot import RATED_TORQUE_MNM, write_canopen_robot
-from kills import KILLS
+from kills import killed_often
 from service.acquisition import BackendOrder, RunOptions, RunOrder, RunRecord, recover_runs
 from service.acquisition.run_process import RunProcess
 from service.excitation import write_trajectory
@@ -124,14 +125,15 @@ def refused_without_acknowledgement(site: Site) -> RunRecord:
 @pytest.mark.timeout(2400)
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
 def test_fifty_times_each(site: Site, how: signal.Signals) -> None:
-    rng = np.random.default_rng([3, how])
-    counted = 0
-    for attempt in range(KILLS + KILLS // 2):
-        counted += kill_once(site, how, float(rng.uniform(0.0, 1.0)))
-        if counted == 1 or attempt % 10 == 0:
+    rng, kills = np.random.default_rng([3, how]), count()
+
+    def kill() -> bool | None:
+        if not kill_once(site, how, float(rng.uniform(0.0, 1.0))):
+            return None
+        if next(kills) % 10 == 0:
             problem = refused_without_acknowledgement(site).problem
             assert problem is not None
             assert "acknowledge" in problem.detail
-        if counted == KILLS:
-            return
-    pytest.fail(f"only {counted} runs went on until they were killed: the machine is too busy")
+        return True
+
+    killed_often(kill)

@@ -13,7 +13,7 @@ import pytest
 from hardware_emulated.campaign_arms import deviations, six_joints, three_joints
 from hardware_emulated.canopen_rig import ANSWER_PATIENCE_S
 from hardware_emulated.canopen_robot import GEAR, write_canopen_arm
-from hardware_emulated.counted import require_all_counted
+from hardware_emulated.counted import against_the_clock, require_all_counted
 from service.acquisition import BackendOrder, RunOptions, RunOrder, RunProcess, RunRecord
 from service.excitation import ExcitationOptions, Trajectory, design_excitation, write_trajectory
 from service.identification import document, identify
@@ -62,10 +62,11 @@ def play(arm: dict[str, Any], folder: Path) -> RunRecord:
 def test_a_campaign_at_200_hz(name: str, tmp_path: Path) -> None:
     arm = ARMS[name]()
     record = play(arm, tmp_path)
-    require_all_counted(record, tmp_path / "run", RATE_HZ)
-    told = read_robot(write_canopen_arm(arm, tmp_path / "told.json", tmp_path / "unused", knows_model=False))
-    found = document(identify(told, [read_recording(tmp_path / "run" / "recording.csv")]))
-    far = deviations(found, read_robot(tmp_path / "arm.json"))
-    print(f"largest deviation {max(map(abs, far.values())):.2f} standard errors of {len(far)}")
-    assert max(map(abs, far.values())) < 4.0, far
-    assert len(found.base_parameters) >= 3 * len(arm["joints"])
+    with against_the_clock(record):
+        require_all_counted(record, tmp_path / "run", RATE_HZ)
+        told = read_robot(write_canopen_arm(arm, tmp_path / "told.json", tmp_path / "unused", knows_model=False))
+        found = document(identify(told, [read_recording(tmp_path / "run" / "recording.csv")]))
+        far = deviations(found, read_robot(tmp_path / "arm.json"))
+        print(f"largest deviation {max(map(abs, far.values())):.2f} standard errors of {len(far)}")
+        assert max(map(abs, far.values())) < 4.0, far
+        assert len(found.base_parameters) >= 3 * len(arm["joints"])

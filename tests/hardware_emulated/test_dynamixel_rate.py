@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from hardware_emulated.campaign_arms import six_joints, write_robot
-from hardware_emulated.counted import require_all_counted
+from hardware_emulated.counted import against_the_clock, require_all_counted
 from hardware_emulated.dynamixel_bench import SLACK_S
 from service.acquisition import BackendOrder, RunOptions, RunOrder, RunProcess
 from service.excitation import ExcitationOptions, design_excitation, write_trajectory
@@ -40,4 +40,5 @@ def test_six_joints_at_200_hz(tmp_path: Path) -> None:
     )
     with EmulatorProcess(order):
         record = RunProcess(tmp_path / "run", run, robot).wait(100.0)
-    require_all_counted(record, tmp_path / "run", RATE_HZ)
+    with against_the_clock(record):
+        require_all_counted(record, tmp_path / "run", RATE_HZ)

@@ -2,6 +2,7 @@
 
 import pytest
 
+from drivers.backend import ControlMode
 from drivers.canopen import objects
 from drivers.canopen.configuration import NodeConfiguration
 from drivers.canopen.emergency import HEARTBEAT_LOST
@@ -9,9 +10,11 @@ from drivers.canopen.node import DriveNode
 from drivers.canopen.objects import DriveObject
 from drivers.canopen.observation import arm_faults
 from drivers.canopen.process_data import MOTION_PDO, STATE_PDO
+from drivers.canopen.session import Session
 from drivers.canopen.state_machine import Goal
-from drivers.canopen.stopping import dropped_faults, has_stopped, stop_one_by_one
+from drivers.canopen.stopping import PROMPT_CYCLES, dropped_faults, has_stopped, stop_one_by_one, stop_promptly
 from drivers.errors import DriverError, DriverErrorKind, Fault
+from drivers.state import ArmState
 
 # statuswords of CiA 402-2; voltage is there in all of them
 SWITCH_ON_DISABLED, READY, SWITCHED_ON, OPERATION_ENABLED = 0x0250, 0x0231, 0x0233, 0x0237
@@ -77,6 +80,41 @@ def test_a_bus_that_is_gone_is_no_silent_drive() -> None:
     with pytest.raises(DriverError) as failure:
         stop_one_by_one([node], Goal.QUICK_STOP, is_stopped=False)
     assert failure.value.kind is DriverErrorKind.LOST
+
+
+class Unanswered(Session):
+    """Drives that answer no SYNC: what they told in the last cycle that they answered is all there is."""
+
+    cycles = 0
+
+    def cycle(self, *_: object) -> ArmState:
+        self.cycles += 1
+        for node in self.nodes:
+            node.values = {}
+        return self.observe(0)
+
+
+class Clock:
+    """Stands still."""
+
+    def now_ns(self) -> int:
+        return 0
+
+    def wait_until_ns(self, deadline_ns: int) -> int:
+        return deadline_ns
+
+
+@pytest.mark.parametrize(("is_deaf", "cycles", "is_enabled"), [(True, 1, False), (False, PROMPT_CYCLES, True)])
+def test_drives_that_missed_the_master_are_asked_what_they_have_done(
+    is_deaf: bool, cycles: int, is_enabled: bool
+) -> None:
+    node, dictionary = drive(1, OPERATION_ENABLED)
+    session = Unanswered(None, (node,), Clock(), 0)  # pyright: ignore[reportArgumentType]
+    session.read_by_service_data()
+    node.is_deaf, dictionary.values[objects.STATUSWORD] = is_deaf, SWITCH_ON_DISABLED
+    state = stop_promptly(session, ControlMode.POSITION, Goal.SWITCH_ON_DISABLED)
+    assert session.cycles == cycles
+    assert state.enabled.tolist() == [is_enabled], "one that may hear the next cycle is as it last told"
 
 
 def test_what_has_stopped_depends_on_where_the_stop_goes() -> None:

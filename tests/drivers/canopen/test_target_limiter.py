@@ -53,17 +53,26 @@ def test_a_target_that_comes_late_goes_no_further_than_one_in_time(late_ns: np.n
     np.testing.assert_array_equal(sent_towards(1.0, (in_time + late_ns).tolist()), sent_towards(1.0, in_time.tolist()))
 
 
-def test_cycles_that_were_skipped_are_made_up_for() -> None:
-    in_time = np.arange(100)
-    skipping = np.delete(in_time, [30, 31, 60])
-    whole, partly = (sent_towards(1.0, (cycles * CYCLE_NS).tolist()) for cycles in (in_time, skipping))
-    np.testing.assert_allclose(partly[30:50], whole[skipping[30:50]], atol=0.002)
+def test_no_cycle_makes_up_for_those_that_a_late_host_skipped() -> None:
+    """A drive goes to its target within one cycle, also where the host has let three pass."""
+    cycles = np.delete(np.arange(400), [60, 61, 62, 150, 151])
+    limiter = TargetLimiter(BOUNDS, np.zeros(2), CYCLE_S)
+    plan = 0.5 * (1.0 - np.cos(1.5 * cycles * CYCLE_S))  # 0.75 rad/s at most, just below the limit
+    sent = np.array(
+        [limiter.limited(setpoint(q), int(k) * CYCLE_NS).position[0] for k, q in zip(cycles, plan, strict=True)]
+    )
+    speed = np.diff(sent) / CYCLE_S
+    assert np.abs(speed).max() <= SPEED * (1.0 + 1e-9)
+    assert np.abs(np.diff(speed)).max() < 0.2 * SPEED, "three cycles in one would be twice the speed more"
+    # it catches up while the target goes on moving
+    np.testing.assert_allclose(sent[100:147], plan[100:147], atol=1e-12)
+    np.testing.assert_allclose(sent[-100:], plan[-100:], atol=1e-12)
 
 
 def test_after_a_stall_a_burst_of_targets_keeps_to_the_speed_limit() -> None:
     instants = [*range(0, 60 * CYCLE_NS, CYCLE_NS), *(66 * CYCLE_NS + 100_000 * k for k in range(6))]
     sent = sent_towards(1.0, instants)
-    assert sent[-1] - sent[59] <= SPEED * 7 * CYCLE_S * (1.0 + 1e-9)
+    assert sent[-1] - sent[59] <= SPEED * CYCLE_S * (1.0 + 1e-9)
 
 
 @given(arrays(np.float64, (30, 2), elements=st.floats(-1e6, 1e6)), st.floats(-1e6, 1e6))
@@ -73,5 +82,5 @@ def test_whatever_is_asked_for_stays_within_range_speed_and_torque(asked: np.nda
         sent = limiter.limited(Setpoint(row, np.full(2, torque)), cycle * CYCLE_NS)
         assert ((sent.position >= LOW) & (sent.position <= HIGH)).all()
         assert (np.abs(sent.torque) <= TORQUE).all()
-        assert (np.abs(sent.position - before) <= SPEED_MARGIN * SPEED * 0.007 + 1e-12).all()
+        assert (np.abs(sent.position - before) <= SPEED_MARGIN * SPEED * 1.4 * CYCLE_S + 1e-12).all()
         before = sent.position

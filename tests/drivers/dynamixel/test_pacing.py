@@ -1,9 +1,13 @@
 """How fast a servo goes after each goal: by the path of a target that moves so fast and no faster."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 from drivers.dynamixel.configuration import ServoConfiguration
 from drivers.dynamixel.control_table import encode_items
@@ -85,6 +89,25 @@ def test_a_host_that_is_late_stops_no_servo_and_leaves_none_behind(model: int) -
     assert np.mean(rests[5:]) < 0.005 * CYCLE_S, "it is under way all the time, but for what whole units make of it"
     assert max(behind) <= 2.0 * counts_a_second * CYCLE_S
     assert np.median(behind) == pytest.approx(counts_a_second * CYCLE_S, rel=0.3)
+
+
+@given(arrays(np.float64, 60, elements=st.floats(0.0, 0.85)), st.floats(-1.5, 1.5))
+def test_a_late_host_does_not_change_the_speed_of_an_even_motion(late: np.ndarray, speed: float) -> None:
+    """Goals are for the instants at which cycles were due: what changes with lateness is read as friction."""
+    late[0] = 0.0
+    one = servo()
+    wakes = CYCLE_S * (np.arange(1, 61) + late)
+    counts_a_second = speed * one.model.counts_per_radian
+    pace, target = GoalPace([one], [0], [1910], CYCLE_S, 0), Target(one, 0.0)
+    passed = []
+    for cycle, (wake, next_wake) in enumerate(pairwise(wakes), start=1):
+        goal = round(counts_a_second * cycle * CYCLE_S)
+        (profile,) = pace.speeds([goal], round(wake * 1e9))
+        target.follow(goal, profile, next_wake - wake)
+        passed.append(target.place - counts_a_second * (next_wake - 2.0 * CYCLE_S))
+    # whole units of Profile Velocity are upward, so that the servo is a little ahead
+    unit = one.model.velocity_unit * one.model.counts_per_radian
+    assert np.abs(passed[30:]).max() <= 2.0 * unit * CYCLE_S + 1.0 + 0.01 * 1910 * unit * CYCLE_S
 
 
 def test_a_servo_that_stands_keeps_a_speed_for_zero_would_be_none_at_all() -> None:

@@ -101,3 +101,20 @@ def test_a_late_setpoint_of_a_told_period_is_the_next_and_none_after_a_gap(late:
     arrivals = [(period * (k + (late if k == 40 else 0.0)), period * k) for k in range(80)]
     targets = feed(SetpointSpline(np.zeros(1), period), lambda t: slope * t, arrivals, range(316))[60:]
     np.testing.assert_allclose(targets[:, 1], slope, rtol=0.02)
+
+
+@pytest.mark.parametrize("told", [5.0, None])
+def test_late_setpoints_at_first_do_not_throw_the_grid_off_for_long(told: float | None) -> None:
+    """A slope found from them would run away from those that follow, until a setpoint falls between two cycles."""
+    period, slope = 5.0, 0.01
+    late = [0.12 * k if 3 <= k < 20 else 0.0 for k in range(800)]
+    arrivals = [(period * k + late[k], period * k) for k in range(800)]
+    targets = feed(SetpointSpline(np.zeros(1), told), lambda t: slope * t, arrivals, range(3990))[400:]
+    np.testing.assert_allclose(targets[:, 1], slope, rtol=0.05)
+
+
+def test_a_grid_that_setpoints_are_off_for_good_is_begun_anew() -> None:
+    period, slope = 5.0, 0.01
+    arrivals = [(period * k + (1.5 if k >= 100 else 0.0), period * k) for k in range(400)]
+    targets = feed(SetpointSpline(np.zeros(1), period), lambda t: slope * t, arrivals, range(1990))[700:]
+    np.testing.assert_allclose(targets[:, 0], slope * (np.arange(700, 1990) - 1.5 - 2.0 * period), atol=1e-3 * slope)
