@@ -6,34 +6,39 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from service.diagnosis.admission import LEVEL
-from service.diagnosis.band import diagnosis_cutoff
 from service.diagnosis.catalogue import Effect, Setting, possible_effects
 from service.diagnosis.catalogue.payload import Payload
 from service.diagnosis.catalogue.plain_terms import TorqueOffset
 from service.diagnosis.catalogue.rotor_inertia import RotorInertia
-from service.diagnosis.choice import Selection
-from service.diagnosis.confirmation import HeldOut
-from service.diagnosis.constancy import constancy
-from service.diagnosis.constant_torque import with_better_than_constants
-from service.diagnosis.detectability import Detectable, detectable, detectable_parameters
-from service.diagnosis.diagnosed import Diagnosis
-from service.diagnosis.events import beside_events
-from service.diagnosis.farther import looked_farther
-from service.diagnosis.findings import Finding, FitSizes, selected_findings, sizes
-from service.diagnosis.fit import Fitter
-from service.diagnosis.friction_slopes import open_slopes, open_stribeck, with_fitting_slopes, with_fitting_stribeck
-from service.diagnosis.lack_of_fit import lack_of_fit
-from service.diagnosis.location import locate
-from service.diagnosis.model import ExtendedModel
-from service.diagnosis.noise_floor import with_noise
-from service.diagnosis.nominal import delivered_model, identified_rotors, nominal_model, setting_of
-from service.diagnosis.observations import Observations
-from service.diagnosis.plain_findings import states_friction, undeclared_offsets, with_plain_terms
-from service.diagnosis.regressor_noise import row_weights
-from service.diagnosis.screening import Screen
-from service.diagnosis.selection import Selector
-from service.diagnosis.term import Term
+from service.diagnosis.findings.constancy import constancy
+from service.diagnosis.findings.constant_torque import with_better_than_constants
+from service.diagnosis.findings.detectability import Detectable, detectable, detectable_parameters
+from service.diagnosis.findings.diagnosed import Diagnosis
+from service.diagnosis.findings.finding import Finding, FitSizes, selected_findings, sizes
+from service.diagnosis.findings.location import locate
+from service.diagnosis.findings.plain import states_friction, undeclared_offsets, with_plain_terms
+from service.diagnosis.fitting.fit import Fitter
+from service.diagnosis.fitting.friction_slopes import (
+    open_slopes,
+    open_stribeck,
+    with_fitting_slopes,
+    with_fitting_stribeck,
+)
+from service.diagnosis.fitting.lack_of_fit import lack_of_fit
+from service.diagnosis.fitting.regressor_noise import row_weightings
+from service.diagnosis.model.extended import ExtendedModel
+from service.diagnosis.model.nominal import delivered_model, identified_rotors, nominal_model, setting_of
+from service.diagnosis.model.term import Term
+from service.diagnosis.noise.events import beside_events
+from service.diagnosis.noise.floor import with_noise
+from service.diagnosis.observations.band import diagnosis_cutoff
+from service.diagnosis.observations.observations import Observations
+from service.diagnosis.screening.screen import Screen
+from service.diagnosis.selection.admission import LEVEL
+from service.diagnosis.selection.choice import Selection
+from service.diagnosis.selection.confirmation import HeldOut
+from service.diagnosis.selection.farther import looked_farther
+from service.diagnosis.selection.selector import Selector
 from service.identification import Identification, Options, identify
 from service.recording.conditioning import Conditioner
 from service.recording.recording import Recording
@@ -142,7 +147,7 @@ def _held_out(
     model = nominal_model(identification)
     rows = Observations.prepare(conditioners, robot, identification.structure.base, cutoff_hz, model.steepness)
     rows = rows.with_noise(observations.noise)
-    return HeldOut(_apart(rows.with_weights(row_weights(rows, model))))
+    return HeldOut(_apart(rows.with_weightings(row_weightings(rows, model))))
 
 
 def _apart(observations: Observations) -> Observations:
@@ -159,7 +164,7 @@ def _observed(observations: Observations, model: ExtendedModel, effects: Sequenc
     known, pure_error = with_noise(observations, model, effects)
     if pure_error:
         known, pure_error = beside_events(observations, known, model, effects)
-    return known.with_weights(row_weights(known, model)), pure_error
+    return known.with_weightings(row_weightings(known, model)), pure_error
 
 
 def _concluded(

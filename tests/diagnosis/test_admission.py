@@ -6,7 +6,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from service.diagnosis.admission import Admission
+from service.diagnosis.selection.admission import Admission
 
 
 @pytest.mark.parametrize(("std", "correlation", "expected"), [(0.2, 0.0, True), (0.4, 0.0, False), (0.4, -0.9, True)])

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from service.diagnosis.confirmation import Confirmation, likeness
-from service.diagnosis.prediction import log_likelihood
-from service.diagnosis.projection import JointColumns
+from service.diagnosis.fitting.prediction import log_likelihood
+from service.diagnosis.fitting.projection import JointColumns
+from service.diagnosis.selection.confirmation import Confirmation, likeness
 from service.recording.recording import Array
 
 

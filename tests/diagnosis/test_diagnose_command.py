@@ -15,6 +15,7 @@ from service.cli.values import SeveralValuesCommand
 from service.cli.verbs import add_verb
 from service.diagnosis import DiagnosisDocument
 from service.diagnosis.extended_model import read_model
+from service.errors import ExcitationError
 from service.excitation import motion_limits, read_trajectory, require_within_limits
 from service.recording import Recording
 from service.robot import read_robot
@@ -88,6 +89,22 @@ def test_everything_that_can_be_written_is_written_and_read_again(files: list[st
     status, shown = run(*files[:2], "--against", str(out["model.json"]))
     assert status == 0
     assert "consistent" in shown
+
+
+def test_limits_that_allow_no_next_experiment_cost_nobody_the_diagnosis(
+    files: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(*_: object, **__: object) -> None:
+        raise ExcitationError("joint1: no room; relax its limits")
+
+    monkeypatch.setattr("service.cli.diagnose_run.planned_experiment", refused)
+    out, motion = tmp_path / "out.json", tmp_path / "next.json"
+    status, shown = run(*files, "--json", str(out), "--next-trajectory", str(motion))
+    assert status == 1
+    assert DiagnosisDocument.model_validate_json(out.read_text()).findings
+    assert not motion.exists()
+    assert f"wrote {out}" in shown
+    assert str(motion) not in shown
 
 
 def test_a_suffix_that_names_nothing_is_wrong_usage(files: list[str], tmp_path: Path) -> None:

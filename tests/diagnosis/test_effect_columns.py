@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from arms import random_parameters, ur5_like
 from pinocchio_arm import pinocchio_model
 from service.diagnosis.catalogue import Effect, Setting, Signals, catalogue, possible_effects
-from service.diagnosis.catalogue.time_delay import Lag, Shift
-from service.robot import Robot
+from service.diagnosis.catalogue.joint_elasticity import DAMPING, transmitted
+from service.diagnosis.catalogue.late_torque import Lag, Shift
+from service.robot import JointType, Robot
 
 Array = NDArray[np.float64]
 
@@ -82,6 +83,7 @@ def setting(gear_ratio: float | None = None) -> Setting:
         top_speed=np.abs(s.velocity).max(axis=1),
         load=s.load.std(axis=1),
         top_torque=np.abs(s.torque).max(axis=1),
+        inertia=np.full(6, 0.5),
         durations=(8.0,),
         cutoff_hz=30.0,
     )
@@ -108,7 +110,8 @@ S = SIGNALS.step[2]
         ("asymmetric_viscous", (), [np.where(V > 0, V, -V)]),
         ("nonlinear_viscous", (2.2,), [np.where(V > 0, 1, -1) * np.exp(2.2 * np.log(np.abs(V)))]),
         ("load_dependent_friction", (), [S * np.sqrt(L**2)]),
-        ("position_dependent_friction", (), [S * np.cos(Q), S * np.sin(Q)]),
+        ("position_dependent_friction", (1.0,), [S * np.cos(Q), S * np.sin(Q)]),
+        ("position_dependent_friction", (2.0,), [S * (1.0 - 2.0 * np.sin(Q) ** 2), 2.0 * S * np.sin(Q) * np.cos(Q)]),
         ("stribeck_friction", (0.2, 2.0), [S / np.exp((V / 0.2) ** 2)]),
         ("stribeck_friction", (0.2, 1.0), [S / np.exp(np.abs(V) / 0.2)]),
         ("cogging", (21.0,), [np.imag(np.exp(21j * Q)), np.real(np.exp(21j * Q))]),
@@ -123,6 +126,21 @@ def test_columns_that_need_no_state(effect: str, shape: tuple[float, ...], expec
     found = columns(effect, 2, shape)
     assert found.shape == (len(expected), 1, len(V))
     assert found[:, 0] == pytest.approx(np.array(expected), abs=1e-12)
+
+
+def test_friction_varies_by_whole_waves_a_turn_and_by_any_along_a_rail() -> None:
+    given = setting()
+    joints = tuple(replace(joint, type=JointType.PRISMATIC) for joint in given.robot.joints)
+    turning, sliding = (
+        next(each for each in possible_effects(one) if each.id == "position_dependent_friction" and each.joint == 2)
+        for one in (given, replace(given, robot=replace(given.robot, joints=joints)))
+    )
+    assert not turning.is_free(0)
+    assert list(turning.grid[:, 0]) == [1.0, 2.0, 3.0]
+    stroke = given.highest[2] - given.lowest[2]
+    assert sliding.is_free(0)
+    assert sliding.grid[0, 0] * stroke == pytest.approx(1.0)
+    assert sliding.grid[-1, 0] * stroke < 6.0 * np.pi
 
 
 def test_a_clipped_torque_is_short_of_what_lies_beyond_the_level() -> None:
@@ -258,21 +276,18 @@ def test_a_compliant_joint_leaves_the_torque_of_the_link_that_lags() -> None:
         values[2] -= np.fft.irfft(rate**order * spectrum, n=len(lag))
     picked = slice(None, None, 40)
     moved = torque(SIGNALS.robot, SIGNALS.links, *(each[:, picked] for each in state))
-    found = compliance * columns("joint_elasticity", 2, (400.0,))[0][:, picked]
+    found = compliance * columns("joint_elasticity", 2, (400.0, 0.0))[0][:, picked]
     assert found == pytest.approx(moved - SIGNALS.load[:, picked], abs=2e-3 * np.abs(found).max())
 
 
-def test_play_changes_sides_with_the_load() -> None:
-    width = 0.25 * float(SIGNALS.load[2].std())
-    lag = 0.5e-5 * np.tanh(SIGNALS.load[2] / width)
-    rate = 2j * np.pi * np.fft.rfftfreq(len(lag), 1 / RATE)
-    state = [SIGNALS.position.copy(), SIGNALS.velocity.copy(), SIGNALS.acceleration.copy()]
-    for order, values in enumerate(state):
-        values[2] -= np.fft.irfft(rate**order * np.fft.rfft(lag), n=len(lag))
-    picked = slice(None, None, 40)
-    moved = torque(SIGNALS.robot, SIGNALS.links, *(each[:, picked] for each in state))
-    found = 1e-5 * columns("backlash", 2, (width, 400.0))[0][:, picked]
-    assert found == pytest.approx(moved - SIGNALS.load[:, picked], abs=5e-3 * np.abs(found).max())
+def test_an_elastic_joint_swings_on_its_spring() -> None:
+    """Far below its resonance the load is passed on as it is, at the resonance it is made larger by 1/(2 ζ)."""
+    time = np.arange(4000) / RATE
+    inertia = np.full(len(time), 0.3)
+    for frequency, resonance, gain in ((0.5, 20.0, 1.0), (2.0, 2.0, 0.5 / DAMPING)):
+        compliance = 1.0 / ((2.0 * np.pi * resonance) ** 2 * 0.3)
+        found = transmitted(np.sin(2.0 * np.pi * frequency * time), inertia, compliance, RATE)
+        assert np.abs(found[-1000:]).max() == pytest.approx(gain, rel=0.02)
 
 
 def test_a_stated_gear_ratio_leaves_whole_turns_of_the_motor_only() -> None:
@@ -325,3 +340,13 @@ def test_bristles_shorter_than_the_encoder_s_noise_are_not_looked_for() -> None:
     assert fine.lower[0] < noise[2]
     assert coarse.lower[0] >= 4.0 * noise[2]
     assert set(coarse.grid[:, 0]) == {length for length in fine.grid[:, 0] if length > 4.0 * noise[2]}
+
+
+def test_what_gives_way_is_what_the_link_swings_on() -> None:
+    """A resonance far from that of the compliance found is some other wave."""
+    elastic, swinging = form("joint_elasticity", 2), 1e-4
+    assert elastic.is_consistent(np.array([1.5e-4]), np.array([10.0, swinging]))
+    assert not elastic.is_consistent(np.array([1e-6]), np.array([10.0, swinging]))
+    assert elastic.is_consistent(np.array([1e-6]), np.array([10.0, 0.0])), (
+        "where nothing swings there is nothing to compare"
+    )

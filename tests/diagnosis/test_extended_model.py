@@ -29,9 +29,9 @@ from service.diagnosis.extended_model import (
 from service.diagnosis.extended_model.compensation_code import EXPRESSIONS
 from service.diagnosis.extended_model.saved import _entry, _term
 from service.diagnosis.extended_model.simulation_files import ENTRIES
-from service.diagnosis.model import with_terms
-from service.diagnosis.residual import raw_squares
-from service.diagnosis.term import Term
+from service.diagnosis.model.extended import with_terms
+from service.diagnosis.model.residual import raw_squares
+from service.diagnosis.model.term import Term
 from service.errors import IdentificationError
 from service.recording import EffortKind
 from service.robot import read_robot

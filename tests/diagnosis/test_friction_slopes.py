@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 
 from identification.simulated import PAPER_NOISE, paper_robot, simulate, with_shapes
-from service.diagnosis.fit import Fitter
-from service.diagnosis.friction_slopes import open_slopes, with_fitting_slopes, with_fitting_stribeck
-from service.diagnosis.model import ExtendedModel
-from service.diagnosis.noise_floor import with_noise
-from service.diagnosis.nominal import nominal_model
-from service.diagnosis.observations import Observations
+from service.diagnosis.fitting.fit import Fitter
+from service.diagnosis.fitting.friction_slopes import open_slopes, with_fitting_slopes, with_fitting_stribeck
+from service.diagnosis.model.extended import ExtendedModel
+from service.diagnosis.model.nominal import nominal_model
+from service.diagnosis.noise.floor import with_noise
+from service.diagnosis.observations.observations import Observations
 from service.identification import identify
 from service.recording.conditioning import Conditioner
 from service.robot import FrictionCoefficients

@@ -4,11 +4,11 @@ import numpy as np
 
 from diagnosis.diagnosed_arm import at_joint, recordings
 from identification.simulated import paper_robot
-from service.diagnosis.findings import without_nominal
-from service.diagnosis.fit import Fitter
-from service.diagnosis.noise_floor import with_noise
-from service.diagnosis.nominal import nominal_model
-from service.diagnosis.observations import Observations
+from service.diagnosis.findings.finding import without_nominal
+from service.diagnosis.fitting.fit import Fitter
+from service.diagnosis.model.nominal import nominal_model
+from service.diagnosis.noise.floor import with_noise
+from service.diagnosis.observations.observations import Observations
 from service.identification import identify
 from service.recording.conditioning import Conditioner
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from diagnosis.test_repetitions import observed
-from service.diagnosis.diagnosed import Diagnosis
-from service.diagnosis.fit import Fitter
-from service.diagnosis.lack_of_fit import LackOfFit, lack_of_fit
-from service.diagnosis.whitening import JointNoise
+from service.diagnosis.findings.diagnosed import Diagnosis
+from service.diagnosis.fitting.fit import Fitter
+from service.diagnosis.fitting.lack_of_fit import LackOfFit, lack_of_fit
+from service.diagnosis.observations.whitening import JointNoise
 from service.identification.autocorrelation import Autoregression
 
 

@@ -57,6 +57,22 @@ def test_motions_ask_for_no_more_torque_than_there_is(identification: Identifica
         assert np.abs(torque[:, 1]).max() + 1.3 < 12.0 * 1.02, primitive.kind
 
 
+def test_links_that_no_posture_could_carry_are_no_guide(identification: Identification) -> None:
+    """A poor motion may say so; the arm was in some posture, and the robot file's own model says what it takes."""
+    joints = [replace(joint, limits=replace(joint.limits, torque=60.0)) for joint in identification.robot.joints]
+    heavy = [
+        replace(link, mass=1e4 * link.mass, first_moment=1e4 * link.first_moment)
+        for link in identification.consistent.links
+    ]
+    misled = replace(
+        identification,
+        robot=replace(identification.robot, joints=tuple(joints)),
+        consistent=replace(identification.consistent, links=tuple(heavy)),
+    )
+    seen = list(Bank(misled, np.random.default_rng(0)).first_look(1))
+    assert {primitive.kind for primitive in seen} >= set(KINDS)
+
+
 def test_a_sweep_is_its_own_derivatives_and_mostly_at_its_speed() -> None:
     limits = motion_limits(paper_robot())
     segment = sweep(limits, 0.3, 20.0)
@@ -83,7 +99,7 @@ class _Rows:
         return [self._torque - model.parameters @ self._columns]
 
     def columns(self, model: "_Flat") -> list:
-        from service.diagnosis.projection import JointColumns
+        from service.diagnosis.fitting.projection import JointColumns
 
         used = np.flatnonzero(model.uses)
         return [JointColumns(np.arange(len(used)), self._columns[used])]

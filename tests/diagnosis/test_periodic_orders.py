@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagnosis.test_effect_columns import setting
-from service.diagnosis.catalogue.periodic_torque import FARTHER, farther_orders, possible_orders
+from service.diagnosis.catalogue.periodic_torque import FARTHER, farther_orders, possible_orders, waves
 
 CYCLES = 2.0 * np.pi
 
@@ -55,3 +55,10 @@ def test_a_geared_motor_s_orders_are_its_multiples_however_far() -> None:
     farther = farther_orders(geared, 0)
     assert len(farther) >= 4
     assert farther == pytest.approx(100.0 * np.arange(1, len(farther) + 1))
+
+
+@pytest.mark.parametrize("orders", [np.linspace(2.0, 300.0, 800), np.array([7.0, 14.0, 28.0, 36.0]), np.array([3.0])])
+def test_waves_of_even_steps_are_those_of_any(orders: np.ndarray) -> None:
+    position = np.linspace(-6.0, 6.0, 500)
+    angle = orders[:, None] * position
+    np.testing.assert_allclose(waves(position, orders), np.stack([np.sin(angle), np.cos(angle)], axis=1), atol=1e-11)

@@ -5,8 +5,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
-from service.diagnosis.effective_number import effective_number
-from service.diagnosis.projection import JointColumns, moments, project, statistics
+from service.diagnosis.fitting.projection import JointColumns, moments, project, statistics
+from service.diagnosis.screening.effective_number import effective_number
 
 Array = NDArray[np.float64]
 

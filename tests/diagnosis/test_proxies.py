@@ -9,10 +9,12 @@ from diagnosis.diagnosed_arm import at_joint, recordings
 from identification.simulated import Array, SimulatedArm, paper_robot
 from service.diagnosis import diagnose
 from service.diagnosis.catalogue.external_contact import JointContact
-from service.diagnosis.choice import Choice
-from service.diagnosis.diagnosed import Diagnosis
-from service.diagnosis.proxies import proxies
-from service.diagnosis.table import fitted_option
+from service.diagnosis.findings.diagnosed import Diagnosis
+from service.diagnosis.selection.admission import Admission
+from service.diagnosis.selection.choice import Choice
+from service.diagnosis.selection.proxies import proxies
+from service.diagnosis.selection.pruning import without_proxies
+from service.diagnosis.selection.table import fitted_option
 
 
 def crossed(arm: SimulatedArm, rigid: Array) -> Array:
@@ -40,6 +42,21 @@ def test_a_likeness_that_leaves_most_of_what_is_wrong_is_none(diagnosis: Diagnos
     option = fitted_option(likeness, nominal, diagnosis.fitter)
     choice = Choice((option,), None, 0.0)
     assert proxies(nominal, option.fit, [choice], diagnosis.fitter.observations, pure_error=True) == [0]
+
+
+def test_what_was_needed_beside_a_likeness_alone_goes_with_it(diagnosis: Diagnosis) -> None:
+    """A likeness of many joints spoils some of them, and something else there makes up for it."""
+    nominal, fitter = diagnosis.selection.nominal, diagnosis.fitter
+    shown = diagnosis.screen.candidates(nominal)
+    likeness, *_ = [each for each in shown if each.effect.id == "friction_coupling" and each.effect.joint == 1]
+    beside, *_ = [each for each in shown if each.effect.id == "load_dependent_friction" and each.effect.joint == 0]
+    first = fitted_option(likeness, nominal, fitter)
+    second = fitted_option(beside, first.fit, fitter)
+    choices = [Choice((first,), None, 0.0), Choice((second,), None, 0.0)]
+    admission = Admission(diagnosis.screen, pure_error=True)
+    fit, kept = without_proxies(nominal, second.fit, choices, fitter, admission)
+    assert kept == []
+    assert fit.model.terms == ()
 
 
 def test_a_contact_that_explains_more_than_all_that_is_left_is_there_whatever_else_is(diagnosis: Diagnosis) -> None:

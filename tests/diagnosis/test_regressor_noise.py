@@ -6,14 +6,24 @@ import numpy as np
 import pytest
 
 from diagnosis.test_repetitions import observed
-from service.diagnosis.noise_floor import with_noise
-from service.diagnosis.regressor_noise import _step_error, row_weights
+from service.diagnosis.fitting.regressor_noise import (
+    OF_ITS_PERIOD,
+    _shared_errors,
+    _step_error,
+    _steps,
+    row_weightings,
+    weightings_of_motion,
+)
+from service.diagnosis.noise.floor import with_noise
+from service.diagnosis.observations.whitening import JointNoise
+from service.identification.autocorrelation import Autoregression
+from service.recording.conditioning.filters import smooth
 
 
 def test_rows_far_from_reversals_count_fully_and_those_at_reversals_less() -> None:
     observations, model = observed()
     known, _ = with_noise(observations, model, ())
-    weights = row_weights(known, model)
+    weights = [each.weights for each in row_weightings(known, model)]
     assert [len(row) for row in weights] == [int(known.kept(joint).sum()) for joint in range(3)]
     for joint, own in enumerate(weights):
         (piece,) = known.pieces
@@ -47,9 +57,10 @@ def test_an_encoder_that_rounds_leaves_slow_motion_uncertain_and_one_that_is_mer
     known, _ = with_noise(observations, model, ())
     (piece,) = known.pieces
     assert (piece.position_noise.step < 1e-6).all(), "these positions are not rounded"
-    rounded_noise = replace(piece.position_noise, step=np.full(3, 0.01 / piece.state_hz))
+    rounded_noise = replace(piece.position_noise, step=0.01 / piece.state_hz)
     coarse = replace(known, pieces=(replace(piece, position_noise=rounded_noise),))
-    for fine, rounded in zip(row_weights(known, model), row_weights(coarse, model), strict=True):
+    both = [[each.weights for each in row_weightings(seen, model)] for seen in (known, coarse)]
+    for fine, rounded in zip(*both, strict=True):
         assert (rounded <= fine + 1e-12).all()
         assert rounded.min() < fine.min()
         assert np.mean(rounded < 0.99 * fine) < 0.5, "fast motion crosses steps quickly: that is noise"
@@ -58,4 +69,37 @@ def test_an_encoder_that_rounds_leaves_slow_motion_uncertain_and_one_that_is_mer
 def test_a_model_that_leaves_nearly_everything_is_no_guide() -> None:
     quiet, _ = with_noise(*observed(), ())
     observations, model = observed(20.0)
-    assert all((own == 1.0).all() for own in row_weights(observations.with_noise(quiet.noise), model))
+    for own in row_weightings(observations.with_noise(quiet.noise), model):
+        assert (own.weights == 1.0).all()
+        assert not own.shrinkage.size
+
+
+def test_what_half_the_band_makes_of_friction_passes_for_no_more_than_noise() -> None:
+    observations, model = observed()
+    (piece,) = observations.pieces
+    motion, still = piece.prepared.motion, JointNoise(Autoregression(np.empty(0), 1e-6, 1e-6))
+    known = observations.with_noise([still] * 3)
+    for joint, own in enumerate(weightings_of_motion(known, model)):
+        narrow = smooth(motion.velocity[:, [joint]], motion.rate_hz, 0.5 * float(piece.state_hz[joint]))[:, 0]
+        change = _steps(model, joint, narrow) - _steps(model, joint, motion.velocity[:, joint])
+        error = known.white(joint, [piece.reduced(change[None])])
+        assert np.sum((own.weights * error) ** 2) > 2.0
+        assert np.sum(own.applied(error) ** 2) < 1.0
+
+
+def test_a_band_moves_reversals_by_no_more_than_a_part_of_its_period(monkeypatch: pytest.MonkeyPatch) -> None:
+    observations, model = observed()
+    (piece,) = observations.pieces
+    motion, still = piece.prepared.motion, JointNoise(Autoregression(np.empty(0), 1e-6, 1e-6))
+    known = observations.with_noise([still] * 3)
+    for joint, band_hz in enumerate(piece.state_hz):
+        slope = np.gradient(_steps(model, joint, motion.velocity[:, joint])) * motion.rate_hz
+        white = known.white(joint, [piece.reduced(slope[None])])[0]
+        found_s = []
+        for part in (OF_ITS_PERIOD, 1e-4):
+            monkeypatch.setattr("service.diagnosis.fitting.regressor_noise.OF_ITS_PERIOD", part)
+            _, shift = _shared_errors(known, model, joint, np.ones(len(white)))
+            found_s.append(float(shift @ white) / float(white @ white))
+            np.testing.assert_allclose(shift, found_s[-1] * white, atol=1e-9 * np.abs(shift).max())
+        assert 1e-4 < found_s[0] * band_hz < OF_ITS_PERIOD, "this band moves them by less than that"
+        assert found_s[1] * band_hz == pytest.approx(1e-4)

@@ -5,10 +5,10 @@ import pytest
 
 from diagnosis.diagnosed_arm import POSITION_NOISE, motions
 from identification.simulated import PAPER_NOISE, Array
-from service.diagnosis.model import ExtendedModel
-from service.diagnosis.noise_floor import repeated_differences, with_noise
-from service.diagnosis.nominal import nominal_model
-from service.diagnosis.observations import Observations
+from service.diagnosis.model.extended import ExtendedModel
+from service.diagnosis.model.nominal import nominal_model
+from service.diagnosis.noise.floor import repeated_differences, with_noise
+from service.diagnosis.observations.observations import Observations
 from service.identification import identify
 from service.recording.conditioning import Conditioner
 

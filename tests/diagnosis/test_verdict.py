@@ -5,9 +5,9 @@ import pytest
 from scipy import stats
 
 from service.diagnosis.catalogue.elastic_forces import JointSpring
-from service.diagnosis.detectability import detectable, needed_strength
-from service.diagnosis.screening import Candidate
-from service.diagnosis.verdict import Evidence, Verdict, verdict
+from service.diagnosis.findings.detectability import detectable, needed_strength
+from service.diagnosis.findings.verdict import Evidence, Verdict, verdict
+from service.diagnosis.screening.screen import Candidate
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from service.diagnosis.whitening import fitted_noise
+from service.diagnosis.observations.whitening import fitted_noise
 from service.recording.conditioning.common_band import Decimator
 
 

@@ -7,13 +7,13 @@ from scipy import stats
 from diagnosis.diagnosed_arm import recordings
 from identification.simulated import paper_robot
 from service.diagnosis.catalogue import Signals, TimeLocalEffect, possible_effects
-from service.diagnosis.fit import Fit, Fitter
-from service.diagnosis.noise_floor import with_noise
-from service.diagnosis.nominal import nominal_model, setting_of
-from service.diagnosis.observations import Observations
-from service.diagnosis.projection import moments, statistics
-from service.diagnosis.screening import Screen, model_signals
-from service.diagnosis.windows import white_torque, windowed_moments, windows_on_rows, windows_tried
+from service.diagnosis.fitting.fit import Fit, Fitter
+from service.diagnosis.fitting.projection import moments, statistics
+from service.diagnosis.model.nominal import nominal_model, setting_of
+from service.diagnosis.noise.floor import with_noise
+from service.diagnosis.observations.observations import Observations
+from service.diagnosis.screening.screen import Screen, model_signals
+from service.diagnosis.screening.windows import white_torque, windowed_moments, windows_on_rows, windows_tried
 from service.identification import identify
 from service.recording.conditioning import Conditioner
 

@@ -1,6 +1,7 @@
 """The catalogue of effects that a model may have left out: one small file an effect."""
 
-from service.diagnosis.catalogue.effect import Coefficient, Effect, Quantity, Shape
+from service.diagnosis.catalogue.effect import Effect
+from service.diagnosis.catalogue.parameters import Coefficient, Quantity, Shape
 from service.diagnosis.catalogue.registry import catalogue, farther_effects, possible_effects
 from service.diagnosis.catalogue.setting import Setting
 from service.diagnosis.catalogue.signals import Signals

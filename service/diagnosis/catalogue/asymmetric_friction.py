@@ -5,7 +5,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from service.diagnosis.catalogue.effect import Coefficient, Effect, per_joint_columns
+from service.diagnosis.catalogue.effect import Effect, per_joint_columns
+from service.diagnosis.catalogue.parameters import Coefficient
 from service.diagnosis.catalogue.setting import Setting
 from service.diagnosis.catalogue.signals import Signals
 from service.recording.recording import Array
@@ -14,6 +15,7 @@ from service.recording.recording import Array
 class AsymmetricCoulomb(Effect):
     """τ = a |A(q̇)|: Coulomb friction is larger by a one way and smaller by a the other."""
 
+    has_step: ClassVar[bool] = True
     id: ClassVar[str] = "asymmetric_coulomb"
     arguments: ClassVar[frozenset[str] | None] = frozenset({"velocity"})
     equation: ClassVar[str] = "tau = a |sgn(qd)|, sgn smoothed: Coulomb friction F_c + a forwards, F_c - a backwards"

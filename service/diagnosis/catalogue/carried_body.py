@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from service.diagnosis.catalogue.effect import Coefficient, Quantity, Shape
+from service.diagnosis.catalogue.parameters import Coefficient, Quantity, Shape
 from service.diagnosis.catalogue.signals import Signals
 from service.dynamics import torque_regressor
 from service.recording.recording import Array

@@ -12,6 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from service.diagnosis.catalogue.parameters import Coefficient, Quantity, Shape
 from service.diagnosis.catalogue.setting import Setting
 from service.diagnosis.catalogue.signals import Signals
 from service.recording.recording import Array
@@ -19,72 +20,6 @@ from service.robot import JointType
 
 _POSITION = {JointType.REVOLUTE: "rad", JointType.PRISMATIC: "m"}
 _TORQUE = {JointType.REVOLUTE: "Nm", JointType.PRISMATIC: "N"}
-
-
-@dataclass(frozen=True)
-class Coefficient:
-    """A linear coefficient of an effect.
-
-    name : str
-        in the equation
-    unit : str
-        with ``{tau}`` and ``{q}`` in place of the joint's units of torque and position
-    positive : bool
-        whether physics allows no negative value
-    largest : float
-        magnitude beyond which nothing real has it
-    smallest : float
-        magnitude below which it stands for something else
-    """
-
-    name: str
-    unit: str
-    positive: bool = False
-    largest: float = np.inf
-    smallest: float = 0.0
-
-
-@dataclass(frozen=True)
-class Shape:
-    """A quantity that shapes an effect's columns and is searched over a grid, then refined between bounds.
-
-    name : str
-        in the equation
-    unit : str
-        as in `Coefficient`
-    logarithmic : bool
-        whether steps are relative ones
-    fixed : bool
-        whether only the grid's own values make sense
-    reported : bool
-        whether it belongs to the effect and not merely to how its column is made
-    """
-
-    name: str
-    unit: str
-    logarithmic: bool = False
-    fixed: bool = False
-    reported: bool = True
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """A parameter as a finding reports it.
-
-    name : str
-        in the equation
-    value : float
-        estimate
-    std : float
-        its standard error
-    unit : str
-        SI
-    """
-
-    name: str
-    value: float
-    std: float
-    unit: str
 
 
 NO_SHAPE = np.zeros((1, 0))
@@ -102,7 +37,8 @@ class Effect(ABC):
     lower, upper : (k,) float64
         bounds of the shape parameters
 
-    Columns of an effect `of_motion_alone` are the same beside every model, and are made once.
+    Columns of an effect `of_motion_alone` are the same beside every model, and are made once; those of one that
+    `has_step` change with K_v of its joint.
     What a sensor does not pass on, `swallows`, may be more than what was measured; no other effect's torque can be.
     An effect that is `screened` is looked for beside the nominal model; any other becomes a finding by comparison with
     a given model.
@@ -120,6 +56,7 @@ class Effect(ABC):
     shapes: ClassVar[tuple[Shape, ...]] = ()
     repeats: ClassVar[bool] = False
     of_motion_alone: ClassVar[bool] = False
+    has_step: ClassVar[bool] = False
     swallows: ClassVar[bool] = False
     screened: ClassVar[bool] = True
     repeats_with_motion: ClassVar[bool] = True
@@ -197,6 +134,30 @@ class Effect(ABC):
             values of the shape parameters
         """
         return np.zeros(len(shapes))
+
+    def is_possible(self, shape: Array, k_v: float | None) -> bool:
+        """Whether this shape is still what the effect means, beside the joint's friction as it was fitted with it.
+
+        Parameters
+        ----------
+        shape : (k,) float64
+            values of the shape parameters
+        k_v : float or None
+            K_v of the effect's joint; None where there is none [s/rad or s/m]
+        """
+        return True
+
+    def is_consistent(self, coefficients: Array, shape: Array) -> bool:
+        """Whether coefficients and shape, each fitted freely, can belong to one thing.
+
+        Parameters
+        ----------
+        coefficients : (c,) float64
+            values of the coefficients
+        shape : (k,) float64
+            values of the shape parameters
+        """
+        return True
 
     def touched(self, joint_count: int) -> tuple[int, ...]:
         """Joints whose torque the effect changes: its own one, or all.

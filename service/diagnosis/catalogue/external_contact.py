@@ -6,7 +6,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from service.diagnosis.catalogue.effect import Coefficient, Effect, Shape
+from service.diagnosis.catalogue.effect import Effect
+from service.diagnosis.catalogue.parameters import Coefficient, Shape
 from service.diagnosis.catalogue.setting import Setting
 from service.diagnosis.catalogue.signals import Signals
 from service.diagnosis.catalogue.time_local import EVERY, HALF_SINE, TimeLocalEffect

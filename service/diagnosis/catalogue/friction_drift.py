@@ -7,7 +7,8 @@ from typing import ClassVar
 import numpy as np
 from scipy import signal
 
-from service.diagnosis.catalogue.effect import Coefficient, Effect, Shape
+from service.diagnosis.catalogue.effect import Effect
+from service.diagnosis.catalogue.parameters import Coefficient, Shape
 from service.diagnosis.catalogue.setting import Setting
 from service.diagnosis.catalogue.signals import Signals
 from service.recording.recording import Array
@@ -31,6 +32,7 @@ class FrictionDrift(Effect):
     """
 
     repeats_with_motion: ClassVar[bool] = False
+    has_step: ClassVar[bool] = True
     id: ClassVar[str] = "friction_drift"
     arguments: ClassVar[frozenset[str] | None] = frozenset({"velocity", "time"})
     equation: ClassVar[str] = (

@@ -5,7 +5,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from service.diagnosis.catalogue.effect import Coefficient, Effect, per_joint_columns
+from service.diagnosis.catalogue.effect import Effect, per_joint_columns
+from service.diagnosis.catalogue.parameters import Coefficient
 from service.diagnosis.catalogue.setting import Setting
 from service.diagnosis.catalogue.signals import Signals
 from service.recording.recording import Array
@@ -14,13 +15,15 @@ from service.recording.recording import Array
 class LoadDependentFriction(Effect):
     """τ = μ |τ_rb| A(q̇), τ_rb the rigid-body torque."""
 
+    has_step: ClassVar[bool] = True
     id: ClassVar[str] = "load_dependent_friction"
     arguments: ClassVar[frozenset[str] | None] = frozenset({"load", "velocity"})
     equation: ClassVar[str] = "tau = mu |tau_rb| sgn(qd)"
     meaning: ClassVar[str] = "friction grows with the transmitted torque"
     remedy: ClassVar[str] = "add mu times the magnitude of the rigid-body torque to the Coulomb level"
     revealing_motion: ClassVar[str] = "the same speeds under other loads: other poses, an added payload, fast motion"
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("mu", "1", positive=True, largest=1.0),)
+    # 4: a worm gear of 20 % efficiency, 1 / (1 + mu)
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("mu", "1", positive=True, largest=4.0),)
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:

@@ -16,7 +16,8 @@ from service.diagnosis.catalogue.carried_body import (
     body_quantities,
     unit_body,
 )
-from service.diagnosis.catalogue.effect import Coefficient, Effect, Quantity, Shape
+from service.diagnosis.catalogue.effect import Effect
+from service.diagnosis.catalogue.parameters import Coefficient, Quantity, Shape
 from service.diagnosis.catalogue.setting import Setting
 from service.diagnosis.catalogue.signals import Signals
 from service.recording.recording import Array

@@ -6,11 +6,13 @@ motor's revolution can occur; otherwise the angle-periodogram is scanned as fine
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
 
-from service.diagnosis.catalogue.effect import Coefficient, Effect, Quantity, Shape, per_joint_columns
+from service.diagnosis.catalogue.effect import Effect, per_joint_columns
+from service.diagnosis.catalogue.parameters import Coefficient, Quantity, Shape
 from service.diagnosis.catalogue.setting import Setting
 from service.diagnosis.catalogue.signals import Signals
 from service.recording.recording import Array
@@ -26,6 +28,9 @@ BAND_SHARE = 0.8
 """Share of the band up to which the frequency at typical speed may reach."""
 
 MOST_ORDERS = 220
+
+EVEN = 1e-9
+"""Spread of steps, relative to one, up to which they are even: over a thousand orders no phase is off by as much."""
 
 FARTHER = 8.0
 """Factor up to which orders are looked at where something is left: they reach the band near reversals only, in a
@@ -86,6 +91,34 @@ def _pole_pairs(setting: Setting, joint: int) -> int:
 def _is_geared(setting: Setting, joint: int) -> bool:
     described = setting.robot.joints[joint]
     return described.gear_ratio is not None and described.type is JointType.REVOLUTE
+
+
+def waves(position: Array, orders: Array) -> Array:
+    """Sines and cosines of orders of a position; of even steps by sin(a + b) and cos(a + b), ten times as quick.
+
+    Parameters
+    ----------
+    position : (N,) float64
+        q [rad or m]
+    orders : (g,) float64
+        k [1/rad or 1/m]
+
+    Returns
+    -------
+    (g, 2, N) float64
+        sin kq, cos kq
+    """
+    steps = np.diff(orders)
+    if len(steps) < 2 or np.ptp(steps) > EVEN * abs(steps[0]):
+        angle = orders[:, None] * position
+        return np.stack([np.sin(angle), np.cos(angle)], axis=1)
+    found = np.empty((len(orders), 2, len(position)))
+    found[0] = np.sin(orders[0] * position), np.cos(orders[0] * position)
+    sine, cosine = np.sin(steps[0] * position), np.cos(steps[0] * position)
+    for before, after in pairwise(found):
+        after[0] = before[0] * cosine + before[1] * sine
+        after[1] = before[1] * cosine - before[0] * sine
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,8 +214,7 @@ class _Periodic(Effect):
 
     def _waves(self, signals: Signals, shapes: Array) -> Array:
         """Sin kq, cos kq, (g, 2, N)."""
-        angle = shapes * signals.position[self.joint]
-        return np.stack([np.sin(angle), np.cos(angle)], axis=1)
+        return waves(signals.position[self.joint or 0], shapes[:, 0])
 
 
 class Cogging(_Periodic):

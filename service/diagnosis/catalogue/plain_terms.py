@@ -9,7 +9,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from service.diagnosis.catalogue.effect import Coefficient, Effect, Shape, per_joint_columns
+from service.diagnosis.catalogue.effect import Effect, per_joint_columns
+from service.diagnosis.catalogue.parameters import Coefficient, Shape
 from service.diagnosis.catalogue.setting import Setting
 from service.diagnosis.catalogue.signals import Signals
 from service.dynamics import smooth_sign

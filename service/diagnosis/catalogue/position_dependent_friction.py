@@ -1,49 +1,86 @@
-"""A friction level that varies over a turn of the joint: an eccentric bearing, a seal that rubs on one side."""
+"""A friction level that varies with position: an eccentric bearing, an oval one, a rail that is worn in its middle."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from service.diagnosis.catalogue.effect import Coefficient, Effect, per_joint_columns
+from service.diagnosis.catalogue.effect import Effect, per_joint_columns
+from service.diagnosis.catalogue.parameters import Coefficient, Shape
 from service.diagnosis.catalogue.setting import Setting
 from service.diagnosis.catalogue.signals import Signals
 from service.recording.recording import Array
 from service.robot import JointType
 
+TIMES_A_TURN = np.array([1.0, 2.0, 3.0])
+"""An eccentric bearing, an oval one, and one that three jaws hold."""
 
+RADIANS_A_STROKE = np.array([1.0, 2.0, 4.0, 6.0, 9.0, 12.0, 15.0, 18.0])
+"""k times the stroke of a linear axis: from what is bent a little up to three waves."""
+
+
+@dataclass(frozen=True, eq=False)
 class PositionDependentFriction(Effect):
-    """τ = A(q̇) (a cos q + b sin q)."""
+    """τ = A(q̇) (a cos kq + b sin kq).
 
+    turns : bool
+        whether the joint comes round again: k is a whole number then
+    """
+
+    has_step: ClassVar[bool] = True
     id: ClassVar[str] = "position_dependent_friction"
     arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "velocity"})
-    equation: ClassVar[str] = "tau = sgn(qd) (a cos q + b sin q)"
-    meaning: ClassVar[str] = "the friction level varies with the joint's angle"
-    remedy: ClassVar[str] = "let the Coulomb level vary with the joint's angle"
-    revealing_motion: ClassVar[str] = "the same angles under other loads and speeds"
+    equation: ClassVar[str] = "tau = sgn(qd) (a cos kq + b sin kq)"
+    meaning: ClassVar[str] = "the friction level varies with the joint's position"
+    remedy: ClassVar[str] = "let the Coulomb level vary with the joint's position"
+    revealing_motion: ClassVar[str] = "the same positions under other loads and speeds"
     coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("a", "{tau}"), Coefficient("b", "{tau}"))
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("k", "1/{q}", logarithmic=True),)
+
+    turns: bool = True
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """One a joint that turns.
+        """One a joint that moves.
 
         Parameters
         ----------
         setting : Setting
             the arm
         """
-        turning = [joint for joint in setting.joints if setting.robot.joints[joint].type is JointType.REVOLUTE]
-        return [cls(joint) for joint in turning if setting.moves(joint)]
+        return [cls._of_joint(setting, joint) for joint in setting.joints if setting.moves(joint)]
+
+    @classmethod
+    def _of_joint(cls, setting: Setting, joint: int) -> Effect:
+        turns = setting.robot.joints[joint].type is JointType.REVOLUTE
+        stroke = float(setting.highest[joint] - setting.lowest[joint])
+        waves = TIMES_A_TURN if turns else RADIANS_A_STROKE / stroke
+        return cls(joint, waves[:, None], 0.8 * waves[:1], 1.2 * waves[-1:], turns=turns)
+
+    def is_free(self, place: int) -> bool:
+        """Whether k is estimated between the grid's points.
+
+        Parameters
+        ----------
+        place : int
+            k is the only shape
+        """
+        return not self.turns
+
+    def rough_grid(self) -> Array:
+        """Once a turn, or a few waves along a rail."""
+        return self.grid[:1] if self.turns else self.grid[::3]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """A(q̇) cos q, A(q̇) sin q.
+        """A(q̇) cos kq, A(q̇) sin kq.
 
         Parameters
         ----------
         signals : Signals
             one piece of motion
-        shapes : (1, 0) float64
-            none
+        shapes : (g, 1) float64
+            k [1/rad or 1/m]
         """
-        position, step = signals.position[self.joint], signals.step[self.joint]
-        return per_joint_columns(np.stack([step * np.cos(position), step * np.sin(position)])[None])
+        step, angle = signals.step[self.joint], shapes * signals.position[self.joint]
+        return per_joint_columns(np.stack([step * np.cos(angle), step * np.sin(angle)], axis=1))

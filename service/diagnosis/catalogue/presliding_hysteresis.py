@@ -10,7 +10,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from service.diagnosis.catalogue.effect import Coefficient, Effect, Shape, per_joint_columns
+from service.diagnosis.catalogue.effect import Effect, per_joint_columns
+from service.diagnosis.catalogue.parameters import Coefficient, Shape
 from service.diagnosis.catalogue.setting import Setting
 from service.diagnosis.catalogue.signals import Signals
 from service.recording.recording import Array
@@ -58,6 +59,7 @@ def bristle_deflection(position: Array, lengths: Array, start: Array) -> Array:
 class PreslidingHysteresis(Effect):
     """τ = F (z - A(q̇)), z the bristles' deflection."""
 
+    has_step: ClassVar[bool] = True
     id: ClassVar[str] = "presliding_hysteresis"
     arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "velocity"})
     equation: ClassVar[str] = "tau = F (z - sgn(qd)), dz/dt = qd/x_s - |qd| z/x_s"

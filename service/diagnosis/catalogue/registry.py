@@ -8,13 +8,14 @@ from functools import cache
 from importlib.metadata import entry_points
 
 from service.diagnosis.catalogue.asymmetric_friction import AsymmetricCoulomb, AsymmetricViscous
+from service.diagnosis.catalogue.backlash import Backlash
 from service.diagnosis.catalogue.base_tilt import BaseTilt
-from service.diagnosis.catalogue.compliance import Backlash, JointElasticity
 from service.diagnosis.catalogue.effect import Effect
 from service.diagnosis.catalogue.elastic_forces import CableForce, JointSpring
 from service.diagnosis.catalogue.external_contact import ExternalContact
 from service.diagnosis.catalogue.friction_coupling import FrictionCoupling
 from service.diagnosis.catalogue.friction_drift import FrictionDrift
+from service.diagnosis.catalogue.joint_elasticity import JointElasticity
 from service.diagnosis.catalogue.kinematic_error import KinematicError
 from service.diagnosis.catalogue.load_dependent_friction import LoadDependentFriction
 from service.diagnosis.catalogue.nonlinear_viscous import NonlinearViscous

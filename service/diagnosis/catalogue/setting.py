@@ -26,6 +26,8 @@ class Setting:
         rms and largest magnitude of every joint's velocity [rad/s or m/s]
     load, top_torque : (n,) float64
         rms of the fitted rigid-body torque, largest magnitude of the model's torque [Nm or N]
+    inertia : (n,) float64
+        mean of every joint's inertia with all that it carries, zero where the fit knows of none [kg m² or kg]
     durations : tuple of float
         length of every training recording [s]
     cutoff_hz : float
@@ -43,6 +45,7 @@ class Setting:
     top_speed: Array
     load: Array
     top_torque: Array
+    inertia: Array
     durations: tuple[float, ...]
     cutoff_hz: float
     position_std: Array | None = None

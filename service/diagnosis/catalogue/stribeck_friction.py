@@ -5,7 +5,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from service.diagnosis.catalogue.effect import Coefficient, Effect, Shape, mesh, per_joint_columns
+from service.diagnosis.catalogue.effect import Effect, mesh, per_joint_columns
+from service.diagnosis.catalogue.parameters import Coefficient, Shape
 from service.diagnosis.catalogue.setting import Setting
 from service.diagnosis.catalogue.signals import Signals
 from service.recording.recording import Array
@@ -15,10 +16,15 @@ SPEEDS = np.array([0.04, 0.08, 0.15, 0.25, 0.4, 0.65, 1.0])
 
 EXPONENTS = np.array([1.0, 2.0])
 
+SHORTEST_DECAY = 1.0
+"""Least K_v v_s: where friction has not risen to half its size before it decays, step and decay together are any small
+bump, and s is of any size."""
+
 
 class StribeckFriction(Effect):
     """τ = s A(q̇) exp(-(|q̇|/v_s)^α)."""
 
+    has_step: ClassVar[bool] = True
     id: ClassVar[str] = "stribeck_friction"
     arguments: ClassVar[frozenset[str] | None] = frozenset({"velocity"})
     equation: ClassVar[str] = "tau = s sgn(qd) exp(-(|qd|/v_s)^alpha)"
@@ -30,7 +36,7 @@ class StribeckFriction(Effect):
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """One a joint that moves.
+        """Two a joint that moves, an exponent each: which of the two it is, only the fitted curves can say.
 
         Parameters
         ----------
@@ -41,9 +47,22 @@ class StribeckFriction(Effect):
         for joint in setting.joints:
             if setting.moves(joint):
                 speeds = SPEEDS * setting.top_speed[joint]
-                bounds = np.array([0.5 * speeds[0], 1.0]), np.array([1.5 * speeds[-1], 2.0])
-                made.append(cls(joint, mesh(speeds, EXPONENTS), *bounds))
+                for exponent in EXPONENTS:
+                    bounds = np.array([0.5 * speeds[0], exponent]), np.array([1.5 * speeds[-1], exponent])
+                    made.append(cls(joint, mesh(speeds, np.array([exponent])), *bounds))
         return made
+
+    def is_possible(self, shape: Array, k_v: float | None) -> bool:
+        """Whether friction rises before it decays.
+
+        Parameters
+        ----------
+        shape : (2,) float64
+            v_s [rad/s or m/s], α
+        k_v : float or None
+            K_v of the joint; None where there is none [s/rad or s/m]
+        """
+        return k_v is None or k_v * float(shape[0]) >= SHORTEST_DECAY
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """A(q̇) exp(-(|q̇|/v_s)^α).

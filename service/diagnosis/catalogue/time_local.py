@@ -1,7 +1,8 @@
 """Effects that are there for a part of the time only: what they do, and the window in which they do it.
 
 A window is found by its edges among a great many. Their columns are one and the same torque, seen through different
-windows: a screening needs that torque once (`service.diagnosis.windows`), and the exact columns where it refines.
+windows: a screening needs that torque once (`service.diagnosis.screening.windows`), and the exact columns where it
+refines.
 """
 
 from abc import abstractmethod

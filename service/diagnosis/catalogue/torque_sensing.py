@@ -1,12 +1,13 @@
 """What is wrong with the size of the recorded torque: scaled, or compressed at high load."""
 
+from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from service.diagnosis.catalogue.effect import Coefficient, Effect, Quantity, Shape, per_joint_columns
+from service.diagnosis.catalogue.effect import Effect, per_joint_columns
+from service.diagnosis.catalogue.parameters import Coefficient, Quantity, Shape
 from service.diagnosis.catalogue.setting import Setting
 from service.diagnosis.catalogue.signals import Signals
 from service.recording.recording import Array
@@ -16,6 +17,9 @@ COMPRESSIONS = np.array([0.3, 0.5, 0.8, 1.3, 2.2, 4.0])
 
 CLIPS = np.array([0.3, 0.45, 0.6, 0.7, 0.8, 0.9])
 """Levels of a hard one."""
+
+CLIPPED_AT_LEAST = 0.5
+"""Part of what lies beyond the level that a hard curve takes off: one that takes off little is a soft curve."""
 
 
 class TorqueGainError(Effect):
@@ -53,40 +57,45 @@ class TorqueGainError(Effect):
         return per_joint_columns(signals.torque[self.joint][None, None])
 
 
-@dataclass(frozen=True, eq=False)
-class TorqueSaturation(Effect):
-    """τ_recorded = τ - a (τ - c tanh(τ/c)), or τ - a (τ - clip(τ, ±c)); a is 1 where nothing else bends the curve.
-
-    clips : bool
-        whether the torque is clipped rather than compressed
-    """
+class Saturation(Effect):
+    """τ_recorded = τ - a (τ - r(τ)): what all curves r have in common; a is 1 where nothing else bends them."""
 
     id: ClassVar[str] = "torque_saturation"
     equation: ClassVar[str] = "tau_recorded = tau - a (tau - c tanh(tau/c)); clipped: tau - a (tau - clip(tau, +-c))"
     meaning: ClassVar[str] = "the recorded torque is compressed or clipped at high load"
     remedy: ClassVar[str] = "record within the sensor's or the drive's linear range"
     revealing_motion: ClassVar[str] = "the same motion slower and without payload, well below the level"
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("a", "1", positive=True, largest=2.0),)
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("c", "{tau}", logarithmic=True),)
     swallows: ClassVar[bool] = True
 
-    clips: bool = False
-
     @classmethod
-    def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """Both curves at every joint.
+    def of_levels(cls, setting: Setting, parts: Array) -> list[Effect]:
+        """One a joint.
 
         Parameters
         ----------
         setting : Setting
             the arm
+        parts : (g,) float64
+            levels looked at, relative to the joint's largest torque
         """
-        made = []
+        made: list[Effect] = []
         for joint in setting.joints:
-            for clips, parts in ((False, COMPRESSIONS), (True, CLIPS)):
-                levels = parts * float(setting.top_torque[joint])
-                made.append(cls(joint, levels[:, None], 0.7 * levels[:1], 1.5 * levels[-1:], clips=clips))
+            levels = parts * float(setting.top_torque[joint])
+            made.append(cls(joint, levels[:, None], 0.7 * levels[:1], 1.5 * levels[-1:]))
         return made
+
+    @abstractmethod
+    def recorded(self, torque: Array, levels: Array) -> Array:
+        """Torque r(τ) as it is recorded with a = 1, (g, N).
+
+        Parameters
+        ----------
+        torque : (N,) float64
+            as it is [Nm or N]
+        levels : (g, 1) float64
+            c [Nm or N]
+        """
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """What the recorded torque falls short by.
@@ -99,8 +108,36 @@ class TorqueSaturation(Effect):
             c [Nm or N]
         """
         torque = signals.torque[self.joint]
-        recorded = np.clip(torque, -shapes, shapes) if self.clips else shapes * np.tanh(torque / shapes)
-        return per_joint_columns((recorded - torque)[:, None])
+        return per_joint_columns((self.recorded(torque, shapes) - torque)[:, None])
+
+
+class TorqueSaturation(Saturation):
+    """r(τ) = c tanh(τ/c), a soft curve."""
+
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("a", "1", positive=True, largest=2.0),)
+
+    @classmethod
+    def forms(cls, setting: Setting) -> Sequence[Effect]:
+        """Both curves at every joint.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        """
+        return [*cls.of_levels(setting, COMPRESSIONS), *Clipping.forms(setting)]
+
+    def recorded(self, torque: Array, levels: Array) -> Array:
+        """A soft curve, c tanh(τ/c), (g, N).
+
+        Parameters
+        ----------
+        torque : (N,) float64
+            as it is [Nm or N]
+        levels : (g, 1) float64
+            c [Nm or N]
+        """
+        return levels * np.tanh(torque / levels)
 
     def quantities(
         self, setting: Setting, coefficients: Array, shape: Array, covariance: Array
@@ -118,9 +155,38 @@ class TorqueSaturation(Effect):
         covariance : (2, 2) float64
             of both
         """
-        if self.clips:
-            return super().quantities(setting, coefficients, shape, covariance)
         share, level = max(float(coefficients[0]), 1e-12), float(shape[0])
         slope = np.array([-0.5 * level / share**1.5, 1.0 / np.sqrt(share)])
         std = float(np.sqrt(max(slope @ covariance @ slope, 0.0)))
         return (Quantity("c", level / np.sqrt(share), std, self.unit("{tau}", setting)),)
+
+
+class Clipping(Saturation):
+    """r(τ) = clip(τ, ±c): what lies beyond the level is cut off."""
+
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (
+        Coefficient("a", "1", positive=True, largest=2.0, smallest=CLIPPED_AT_LEAST),
+    )
+
+    @classmethod
+    def forms(cls, setting: Setting) -> Sequence[Effect]:
+        """One a joint.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        """
+        return cls.of_levels(setting, CLIPS)
+
+    def recorded(self, torque: Array, levels: Array) -> Array:
+        """A hard curve, clip(τ, ±c), (g, N).
+
+        Parameters
+        ----------
+        torque : (N,) float64
+            as it is [Nm or N]
+        levels : (g, 1) float64
+            c [Nm or N]
+        """
+        return np.clip(torque, -levels, levels)

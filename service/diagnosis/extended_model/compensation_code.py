@@ -7,8 +7,8 @@ same instant. What needs a state, other joints or the clock is named in the file
 from collections.abc import Mapping, Sequence
 from datetime import datetime
 
-from service.diagnosis.diagnosed import Diagnosis
-from service.diagnosis.term import Term
+from service.diagnosis.findings.diagnosed import Diagnosis
+from service.diagnosis.model.term import Term
 from service.errors import ExportError
 from service.identification.compensation import (
     CompensationModel,
@@ -29,7 +29,7 @@ EXPRESSIONS: Mapping[str, str] = {
     "asymmetric_viscous": "{c0} * fabs(v)",
     "nonlinear_viscous": "{c0} * copysign(pow(fabs(v), {s0}), v)",
     "load_dependent_friction": "{c0} * fabs(load) * atan({k_v} * v) * " + TWO_OVER_PI,
-    "position_dependent_friction": "({c0} * cos(q) + {c1} * sin(q)) * atan({k_v} * v) * " + TWO_OVER_PI,
+    "position_dependent_friction": "({c0} * cos({s0} * q) + {c1} * sin({s0} * q)) * atan({k_v} * v) * " + TWO_OVER_PI,
     "stribeck_friction": "{c0} * atan({k_v} * v) * " + TWO_OVER_PI + " * exp(-pow(fabs(v) / {s0}, {s1}))",
     "cogging": "{c0} * sin({s0} * q) + {c1} * cos({s0} * q)",
     "torque_ripple": "load * ({c0} * sin({s0} * q) + {c1} * cos({s0} * q))",

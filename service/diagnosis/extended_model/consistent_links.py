@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from service.diagnosis.diagnosed import Diagnosis
+from service.diagnosis.findings.diagnosed import Diagnosis
 from service.identification.least_squares import Solution
 from service.identification.physical_estimate import consistent_estimate
 from service.robot import LinkInertia

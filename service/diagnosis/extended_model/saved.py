@@ -1,6 +1,7 @@
 """An extended model as a file, schema tauscope.model/1, and back: every number reads as the same float64."""
 
 from dataclasses import fields
+from inspect import isabstract
 from pathlib import Path
 from typing import Any, Literal
 
@@ -8,11 +9,11 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from service.diagnosis.catalogue import Effect, catalogue
-from service.diagnosis.diagnosed import Diagnosis
+from service.diagnosis.documents.result import Document
 from service.diagnosis.extended_model.consistent_links import consistent_links
-from service.diagnosis.model import ExtendedModel
-from service.diagnosis.result import Document
-from service.diagnosis.term import Term
+from service.diagnosis.findings.diagnosed import Diagnosis
+from service.diagnosis.model.extended import ExtendedModel
+from service.diagnosis.model.term import Term
 from service.dynamics import base_parameters
 from service.errors import IdentificationError
 from service.identification.structure import JointTerms, ModelStructure
@@ -193,8 +194,7 @@ def _entry(term: Term, names: list[str]) -> EffectEntry:
 
 
 def _term(entry: EffectEntry, names: list[str]) -> Term:
-    kinds: dict[tuple[str, str], type[Effect]] = {(kind.id, kind.__name__): kind for kind in _with_forms(catalogue())}
-    kind = kinds.get((entry.effect, entry.form))
+    kind = _forms().get((entry.effect, entry.form))
     if kind is None or (entry.joint is not None and entry.joint not in names):
         place = entry.effect if entry.joint is None else f"{entry.effect}@{entry.joint}"
         raise IdentificationError(f"effect {shown(place)} is not known here: install the plugin that has it")
@@ -206,9 +206,13 @@ def _term(entry: EffectEntry, names: list[str]) -> Term:
     return Term(effect, shape, np.array([each.value for each in entry.coefficients]))
 
 
-def _with_forms(kinds: tuple[type[Effect], ...]) -> list[type[Effect]]:
-    """Effects and the forms derived from them."""
-    found: list[type[Effect]] = []
-    for kind in kinds:
-        found += [kind, *_with_forms(tuple(kind.__subclasses__()))]
-    return found
+def _forms() -> dict[tuple[str, str], type[Effect]]:
+    """Classes of the catalogue's effects, by id and name: one that is listed there may bring forms of other classes."""
+    known = {kind.id for kind in catalogue()}
+    kinds = [kind for kind in _derived(Effect) if not isabstract(kind)]
+    return {(kind.id, kind.__name__): kind for kind in kinds if kind.id in known}
+
+
+def _derived(kind: type[Effect]) -> list[type[Effect]]:
+    """All classes derived from one."""
+    return [each for own in kind.__subclasses__() for each in (own, *_derived(own))]

@@ -14,9 +14,10 @@ import numpy as np
 from ruamel.yaml import YAML
 
 from service.diagnosis.catalogue.time_local import EVERY, HALF_SINE
-from service.diagnosis.diagnosed import Diagnosis
+from service.diagnosis.catalogue.torque_sensing import Clipping
 from service.diagnosis.extended_model.consistent_links import consistent_links
-from service.diagnosis.term import Term
+from service.diagnosis.findings.diagnosed import Diagnosis
+from service.diagnosis.model.term import Term
 from service.robot import LinkInertia
 
 Entry = dict[str, Any]
@@ -147,7 +148,7 @@ def _saturation(term: Term, shape: Sequence[float], own: Sequence[float], diagno
     """Clipped at c, or the soft curve: τ - a (τ - c tanh(τ/c)) is l tanh(τ/l) to third order, l = c/√a."""
     if own[0] <= 0.0:
         return []
-    clips = getattr(term.effect, "clips", False)
+    clips = isinstance(term.effect, Clipping)
     level = shape[0] if clips else shape[0] / float(np.sqrt(own[0]))
     return [{"level": level, "shape": "clip" if clips else "compression"}]
 
@@ -174,7 +175,7 @@ ENTRIES: Mapping[str, Any] = {
     "nonlinear_viscous": lambda t, s, c, d: [{"amplitude": c[0], "exponent": s[0]}],
     "load_dependent_friction": lambda t, s, c, d: [{"mu": c[0]}],
     "position_dependent_friction": lambda t, s, c, d: [
-        {"amplitude": float(np.hypot(*c)), "order": 1.0, "phase": float(np.arctan2(c[0], c[1]))}
+        {"amplitude": float(np.hypot(*c)), "order": s[0], "phase": float(np.arctan2(c[0], c[1]))}
     ],
     "stribeck_friction": lambda t, s, c, d: [{"amplitude": c[0], "velocity": s[0], "exponent": s[1]}],
     "presliding_hysteresis": lambda t, s, c, d: [{"distance": s[0]}],

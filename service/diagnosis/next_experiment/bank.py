@@ -1,6 +1,7 @@
 """Motions to choose the next experiment from: Fourier series of several kinds, sweeps, slow reversals.
 
-All keep the arm's limits of position, speed and acceleration, and of torque as far as the identified model predicts it.
+All keep the arm's limits of position, speed and acceleration, and of torque as far as the identified model predicts it;
+where that would allow no posture, as far as the robot file's does.
 """
 
 from collections.abc import Iterator
@@ -9,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from service.diagnosis.next_experiment.sweeps import sweep
+from service.errors import ExcitationError
 from service.excitation import ExcitationOptions, FourierSegment, MotionSamples, Trajectory
 from service.excitation.setting import Setting
 from service.excitation.slow_reversals import slow_part
@@ -65,8 +67,15 @@ class Bank:
     """
 
     def __init__(self, identification: Identification, rng: np.random.Generator) -> None:
-        robot = _as_identified(identification)
         self._rng = rng
+        try:
+            self._prepare(_as_identified(identification))
+        except ExcitationError:
+            # the arm was in some posture: what was identified of a poor motion is no guide where it allows none
+            self._prepare(identification.robot)
+
+    def _prepare(self, robot: Robot) -> None:
+        """Constraints and standing postures of an arm as it is believed to be."""
         self._settings = {
             kind: Setting.of(robot, ExcitationOptions(period_s=period, harmonics=harmonics))
             for kind, (period, harmonics) in KINDS.items()
@@ -74,7 +83,7 @@ class Bank:
         self._robot = robot
         first = next(iter(self._settings.values()))
         self._limits, self._states = first.planned, first.states
-        self._postures = first.feasibility.standing_postures(rng)
+        self._postures = first.feasibility.standing_postures(self._rng)
 
     def first_look(self, of_each: int) -> Iterator[Primitive]:
         """Some motions of every kind.

@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from service.diagnosis.diagnosed import Diagnosis
-from service.diagnosis.model import ExtendedModel
+from service.diagnosis.findings.diagnosed import Diagnosis
+from service.diagnosis.findings.verdict import Verdict
+from service.diagnosis.model.extended import ExtendedModel
 from service.diagnosis.next_experiment.bank import KINDS, Bank, Primitive
 from service.diagnosis.next_experiment.separation import equations, log_variances, played, separations
-from service.diagnosis.verdict import Verdict
 from service.errors import ExcitationError
 from service.excitation import Trajectory
 from service.recording.recording import Array

@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from service.diagnosis.fit import Fitter
-from service.diagnosis.model import ExtendedModel
-from service.diagnosis.observations import Observations
-from service.diagnosis.regressor_noise import weights_of_motion
+from service.diagnosis.fitting.fit import Fitter
+from service.diagnosis.fitting.regressor_noise import weightings_of_motion
+from service.diagnosis.model.extended import ExtendedModel
+from service.diagnosis.observations.observations import Observations
 from service.excitation import Trajectory
 from service.recording import Recording
 from service.recording.conditioning import Conditioner
@@ -60,7 +60,7 @@ def played(trajectory: Trajectory, observations: Observations, model: ExtendedMo
     number = len(observations.names)  # later than all that were recorded
     pieces = tuple(replace(piece, prepared=replace(piece.prepared, recording=number)) for piece in rows)
     rows = replace(rows, pieces=pieces).with_noise(observations.noise)
-    return Played(Fitter(rows.with_weights(weights_of_motion(rows, model))))
+    return Played(Fitter(rows.with_weightings(weightings_of_motion(rows, model))))
 
 
 def _measured(position: Array, noises: Sequence[PositionNoise], rate_hz: float) -> Array:

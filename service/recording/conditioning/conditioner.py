@@ -58,8 +58,8 @@ class Conditioner:
         noise of the positions, and the band that the motion's sources allow
     source : MotionSource
         what every joint's velocity and acceleration are made from
-    state_hz : float or None
-        cut-off of the smoothing of motion that is not averaged [Hz]; by the common band's where None
+    state_hz : (n,) float64 or None
+        cut-off of the smoothing of motion that is not averaged, joint by joint [Hz]; by the common band's where None
     """
 
     recording: Recording
@@ -67,7 +67,7 @@ class Conditioner:
     timing: Timing
     noise: PositionNoise
     source: MotionSource
-    state_hz: float | None = None
+    state_hz: Array | None = None
 
     @staticmethod
     def survey(recording: Recording, robot: Robot) -> "Conditioner":
@@ -94,13 +94,13 @@ class Conditioner:
         noise = replace(noise, limit_hz=lowest_limit(source.limits_hz), joint_limits_hz=source.limits_hz)
         return Conditioner(recording, robot, timing, noise, source)
 
-    def as_one_motion(self, state_hz: float | None) -> "Conditioner":
+    def as_one_motion(self, state_hz: Array | None) -> "Conditioner":
         """The same recording with no period averaged: each repetition of a motion counts as the motion that it was.
 
         Parameters
         ----------
-        state_hz : float or None
-            cut-off of the motion's own smoothing [Hz]; by the common band's where None
+        state_hz : (n,) float64 or None
+            cut-off of the motion's own smoothing, joint by joint [Hz]; by the common band's where None
         """
         return replace(self, timing=replace(self.timing, runs=()), state_hz=state_hz)
 

@@ -52,6 +52,25 @@ def smooth(values: Array, rate_hz: float, cutoff_hz: float) -> Array:
     return signal.sosfiltfilt(sections, values, axis=0, padlen=padding)
 
 
+def smooth_each(values: Array, rate_hz: float, cutoffs_hz: Array) -> Array:
+    """`smooth`, each signal in a band of its own.
+
+    Parameters
+    ----------
+    values : (N, n) float64
+        signals, a column each
+    rate_hz : float
+        sampling rate [Hz]
+    cutoffs_hz : (n,) float64
+        f_c of each [Hz]
+    """
+    smoothed = np.empty_like(values)
+    for cutoff_hz in np.unique(cutoffs_hz):
+        alike = cutoffs_hz == cutoff_hz
+        smoothed[:, alike] = smooth(values[:, alike], rate_hz, float(cutoff_hz))
+    return smoothed
+
+
 def smoothing_margin(rate_hz: float, cutoff_hz: float) -> int:
     """Samples at each end that `smooth` cannot be trusted with: the slowest pole has decayed to 0.1 %.
 

@@ -9,7 +9,7 @@ from service.recording.conditioning.filters import (
     DIFFERENCE_MARGIN,
     STATE_BAND_RATIO,
     derivative,
-    smooth,
+    smooth_each,
     smoothing_margin,
 )
 from service.recording.conditioning.motion_source import MotionSource
@@ -78,19 +78,20 @@ class Trim:
         the same for every piece, so that pieces join
     cutoff_hz : float or None
         of the band [Hz]; None where it is open
-    state_hz : float
-        cut-off of the motion's own smoothing [Hz]; the sampling rate where nothing is smoothed
+    state_hz : float or (n,) float64
+        cut-off of the motion's own smoothing, of each joint if they differ [Hz]; the sampling rate where nothing is
+        smoothed
     margin : int
         samples that smoothing and differentiation take from each end of a piece
     """
 
     band: AllPass | Decimator
     cutoff_hz: float | None
-    state_hz: float
+    state_hz: float | Array
     margin: int
 
     @staticmethod
-    def design(rate_hz: float, cutoff_hz: float | None, state_hz: float | None = None) -> "Trim":
+    def design(rate_hz: float, cutoff_hz: float | None, state_hz: Array | None = None) -> "Trim":
         """Band and margin for a cut-off.
 
         Parameters
@@ -99,14 +100,14 @@ class Trim:
             sampling rate [Hz]
         cutoff_hz : float or None
             of the common band [Hz]; None for no filter
-        state_hz : float or None
-            of the motion's own smoothing [Hz]; `state_cutoff` where None
+        state_hz : (n,) float64 or None
+            of the motion's own smoothing, joint by joint [Hz]; `state_cutoff` where None
         """
         margin = 2 * DIFFERENCE_MARGIN
         if cutoff_hz is None or cutoff_hz >= OPEN_BAND_FRACTION * rate_hz:
             return Trim(AllPass(rate_hz), None, rate_hz, margin)
         smoothing = state_cutoff(rate_hz, cutoff_hz) if state_hz is None else state_hz
-        margin += smoothing_margin(rate_hz, smoothing)
+        margin += smoothing_margin(rate_hz, float(np.min(smoothing)))
         return Trim(Decimator.design(rate_hz, cutoff_hz), cutoff_hz, smoothing, margin)
 
     @property
@@ -163,16 +164,18 @@ def transient_motion(stretch: Stretch, trim: Trim, source: MotionSource) -> Moti
     rate, count = stretch.rate_hz, len(stretch.position)
     if not trim.outputs(count):
         return None
-    cutoff = trim.state_hz
-    position = smooth(stretch.position, rate, cutoff)
+    cutoffs = np.broadcast_to(trim.state_hz, stretch.position.shape[1])
+    position = smooth_each(stretch.position, rate, cutoffs)
     velocity = derivative(position, rate)
     use_velocity = _usable(stretch.velocity, source.velocity)
     if stretch.velocity is not None and use_velocity.any():
-        velocity[:, use_velocity] = smooth(stretch.velocity[:, use_velocity], rate, cutoff)
+        velocity[:, use_velocity] = smooth_each(stretch.velocity[:, use_velocity], rate, cutoffs[use_velocity])
     acceleration = derivative(velocity, rate)
     use_acceleration = _usable(stretch.acceleration, source.acceleration)
     if stretch.acceleration is not None and use_acceleration.any():
-        acceleration[:, use_acceleration] = smooth(stretch.acceleration[:, use_acceleration], rate, cutoff)
+        acceleration[:, use_acceleration] = smooth_each(
+            stretch.acceleration[:, use_acceleration], rate, cutoffs[use_acceleration]
+        )
     inner = slice(trim.margin, count - trim.margin)
     return Motion(
         time=stretch.start_s + np.arange(count)[inner] / rate,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from service.recording.conditioning.filters import DIFFERENCE_MARGIN, derivative, smooth, smoothing_margin
+from service.recording.conditioning.filters import DIFFERENCE_MARGIN, derivative, smooth, smooth_each, smoothing_margin
 
 
 @pytest.mark.parametrize(("fraction_of_nyquist", "bound"), [(0.1, 2e-7), (0.2, 4e-5), (0.4, 8e-3)])
@@ -42,6 +42,13 @@ def test_smoothing_has_the_stated_gain_and_no_delay(frequency: float, gain: floa
     (in_phase, quadrature), *_ = np.linalg.lstsq(parts[inner], smoothed[inner], rcond=None)
     assert in_phase == pytest.approx(gain, rel=2e-3, abs=3e-4)
     assert abs(quadrature) < 1e-4 * gain
+
+
+def test_each_signal_has_its_own_band() -> None:
+    signals = np.random.default_rng(3).standard_normal((300, 4))
+    bands = np.array([5.0, 20.0, 5.0, 60.0])
+    each = np.hstack([smooth(signals[:, [j]], 100.0, band) for j, band in enumerate(bands)])
+    np.testing.assert_array_equal(smooth_each(signals, 100.0, bands), each)
 
 
 @pytest.mark.parametrize("offset", [0.0, 1e4, -3e6])

@@ -1,0 +1,150 @@
+"""A transmission that lets its link be elsewhere than the encoder on the motor's side says, and what torque that makes.
+
+q_link = q - δ, so that to first order the torque changes by -(∂τ/∂q δ + ∂τ/∂q̇ δ' + ∂τ/∂q̈ δ'') at every joint. In δ''
+stands the fourth derivative of the position: the load is smoothed before, to a band that the data choose.
+"""
+
+from abc import abstractmethod
+from typing import ClassVar
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from service.diagnosis.catalogue.effect import Effect
+from service.diagnosis.catalogue.parameters import Shape
+from service.diagnosis.catalogue.setting import Setting
+from service.diagnosis.catalogue.signals import Signals
+from service.dynamics import inverse_dynamics
+from service.recording.recording import Array
+
+SMALL = 1e-4
+"""Step of the difference quotient by position [rad or m]: far above rounding, far below the curvature of any sine."""
+
+SLOPES_HZ = 100.0
+"""Rate at which derivatives by the state are taken: they change with the pose, by far slower than a recording."""
+
+LEAST_INERTIA = 0.05
+"""Share of a joint's largest inertia below which a fitted one is an error of the fit."""
+
+BAND = Shape("band", "Hz", fixed=True, reported=False)
+"""Of the load that deflects the transmission."""
+
+
+class Deflection(Effect):
+    """δ of one joint's transmission, per unit of its one coefficient: an effect says which δ its load makes."""
+
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "velocity", "acceleration", "load"})
+
+    @staticmethod
+    def deflected_joints(setting: Setting) -> list[int]:
+        """Joints that move, and whose transmission carries anything.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        """
+        return [joint for joint in setting.joints if setting.moves(joint) and setting.is_loaded(joint)]
+
+    def touched(self, joint_count: int) -> tuple[int, ...]:
+        """All joints.
+
+        Parameters
+        ----------
+        joint_count : int
+            n
+        """
+        return tuple(range(joint_count))
+
+    @abstractmethod
+    def deflection(self, load: Array, inertia: Array, shape: Array, rate_hz: float) -> Array:
+        """δ per unit of the coefficient along a motion, (N,).
+
+        Parameters
+        ----------
+        load : (N,) float64
+            τ_rb, smoothed [Nm or N]
+        inertia : (N,) float64
+            of the link and all that it carries, zero where it is not known [kg m² or kg]
+        shape : (k,) float64
+            values of the shape parameters
+        rate_hz : float
+            sampling rate [Hz]
+        """
+
+    def columns(self, signals: Signals, shapes: Array) -> Array:
+        """Torque of the deflection; where the motion repeats, as in a repetition that follows another.
+
+        Parameters
+        ----------
+        signals : Signals
+            one piece of motion
+        shapes : (g, k) float64
+            values of the shape parameters, `BAND` among them
+        """
+        joint, band = self.joint or 0, self.shapes.index(BAND)
+        times, count = 2 if signals.periodic else 1, signals.position.shape[-1]
+        inertia = np.tile(inertia_of_link(signals, joint), times)
+        found = []
+        for shape in shapes:
+            load = np.tile(signals.smoothed(signals.load[joint], shape[band]), times)
+            lag = self.deflection(load, inertia, shape, signals.rate_hz)[-count:]
+            found.append(torque_of_deflection(signals, joint, lag))
+        return np.stack(found)[:, None]
+
+
+def torque_of_deflection(signals: Signals, joint: int, deflection: Array) -> Array:
+    """Torque that a small deflection of one joint's transmission makes at all joints.
+
+    Parameters
+    ----------
+    signals : Signals
+        one piece of motion
+    joint : int
+        joint index, from 0
+    deflection : (N,) float64
+        δ, by how much the link lags the motor [rad or m]
+
+    Returns
+    -------
+    (n, N) float64
+        τ(q - δ) - τ(q), to first order [Nm or N]
+    """
+    by_position, by_velocity, by_acceleration = _slopes(signals, joint)
+    rate = signals.derivative(deflection)
+    return -(by_position * deflection + by_velocity * rate + by_acceleration * signals.derivative(rate))
+
+
+def inertia_of_link(signals: Signals, joint: int) -> Array:
+    """Inertia that a joint's transmission moves, (N,) [kg m² or kg]; zero where the fit knows of none.
+
+    Parameters
+    ----------
+    signals : Signals
+        one piece of motion
+    joint : int
+        joint index, from 0
+    """
+    inertia = _slopes(signals, joint)[2][joint]
+    return np.asarray(np.maximum(inertia, LEAST_INERTIA * max(float(inertia.max()), 0.0)))
+
+
+def _slopes(signals: Signals, joint: int) -> tuple[Array, Array, Array]:
+    return signals.remembered(f"state of {joint}", lambda: _by_state(signals, joint))
+
+
+def _by_state(signals: Signals, joint: int) -> tuple[Array, Array, Array]:
+    """∂τ/∂q_j, ∂τ/∂q̇_j, ∂τ/∂q̈_j along the motion, (n, N) each; torque is quadratic in q̇ and linear in q̈."""
+    count = signals.position.shape[-1]
+    knots = np.unique(np.append(np.arange(0, count, max(int(signals.rate_hz // SLOPES_HZ), 1)), count - 1))
+    state = [each.T[knots] for each in (signals.position, signals.velocity, signals.acceleration)]
+    slopes = []
+    for order, step in enumerate((SMALL, 1.0, 1.0)):
+        torques = []
+        for sign in (0.5, -0.5):
+            moved = [each.copy() if place == order else each for place, each in enumerate(state)]
+            moved[order][:, joint] += sign * step
+            torques.append(inverse_dynamics(signals.robot, signals.bodies, *moved).T)
+        slope = (torques[0] - torques[1]) / step
+        slopes.append(slope if len(knots) == count else CubicSpline(knots, slope, axis=1)(np.arange(count)))
+    return slopes[0], slopes[1], slopes[2]

@@ -1,0 +1,132 @@
+"""A transmission that gives way under load, quasi-statically or with the resonance of link and spring."""
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+from scipy.linalg import solve_banded
+
+from service.diagnosis.catalogue.deflection import BAND, Deflection
+from service.diagnosis.catalogue.effect import Effect
+from service.diagnosis.catalogue.parameters import Coefficient, Shape
+from service.diagnosis.catalogue.setting import Setting
+from service.recording.recording import Array
+
+BANDS = np.array([1.0, 0.35, 0.12])
+"""Bands to which the load is smoothed, relative to the common one."""
+
+RESONANCES = np.array([0.6, 0.75, 0.9, 1.1, 1.35, 1.7, 2.2, 3.0])
+"""Resonances of the link at its mean inertia, the motor held, relative to the common band; beyond, nothing is seen."""
+
+SAME = 1.6
+"""Factor between the compliance that swings and the one that is found, up to which they are the same."""
+
+CLEARLY_BETTER = 20.0
+"""What a resonance has to explain more than a joint that follows its load at once [noise variances]."""
+
+DAMPING = 0.1
+"""Damping ratio of the resonance: gears and bearings make it heavier than steel alone."""
+
+
+def transmitted(load: Array, inertia: Array, compliance: float, rate_hz: float) -> Array:
+    """What a spring transmits to a link whose load is given for a rigid transmission: I δ̈ + D δ̇ + K δ = τ_rb.
+
+    D = 2 ζ √(K Ī) with the mean inertia Ī. By the trapezoidal rule, from rest under the first load.
+
+    Parameters
+    ----------
+    load : (N,) float64
+        τ_rb [Nm or N]
+    inertia : (N,) float64
+        I, above zero [kg m² or kg]
+    compliance : float
+        1/K [rad/Nm or m/N]
+    rate_hz : float
+        sampling rate [Hz]
+
+    Returns
+    -------
+    (N,) float64
+        K δ [Nm or N]
+    """
+    by_acceleration = rate_hz**2 * compliance * inertia
+    by_rate = DAMPING * rate_hz * np.sqrt(compliance * inertia.mean())
+    ahead = by_acceleration + by_rate + 0.25
+    here = 0.5 - 2.0 * by_acceleration
+    behind = by_acceleration - by_rate + 0.25
+    # row k + 1 holds the equation at k; the first two say that it rests
+    count = len(load)
+    matrix = np.zeros((3, count))
+    matrix[0, :2], matrix[0, 2:] = 1.0, ahead[1:-1]
+    matrix[1, 1:-1], matrix[2, :-2] = here[1:-1], behind[1:-1]
+    right = np.concatenate([load[:1], load[:1], 0.25 * (load[2:] + 2.0 * load[1:-1] + load[:-2])])
+    return np.asarray(solve_banded((2, 0), matrix, right))
+
+
+class JointElasticity(Deflection):
+    """q_link = q - c τ, τ the load as the spring passes it on."""
+
+    id: ClassVar[str] = "joint_elasticity"
+    equation: ClassVar[str] = "q_link = q - c tau_rb, c = 1/stiffness"
+    meaning: ClassVar[str] = "the transmission gives way under load"
+    remedy: ClassVar[str] = "model the joint as two masses with a stiffness between them"
+    revealing_motion: ClassVar[str] = "sharp reversals from constant speed, and an encoder on the link"
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("c", "{q}/{tau}", positive=True),)
+    shapes: ClassVar[tuple[Shape, ...]] = (BAND, Shape("swinging", "{q}/{tau}", fixed=True, reported=False))
+
+    @classmethod
+    def forms(cls, setting: Setting) -> Sequence[Effect]:
+        """One a joint that moves.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        """
+        bands = BANDS * setting.cutoff_hz
+        stiff = np.stack([bands, np.zeros(len(bands))], axis=1)
+        made = []
+        for joint in cls.deflected_joints(setting):
+            grid = stiff
+            if setting.inertia[joint] > 0.0:
+                swinging = 1.0 / ((2.0 * np.pi * RESONANCES * setting.cutoff_hz) ** 2 * setting.inertia[joint])
+                grid = np.concatenate([stiff, np.stack([np.full(len(swinging), bands[0]), swinging], axis=1)])
+            made.append(cls(joint, grid, grid.min(axis=0), grid.max(axis=0)))
+        return made
+
+    def reluctance(self, shapes: Array) -> Array:
+        """A resonance has to be clearly better: where little is seen, any of them fits some noise.
+
+        Parameters
+        ----------
+        shapes : (g, 2) float64
+            band of the load [Hz], compliance on which the link swings, 0 where it does not [rad/Nm or m/N]
+        """
+        return np.where(shapes[:, 1] == 0.0, 0.0, CLEARLY_BETTER)
+
+    def is_consistent(self, coefficients: Array, shape: Array) -> bool:
+        """Whether what gives way is what the link swings on.
+
+        Parameters
+        ----------
+        coefficients : (1,) float64
+            c [rad/Nm or m/N]
+        shape : (2,) float64
+            band of the load [Hz], compliance on which the link swings, 0 where it does not [rad/Nm or m/N]
+        """
+        return bool(shape[1] == 0.0 or 1.0 / SAME < coefficients[0] / shape[1] < SAME)
+
+    def deflection(self, load: Array, inertia: Array, shape: Array, rate_hz: float) -> Array:
+        """What the spring transmits.
+
+        Parameters
+        ----------
+        load, inertia : (N,) float64
+            of the link [Nm or N, kg m² or kg]
+        shape : (2,) float64
+            band of the load [Hz], compliance on which the link swings, 0 where it does not [rad/Nm or m/N]
+        rate_hz : float
+            sampling rate [Hz]
+        """
+        swinging = float(shape[1])
+        return load if swinging == 0.0 or not inertia.all() else transmitted(load, inertia, swinging, rate_hz)

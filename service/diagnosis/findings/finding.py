@@ -1,0 +1,200 @@
+"""What was found, each finding beside all others: how much it explains, and what the model without it leaves."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from service.diagnosis.catalogue import Effect, TimeLocalEffect
+from service.diagnosis.fitting.fit import Fit, Fitter
+from service.diagnosis.model.extended import ExtendedModel
+from service.diagnosis.model.residual import raw_squares
+from service.diagnosis.model.term import Term
+from service.diagnosis.observations.observations import Observations
+from service.diagnosis.screening.screen import Screen
+from service.diagnosis.selection.choice import Option, Selection
+from service.diagnosis.selection.confirmation import HeldOut
+from service.diagnosis.selection.equivalence import doubt, probability_among
+from service.diagnosis.selection.interleaved import interleaved_confirmation
+from service.diagnosis.selection.shape_error import groups_of, standings, without_group
+from service.recording.recording import Array
+
+
+@dataclass(frozen=True, eq=False)
+class FitSizes:
+    """Rms of the torque residual at the recorded rate, no filter.
+
+    train : (n,) float64
+        on the recordings that the model was made from [Nm or N]
+    held_out : (n,) float64 or None
+        on recordings that were not used
+    """
+
+    train: Array
+    held_out: Array | None
+
+
+@dataclass(frozen=True, eq=False)
+class Finding:
+    """Effects of one kind at one place: one term, or several orders of a periodic torque.
+
+    terms : tuple of Term
+        as in the final model
+    covariances : tuple of (k, k) float64
+        of each term's coefficients and shapes
+    gain : float
+        what they take off the residual's energy beside all other findings [noise variances]
+    probability : float
+        that it is this effect, and neither one of its equivalents nor an error of a larger effect's curve
+    before, after : FitSizes
+        residuals of the model without it, and with all findings
+    alternatives : tuple of Option
+        what explains nearly as much in its place
+    confirmed : bool or None
+        by motion that was not used; None where there was none
+    in_model : bool
+        whether the terms stand in the final model beside its nominal part, and not within that
+    behind : Effect or None
+        the effect that leads at its joint, of whose curve it may be an error
+    """
+
+    terms: tuple[Term, ...]
+    covariances: tuple[Array, ...]
+    gain: float
+    probability: float
+    before: FitSizes
+    after: FitSizes
+    alternatives: tuple[Option, ...] = ()
+    confirmed: bool | None = None
+    in_model: bool = True
+    behind: Effect | None = None
+
+    @property
+    def place(self) -> tuple[str, int | None]:
+        """Effect id and joint index."""
+        effect = self.terms[0].effect
+        return effect.id, effect.joint
+
+
+def sizes(model: ExtendedModel, fitter: Fitter, held_out: HeldOut | None) -> FitSizes:
+    """Raw residuals of a model on training and held-out recordings.
+
+    Parameters
+    ----------
+    model : ExtendedModel
+        the model
+    fitter : Fitter
+        of the training recordings
+    held_out : HeldOut or None
+        the others
+    """
+    train = _rms(model, fitter.observations)
+    return FitSizes(train, None if held_out is None else _rms(model, held_out.observations))
+
+
+def _rms(model: ExtendedModel, observations: Observations) -> Array:
+    squares, samples = raw_squares(model, observations)
+    return np.sqrt(squares / np.maximum(samples, 1.0))
+
+
+def selected_findings(
+    selection: Selection, screen: Screen, fitter: Fitter, held_out: HeldOut | None, inflation: float
+) -> tuple[Finding, ...]:
+    """Terms of one effect at one place together, each compared with the model without it.
+
+    Parameters
+    ----------
+    selection : Selection
+        what was selected
+    screen : Screen
+        of the training recordings
+    fitter : Fitter
+        of the same
+    held_out : HeldOut or None
+        the others
+    inflation : float
+        factor by which the residual exceeds the modelled noise
+    """
+    fit = selection.fit
+    covariance = fitter.covariance(fit) * inflation
+    groups = groups_of(fit.model)
+    after = sizes(fit.model, fitter, held_out)
+    all_without = [without_group(fit, places, fitter) for places in groups.values()]
+    own = standings(selection.nominal, fit, all_without, fitter, inflation)
+    found = []
+    for places, without, standing in zip(groups.values(), all_without, own, strict=True):
+        slices = fit.model.term_places()
+        terms = tuple(fit.model.terms[place] for place in places)
+        choices = [selection.choices[place] for place in places]
+        chosen, *rivals = choices[0].options
+        alternatives = _likely(rivals, without, screen, held_out)
+        found.append(
+            Finding(
+                terms=terms,
+                covariances=tuple(
+                    _spread_out(t, covariance[slices[p], slices[p]]) for t, p in zip(terms, places, strict=True)
+                ),
+                gain=without.energy - fit.energy,
+                probability=standing.certainty
+                * probability_among(
+                    chosen.score,
+                    [each.score for each in alternatives],
+                    [doubt(chosen, each, inflation) for each in alternatives],
+                ),
+                before=sizes(without.model, fitter, held_out),
+                after=after,
+                alternatives=alternatives,
+                confirmed=any(choice.confirmation is not None for choice in choices) or None,
+                behind=standing.behind,
+            )
+        )
+    return in_order(found)
+
+
+def _likely(options: Sequence[Option], without: Fit, screen: Screen, held_out: HeldOut | None) -> tuple[Option, ...]:
+    """The options less those windows that do not hold within themselves: one can be found on anything."""
+    return tuple(
+        option
+        for option in options
+        if not isinstance(option.candidate.effect, TimeLocalEffect)
+        or interleaved_confirmation(option.fit.model.terms[-1], without, option.fit, screen, held_out).confirmed(
+            cautious=True
+        )
+    )
+
+
+def in_order(found: Sequence[Finding]) -> tuple[Finding, ...]:
+    """Findings, most explained energy first.
+
+    Parameters
+    ----------
+    found : sequence of Finding
+        in any order
+    """
+    return tuple(sorted(found, key=lambda each: -each.gain))
+
+
+def without_nominal(fit: Fit, place: int, fitter: Fitter) -> Fit:
+    """The model fitted anew with one of its nominal parameters held at zero.
+
+    Parameters
+    ----------
+    fit : Fit
+        the model
+    place : int
+        of the parameter among Θ
+    fitter : Fitter
+        of the recordings
+    """
+    parameters = fit.model.parameters.copy()
+    parameters[place] = 0.0
+    return fitter.fit(replace(fit.model, parameters=parameters, held=(*fit.model.held, place)))
+
+
+def _spread_out(term: Term, covariance: Array) -> Array:
+    """Covariance of coefficients and all shapes; shapes that were only chosen have none."""
+    count = len(term.coefficients)
+    places = [*range(count), *(count + place for place in term.free_shapes)]
+    whole = np.zeros((count + len(term.shape), count + len(term.shape)))
+    whole[np.ix_(places, places)] = covariance
+    return whole

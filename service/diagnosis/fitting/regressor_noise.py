@@ -1,0 +1,145 @@
+"""What the columns themselves do not know: friction's step where a joint's velocity is smaller than its own error.
+
+Under stiff friction a joint sticks at every reversal: its torque runs from one level to the other while the velocity
+creeps within ±1/K_v. No position sensor shows that. With a velocity known to ±δ the step is known to
+
+    u = |F(q̇ + δ) - F(q̇ - δ)| / 2,        F(q̇) = τ_s A(K_v q̇) + τ_sc A(δ_s q̇),
+
+which is zero but near reversals. Rows that such an instant enters count less: taken at full weight, thirty reversals
+of rounded corners look like a delay, a rotor, or bristles.
+
+Nor are those errors independent. How a joint comes to rest is much the same at each of its reversals, and a band that
+is too narrow for it moves and rounds F(t) = F(q̇(t)) alike at all of them. With e the change that half the band makes,
+
+    e = F(q̇ in f/2) - F(q̇ in f),        c = dF/dt,        d = (e·c)/(c·c),
+
+the band itself is expected to have rounded by as much as e and to have moved all reversals by 2 d, with either sign: d
+is still growing from one octave to the next where it counts. Nor does a band move them by much more than a tenth of its
+period 1/f: on simulated arms, whose true velocities are known, by up to 0.15/f, where f is 5 to 60 Hz. What a fit could
+explain by that is not held against the model. Encoders of 12 bit leave bands of 6 Hz and d of 10 ms.
+
+An encoder of step s makes white noise of a joint that crosses many steps within the motion's time constant. Slower than
+v = s f, with f the band of the motion, single steps are followed, and the velocity is uncertain by v itself.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from service.diagnosis.fitting.fit import Fitter
+from service.diagnosis.model.extended import ExtendedModel
+from service.diagnosis.observations.observations import Observations, Piece
+from service.diagnosis.observations.row_weighting import RowWeighting
+from service.dynamics import smooth_sign
+from service.recording.conditioning.common_band import Decimator
+from service.recording.conditioning.filters import smooth
+from service.recording.recording import Array
+
+FAR_OFF = 6.0
+"""Power that the nominal model leaves, in noise variances, beyond which its friction is no guide to anything."""
+
+HALF_BAND = 0.5
+"""What the motion's velocity is without the upper half of its band stands for how far the band itself may be off."""
+
+BEYOND = 2.0
+"""By how much a band may have moved all reversals, in what half of it moves them by."""
+
+OF_ITS_PERIOD = 0.1
+"""…and no more than this part of its period 1/f."""
+
+
+def row_weightings(observations: Observations, model: ExtendedModel) -> tuple[RowWeighting, ...]:
+    """How much the whitened rows count, one entry a joint.
+
+    Parameters
+    ----------
+    observations : Observations
+        the data, noise known
+    model : ExtendedModel
+        the nominal model
+    """
+    fit = Fitter(observations).fit(model)  # an identification leaves alone what it cannot tell, however large it is
+    if fit.inflation() > FAR_OFF:
+        return tuple(
+            RowWeighting.certain(int(observations.kept(joint).sum())) for joint in range(len(observations.noise))
+        )
+    return weightings_of_motion(observations, fit.model)
+
+
+def weightings_of_motion(observations: Observations, model: ExtendedModel) -> tuple[RowWeighting, ...]:
+    """The same by a model that is right about friction, whatever torque was measured.
+
+    Parameters
+    ----------
+    observations : Observations
+        the data, noise known
+    model : ExtendedModel
+        the model
+    """
+    whole = observations.with_weightings(())
+    weightings = []
+    for joint, noise in enumerate(observations.noise):
+        power = noise.model.variance
+        parts = [
+            1.0 / np.sqrt(1.0 + _uncertain_power(piece, model, joint)[noise.order :] / power) for piece in observations
+        ]
+        weights = np.concatenate(parts)[observations.kept(joint)]
+        weightings.append(RowWeighting.of(weights, _shared_errors(whole, model, joint, weights)))
+    return tuple(weightings)
+
+
+def _shared_errors(observations: Observations, model: ExtendedModel, joint: int, weights: Array) -> Array:
+    """What the band makes of all reversals alike, e and 2 d c among weighted rows, (2, R)."""
+    changes, slopes = [], []
+    for piece in observations:
+        motion = piece.prepared.motion
+        friction = _steps(model, joint, motion.velocity[:, joint])
+        changes.append(piece.reduced((_steps(model, joint, _narrow_velocity(piece, joint)) - friction)[None]))
+        slopes.append(piece.reduced((np.gradient(friction) * motion.rate_hz)[None]))
+    change, slope = (weights * observations.white(joint, rows)[0] for rows in (changes, slopes))
+    delay = abs(float(change @ slope)) / max(float(slope @ slope), np.finfo(float).tiny)
+    narrowest = min(float(piece.state_hz[joint]) for piece in observations)
+    return np.stack([change, min(BEYOND * delay, OF_ITS_PERIOD / narrowest) * slope])
+
+
+def _uncertain_power(piece: Piece, model: ExtendedModel, joint: int) -> Array:
+    """Variance of a row's friction, (M,) [Nm² or N²]."""
+    motion = piece.prepared.motion
+    velocity = motion.velocity[:, joint]
+    rate, state_hz = motion.rate_hz, float(piece.state_hz[joint])
+    crawl = piece.position_noise.step[joint] * state_hz
+    noise = np.hypot(piece.velocity_std[joint], np.where(np.abs(velocity) < crawl, crawl, 0.0))
+    narrow = _narrow_velocity(piece, joint)
+    at_random = _step_error(model, joint, velocity, noise)
+    rounded = _step_error(model, joint, velocity, np.abs(velocity - narrow))
+    band = motion.band
+    if not isinstance(band, Decimator):
+        return at_random**2 + rounded**2
+    squared = Decimator(band.kernel**2, band.factor, band.rate_hz)
+    whole = Decimator(np.abs(band.kernel), band.factor, band.rate_hz)
+    together = max(rate / (2.0 * state_hz), 1.0)  # samples that share one error of the velocity
+    return together * squared.reduce(at_random**2) + whole.reduce(rounded) ** 2
+
+
+def _narrow_velocity(piece: Piece, joint: int) -> Array:
+    """A joint's velocity in half the motion's band, (N,)."""
+    motion = piece.prepared.motion
+    return smooth(motion.velocity[:, [joint]], motion.rate_hz, HALF_BAND * float(piece.state_hz[joint]))[:, 0]
+
+
+def _step_error(model: ExtendedModel, joint: int, velocity: Array, error: Array) -> Array:
+    """U for a velocity known to ± error, (N,)."""
+    ahead, behind = (_steps(model, joint, velocity + sign * error) for sign in (1.0, -1.0))
+    return 0.5 * np.abs(ahead - behind)
+
+
+def _steps(model: ExtendedModel, joint: int, velocity: Array) -> Array:
+    """Coulomb and Stribeck part of a joint's friction, (N,)."""
+    total = np.zeros_like(velocity)
+    terms = model.structure.terms[joint]
+    steps: Sequence[tuple[str, float | None]] = (("stiction", terms.k_v), ("stribeck", terms.delta))
+    for name, steepness in steps:
+        column = model.structure.coefficient(joint, name)
+        if column is not None and steepness is not None:
+            total += model.parameters[column] * smooth_sign(velocity, steepness)
+    return total

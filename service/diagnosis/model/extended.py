@@ -1,0 +1,265 @@
+"""The extended model: the nominal one, and the torque of the effects that were found beside it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from service.diagnosis.catalogue import Signals
+from service.diagnosis.model.term import Term, shape_step
+from service.diagnosis.observations.observations import Piece
+from service.dynamics import smooth_sign, smooth_sign_slope
+from service.identification.shape_sensitivity import ShapeParameter
+from service.identification.structure import ModelStructure
+from service.recording.recording import Array
+
+HOLDING = 1e8
+"""Inverse of the standard error [SI] of a parameter that no fit may move."""
+
+SIGNALS_KEPT = 3
+"""Sets of signals that are kept a piece: those of the model at hand, of the step that is tried, and of one more."""
+
+STEEPNESS_DIFFERENCE = 0.01
+"""Step of log K_v for the derivative of a term that has friction's step in it."""
+
+STATED_ERROR = 0.15
+"""Relative standard error of a constant of the friction curve that the robot file states: it may be a guess."""
+
+
+@dataclass(frozen=True, eq=False)
+class ExtendedModel:
+    """τ = W(K_v, δ) Θ + Σ effects.
+
+    structure : ModelStructure
+        the nominal columns with their present shape constants
+    parameters : (p,) float64
+        Θ
+    links : (10 n,) float64
+        standard parameters of the nearest physically consistent links, for effects that need a whole body
+    constants : tuple of (int, str)
+        shape constants of the friction curve that are estimated along, as logarithms
+    stated : tuple of float or None
+        for each of these the value that the robot file states, None where it states none
+    terms : tuple of Term
+        effects beside the nominal model
+    held : tuple of int
+        places among Θ that no fit moves
+    """
+
+    structure: ModelStructure
+    parameters: Array
+    links: Array
+    constants: tuple[ShapeParameter, ...]
+    stated: tuple[float | None, ...]
+    terms: tuple[Term, ...] = ()
+    held: tuple[int, ...] = ()
+
+    @property
+    def size(self) -> int:
+        """Number of all parameters: Θ, constants, then every term's."""
+        return self.structure.size + len(self.constants) + sum(term.size for term in self.terms)
+
+    @property
+    def steepness(self) -> Array:
+        """K_v of every joint's friction, (n,) [s/rad or s/m]."""
+        return np.array([terms.k_v for terms in self.structure.terms])
+
+    @property
+    def unmoved(self) -> tuple[int, ...]:
+        """Places among Θ that no fit moves: those held, and those that a term displaces."""
+        return tuple({*self.held, *(place for term in self.terms for place in term.displaced)})
+
+    def constant(self, place: int) -> float:
+        """Present value of an estimated constant of the friction curve.
+
+        Parameters
+        ----------
+        place : int
+            among `constants`
+        """
+        joint, name = self.constants[place]
+        terms = self.structure.terms[joint]
+        return terms.k_v if name == "k_v" else terms.delta or 0.0
+
+    def prior(self) -> tuple[Array, Array]:
+        """Rows of the robot file's statements about the friction curve, (s, p), and what they leave, (s,).
+
+        A stated constant counts as measured once, with a relative standard error of `STATED_ERROR`; a parameter that
+        is held, as measured `HOLDING` times better than any data can.
+        """
+        rows, left = [], []
+        for place in self.unmoved:
+            row = np.zeros(self.size)
+            row[place] = HOLDING
+            rows.append(row)
+            left.append(0.0)
+        for place, stated in enumerate(self.stated):
+            if stated is not None:
+                row = np.zeros(self.size)
+                row[self.structure.size + place] = 1.0 / STATED_ERROR
+                rows.append(row)
+                left.append(np.log(stated / self.constant(place)) / STATED_ERROR)
+        return np.array(rows).reshape(-1, self.size), np.array(left)
+
+    def term_places(self) -> list[slice]:
+        """Where each term's parameters stand among all."""
+        first = self.structure.size + len(self.constants)
+        places = []
+        for term in self.terms:
+            places.append(slice(first, first + term.size))
+            first += term.size
+        return places
+
+    def without_terms(self) -> "ExtendedModel":
+        """The nominal part alone."""
+        return replace(self, terms=())
+
+    def sensitivity_columns(self, piece: Piece, joint: int) -> tuple[list[int], Array]:
+        """∂τ/∂log K of a joint's own estimated constants, in the common band, (k, M), with their places.
+
+        Parameters
+        ----------
+        piece : Piece
+            from the observations
+        joint : int
+            joint index, from 0
+        """
+        places, rows = [], []
+        velocity = piece.prepared.motion.velocity[:, joint]
+        for place, (owner, name) in enumerate(self.constants):
+            if owner == joint:
+                column = self.structure.coefficient(joint, "stiction" if name == "k_v" else "stribeck")
+                amplitude = 0.0 if column is None else self.parameters[column]
+                value = self.constant(place)
+                rows.append(amplitude * value * smooth_sign_slope(velocity, value))
+                places.append(self.structure.size + place)
+        if not rows:
+            return places, np.zeros((0, piece.rows))
+        return places, piece.prepared.motion.band.reduce(np.stack(rows))
+
+    def standard_parameters(self) -> Array:
+        """Standard parameters with the fitted base parameters, (10 n,): those in combinations only are zero."""
+        base = self.structure.base
+        standard = np.zeros_like(self.links)
+        standard[base.independent_columns] = self.parameters[: self.structure.base_count]
+        return standard
+
+    def signals(self, piece: Piece) -> Signals:
+        """One piece of motion with what the nominal part of the model says of it.
+
+        Parameters
+        ----------
+        piece : Piece
+            from the observations
+        """
+        kept: list[tuple[tuple[object, ...], Signals]] = piece.memory.setdefault("signals", [])
+        key = (self.structure, self.parameters, self.links)
+        for known, signals in kept:
+            if all(a is b for a, b in zip(known, key, strict=True)):
+                return signals
+        signals = self._made_signals(piece)
+        kept.append((key, signals))
+        del kept[:-SIGNALS_KEPT]
+        return signals
+
+    def _made_signals(self, piece: Piece) -> Signals:
+        """The same, made anew."""
+        prepared, structure = piece.prepared, self.structure
+        motion = prepared.motion
+        bodies = np.where(np.arange(structure.size) < structure.base_count, self.parameters, 0.0)
+        whole, rigid = prepared.predicted_torque(structure, np.stack([self.parameters, bodies]))
+        load, acceleration = (piece.without_noise_of_inertia(rows) for rows in (rigid, motion.acceleration.T))
+        steepness = self.steepness
+        velocity = np.ascontiguousarray(motion.velocity.T)
+        return Signals(
+            robot=structure.robot,
+            rate_hz=motion.rate_hz,
+            time=piece.time,
+            recording=prepared.recording,
+            position=np.ascontiguousarray(motion.position.T),
+            velocity=velocity,
+            acceleration=acceleration,
+            load=load,
+            torque=whole - rigid + load,
+            step=smooth_sign(velocity, steepness[:, None]),
+            steepness=steepness,
+            bodies=self.standard_parameters(),
+            links=self.links,
+            periodic=motion.repetitions > 1,
+            of_motion=piece.memory.setdefault("of_motion", {}),
+        )
+
+    def term_torque(self, term: Term, signals: Signals) -> Array:
+        """Torque of one term at the recorded rate, (m, N) or (m, P, N) for the joints that it touches.
+
+        Parameters
+        ----------
+        term : Term
+            of this model
+        signals : Signals
+            one piece of motion
+        """
+        (columns,) = term.effect.columns(signals, term.shape[None])
+        return np.asarray(np.tensordot(term.coefficients, columns, axes=1), dtype=np.float64)
+
+    def step_sensitivity(self, term: Term, signals: Signals) -> Array:
+        """∂τ/∂log K_v of a term whose torque has friction's step in it, K_v of its own joint, (1, N) or (1, P, N).
+
+        Parameters
+        ----------
+        term : Term
+            of this model, at a joint
+        signals : Signals
+            one piece of motion
+        """
+        joint = term.effect.joint
+        ahead, behind = (
+            self.term_torque(term, _with_steepness(signals, joint, np.exp(sign * STEEPNESS_DIFFERENCE)))
+            for sign in (1.0, -1.0)
+        )
+        return (ahead - behind) / (2.0 * STEEPNESS_DIFFERENCE)
+
+    def term_derivatives(self, term: Term, signals: Signals) -> Array:
+        """Torque per unit of each of a term's parameters, (c + f, m, N) or (c + f, m, P, N).
+
+        Parameters
+        ----------
+        term : Term
+            of this model
+        signals : Signals
+            one piece of motion
+        """
+        steps = [shape_step(term, place) for place in term.free_shapes]
+        shapes = [term.shape]
+        for place, step in zip(term.free_shapes, steps, strict=True):
+            for sign in (1.0, -1.0):
+                moved = term.shape.copy()
+                moved[place] += sign * step
+                shapes.append(moved)
+        columns = term.effect.columns(signals, np.stack(shapes))
+        rows = [*columns[0]]
+        for number, step in enumerate(steps):
+            ahead, behind = columns[1 + 2 * number], columns[2 + 2 * number]
+            rows.append(np.tensordot(term.coefficients, ahead - behind, axes=1) / (2.0 * step))
+        return np.stack(rows)
+
+
+def _with_steepness(signals: Signals, joint: int | None, factor: float) -> Signals:
+    """The same signals with another K_v at a joint."""
+    steepness, step = signals.steepness.copy(), signals.step.copy()
+    steepness[joint] *= factor
+    step[joint] = smooth_sign(signals.velocity[joint], steepness[joint])
+    return replace(signals, steepness=steepness, step=step, _memory={})
+
+
+def with_terms(model: ExtendedModel, terms: Sequence[Term]) -> ExtendedModel:
+    """The same nominal part with other effects.
+
+    Parameters
+    ----------
+    model : ExtendedModel
+        the model
+    terms : sequence of Term
+        all effects
+    """
+    return replace(model, terms=tuple(terms))

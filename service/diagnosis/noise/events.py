@@ -1,0 +1,96 @@
+"""What happens once, or changes with time, differs from one repetition to the next, as noise does, and is none.
+
+Left in the differences between repetitions, a payload that is dropped or friction that falls would be taken for noise
+of its own size and colour, and whitened away. So before the noise is settled, such effects are screened as if it were
+white, and a term that makes the repetitions agree better is taken out of their differences, for that purpose only.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from service.diagnosis.catalogue import Effect
+from service.diagnosis.fitting.fit import Fit, Fitter
+from service.diagnosis.model.extended import ExtendedModel, with_terms
+from service.diagnosis.model.residual import residual_rows
+from service.diagnosis.model.term import Term
+from service.diagnosis.noise.floor import with_noise
+from service.diagnosis.observations.observations import Observations
+from service.diagnosis.observations.whitening import JointNoise
+from service.diagnosis.screening.refinement import refined
+from service.diagnosis.screening.screen import Candidate, Screen, model_signals
+from service.identification.autocorrelation import Autoregression
+from service.recording.recording import Array
+
+MOST_EVENTS = 3
+
+LOOKED_AT = 3
+"""Forms, best first, that are tried in each round."""
+
+CHANCE = 1e-4
+"""Chance, if all that the model leaves were white noise, beyond which a window is not looked into."""
+
+BETTER = 0.97
+"""Part of the noise's variance at some joint that is left at most where repetitions really agree better."""
+
+WORSE = 1.02
+
+
+def beside_events(
+    observations: Observations, known: Observations, model: ExtendedModel, effects: Sequence[Effect]
+) -> tuple[Observations, bool]:
+    """The observations with the noise that is left beside what happens once, and whether repetitions still tell it.
+
+    Parameters
+    ----------
+    observations : Observations
+        the data
+    known : Observations
+        the same with the noise that repetitions show
+    model : ExtendedModel
+        the nominal model
+    effects : sequence of Effect
+        the catalogue
+    """
+    passing = [effect for effect in effects if not effect.repeats_with_motion]
+    best, pure_error = known, True
+    rows = observations.with_noise(_white(observations, model))
+    screen, fitter = Screen(rows, passing, count_all=True), Fitter(rows)
+    fit = fitter.projected(model)
+    for _ in range(MOST_EVENTS):
+        signals = model_signals(fit.model, rows)
+        likely = [each for each in screen.candidates(fit) if each.p_value() < CHANCE]
+        ranked = sorted(likely, key=lambda each: -each.score)
+        for candidate in ranked[:LOOKED_AT]:
+            tried = fitter.fit(_with(fit, refined(candidate, fit, screen, signals)))
+            found, still_pure = with_noise(observations, tried.model, effects)
+            if still_pure and _agree_better(_variances(found), _variances(best)):
+                fit, best, pure_error = tried, found, still_pure
+                break
+        else:
+            break
+    return best, pure_error
+
+
+def _with(fit: Fit, candidate: Candidate) -> ExtendedModel:
+    term = Term(candidate.effect, candidate.shape, candidate.coefficients)
+    return with_terms(fit.model, [*fit.model.terms, term])
+
+
+def _white(observations: Observations, model: ExtendedModel) -> list[JointNoise]:
+    """Noise of the size of all that the model leaves."""
+    found = []
+    for pieces in residual_rows(model, observations):
+        power = float(np.mean(np.concatenate([rows[0] for rows in pieces]) ** 2)) + np.finfo(float).tiny
+        found.append(JointNoise(Autoregression(np.empty(0), power, power)))
+    return found
+
+
+def _variances(observations: Observations) -> Array:
+    return np.array([noise.model.variance for noise in observations.noise])
+
+
+def _agree_better(found: Array, before: Array) -> bool:
+    """Whether the noise is smaller somewhere, and larger nowhere."""
+    ratio = found / before
+    return bool(ratio.min() < BETTER and ratio.max() < WORSE)

@@ -1,0 +1,206 @@
+"""The noise of every joint's rows, from the data and not from the fit.
+
+Where motion repeats, what differs between repetitions is noise whatever the model lacks (pure error). Elsewhere the
+residual of a saturated fit stands in for it: the nominal model and as many candidates as explain anything, so that a
+left-out effect is not taken for the noise's colour and whitened away.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service.diagnosis.catalogue import Effect
+from service.diagnosis.fitting.fit import Fitter
+from service.diagnosis.model.extended import ExtendedModel
+from service.diagnosis.model.residual import residual_rows
+from service.diagnosis.observations.observations import BoolArray, Observations, Piece
+from service.diagnosis.observations.period_pairs import period_pairs, rounding_repeats
+from service.diagnosis.observations.whitening import JointNoise, fitted_noise
+from service.diagnosis.screening.screen import Screen, model_signals
+from service.identification.autocorrelation import Autoregression
+from service.recording.conditioning.common_band import Decimator
+from service.recording.recording import Array
+
+FEWEST_ROWS = 150
+"""Rows of pure error that a joint's noise model needs."""
+
+MOST_ADDED = 40
+"""Columns of the catalogue in a saturated fit at most, and not more than one in `ROWS_A_COLUMN` rows."""
+
+ROWS_A_COLUMN = 25
+
+
+FAR_ABOVE = 2.0
+"""What even a saturated fit leaves, relative to the pure error's power, beyond which it is what counts: what nothing in
+the catalogue explains is then the larger part of the disturbance, and has a colour of its own."""
+
+
+def with_noise(
+    observations: Observations, model: ExtendedModel, effects: Sequence[Effect]
+) -> tuple[Observations, bool]:
+    """The observations with their noise known, and whether it is pure error at every joint.
+
+    Parameters
+    ----------
+    observations : Observations
+        the data
+    model : ExtendedModel
+        the nominal model, fitted
+    effects : sequence of Effect
+        the catalogue, for the saturated fit
+    """
+    differences = [] if rounding_repeats(observations) else list(repeated_differences(observations, model))
+    pure = [[(rows[j], used[j], factor) for rows, used, factor in differences] for j in _joints(observations)]
+    if all(sum(int(used.sum()) for _, used, _ in parts) >= FEWEST_ROWS for parts in pure):
+        share = _band_share(observations)
+        noise = [fitted_noise(parts, share) for parts in pure]
+        return _beyond_pure_error(observations.with_noise(noise), model, effects)
+    return observations.with_noise(_saturated_noise(observations, model, effects)), False
+
+
+def repeated_differences(
+    observations: Observations, model: ExtendedModel
+) -> Iterator[tuple[Array, NDArray[np.bool_], float]]:
+    """What the residual of a period differs by from that of the period before: noise, whatever the model lacks.
+
+    Parameters
+    ----------
+    observations : Observations
+        the data
+    model : ExtendedModel
+        any model; the motion of each repetition is its own
+
+    Yields
+    ------
+    tuple of (n, M) float64, (n, M) bool and float
+        rows in the common band, which of them rest on measured torque, and the factor that turns their power into the
+        noise's
+    """
+    for piece in observations:
+        motion = piece.prepared.motion
+        pairs = list(period_pairs(observations, piece))
+        if not pairs:
+            continue
+        residual = motion.torque[0].T - _full_torque(model, piece)
+        measured = np.ascontiguousarray(motion.measured[0].T)
+        for pair in pairs:
+            rows = motion.band.reduce(np.ascontiguousarray(pair.later(residual) - residual[:, pair.earlier]))
+            used = motion.band.reduce_mask(measured[:, pair.earlier] & measured[:, pair.near])
+            yield rows, used, pair.factor
+
+
+def _full_torque(model: ExtendedModel, piece: Piece) -> Array:
+    """Torque of a model at the recorded rate, (n, N)."""
+    signals = model.signals(piece)
+    total = signals.torque.copy()
+    for term in model.terms:
+        torque = model.term_torque(term, signals)
+        total[list(term.effect.touched(len(total)))] += torque if torque.ndim == 2 else torque[:, 0]
+    return total
+
+
+def _joints(observations: Observations) -> range:
+    return range(observations.robot.joint_count)
+
+
+def _band_share(observations: Observations) -> float:
+    """Cut-off of the common band relative to the highest frequency of the rows; 1 where nothing is filtered."""
+    shares = []
+    for piece in observations:
+        band = piece.prepared.motion.band
+        if isinstance(band, Decimator):
+            response = np.abs(np.fft.rfft(band.kernel, 1 << 14))
+            cutoff = float(np.argmax(response < 0.5)) / (1 << 14) * piece.prepared.motion.rate_hz
+            shares.append(min(2.0 * cutoff / band.rate_hz, 1.0))
+    return min(shares, default=1.0)
+
+
+def _saturated_noise(observations: Observations, model: ExtendedModel, effects: Sequence[Effect]) -> list[JointNoise]:
+    """Noise of what a saturated fit leaves."""
+    residual = residual_rows(model, observations)
+    plain = []
+    for joint in _joints(observations):
+        power = float(np.mean(np.concatenate([rows[0] for rows in residual[joint]]) ** 2)) + np.finfo(float).tiny
+        plain.append(JointNoise(Autoregression(np.empty(0), power, power)))
+    left = _saturated(observations.with_noise(plain), model, effects)
+    share = _band_share(observations)
+    return [fitted_noise(_by_piece(observations, j, rows * plain[j].std), share) for j, rows in enumerate(left)]
+
+
+def _beyond_pure_error(
+    observations: Observations, model: ExtendedModel, effects: Sequence[Effect]
+) -> tuple[Observations, bool]:
+    """Pure error where it is all that a saturated fit leaves; at the other joints, what that fit leaves."""
+    fit = Fitter(observations).fit(model)
+    if fit.inflation() < FAR_ABOVE:
+        return observations, True
+    left = _saturated(observations, fit.model, effects)
+    above = [float(rows @ rows) / (len(rows) * own.share) for rows, own in zip(left, observations.noise, strict=True)]
+    if max(above) <= FAR_ABOVE:
+        return observations, True
+    other = _saturated_noise(observations, fit.model, effects)
+    noise = [
+        replace(of_fit, over_repetitions=far) if far > FAR_ABOVE else of_repetitions
+        for of_repetitions, of_fit, far in zip(observations.noise, other, above, strict=True)
+    ]
+    return observations.with_noise(noise), False
+
+
+def _saturated(observations: Observations, model: ExtendedModel, effects: Sequence[Effect]) -> list[Array]:
+    """What the nominal model and the candidates together leave, whitened rows joint by joint."""
+    fit = Fitter(observations).projected(model)
+    screen = Screen(observations, effects)
+    signals = model_signals(model, observations)
+    columns: dict[int, list[Array]] = {joint: [] for joint in range(observations.robot.joint_count)}
+    for effect, shapes in ((each, each.rough_grid()) for each in effects):
+        white_columns = screen.white_columns(effect, shapes, signals) if len(shapes) else {}
+        for joint, white in white_columns.items():
+            columns[joint].append(white.reshape(-1, white.shape[-1]))
+    left = []
+    for joint, parts in columns.items():
+        basis, residual = fit.projection.basis[joint], fit.projection.residual[joint]
+        every = np.concatenate(parts) if parts else np.zeros((0, len(residual)))
+        left.append(_pursued(every - (every @ basis.T) @ basis, residual))
+    return left
+
+
+def _pursued(columns: Array, residual: Array) -> Array:
+    """The residual after orthogonal matching pursuit, as long as columns explain more than chance allows."""
+    norms = np.linalg.norm(columns, axis=1)
+    columns = columns[norms > 1e-9 * max(norms.max(initial=0.0), 1e-300)]
+    if not len(columns):
+        return residual
+    columns = columns / np.linalg.norm(columns, axis=1, keepdims=True)
+    best_of_many = 2.0 * np.log(len(columns))
+    chance = best_of_many + 6.0
+    left, taken = residual, 0
+    for _ in range(min(MOST_ADDED, len(residual) // ROWS_A_COLUMN)):
+        scores = columns @ left
+        best = int(np.argmax(np.abs(scores)))
+        if scores[best] ** 2 < chance * float(left @ left) / len(left):
+            break
+        taken += 1
+        chosen = columns[best].copy()
+        left = left - scores[best] * chosen
+        columns -= np.outer(columns @ chosen, chosen)
+        norms = np.linalg.norm(columns, axis=1)
+        columns = columns[norms > 1e-2]
+        if not len(columns):
+            break
+        columns /= np.linalg.norm(columns, axis=1, keepdims=True)
+    # Each column, chosen among many, took this much noise with it.
+    return left * np.sqrt(len(left) / max(len(left) - best_of_many * taken, 0.2 * len(left)))
+
+
+def _by_piece(observations: Observations, joint: int, rows: Array) -> Iterator[tuple[Array, BoolArray, float]]:
+    """Rows of a joint that count, back in their pieces."""
+    first = 0
+    for piece in observations:
+        used = piece.used[joint].ravel()
+        spread = np.zeros(len(used))
+        count = int(used.sum())
+        spread[used] = rows[first : first + count]
+        first += count
+        yield spread, used, 1.0

@@ -1,0 +1,64 @@
+"""Shape parameters between the grid's points: no two forms are compared before each is at its own best."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from service.diagnosis.catalogue import Effect, Signals
+from service.diagnosis.fitting.fit import Fit
+from service.diagnosis.fitting.projection import statistics
+from service.diagnosis.screening.screen import Candidate, Screen
+from service.recording.recording import Array
+
+POINTS = 7
+ZOOMS = 3
+
+
+def refined(candidate: Candidate, fit: Fit, screen: Screen, signals: Sequence[Signals]) -> Candidate:
+    """The candidate at the best shape near its grid point.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        at its best point of the grid
+    fit : Fit
+        the model so far
+    screen : Screen
+        of the observations
+    signals : sequence of Signals
+        of every piece under that model
+    """
+    effect = candidate.effect
+    for place in filter(effect.is_free, range(len(effect.shapes))):
+        low, high = _neighbours(effect, candidate.shape, place)
+        for _ in range(ZOOMS):
+            values = _spread(low, high, effect.shapes[place].logarithmic)
+            shapes = np.tile(candidate.shape, (POINTS, 1))
+            shapes[:, place] = values
+            found = screen.at_shapes(effect, shapes, fit, signals)
+            gains, coefficients = statistics(found, [each.positive for each in effect.coefficients])
+            best = int(np.argmax(gains))
+            low, high = float(values[max(best - 1, 0)]), float(values[min(best + 1, POINTS - 1)])
+            if gains[best] > candidate.gain:
+                candidate = replace(
+                    candidate,
+                    shape=shapes[best],
+                    coefficients=coefficients[best],
+                    gain=float(gains[best]),
+                    gram=found.gram[best],
+                )
+    return candidate
+
+
+def _neighbours(effect: Effect, shape: Array, place: int) -> tuple[float, float]:
+    """The grid's values of a shape parameter below and above, or its bounds."""
+    values = np.unique(effect.grid[:, place])
+    at = int(np.argmin(np.abs(values - shape[place])))
+    low = values[at - 1] if at > 0 else effect.lower[place]
+    high = values[at + 1] if at + 1 < len(values) else effect.upper[place]
+    return float(low), float(high)
+
+
+def _spread(low: float, high: float, logarithmic: bool) -> Array:
+    return np.geomspace(low, high, POINTS) if logarithmic else np.linspace(low, high, POINTS)

@@ -1,0 +1,259 @@
+"""Every form of every effect beside the fitted model: how much each would explain, and how likely noise does that."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from service.diagnosis.catalogue import Effect, Signals, TimeLocalEffect
+from service.diagnosis.fitting.fit import Fit
+from service.diagnosis.fitting.projection import INVISIBLE, Moments, moments, statistics
+from service.diagnosis.model.extended import ExtendedModel
+from service.diagnosis.observations.observations import Observations
+from service.diagnosis.screening.effective_number import effective_number
+from service.diagnosis.screening.windows import Windows, white_torque, windowed_moments, windows_on_rows, windows_tried
+from service.diagnosis.threads import side_by_side
+from service.recording.recording import Array
+
+MOST_KEPT = 400 * 1024 * 1024
+"""Bytes of columns that are kept from one model to the next."""
+
+WORTH_COUNTING = 1e-3
+"""Chance below which the best of many windows is worth the draws that tell how many windows there are in effect; above,
+all of them count, which changes no decision."""
+
+SHAPES_AT_ONCE = 48
+"""Shapes whose columns are made together: bounds memory."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One form of an effect beside a fitted model, at its best shape.
+
+    effect : Effect
+        form and place
+    shape : (k,) float64
+        the best shape
+    coefficients : (c,) float64
+        with which it explains most
+    gain : float
+        T, what it takes off the residual's energy [noise variances]
+    gram : (c, c) float64
+        of its projected columns at that shape
+    visible : bool
+        whether any data of this kind could show it
+    shapes_tried : float
+        effective number of independent shapes, at least 1
+    information : float
+        energy of the first coefficient's projected column per unit, the median over the visible shapes: the inverse of
+        its variance
+    """
+
+    effect: Effect
+    shape: Array
+    coefficients: Array
+    gain: float
+    gram: Array
+    visible: bool
+    shapes_tried: float
+    information: float
+
+    @property
+    def count(self) -> int:
+        """Number of coefficients c."""
+        return len(self.coefficients)
+
+    @property
+    def score(self) -> float:
+        """T less what as many coefficients and shapes would explain of noise."""
+        return self.gain - self.count - 2.0 * float(np.log(self.shapes_tried))
+
+    def p_value(self, inflation: float = 1.0, *, refined: bool = False, freedom: float = np.inf) -> float:
+        """Chance that noise alone explains as much somewhere on this form's grid.
+
+        Parameters
+        ----------
+        inflation : float
+            factor by which the residual exceeds the modelled noise
+        refined : bool
+            whether the shape was moved between the grid's points: then noise had that freedom too
+        freedom : float
+            rows from which the noise's size is known, less parameters; infinite where it needs no estimate
+        """
+        free = sum(self.effect.is_free(place) for place in range(len(self.shape))) if refined else 0
+        count = self.count + free
+        known = np.isinf(freedom)
+        share = self.gain / inflation
+        tail = float(stats.chi2.sf(share, count) if known else stats.f.sf(share / count, count, freedom))
+        return min(1.0, self.shapes_tried * tail * (1.0 if free else self._one_sided))
+
+    @property
+    def _one_sided(self) -> float:
+        return 0.5 if self.count == 1 and self.effect.coefficients[0].positive else 1.0
+
+
+class Screen:
+    """Screens effects on the same observations; effective numbers of shapes are worked out once.
+
+    Parameters
+    ----------
+    observations : Observations
+        the data, noise known
+    effects : sequence of Effect
+        all forms to look at
+    seed : int
+        of the draws for the effective numbers
+    count_all : bool
+        whether every window counts, as if none resembled another: quicker, and never too bold
+    """
+
+    def __init__(
+        self, observations: Observations, effects: Sequence[Effect], seed: int = 0, *, count_all: bool = False
+    ) -> None:
+        self.observations = observations
+        self.effects = tuple(effects)
+        self._seed = seed
+        self._count_all = count_all
+        self._kept_columns: dict[tuple[int, int], dict[int, Array]] = {}
+        self._kept_bytes = 0
+        self._numbers: dict[int, float] = {}
+        self._windows: dict[int, Windows] = {}
+        self._first: tuple[Fit, list[Candidate]] | None = None
+
+    def candidates(self, fit: Fit) -> list[Candidate]:
+        """Every form at its best shape on the grid.
+
+        Parameters
+        ----------
+        fit : Fit
+            the model so far
+        """
+        if self._first is None or self._first[0] is not fit:
+            signals = [fit.model.signals(piece) for piece in self.observations]
+            places = range(len(self.effects))
+            found = side_by_side(lambda at: self._candidate(at, self.effects[at], fit, signals), places)
+            if self._first is not None:
+                return found
+            self._first = fit, found  # the nominal model, which is looked at twice
+        return list(self._first[1])
+
+    def at_shapes(self, effect: Effect, shapes: Array, fit: Fit, signals: Sequence[Signals]) -> Moments:
+        """Moments of an effect at any shapes.
+
+        Parameters
+        ----------
+        effect : Effect
+            the form
+        shapes : (g, k) float64
+            shapes
+        fit : Fit
+            the model so far
+        signals : sequence of Signals
+            of every piece
+        """
+        return moments(fit.projection, self.white_columns(effect, shapes, signals))
+
+    def white_columns(self, effect: Effect, shapes: Array, signals: Sequence[Signals]) -> dict[int, Array]:
+        """Whitened columns (g, c, R_j) of an effect at every joint that it touches.
+
+        Parameters
+        ----------
+        effect : Effect
+            the form
+        shapes : (g, k) float64
+            shapes
+        signals : sequence of Signals
+            of every piece
+        """
+        touched = effect.touched(self.observations.robot.joint_count)
+        rows: dict[int, list[Array]] = {joint: [] for joint in touched}
+        count = 1
+        for piece, own in zip(self.observations, signals, strict=True):
+            columns = effect.columns(own, shapes)
+            count = columns.shape[1]
+            for slot, joint in enumerate(touched):
+                values = columns[:, :, slot]
+                flat = values.reshape(len(shapes) * count, *values.shape[2:])
+                rows[joint].append(piece.reduced(np.ascontiguousarray(flat)))
+        white = {joint: self.observations.white(joint, parts) for joint, parts in rows.items()}
+        return {joint: each.reshape(len(shapes), count, -1) for joint, each in white.items()}
+
+    def _candidate(self, place: int, effect: Effect, fit: Fit, signals: Sequence[Signals]) -> Candidate:
+        if isinstance(effect, TimeLocalEffect):
+            found = self._through_windows(place, effect, fit, signals)
+        else:
+            found = self._on_grid(place, effect, fit, signals)
+        gains, coefficients = statistics(found, [each.positive for each in effect.coefficients])
+        best = int(np.argmax(gains - effect.reluctance(effect.grid)))
+        visible = (found.shares > INVISIBLE).all(axis=1)
+        return Candidate(
+            effect=effect,
+            shape=effect.grid[best],
+            coefficients=coefficients[best],
+            gain=float(gains[best]),
+            gram=found.gram[best],
+            visible=bool(visible.any()),
+            shapes_tried=self._numbers.get(place, float(len(effect.grid))),
+            information=float(np.median(found.gram[visible, 0, 0])) if visible.any() else 0.0,
+        )
+
+    def _on_grid(self, place: int, effect: Effect, fit: Fit, signals: Sequence[Signals]) -> Moments:
+        """Moments of all shapes of the grid."""
+        parts, whitened = [], []
+        known = place in self._numbers
+        for first in range(0, len(effect.grid), SHAPES_AT_ONCE):
+            columns = self._grid_columns(place, first, effect, signals)
+            parts.append(moments(fit.projection, columns))
+            if not known and len(effect.grid) > 1:
+                whitened.append(columns)
+        found = Moments(*(np.concatenate([getattr(part, name) for part in parts]) for name in Moments.__annotations__))
+        if not known:
+            self._numbers[place] = effective_number(found, whitened, self._draws(place)) if whitened else 1.0
+        return found
+
+    def _grid_columns(self, place: int, first: int, effect: Effect, signals: Sequence[Signals]) -> dict[int, Array]:
+        """Whitened columns of some of the grid's shapes; those that no model changes are kept."""
+        kept = self._kept_columns.get((place, first))
+        if kept is not None:
+            return kept
+        columns = self.white_columns(effect, effect.grid[first : first + SHAPES_AT_ONCE], signals)
+        size = sum(rows.nbytes for rows in columns.values())
+        if effect.of_motion_alone and self._kept_bytes + size < MOST_KEPT:
+            self._kept_columns[place, first] = columns
+            self._kept_bytes += size
+        return columns
+
+    def _through_windows(self, place: int, effect: TimeLocalEffect, fit: Fit, signals: Sequence[Signals]) -> Moments:
+        """Moments of all windows, on rows that are whitened once."""
+        if place not in self._windows:
+            self._windows[place] = windows_on_rows(effect, self.observations)
+        white = white_torque(effect, self.observations, signals)
+        found = windowed_moments(white, self._windows[place], fit)
+        if place not in self._numbers and self._count_all:
+            self._numbers[place] = float(len(effect.grid))
+        elif place not in self._numbers and self._may_count(found):
+            self._numbers[place] = windows_tried(found, white, self._windows[place], fit, self._draws(place))
+        return found
+
+    def _may_count(self, found: Moments) -> bool:
+        """Whether any of many shapes would be worth a look if it were the only one."""
+        gains, _ = statistics(found, [False] * found.target.shape[1])
+        return float(stats.chi2.sf(gains.max(initial=0.0), found.target.shape[1])) < WORTH_COUNTING
+
+    def _draws(self, place: int) -> np.random.Generator:
+        """Source of an effect's draws, whichever thread makes them."""
+        return np.random.default_rng([self._seed, place])
+
+
+def model_signals(model: ExtendedModel, observations: Observations) -> list[Signals]:
+    """Signals of every piece under a model.
+
+    Parameters
+    ----------
+    model : ExtendedModel
+        the model
+    observations : Observations
+        the data
+    """
+    return [model.signals(piece) for piece in observations]

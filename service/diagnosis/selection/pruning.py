@@ -1,0 +1,99 @@
+"""What a model is better without, once all that seemed to be missing is in it."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from service.diagnosis.fitting.fit import Fit, Fitter
+from service.diagnosis.model.extended import with_terms
+from service.diagnosis.selection.admission import Admission
+from service.diagnosis.selection.choice import Choice
+from service.diagnosis.selection.proxies import proxies
+from service.diagnosis.selection.shape_error import HARDLY, groups_of, standings, without_group
+
+Pruned = tuple[Fit, list[Choice]]
+"""A model, and the choices that are left in it."""
+
+
+def without_superfluous(fit: Fit, choices: list[Choice], fitter: Fitter, admission: Admission) -> Pruned:
+    """Drop terms that the others have made superfluous, the weakest first.
+
+    Parameters
+    ----------
+    fit : Fit
+        the model with all choices
+    choices : list of Choice
+        one a term
+    fitter : Fitter
+        of the training recordings
+    admission : Admission
+        what was asked of each
+    """
+    while choices:
+        gains = []
+        for place in range(len(choices)):
+            without = without_group(fit, [place], fitter)
+            gains.append((without.energy - fit.energy, without))
+        weakest = int(np.argmin([gain for gain, _ in gains]))
+        candidate = replace(choices[weakest].options[0].candidate, gain=max(gains[weakest][0], 0.0))
+        if candidate.p_value(admission.inflation(fit), refined=True) < admission.level:
+            break
+        fit = gains[weakest][1]
+        choices = [choice for place, choice in enumerate(choices) if place != weakest]
+    return fit, choices
+
+
+def without_proxies(nominal: Fit, fit: Fit, choices: list[Choice], fitter: Fitter, admission: Admission) -> Pruned:
+    """Drop what only stands in for an effect that the catalogue does not have, and what was needed beside that alone.
+
+    Parameters
+    ----------
+    nominal, fit : Fit
+        models without and with all choices
+    choices : list of Choice
+        one a term
+    fitter : Fitter
+        of the training recordings
+    admission : Admission
+        what was asked of each
+    """
+    dropped = proxies(nominal, fit, choices, fitter.observations, pure_error=admission.pure_error)
+    if not dropped:
+        return fit, choices
+    return without_superfluous(*_without(dropped, fit, choices, fitter), fitter, admission)
+
+
+def without_errors_of_larger_ones(
+    nominal: Fit, fit: Fit, choices: list[Choice], fitter: Fitter, admission: Admission
+) -> Pruned:
+    """Drop what is hardly more than an error of the formula of a larger effect at the same joint.
+
+    Parameters
+    ----------
+    nominal, fit : Fit
+        models without and with all choices
+    choices : list of Choice
+        one a term
+    fitter : Fitter
+        of the training recordings
+    admission : Admission
+        what was asked of each
+    """
+    groups = list(groups_of(fit.model).values())
+    if len(groups) < 2:
+        return fit, choices
+    without = [without_group(fit, places, fitter) for places in groups]
+    found = standings(nominal, fit, without, fitter, admission.inflation(fit))
+    pairs = zip(groups, found, strict=True)
+    dropped = [place for places, standing in pairs if standing.certainty < HARDLY for place in places]
+    return _without(dropped, fit, choices, fitter)
+
+
+def _without(dropped: Sequence[int], fit: Fit, choices: list[Choice], fitter: Fitter) -> Pruned:
+    """The model fitted anew without some choices."""
+    if not dropped:
+        return fit, choices
+    kept = [place for place in range(len(choices)) if place not in dropped]
+    terms = [fit.model.terms[place] for place in kept]
+    return fitter.fit(with_terms(fit.model, terms)), [choices[place] for place in kept]

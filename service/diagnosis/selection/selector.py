@@ -1,0 +1,301 @@
+"""Forward selection of effects, each at its own optimum with everything else fitted anew, and a backward pass."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from service.diagnosis.catalogue import TimeLocalEffect
+from service.diagnosis.fitting.fit import Fit, Fitter
+from service.diagnosis.model.extended import ExtendedModel, with_terms
+from service.diagnosis.model.term import Term
+from service.diagnosis.screening.screen import Candidate, Screen, model_signals
+from service.diagnosis.selection.admission import Admission
+from service.diagnosis.selection.choice import (
+    Choice,
+    Option,
+    Place,
+    Selection,
+    distinct,
+    is_physical,
+    outsized,
+    place_of,
+)
+from service.diagnosis.selection.confirmation import Confirmation, HeldOut
+from service.diagnosis.selection.equivalence import EQUIVALENT, FORMULA_ERROR, equivalents, with_rivals
+from service.diagnosis.selection.interleaved import interleaved_confirmation
+from service.diagnosis.selection.outside import where_held_out_shows
+from service.diagnosis.selection.pruning import without_errors_of_larger_ones, without_proxies, without_superfluous
+from service.diagnosis.selection.table import Table, fitted_option
+
+MOST_EFFECTS = 4
+"""Different effects in one model."""
+
+UNCONFIRMED = 0.1
+"""Share of the level that is left to effects that no other motion can confirm."""
+
+UNCOUNTED = ("rotor_inertia",)
+"""Effects beside which others are looked for without limit: every geared joint may have one."""
+
+MOST_REPEATS = 12
+"""Terms of one effect that comes in several orders."""
+
+WORTH_REFINING = 0.6
+"""Share of the best gain above which a form's shape is refined."""
+
+MOST_FITTED = 8
+"""Forms that are fitted with all parameters free before the best is chosen."""
+
+CLOSE = 40.0
+"""Score below the best, in noise variances, within which a form is fitted with all parameters free."""
+
+LIKELY = 0.02
+"""Chance, from blocks of a second, below which an effect may still be named where held-out recordings confirm it by
+`CLEARLY_PREDICTED` standard errors: few blocks tell little, and the two tests are independent."""
+
+CLEARLY_PREDICTED = 2.5
+
+MOST_TERMS = 24
+MOST_REJECTED = 12
+
+
+class Selector:
+    """Selects effects on given observations.
+
+    Parameters
+    ----------
+    screen : Screen
+        of the training recordings
+    fitter : Fitter
+        of the same
+    held_out : HeldOut or None
+        what findings are confirmed by
+    pure_error : bool
+        whether the noise is known from repetitions
+    looked_at_before : int
+        forms that were looked at with another screen, and count as well
+    """
+
+    def __init__(
+        self,
+        screen: Screen,
+        fitter: Fitter,
+        held_out: HeldOut | None,
+        *,
+        pure_error: bool,
+        looked_at_before: int = 0,
+    ) -> None:
+        self.screen = screen
+        self.fitter = fitter
+        self.held_out = held_out
+        self.pure_error = pure_error
+        self.admission = Admission(screen, pure_error=pure_error, looked_at_before=looked_at_before)
+
+    def select(self, model: ExtendedModel, beforehand: Sequence[Term], progress: Callable[[str], None]) -> Selection:
+        """Add effects as long as one is significant and confirmed.
+
+        Parameters
+        ----------
+        model : ExtendedModel
+            the nominal model
+        beforehand : sequence of Term
+            effects that others have found; those that count here too are there before any other is looked for
+        progress : callable
+            told what was found
+        """
+        nominal = fit = self.fitter.fit(model)
+        choices: list[Choice] = []
+        for term in beforehand:
+            option = self._option(fit, term)
+            p_value = self.admission.p_value(option, fit, blocks=False)
+            confirmation = self._confirmation(fit, option)
+            confirmed = confirmation is None or confirmation.confirmed(cautious=not self.pure_error)
+            if p_value < self.admission.level and confirmed:
+                choices.append(Choice((option,), confirmation, p_value, was_given=True))
+                fit = option.fit
+        fit, grown, rejected = self._grown(fit, choices, [], progress)
+        fit, choices = without_superfluous(fit, grown, self.fitter, self.admission)
+        dropped = [each for each in grown if each not in choices]
+        choices = [with_rivals(each, dropped) for each in choices]
+        fit, choices = without_proxies(nominal, fit, choices, self.fitter, self.admission)
+        fit, choices = self._settled(fit, choices)
+        fit, choices = without_errors_of_larger_ones(nominal, fit, choices, self.fitter, self.admission)
+        return Selection(nominal, fit, tuple(choices), tuple(rejected))
+
+    def continued(self, selection: Selection, progress: Callable[[str], None]) -> Selection:
+        """Add effects of this screen to what was selected with another.
+
+        Parameters
+        ----------
+        selection : Selection
+            what there is
+        progress : callable
+            told what was found
+        """
+        fit, choices, rejected = self._grown(selection.fit, list(selection.choices), [], progress)
+        if len(choices) == len(selection.choices):
+            return selection
+        fit, choices = without_superfluous(fit, choices, self.fitter, self.admission)
+        fit, choices = without_proxies(selection.nominal, fit, choices, self.fitter, self.admission)
+        fit, choices = without_errors_of_larger_ones(selection.nominal, fit, choices, self.fitter, self.admission)
+        return Selection(selection.nominal, fit, tuple(choices), (*selection.rejected, *rejected))
+
+    def _grown(
+        self, fit: Fit, choices: list[Choice], rejected: list[Choice], progress: Callable[[str], None]
+    ) -> tuple[Fit, list[Choice], list[Choice]]:
+        """A model with one effect after the other, as long as one is significant and confirmed."""
+        names = [joint.name for joint in fit.model.structure.robot.joints]
+        while len(choices) < MOST_TERMS:
+            choice = self._next(fit, choices, rejected)
+            if choice is None:
+                break
+            choices = [*choices, choice]
+            fit = choice.options[0].fit
+            progress(f"found {choice.options[0].candidate.effect.name(names)}")
+        return fit, choices, rejected
+
+    def _next(self, fit: Fit, choices: Sequence[Choice], rejected: list[Choice]) -> Choice | None:
+        """The best significant and confirmed option; what held-out recordings refuse is added to `rejected`."""
+        refused = {place_of(choice.options[0].candidate) for choice in rejected}
+        table, before = self._table(fit, choices, refused), len(rejected)
+        while len(rejected) < MOST_REJECTED:
+            choice = self._best(table, choices)
+            if choice is None or choice.confirmation is None:
+                return choice
+            if choice.confirmation.confirmed(cautious=not self.pure_error):
+                return with_rivals(choice, rejected[before:])
+            rejected.append(choice)
+            table.refuse(place_of(choice.options[0].candidate))
+        return None
+
+    def _best(self, table: Table, choices: Sequence[Choice]) -> Choice | None:
+        """The best significant option, with those that explain nearly as much."""
+        fit = table.fit
+        level = self.admission.level
+        inflation = self.admission.inflation(fit) if not self.pure_error else 1.0
+        significant = [each for each in table.candidates if each.p_value(inflation) < level]
+        if not significant:
+            return None
+        top = max(each.gain for each in significant)
+        closest = [table.refined(each) for each in significant if each.gain > WORTH_REFINING * top]
+        closest.sort(key=lambda each: -each.score)
+        near = CLOSE * self.admission.inflation(fit) + EQUIVALENT * FORMULA_ERROR * closest[0].gain
+        fitted = [table.fitted(each) for each in closest[:MOST_FITTED] if each.score > closest[0].score - near]
+        fitted = [each for each in fitted if is_physical(each, fit) and not outsized(each, self.screen.observations)]
+        fitted.sort(key=lambda each: -each.score)
+        for option in fitted:
+            known = place_of(option.candidate) in [place_of(choice.options[0].candidate) for choice in choices]
+            p_value = self.admission.p_value(option, fit, blocks=not known)
+            if isinstance(option.candidate.effect, TimeLocalEffect):
+                p_value = min(1.0, p_value / UNCONFIRMED)
+            if p_value < (level if self.pure_error else LIKELY) and self.admission.large_enough(
+                option, fit, choices, known=known
+            ):
+                if not known and not self.pure_error and not self.admission.determined(option.fit, self.fitter):
+                    continue
+                below = [each for each in fitted if each.score <= option.score]
+                chosen = where_held_out_shows(option, fit, self.fitter, self.held_out)
+                confirmation = self._confirmation(fit, chosen)
+                if p_value >= level and (confirmation is None or confirmation.gain_z < CLEARLY_PREDICTED):
+                    continue
+                alike = equivalents(chosen, below, fit, self.screen, self.admission.inflation(chosen.fit))
+                return Choice(distinct([chosen, *alike]), confirmation, p_value / level)
+        for each in closest:  # none of the largest is significant by the stricter measure: look below
+            table.refuse(place_of(each))
+        return self._best(table, choices)
+
+    def _table(self, fit: Fit, choices: Sequence[Choice], refused: set[Place]) -> Table:
+        """What may be added to a model with some choices."""
+        chosen = [place_of(choice.options[0].candidate) for choice in choices]
+        return Table(fit, self.screen, self.fitter, lambda each: self.allowed(each, chosen, refused))
+
+    def allowed(self, candidate: Candidate, chosen: Sequence[Place], refused: set[Place]) -> bool:
+        """Whether a form may be added to a model.
+
+        Parameters
+        ----------
+        candidate : Candidate
+            the form
+        chosen : sequence of (str, int or None)
+            effects and places that the model has
+        refused : set of (str, int or None)
+            effects and places that were refused
+        """
+        place = place_of(candidate)
+        if place in refused or candidate.gain <= 0.0:
+            return False
+        if place in chosen:
+            return candidate.effect.repeats and chosen.count(place) < MOST_REPEATS
+        others = {each for each in chosen if each[0] not in UNCOUNTED}
+        return place[0] in UNCOUNTED or len(others) < MOST_EFFECTS
+
+    def _option(self, fit: Fit, term: Term) -> Option:
+        """A term that was not screened for, fitted."""
+        signals = model_signals(fit.model, self.screen.observations)
+        found = self.screen.at_shapes(term.effect, term.shape[None], fit, signals)
+        candidate = Candidate(
+            term.effect, term.shape, term.coefficients, 0.0, found.gram[0], True, 1.0, found.gram[0, 0, 0]
+        )
+        return fitted_option(candidate, fit, self.fitter)
+
+    def _settled(self, fit: Fit, choices: list[Choice]) -> tuple[Fit, list[Choice]]:
+        """Every choice with its alternatives beside all the others, in the place of one that has turned out better."""
+        place = 0
+        for _ in range(2 * len(choices)):
+            if place == len(choices):
+                break
+            compared = self._compared(fit, choices, place)
+            fit, choice = self._exchanged(fit, compared, place)
+            if choice.options[0] is compared.options[0]:
+                choices[place], place = choice, place + 1
+            else:
+                choices = [*choices[:place], *choices[place + 1 :], choice]
+        return fit, choices
+
+    def _exchanged(self, fit: Fit, compared: Choice, place: int) -> tuple[Fit, Choice]:
+        """A choice with the best of its alternatives in front; one that held-out recordings refute is none."""
+        own, kept, terms = compared.options[0], compared.options, fit.model.terms
+        better = sorted((each for each in kept if each.score > own.score), key=lambda each: -each.score)
+        if not better:
+            return fit, compared
+        without = self.fitter.fit(with_terms(fit.model, [*terms[:place], *terms[place + 1 :]]))
+        for option in better:
+            confirmation = self._confirmation(without, option)
+            if confirmation is None or confirmation.confirmed(cautious=not self.pure_error):
+                return option.fit, Choice(distinct([option, *kept]), confirmation, compared.p_value)
+            kept = tuple(each for each in kept if each is not option)
+        return fit, replace(compared, options=kept)
+
+    def _compared(self, fit: Fit, choices: Sequence[Choice], place: int) -> Choice:
+        """A choice with its alternatives fitted anew beside all the others, those kept that explain nearly as much."""
+        choice, terms = choices[place], list(fit.model.terms)
+        effect = terms[place].effect
+        if (
+            effect.repeats
+            and sum(place_of(other.options[0].candidate) == place_of(choice.options[0].candidate) for other in choices)
+            > 1
+        ):
+            return replace(choice, options=choice.options[:1])
+        without = self.fitter.fit(with_terms(fit.model, [*terms[:place], *terms[place + 1 :]]))
+        own = replace(choice.options[0], fit=fit, gain=without.energy - fit.energy)
+        others = [fitted_option(each.candidate, without, self.fitter) for each in choice.options[1:]]
+        if self._may_have_changed(choices, place) and len(choices) <= MOST_EFFECTS:
+            rest = [other for at, other in enumerate(choices) if at != place]
+            again = self._best(self._table(without, rest, set()), rest)
+            found = [] if again is None else list(again.options)
+            others = [each for each in found if place_of(each.candidate) != place_of(own.candidate)]
+        physical = [each for each in others if is_physical(each, without)]
+        alike = equivalents(own, physical, without, self.screen, self.admission.inflation(fit))
+        return replace(choice, options=distinct([own, *sorted(alike, key=lambda each: -each.score)]))
+
+    def _may_have_changed(self, choices: Sequence[Choice], place: int) -> bool:
+        """Whether a choice was made before something else at its joints, or without looking for others at all."""
+        count = self.screen.observations.robot.joint_count
+        own, *later = [set(choice.options[0].candidate.effect.touched(count)) for choice in choices[place:]]
+        return choices[place].was_given or any(own & each for each in later)
+
+    def _confirmation(self, fit: Fit, option: Option) -> Confirmation | None:
+        term = option.fit.model.terms[-1]
+        if isinstance(term.effect, TimeLocalEffect):
+            return interleaved_confirmation(term, fit, option.fit, self.screen, self.held_out)
+        if self.held_out is None:
+            return None
+        return self.held_out.confirm(fit, option.fit, self.fitter)

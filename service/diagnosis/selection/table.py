@@ -1,0 +1,121 @@
+"""All candidates beside one fitted model, refined and fitted where somebody asks."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from service.diagnosis.fitting.fit import Fit, Fitter
+from service.diagnosis.model.extended import ExtendedModel, with_terms
+from service.diagnosis.model.term import Term
+from service.diagnosis.screening.refinement import refined
+from service.diagnosis.screening.screen import Candidate, Screen, model_signals
+from service.diagnosis.selection.choice import Option, Place, driving, outsized, place_of
+
+
+class Table:
+    """Candidates beside a model, each worked out once.
+
+    Parameters
+    ----------
+    fit : Fit
+        the model
+    screen : Screen
+        of the recordings
+    fitter : Fitter
+        of the same
+    allowed : callable
+        whether a form may be added to the model at all
+    """
+
+    def __init__(self, fit: Fit, screen: Screen, fitter: Fitter, allowed: Callable[[Candidate], bool]) -> None:
+        self.fit = fit
+        self._screen, self._fitter = screen, fitter
+        self._signals = model_signals(fit.model, screen.observations)
+        self.candidates = [each for each in screen.candidates(fit) if allowed(each)]
+        self._refined: dict[int, Candidate] = {}
+        self._fitted: dict[int, Option] = {}
+
+    def refuse(self, place: Place) -> None:
+        """Leave an effect at a place out from now on.
+
+        Parameters
+        ----------
+        place : (str, int or None)
+            effect and joint
+        """
+        self.candidates = [each for each in self.candidates if place_of(each) != place]
+
+    def refined(self, candidate: Candidate) -> Candidate:
+        """The candidate at its best shape.
+
+        Parameters
+        ----------
+        candidate : Candidate
+            one of the table
+        """
+        if id(candidate) not in self._refined:
+            self._refined[id(candidate)] = refined(candidate, self.fit, self._screen, self._signals)
+        return self._refined[id(candidate)]
+
+    def fitted(self, candidate: Candidate) -> Option:
+        """The refined candidate fitted with everything else.
+
+        Parameters
+        ----------
+        candidate : Candidate
+            as `refined` gives it
+        """
+        if id(candidate) not in self._fitted:
+            self._fitted[id(candidate)] = fitted_option(candidate, self.fit, self._fitter)
+        return self._fitted[id(candidate)]
+
+
+def fitted_option(candidate: Candidate, fit: Fit, fitter: Fitter) -> Option:
+    """A form added to a model, with everything fitted anew.
+
+    Where the model's own friction would then drive the motion, or the form be no more than what cancels it, friction is
+    zero instead of negative: the best of what can be.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        the form with its shape
+    fit : Fit
+        the model without it
+    fitter : Fitter
+        of the recordings
+    """
+    term = Term(candidate.effect, candidate.shape, candidate.coefficients)
+    start = with_terms(fit.model, [*fit.model.terms, term])
+    stepped = replace(start, parameters=fit.model.parameters + fit.projection.step[: fit.model.structure.size])
+    found = fitter.fit(stepped)
+    option = Option(candidate, found, fit.energy - found.energy)
+    negative = turned_negative(found, fit)
+    if negative and (driving(found) - driving(fit) or outsized(option, fitter.observations)):
+        found = fitter.fit(_without_friction(found.model, negative))
+        return Option(candidate, found, fit.energy - found.energy)
+    return option
+
+
+def turned_negative(found: Fit, before: Fit) -> set[tuple[int, str]]:
+    """Joints and coefficients of plain friction that are negative, and were not certainly so before.
+
+    One that was as good as zero may have been either: what drives now drives because of what was added.
+
+    Parameters
+    ----------
+    found, before : Fit
+        the model with and without one effect more
+    """
+    return driving(found, certain=0.0) - driving(before)
+
+
+def _without_friction(model: ExtendedModel, coefficients: set[tuple[int, str]]) -> ExtendedModel:
+    """The model with some coefficients of its plain friction zero as long as its last term is there."""
+    columns = [model.structure.coefficient(joint, name) for joint, name in coefficients]
+    displaced = tuple(column for column in columns if column is not None)
+    parameters = np.array(model.parameters)
+    parameters[list(displaced)] = 0.0
+    *others, last = model.terms
+    return with_terms(replace(model, parameters=parameters), [*others, replace(last, displaced=displaced)])

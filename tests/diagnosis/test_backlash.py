@@ -1,0 +1,72 @@
+"""A link in the play of its transmission: where it is, against closed forms and a simulation with stiff teeth."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from service.diagnosis.catalogue.backlash import place_between_teeth
+
+RATE = 1000.0
+TIME = np.arange(4000) / RATE
+
+
+def test_a_free_link_falls_across_the_gap() -> None:
+    """From rest under a constant load: δ = b/2 - (τ/I) t²/2, until -b/2 is reached."""
+    gap, inertia, load = 0.01, 0.5, np.where(TIME < 1.0, 2.0, -2.0)
+    place = place_between_teeth(load, np.full(len(TIME), inertia), gap, RATE)
+    since = TIME - 1.0
+    fallen = 0.5 - (2.0 / inertia) * since**2 / (2.0 * gap)
+    flies = (since > 0.0) & (fallen > -0.5)
+    np.testing.assert_allclose(place[flies], fallen[flies], atol=0.02)
+    assert (place[since < 0.0] == 0.5).all()
+    landed = np.sqrt(2.0 * gap * inertia / 2.0)
+    assert (place[since > landed + 2.0 / RATE] == -0.5).all()
+
+
+def test_a_link_whose_load_turns_again_comes_back() -> None:
+    load = np.where((TIME > 1.0) & (TIME < 1.01), -2.0, 2.0)
+    place = place_between_teeth(load, np.full(len(TIME), 0.5), 0.01, RATE)
+    assert place.min() > -0.5, "it does not reach the other side"
+    assert place.min() < 0.49
+    assert place[-1] == 0.5
+
+
+def test_it_is_where_a_simulation_with_teeth_has_it() -> None:
+    """I δ̈ = τ - T with stiff, heavily damped teeth, in small steps."""
+    inertia, gap, stiffness, damping = 0.3, 6e-3, 3e5, 2e3
+    load = 3.0 * np.sin(2.0 * np.pi * 0.7 * TIME) + 1.5 * np.cos(2.0 * np.pi * 1.9 * TIME)
+    deflection, rate, found, parts = 0.5 * gap, 0.0, [], 50
+    for torque in load:
+        found.append(deflection)
+        for _ in range(parts):
+            side, overlap = np.sign(deflection), abs(deflection) - 0.5 * gap
+            teeth = side * max(0.0, stiffness * overlap + damping * side * rate) if overlap > 0.0 else 0.0
+            rate += (torque - teeth) / inertia / (RATE * parts)
+            deflection += rate / (RATE * parts)
+    place = gap * place_between_teeth(load, np.full(len(TIME), inertia), gap, RATE)
+    assert np.std(place - found) < 0.05 * np.std(found)
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(1e-6, 1.0), st.floats(1e-3, 10.0))
+def test_it_stays_between_the_teeth_and_mirrors_with_the_load(seed: int, gap: float, inertia: float) -> None:
+    rng = np.random.default_rng(seed)
+    load = np.cumsum(rng.standard_normal(300)) + 0.1
+    place = place_between_teeth(load, np.full(300, inertia), gap, 100.0)
+    assert np.abs(place).max() <= 0.5 + 1e-9
+    if (load != 0.0).all():
+        np.testing.assert_allclose(place_between_teeth(-load, np.full(300, inertia), gap, 100.0), -place, atol=1e-9)
+
+
+def test_a_link_without_inertia_crosses_at_once() -> None:
+    load = np.array([1.0, 0.5, -0.5, -1.0, 2.0])
+    np.testing.assert_array_equal(place_between_teeth(load, np.zeros(5), 0.1, 100.0), [0.5, 0.5, -0.5, -0.5, 0.5])
+
+
+@pytest.mark.parametrize("gap", [1e-9, 1e3])
+def test_gaps_of_any_size(gap: float) -> None:
+    load = np.sin(2.0 * np.pi * TIME) + 0.2
+    place = place_between_teeth(load, np.full(len(TIME), 1.0), gap, RATE)
+    assert np.isfinite(place).all()
+    expected = np.where(load >= 0.0, 0.5, -0.5) if gap < 1.0 else np.full(len(TIME), 0.5)
+    np.testing.assert_allclose(np.median(np.abs(place - expected)), 0.0, atol=1e-3)
