@@ -98,7 +98,7 @@ class Case:
             return unknown_trial(where, what, joint, self.wanted, **drawn, **self.sensors)
         if what in FORMS:
             return form_trial(where, what, joint, self.wanted, **drawn, **self.sensors)
-        return effect_trial(where, what, joint, self.wanted, kind=self.kind, **drawn, **self.sensors)
+        return effect_trial(where, what, joint, self.wanted, motion=self.kind, **drawn, **self.sensors)
 
 
 @dataclass(frozen=True)

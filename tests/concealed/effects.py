@@ -63,7 +63,7 @@ class Drawn:
     names : tuple of str
         ids under which it may be named
     also : tuple of str
-        ids that come with it: a second mass that an elastic transmission brings
+        ids that come with it: a second mass that an elastic transmission brings, teeth that give way
     smallest : float
         size below which the effect is another: bristles shorter than the encoder's noise are a step
     largest : float
@@ -80,8 +80,11 @@ class Drawn:
     largest: float = np.inf
 
 
-LARGEST_ASYMMETRY = 0.9
-"""Part of its Coulomb friction by which a joint's differs with direction: at more than all of it, friction drives."""
+LARGEST_VARIATION = 0.9
+"""Part of its Coulomb friction by which a joint's differs with direction or place: more than all of it would drive."""
+
+LARGEST_GAIN_ERROR = 0.5
+"""Of a torque channel: one that is wrong by more, somebody has seen long ago; at one it shows nothing."""
 
 
 def _law(effect: str, ground: Ground, key: str, size: float, **more: object) -> Drawn:
@@ -101,7 +104,7 @@ def _sign(rng: np.random.Generator) -> float:
 
 def asymmetric_coulomb(g: Ground, rng: np.random.Generator) -> Drawn:
     drawn = _law("asymmetric_coulomb", g, "amplitude", 0.8 * g.noise * _sign(rng))
-    return replace(drawn, largest=LARGEST_ASYMMETRY * g.coulomb)
+    return replace(drawn, largest=LARGEST_VARIATION * g.coulomb)
 
 
 def asymmetric_viscous(g: Ground, rng: np.random.Generator) -> Drawn:
@@ -123,7 +126,8 @@ def load_dependent_friction(g: Ground, rng: np.random.Generator) -> Drawn:
 
 def position_dependent_friction(g: Ground, rng: np.random.Generator) -> Drawn:
     phase = float(rng.uniform(-3.0, 3.0))
-    return _law("position_dependent_friction", g, "amplitude", 0.8 * g.noise, order=1.0, phase=phase)
+    drawn = _law("position_dependent_friction", g, "amplitude", 0.8 * g.noise, order=1.0, phase=phase)
+    return replace(drawn, largest=LARGEST_VARIATION * g.coulomb)
 
 
 def presliding_hysteresis(g: Ground, rng: np.random.Generator) -> Drawn:
@@ -213,7 +217,7 @@ def backlash(g: Ground, rng: np.random.Generator) -> Drawn:
         1.0,
         (g.joint,),
         ("backlash",),
-        ("rotor_inertia",),
+        ("rotor_inertia", "joint_elasticity"),  # the teeth give way, too: contact_stiffness
         largest=0.05,
     )
 
@@ -225,7 +229,12 @@ def rotor_inertia(g: Ground, rng: np.random.Generator) -> Drawn:
 def torque_gain_error(g: Ground, rng: np.random.Generator) -> Drawn:
     drawn = _law("torque_gain_error", g, "gain", 0.0)
     return Drawn(
-        lambda value: {**drawn.entry(0.0), "gain": 1.0 + value}, 0.05 * _sign(rng), 1.0, drawn.places, drawn.names
+        lambda value: {**drawn.entry(0.0), "gain": 1.0 + value},
+        0.05 * _sign(rng),
+        1.0,
+        drawn.places,
+        drawn.names,
+        largest=LARGEST_GAIN_ERROR,
     )
 
 

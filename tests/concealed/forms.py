@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
 
-from concealed.effects import LARGEST_ASYMMETRY, Ground
+from concealed.effects import LARGEST_VARIATION, Ground
 from concealed.forward import FINE, Passage
 from concealed.motions import RATE_HZ
 
@@ -62,7 +62,7 @@ class Along:
 
 def easier_one_way(a: Along) -> Array:
     """Coulomb friction that differs with direction, fading in with speed."""
-    amplitude = min(a.amplitude, LARGEST_ASYMMETRY * a.ground.coulomb)
+    amplitude = min(a.amplitude, LARGEST_VARIATION * a.ground.coulomb)
     return np.asarray(amplitude * (1.0 - np.exp(-np.abs(a.velocity) / 0.02)))
 
 

@@ -9,7 +9,7 @@ from concealed.trial import Trial
 from service.diagnosis import diagnosis as steps
 from service.diagnosis import document
 from service.diagnosis.catalogue import Effect, Setting, possible_effects
-from service.diagnosis.document import DiagnosisDocument
+from service.diagnosis.documents.document import DiagnosisDocument
 
 
 def oracle(trial: Trial) -> DiagnosisDocument:

@@ -7,7 +7,7 @@ from concealed.kept import Outcome
 from concealed.plain import NOT_KEPT
 from concealed.score import compared
 from concealed.truth import Hidden, Truth
-from service.diagnosis.document import DiagnosisDocument
+from service.diagnosis.documents.document import DiagnosisDocument
 
 NEEDED_TO_READ: dict[str, list[Any]] = {name: [] for name in NOT_KEPT}
 

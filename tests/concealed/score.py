@@ -8,8 +8,8 @@ import numpy as np
 from concealed.trial import Trial
 from concealed.truth import Hidden, Truth, label, truth_of
 from service.diagnosis import diagnose, document
-from service.diagnosis.document import DiagnosisDocument
-from service.diagnosis.result import FindingEntry
+from service.diagnosis.documents.document import DiagnosisDocument
+from service.diagnosis.documents.result import FindingEntry
 
 UNKNOWN = "unknown"
 FRAME = ("link", "axis")

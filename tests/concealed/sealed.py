@@ -18,7 +18,7 @@ from concealed.case import Case, drawn
 from concealed.motions import Planned
 from concealed.trial import Trial
 from concealed.truth import truth_of
-from service.diagnosis.document import DiagnosisDocument
+from service.diagnosis.documents.document import DiagnosisDocument
 from service.excitation import read_trajectory
 from service.recording import EffortKind, Recording, write_recording
 

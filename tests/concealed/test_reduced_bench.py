@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 from concealed.score import Score, diagnosed, scored
@@ -45,14 +46,8 @@ def test_nothing_is_named_where_nothing_is_concealed() -> None:
 POOR = [
     {"position_std": 2e-4},
     {"encoder_step": 5e-4},
-    pytest.param(
-        {"encoder_step": 1e-3},
-        marks=pytest.mark.xfail(
-            strict=True,
-            reason="rows near reversals, where rounding is most of the noise, say how large the noise is and then"
-            " weigh less: what is left of them passes for a delay, bristles or a contact",
-        ),
-    ),
+    {"encoder_step": 1e-3},
+    {"encoder_step": 2.0 * np.pi / 4096},
 ]
 
 
@@ -76,7 +71,7 @@ def test_two_effects_at_once_are_both_named(first: tuple[str, int], second: tupl
 
 
 def test_motion_that_predicts_nothing_is_not_called_consistent() -> None:
-    trial = effect_trial("paper", "stribeck_friction", 1, 40.0, motion_seed=0, seed=4, kind="slow")
+    trial = effect_trial("paper", "stribeck_friction", 1, 40.0, motion_seed=0, seed=4, motion="slow")
     found, _ = diagnosed(trial)
     assert found.verdict != "consistent"
 

@@ -7,7 +7,7 @@ import pytest
 from concealed.rescored import rescored
 from concealed.score import compared
 from concealed.truth import Hidden, Truth
-from service.diagnosis.document import DiagnosisDocument
+from service.diagnosis.documents.document import DiagnosisDocument
 
 
 def finding(effect: str, joint: str | None, probability: float = 0.95, **more: Any) -> dict[str, Any]:

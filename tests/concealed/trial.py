@@ -121,13 +121,13 @@ def effect_trial(
     *,
     motion_seed: int,
     seed: int,
-    kind: str = "rich",
+    motion: str = "rich",
     states_friction: bool = True,
     **noise: object,
 ) -> Trial:
     """One effect at one joint with a wanted s."""
     concealed = _effects(arm, [(effect, joint)], wanted, motion_seed, seed)
-    return _recorded(arm, motion_seed, kind, concealed, seed, states_friction, noise)
+    return _recorded(arm, motion_seed, motion, concealed, seed, states_friction, noise)
 
 
 def several_trial(

@@ -30,6 +30,7 @@ PARAMETERS: dict[str, Callable[[Entry], Parameters]] = {
     "position_dependent_friction": lambda entry: {
         "a": entry["amplitude"] * np.sin(entry["phase"]),
         "b": entry["amplitude"] * np.cos(entry["phase"]),
+        "k": entry["order"],
     },
     "presliding_hysteresis": _renamed(x_s="distance"),
     "friction_coupling": _renamed(f="coulomb", w="viscous"),

@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from concealed.truth import label
-from service.diagnosis.band import diagnosis_cutoff
 from service.diagnosis.catalogue import Effect, TimeLocalEffect, possible_effects
-from service.diagnosis.fit import Fit, Fitter
-from service.diagnosis.nominal import nominal_model, setting_of
-from service.diagnosis.observations import Observations
-from service.diagnosis.residual import residual_rows
-from service.diagnosis.screening import SHAPES_AT_ONCE, Screen, model_signals
-from service.diagnosis.whitening import JointNoise
+from service.diagnosis.fitting.fit import Fit, Fitter
+from service.diagnosis.model.nominal import nominal_model, setting_of
+from service.diagnosis.model.residual import residual_rows
+from service.diagnosis.observations.band import diagnosis_cutoff
+from service.diagnosis.observations.observations import Observations
+from service.diagnosis.observations.whitening import JointNoise
+from service.diagnosis.screening.screen import SHAPES_AT_ONCE, Screen, model_signals
 from service.identification import identify
 from service.identification.autocorrelation import Autoregression
 from service.recording import Recording

@@ -12,7 +12,7 @@ from concealed.baselines.comparison import shares, table
 from concealed.baselines.ranking import Best, rankings, sparse
 from concealed.baselines.tune import LOOKED_AT
 from concealed.motions import campaign
-from service.diagnosis.projection import JointColumns, project
+from service.diagnosis.fitting.projection import JointColumns, project
 from service.dynamics import inverse_dynamics
 from service.recording import Recording
 from sim_backend.friction import static_friction_torque
