@@ -45,10 +45,41 @@ from service.api.settings import Settings
 from service.identification.history import ModelPolicy
 from service.jobs import StartControl
 
-API_VERSION = "1.5.1"
+API_VERSION = "1.6.0"
 """Of the interface, not of the package; a change of tests/api/openapi.json goes with a change here."""
 
 PREFIX = "/api/v1"
+
+
+VERBS = (
+    campaigns,
+    excitations,
+    runs,
+    recordings,
+    identifications,
+    diagnoses,
+    robots,
+    items,
+    history,
+    schedules,
+    leases,
+    stop_router,
+)
+"""Routers of everything that a client may ask for, below `PREFIX`."""
+
+REQUESTS = (
+    IdentificationRequest,
+    DiagnosisRequest,
+    ExcitationRequest,
+    RunRequest,
+    CampaignRequest,
+    RobotCheckRequest,
+    LeaseRequest,
+    ReasonRequest,
+    ModelPolicy,
+    ScheduleRequest,
+)
+"""Bodies that are read by hand, so that FastAPI does not find them."""
 
 
 def create_app(settings: Settings, executor: Executor | None = None, start: StartControl | None = None) -> FastAPI:
@@ -80,38 +111,13 @@ def create_app(settings: Settings, executor: Executor | None = None, start: Star
         docs_url=None,
         redoc_url=None,
     )
-    for router in (
-        campaigns,
-        excitations,
-        runs,
-        recordings,
-        identifications,
-        diagnoses,
-        robots,
-        items,
-        history,
-        schedules,
-        leases,
-        stop_router,
-    ):
+    for router in VERBS:
         app.include_router(router, prefix=PREFIX)
     app.include_router(health.router)
     app.include_router(pages.router)
     app.include_router(page)
     install_problem_handlers(app)
-    requests = [
-        IdentificationRequest,
-        DiagnosisRequest,
-        ExcitationRequest,
-        RunRequest,
-        CampaignRequest,
-        RobotCheckRequest,
-        LeaseRequest,
-        ReasonRequest,
-        ModelPolicy,
-        ScheduleRequest,
-    ]
-    install_openapi(app, [*requests, Problem, *EVENT_MODELS])
+    install_openapi(app, [*REQUESTS, Problem, *EVENT_MODELS])
     # The last one added is the first to see a request.
     app.add_middleware(Repeatable)
     app.add_middleware(Audited)

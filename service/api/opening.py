@@ -79,7 +79,9 @@ def open_services(
         raise
     services = _assemble(_Ground(settings, access, database, site), executor, start)
     _watch(services)
-    housekeeping = Housekeeping([services.index.sync, services.models.consider_new])
+    housekeeping = Housekeeping(
+        [services.jobs.settle, services.runs.settle, services.index.sync, services.models.consider_new]
+    )
     clock = Housekeeping([services.schedules.tick])  # apart: an interlock may take its time
     housekeeping.start()
     if settings.fires_schedules:

@@ -1,4 +1,4 @@
-"""Pages for people: the interface, and what each code of a problem means. They need nothing from elsewhere."""
+"""Pages for people: the interface, the codes of problems, how-to pages. They need nothing from elsewhere."""
 
 from http import HTTPStatus
 from pathlib import Path as FilePath
@@ -8,6 +8,7 @@ from fastapi import APIRouter, Request, Response
 from fastapi.responses import HTMLResponse
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+from service.api.handbook import chapters
 from service.api.problems import KINDS
 from service.errors import NotFoundError
 from service.robot.messages import one_line, shown
@@ -30,7 +31,9 @@ def show_interface(request: Request) -> Response:
     """Every operation, from the OpenAPI document."""
     document = request.app.openapi()
     page = _templates.get_template("interface.html")
-    return HTMLResponse(page.render(info=document["info"], operations=_operations(document), kinds=KINDS.values()))
+    guides = [(path, chapter.title) for path, chapter in chapters().items() if path.startswith("how-to/")]
+    operations, kinds = _operations(document), KINDS.values()
+    return HTMLResponse(page.render(info=document["info"], operations=operations, kinds=kinds, guides=guides))
 
 
 @router.get("/pages.css")
@@ -51,7 +54,23 @@ def show_problem_kind(code: str) -> Response:
     kind = KINDS.get(code)
     if kind is None:
         raise NotFoundError(one_line(f"there is no error code {shown(code)}; /docs lists them"))
-    return HTMLResponse(_templates.get_template("problem.html").render(kind=kind))
+    chapter = chapters().get(f"errors/{code}")
+    return HTMLResponse(_templates.get_template("problem.html").render(kind=kind, chapter=chapter))
+
+
+@router.get("/how-to/{name}")
+def show_guide(name: str) -> Response:
+    """How something is done.
+
+    Parameters
+    ----------
+    name : str
+        of the page
+    """
+    chapter = chapters().get(f"how-to/{name}")
+    if chapter is None:
+        raise NotFoundError(one_line(f"there is no page {shown(name)}; /docs lists them"))
+    return HTMLResponse(_templates.get_template("guide.html").render(chapter=chapter))
 
 
 def _operations(document: dict[str, Any]) -> list[dict[str, Any]]:

@@ -1,6 +1,5 @@
 """Which problem each exception becomes."""
 
-import errno
 import logging
 from collections.abc import Mapping
 
@@ -12,7 +11,7 @@ from starlette.requests import ClientDisconnect
 from service.api.problems import ProblemError, answer_code, field_errors, make_problem, problem_answer, summarised
 from service.errors import TauscopeError
 from service.jobs import BusyError, LeasedError, LeaseLostError, LeaseNeededError, NotArmedError, QueueFullError
-from service.store import NameTakenError
+from service.store import NameTakenError, is_disk_full
 
 _log = logging.getLogger("tauscope.api")
 
@@ -74,7 +73,7 @@ async def _http_exception(request: Request, error: Exception) -> Response:
 
 async def _system_error(request: Request, error: Exception) -> Response:
     """A full disk is said; any other failure of the system is a fault to look into."""
-    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+    if isinstance(error, OSError) and is_disk_full(error):
         _log.error("the disk is full")
         return answer_code(request, "storage-full", "the service's disk is full; remove recordings or identifications")
     raise error

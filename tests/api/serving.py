@@ -46,4 +46,4 @@ def served(data_folder: Path) -> Iterator[Served]:
             process.terminate()
             out, err = process.communicate(timeout=60)
     if process.returncode != -signal.SIGKILL:
-        assert (out, err) == ("", "")
+        assert (out, err) == ("", ""), f"{out}{err}"

@@ -9,8 +9,8 @@ from starlette.testclient import TestClient
 from api.conftest import RECORDINGS
 from api.problem_check import assert_problem
 from service.diagnosis import DiagnosisDocument
+from service.diagnosis.documents.plots import DiagnosisPlots
 from service.diagnosis.extended_model import ModelDocument
-from service.diagnosis.plots import DiagnosisPlots
 from service.excitation import parse_trajectory_json
 from service.robot import read_robot
 from sim_backend.examples import example_robot

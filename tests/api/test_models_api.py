@@ -83,6 +83,21 @@ def test_an_old_data_folder_gets_its_history(tmp_path: Any) -> None:
         ]
 
 
+def test_an_order_that_names_an_unknown_robot_holds_up_no_service(
+    paper: TestClient, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One flipped bit of a name, in an identification that was not judged yet when the service was killed."""
+    services = paper.app.state.services  # pyright: ignore[reportAttributeAccessIssue]
+    keeper, damaged = services.models, models(paper)[0]["id"]
+    order = services.identifications.items.folder(damaged) / "order.json"
+    order.write_text(order.read_text().replace(f'"{ROBOT}"', '"paper-aro"'))
+    monkeypatch.setattr(keeper.history, "unjudged", lambda _site: [damaged])
+    assert keeper.consider_new() == keeper.consider_new() == []
+    (told,) = [each.getMessage() for each in caplog.records if each.levelname == "WARNING"]
+    assert damaged in told
+    assert "paper-aro" in told
+
+
 @pytest.mark.parametrize("path", [f"{MODELS}/x", f"{MODELS}/x/document", f"{MODELS}/x/drift", "/api/v1/trend?robot=x"])
 def test_what_is_not_there(path: str, client: TestClient) -> None:
     assert_problem(client.get(path), "not-found", 404)

@@ -58,6 +58,18 @@ def test_all_the_way(server: httpx2.Client, paper_robot: bytes, paper_recordings
         assert server.get(link).status_code == 200
 
 
+def test_a_service_that_is_ended_in_the_middle_of_work_ends_without_a_word(
+    tmp_path: Path, paper_robot: bytes, paper_recordings: tuple[bytes, bytes]
+) -> None:
+    """Nothing unforeseen has happened: what is not done waits for the next start."""
+    files = [("robot", ("arm.yaml", paper_robot)), ("recordings", ("train.csv", paper_recordings[0]))]
+    with served(tmp_path) as service:
+        here = service.client.post(IDENTIFICATIONS, files=files).headers["location"]
+        while service.client.get(here).json()["state"] == "queued":
+            pass
+    assert service.process.returncode in (0, -signal.SIGTERM)
+
+
 def test_a_broken_recording(server: httpx2.Client, paper_robot: bytes) -> None:
     files = [
         ("robot", ("arm.yaml", paper_robot)),

@@ -14,7 +14,7 @@ from jobs.executors import InlineExecutor
 from service.api import Settings, create_app
 from snapshots import SNAPSHOTS, unpacked
 
-SCHEDULES = "/api/v1/schedules"
+SCHEDULES, CAMPAIGNS, LEASES = (f"/api/v1/{name}" for name in ("schedules", "campaigns", "leases"))
 WHY = {"reason": "a test"}
 
 
@@ -84,6 +84,29 @@ def test_a_campaign_moves_the_arm_unless_somebody_has_it(old: Settings) -> None:
             assert (second["state"], second["item"]) == ("skipped", None)
             assert "still goes on" in second["reason"]
             assert client.post(f"{first['item']}/stop").status_code == 202
+        finally:
+            controls.obey_from_now_on()
+
+
+def test_a_schedule_waits_while_somebody_has_a_lease_of_its_arm(old: Settings) -> None:
+    controls = HandControls()
+    with connected(create_app(old, InlineExecutor(), controls)) as client:
+        try:
+            put(client, newest(client, "campaign"), kind="campaign", cron="0 2 * * *")
+            campaigns = client.get(CAMPAIGNS).json()
+            lease = client.post(LEASES, json={"robot": "snapshot-arm", "backend": "sim", "holder": "Ann"}).json()
+            for way in ("as it was taken", "armed"):
+                if way == "armed":
+                    client.post(lease["links"]["arm"], headers={"Lease-Token": lease["token"]})
+                firing = client.post(f"{SCHEDULES}/nightly/run", json=WHY).json()
+                assert (firing["state"], firing["item"]) == ("skipped", None)
+                assert firing["reason"].startswith("snapshot-arm on sim: Ann has its lease")
+            assert controls.started == []
+            assert client.get(CAMPAIGNS).json() == campaigns
+            client.delete(lease["links"]["self"], headers={"Lease-Token": lease["token"]})
+            assert client.post(f"{SCHEDULES}/nightly/run", json=WHY).json()["state"] == "started"
+            # Now it is the other way round: nobody is given the arm that moves.
+            assert_problem(client.post(LEASES, json={"robot": "snapshot-arm", "backend": "sim"}), "busy", 409)
         finally:
             controls.obey_from_now_on()
 

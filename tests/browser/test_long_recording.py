@@ -1,75 +1,51 @@
-"""Seven joints × 100,000 samples: all there, thinned without losing a peak, zoomed in step."""
+"""Seven joints × 100,000 samples: all there, thinned without losing a peak, drawn no finer than the screen."""
 
-from pathlib import Path
+from collections.abc import Iterator
 
-import numpy as np
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser, Page
 
 from api.serving import served
-from browser.conftest import PATIENCE_MS
+from browser.long_recording import JOINTS, PEAK, SAMPLES, ZOOM, open_long_recording, write_long_recording
 
 pytestmark = [pytest.mark.system, pytest.mark.slow]
 
-SAMPLES, JOINTS = 100_000, 7
-FRAMES = """
-async () => {
-  const canvas = document.querySelector('.canvas');
-  canvas.focus();
-  const times = [];
-  const frame = () => new Promise((done) => requestAnimationFrame(done));
-  for (let k = 0; k < 60; k += 1) {
-    const begun = performance.now();
-    canvas.dispatchEvent(new KeyboardEvent('keydown', { key: k % 6 < 3 ? '+' : '-', bubbles: true }));
-    await frame();
-    await frame();
-    times.push((performance.now() - begun) / 2);
-  }
-  return times.sort((a, b) => a - b);
-}
-"""
+POINTS_A_COLUMN = 4
+"""Most that a curve draws in a column of pixels: in, lowest, highest, out."""
 
 
 @pytest.fixture(scope="module")
-def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A data folder with a long recording, as an operator puts it there."""
+def page(chromium: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
+    """The page of the long recording."""
     folder = tmp_path_factory.mktemp("long")
-    (folder / "recordings").mkdir()
-    rng = np.random.default_rng(7)
-    time = np.arange(SAMPLES) / 1000.0
-    position = np.sin(np.outer(time, 0.3 + 0.1 * np.arange(JOINTS)))
-    torque = 5.0 * position + rng.normal(size=(SAMPLES, JOINTS))
-    torque[54_321, 3] = 60.0
-    heads = ["t", *(f"q{j + 1}" for j in range(JOINTS)), *(f"tau{j + 1}" for j in range(JOINTS))]
-    columns = np.hstack([time[:, None], position, torque])
-    np.savetxt(
-        folder / "recordings" / "long.csv", columns, delimiter=",", header=",".join(heads), comments="", fmt="%.6g"
+    write_long_recording(folder)
+    with served(folder) as service:
+        shown = open_long_recording(chromium, service)
+        yield shown
+        shown.close()
+
+
+def test_a_long_recording_is_thinned_without_losing_a_peak(page: Page) -> None:
+    thinned = page.evaluate(
+        """async () => {
+          const { getSamples } = await import('/page/api.js');
+          const { thinned } = await import('/page/plots.js');
+          const { columns, shown } = await getSamples('long.csv');
+          const whole = thinned(columns.t, [columns.tau4], 0, 100, 1000);
+          const part = thinned(columns.t, [columns.tau4], 54.3, 54.35, 1000);
+          const peak = (values) => Math.max(...values);
+          return { shown, rows: whole[0].length, peak: peak(whole[1]), part: part[0].length, again: peak(part[1]) };
+        }"""
     )
-    return folder
+    assert thinned["shown"] == SAMPLES
+    assert thinned["rows"] == 2000
+    assert thinned["peak"] == thinned["again"] == PEAK
+    assert 50 <= thinned["part"] <= 54
 
 
-def test_a_long_recording_is_plotted_and_zoomed(chromium: Browser, data: Path) -> None:
-    with served(data) as service:
-        page = chromium.new_page(viewport={"width": 1280, "height": 860})
-        page.set_default_timeout(PATIENCE_MS)
-        page.goto(f"{service.client.base_url}/#/recordings/long.csv".replace("//#", "/#"))
-        expect(page.locator(".canvas canvas").nth(1)).to_be_visible()
-        expect(page.locator(".figures")).to_contain_text("100000")
-        thinned = page.evaluate(
-            """async () => {
-              const { getSamples } = await import('/page/api.js');
-              const { thinned } = await import('/page/plots.js');
-              const { columns, shown } = await getSamples('long.csv');
-              const whole = thinned(columns.t, [columns.tau4], 0, 100, 1000);
-              const part = thinned(columns.t, [columns.tau4], 54.3, 54.35, 1000);
-              const peak = (values) => Math.max(...values);
-              return { shown, rows: whole[0].length, peak: peak(whole[1]), part: part[0].length, again: peak(part[1]) };
-            }"""
-        )
-        assert thinned["shown"] == SAMPLES
-        assert thinned["rows"] == 2000
-        assert thinned["peak"] == thinned["again"] == 60.0
-        assert 50 <= thinned["part"] <= 54
-        times = page.evaluate(FRAMES)
-        print(f"frames while zooming: median {times[30]:.1f} ms, 95 % {times[57]:.1f} ms, longest {times[-1]:.1f} ms")
-        page.close()
+def test_what_is_drawn_while_zooming_is_bounded_by_the_screen(page: Page) -> None:
+    width = page.locator(".canvas canvas").first.evaluate("(canvas) => canvas.width")
+    drawn = page.evaluate(ZOOM, {"frames": 24, "counts": True})["drawn"]
+    assert min(drawn) > 2 * JOINTS  # the zoom is drawn at every step
+    assert max(drawn) <= 2 * JOINTS * POINTS_A_COLUMN * width
+    assert max(drawn) < SAMPLES

@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Mapping
 
 import pytest
 from playwright.sync_api import expect
@@ -16,13 +17,14 @@ MOTION_S = 1500
 """Far longer than a test, however fast the simulated arm computes: it is not bound to the clock."""
 
 
-def begin(service: Served) -> str:
+def begin(service: Served, headers: Mapping[str, str] | None = None) -> str:
     """A slow motion of one joint; returns the run's identifier."""
     samples = [f"{k},{0.2 * math.sin(0.1 * math.pi * k) ** 2:.6f},0,0" for k in range(MOTION_S + 1)]
     trajectory = ("motion.csv", "t,q1,q2,q3\n" + "\n".join(samples) + "\n", "text/csv")
     request = {"backend": {"name": "sim", "time": "virtual"}, "rate_hz": 100, "feed_forward": False}
     answer = service.client.post(
         "/api/v1/runs",
+        headers=headers,
         files={
             "request": (None, json.dumps(request), "application/json"),
             "robot": ("arm.yaml", PAPER_ROBOT.read_bytes()),

@@ -1,27 +1,43 @@
 """The whole story in a browser: from a robot file to a verdict, on the simulated arm."""
 
+import re
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import expect
 
+from api.serving import Served
 from browser.conftest import Visit
 from jobs.paper_files import PAPER_ROBOT
 
-pytestmark = [pytest.mark.system, pytest.mark.slow, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.system, pytest.mark.slow, pytest.mark.timeout(1200)]
 
 CAMPAIGN_MS = 400_000
 
 
 @pytest.fixture(scope="module")
 def address() -> dict[str, str]:
-    """Where the campaign is that the first test begins."""
+    """Where the campaign is that the story is about."""
     return {}
 
 
-def test_a_campaign_is_begun_watched_and_ends_with_a_finding(
-    visit: Visit, tmp_path: Path, address: dict[str, str]
+def test_from_a_robot_file_to_the_report_in_hand(
+    visit: Visit, service: Served, tmp_path: Path, address: dict[str, str]
 ) -> None:
+    """Robot, excitation, run, identification, diagnosis, the next experiment with one click, the report downloaded."""
+    begin_a_campaign(visit, tmp_path)
+    watch_it_to_its_end(visit, tmp_path)
+    address["campaign"] = visit.page.url
+    read_the_diagnosis(visit, tmp_path)
+    diagnosis = visit.page.url
+    run_the_next_experiment(visit, service, tmp_path)
+    visit.page.goto(diagnosis)
+    report = download_the_proof(visit)
+    assert "Joint spring" in report
+    assert "<script" not in report
+
+
+def begin_a_campaign(visit: Visit, tmp_path: Path) -> None:
     page = visit.page
     visit.go("/")
     expect(page.get_by_text("No campaign yet")).to_be_visible()
@@ -29,26 +45,30 @@ def test_a_campaign_is_begun_watched_and_ends_with_a_finding(
     page.get_by_label("Robot file").set_input_files(PAPER_ROBOT)
     expect(page.get_by_role("img", name="Kinematic chain of paper-arm")).to_be_visible()
     page.get_by_label("The simulated arm conceals").select_option("a spring")
-    page.get_by_label("Motion").select_option("short")
+    page.get_by_role("combobox", name="Motion").select_option("short")
+    page.get_by_label("Plan a further motion").check()
     visit.keep("page-new-campaign", tmp_path)
     assert visit.barriers() == []
     page.get_by_role("button", name="Begin").click()
+
+
+def watch_it_to_its_end(visit: Visit, tmp_path: Path) -> None:
+    page = visit.page
     expect(page.get_by_role("heading", name="paper-arm")).to_be_visible()
     expect(page.get_by_text("Waiting for the arm").or_(page.get_by_text(" of ").first).first).to_be_visible(
         timeout=CAMPAIGN_MS
     )
     expect(page.get_by_text("The findings explain all that the model left.")).to_be_visible(timeout=CAMPAIGN_MS)
     expect(page.get_by_text("Joint spring at joint1")).to_be_visible()
+    steps = page.locator(".steps li")
+    expect(steps).to_have_count(6)
+    assert set(steps.evaluate_all("(all) => all.map((each) => each.dataset.state)")) == {"succeeded", "finished"}
     visit.keep("page-campaign", tmp_path)
     assert visit.barriers() == []
-    address["campaign"] = page.url
 
 
-def test_the_diagnosis_is_a_story_that_can_be_looked_into(
-    visit: Visit, tmp_path: Path, address: dict[str, str]
-) -> None:
+def read_the_diagnosis(visit: Visit, tmp_path: Path) -> None:
     page = visit.page
-    page.goto(address["campaign"])
     page.get_by_role("link", name="Read the diagnosis").click()
     headings = page.get_by_role("heading", level=2)
     expect(headings.first).to_have_text("Where")
@@ -63,11 +83,27 @@ def test_the_diagnosis_is_a_story_that_can_be_looked_into(
     proof.scroll_into_view_if_needed()
     proof.get_by_role("button", name="joint2").click()
     expect(proof.get_by_text("Torque of joint2")).to_be_visible()
-    with page.expect_download() as download:
-        page.get_by_role("button", name="Download the proof").click()
-    report = Path(download.value.path()).read_text(encoding="utf-8")
-    assert "Joint spring" in report
-    assert "<script" not in report
+
+
+def run_the_next_experiment(visit: Visit, service: Served, tmp_path: Path) -> None:
+    """One click, and the arm that was diagnosed plays the planned motion: with what it conceals."""
+    page = visit.page
+    expect(page.locator("#next").get_by_text(re.compile("^Planned: "))).to_be_visible()
+    page.get_by_role("button", name="Run it on the simulated arm").click()
+    page.wait_for_url("**/#/runs/*")
+    expect(page.get_by_role("link", name="Look at the recording")).to_be_visible(timeout=CAMPAIGN_MS)
+    visit.keep("page-run", tmp_path)
+    run = service.client.get(f"/api/v1/runs/{page.url.rsplit('/', 1)[1]}").json()
+    (effect,) = run["backend"]["scenario"]["effects"]
+    assert (run["state"], effect["effect"], run["recording"]["partial"]) == ("finished", "joint_spring", False)
+    page.get_by_role("link", name="Look at the recording").click()
+    expect(page.locator(".canvas canvas").nth(1)).to_be_visible()
+
+
+def download_the_proof(visit: Visit) -> str:
+    with visit.page.expect_download() as download:
+        visit.page.get_by_role("button", name="Download the proof").click()
+    return Path(download.value.path()).read_text(encoding="utf-8")
 
 
 def test_the_identification_and_the_recording_are_shown(visit: Visit, tmp_path: Path, address: dict[str, str]) -> None:

@@ -115,7 +115,12 @@ def test_every_top_level_file_is_there(file: str) -> None:
     assert (REPOSITORY / file).read_text(encoding="utf-8").strip()
 
 
-@pytest.mark.parametrize("code", error_codes())
+def all_codes() -> list[str]:
+    """Codes of the error tree, and of what only the service meets."""
+    return sorted({*error_codes(), *KINDS})
+
+
+@pytest.mark.parametrize("code", all_codes())
 def test_every_error_code_has_a_page(code: str) -> None:
     page = REPOSITORY / "docs" / "errors" / f"{code}.md"
     assert page.is_file(), f"write docs/errors/{code}.md: cause, example message, remedy"
@@ -124,18 +129,21 @@ def test_every_error_code_has_a_page(code: str) -> None:
         assert f"{heading}\n" in text, f"docs/errors/{code}.md has no heading `{heading}`"
     examples = text.split("## Examples\n")[1].split("## What to do\n")[0]
     assert re.fullmatch(r"```\n(?:(?!```|@@).+\n)+```\n\n", examples), f"docs/errors/{code}.md shows no example message"
+    assert set(re.findall(r"HTTP status (\d{3})", text)) <= {str(int(KINDS[code].status))}
 
 
 def test_no_page_of_a_code_that_is_gone() -> None:
-    pages = {page.stem for page in (REPOSITORY / "docs" / "errors").glob("*.md")} - {"README", "service"}
-    assert pages == set(error_codes())
+    pages = {page.stem for page in (REPOSITORY / "docs" / "errors").glob("*.md")} - {"README"}
+    assert pages == set(all_codes())
 
 
-def test_every_problem_of_the_service_is_explained() -> None:
-    page = (REPOSITORY / "docs" / "errors" / "service.md").read_text(encoding="utf-8")
-    explained = set(re.findall(r"^\| `([a-z-]+)` \| (\d{3}) \|", page, flags=re.MULTILINE))
-    own = set(error_codes())
-    assert explained == {(kind.code, str(int(kind.status))) for kind in KINDS.values() if kind.code not in own}
+def test_every_error_code_is_listed_with_its_status() -> None:
+    listing = (REPOSITORY / "docs" / "errors" / "README.md").read_text(encoding="utf-8")
+    listed = re.findall(r"^\| \[`([a-z-]+)`\]\(([a-z-]+)\.md\) \| (\d{3}) \|", listing, flags=re.MULTILINE)
+    assert listed == [(code, code, status) for code, _, status in listed]
+    assert sorted((code, status) for code, _, status in listed) == sorted(
+        (kind.code, str(int(kind.status))) for kind in KINDS.values()
+    )
 
 
 def test_error_codes_are_unique() -> None:

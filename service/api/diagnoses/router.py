@@ -17,8 +17,8 @@ from service.api.problems import problem_responses
 from service.api.robots.of_job import add_robot_route
 from service.api.services import Offered, Services
 from service.diagnosis import DiagnosisDocument
+from service.diagnosis.documents.plots import DiagnosisPlots
 from service.diagnosis.extended_model import ModelDocument
-from service.diagnosis.plots import DiagnosisPlots
 from service.errors import NotFoundError
 from service.excitation.trajectory_document import TrajectoryDocument
 from service.jobs import DiagnosisWorkspace
@@ -38,7 +38,7 @@ _UPLOADS = {
     status_code=202,
     summary="Hand in a diagnosis",
     response_model=DiagnosisAnswer,
-    responses=problem_responses(*SUBMISSION, "not-found", "queue-full"),
+    responses=problem_responses(*SUBMISSION, "recording", "not-found", "queue-full"),
     openapi_extra=request_body(DiagnosisRequest, EXAMPLES, _UPLOADS),
 )
 async def hand_in(request: Request, response: Response, services: Offered) -> DiagnosisAnswer:

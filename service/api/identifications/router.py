@@ -50,7 +50,7 @@ _EXPORT_CONTENT: dict[str, Any] = {
     status_code=202,
     summary="Hand in an identification",
     response_model=IdentificationAnswer,
-    responses=problem_responses(*SUBMISSION, "not-found", "queue-full"),
+    responses=problem_responses(*SUBMISSION, "recording", "not-found", "queue-full"),
     openapi_extra=request_body(IdentificationRequest, EXAMPLES, _UPLOADS),
 )
 async def hand_in(request: Request, response: Response, services: Offered) -> IdentificationAnswer:

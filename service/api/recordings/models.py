@@ -16,6 +16,7 @@ class RecordingAnswer(AnswerModel):
     size: int = Field(description="number of bytes", examples=[1830221])
     modified: datetime = Field(description="when it was last written, UTC")
     sha256: str | None = Field(description="of its bytes, in hexadecimal; null in a list where it was not computed yet")
+    is_damaged: bool = Field(description="whether it was sent or recorded, and its bytes are not those any more")
 
 
 class RecordingListAnswer(AnswerModel):

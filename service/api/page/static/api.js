@@ -20,7 +20,10 @@ function headers(more) {
 /** Keep a key for as long as this tab is open. */
 export function useKey(key) {
   sessionStorage.setItem(KEY, key);
+  window.dispatchEvent(new Event("tauscope:key"));
 }
+
+export const hasKey = () => sessionStorage.getItem(KEY) !== null;
 
 async function answered(response) {
   if (response.ok) return response;
@@ -49,16 +52,16 @@ export async function post(path, body, options = {}) {
   const isForm = body instanceof FormData;
   const more = body === undefined || isForm ? {} : { "Content-Type": "application/json" };
   const response = await fetchRaw(path, {
+    ...options,
     method: "POST",
     body: body === undefined || isForm ? body : JSON.stringify(body),
-    headers: { ...more, "Idempotency-Key": crypto.randomUUID?.() ?? `${Date.now()}-${Math.random()}` },
-    ...options,
+    headers: { ...more, "Idempotency-Key": crypto.randomUUID?.() ?? `${Date.now()}-${Math.random()}`, ...options.headers },
   });
   return response.status === 204 ? null : response.json();
 }
 
-export async function remove(path) {
-  await fetchRaw(path, { method: "DELETE" });
+export async function remove(path, options = {}) {
+  await fetchRaw(path, { ...options, method: "DELETE" });
 }
 
 /** Save a file that the service sends; a link alone could bring no key. */

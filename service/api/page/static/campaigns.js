@@ -2,8 +2,9 @@
 
 import { armDrawing, jointRows } from "./arm.js";
 import { follow, getJson, post } from "./api.js";
-import { chance, h, moment, number, render, section, state, table, title } from "./dom.js";
+import { chance, explained, h, moment, number, render, section, state, table, title } from "./dom.js";
 import { HEADLINES, appendRobot } from "./diagnoses.js";
+import { move } from "./leases.js";
 import { items } from "./lists.js";
 import { liveMonitor } from "./runs.js";
 
@@ -33,7 +34,7 @@ export async function showCampaign(root, { id, signal, show }) {
   let watched = null;
   let leaving = null;
   function update() {
-    render(status, state(campaign.state), campaign.problem ? h("span", { role: "alert", text: ` ${campaign.problem.detail}` }) : "");
+    render(status, state(campaign.state), campaign.problem ? h("span", { role: "alert" }, " ", explained(campaign.problem)) : "");
     render(steps, campaign.steps.map((step) => h("li", { "data-state": step.state, "data-live": !ENDS.includes(step.state) && !RUN_ENDS.includes(step.state) },
       h("b", {}, step.link && !step.link.includes("/excitations/") ? h("a", { href: linked(step.link), text: NAMES[step.name] }) : NAMES[step.name]), state(step.state))));
     const moving = campaign.steps.find((step) => step.link?.includes("/runs/") && !RUN_ENDS.includes(step.state));
@@ -127,7 +128,7 @@ export async function showNewCampaign(root, { signal }) {
       render(joints, ...report.joints.map((joint) => h("option", { value: joint.number, text: joint.name })));
     } catch (error) {
       render(sheet);
-      said.textContent = error.message;
+      render(said, explained(error));
     }
   }
 
@@ -138,6 +139,7 @@ export async function showNewCampaign(root, { signal }) {
   const length = h("select", { id: "length" }, Object.keys(LENGTHS).map((name) => h("option", { value: name, text: name })));
   const clear = h("input", { type: "checkbox", id: "clear" });
   const clearLabel = h("label", { class: "check", for: "clear", hidden: true }, clear, "The arm's whole reach is clear, and the emergency stop is at hand.");
+  const plan = h("input", { type: "checkbox", id: "plan" });
   const simulated = [time, conceal, joints];
   backend.onchange = () => {
     const real = backend.value !== "sim";
@@ -151,19 +153,20 @@ export async function showNewCampaign(root, { signal }) {
     said.textContent = "Handing in …";
     const concealed = backend.value === "sim" ? CONCEALED[conceal.value](Number(joints.value)) : null;
     const isSim = backend.value === "sim";
-    const request = { backend: { name: backend.value, ...(isSim ? { time: time.value } : {}), ...(concealed ? { scenario: { torque_noise_std: 0.1, seed: 1, effects: [concealed] } } : {}) }, diagnosis: {}, ...LENGTHS[length.value] };
+    const request = { backend: { name: backend.value, ...(isSim ? { time: time.value } : {}), ...(concealed ? { scenario: { torque_noise_std: 0.1, seed: 1, effects: [concealed] } } : {}) }, diagnosis: { next_trajectory: plan.checked }, ...LENGTHS[length.value] };
     if (isSim) request.run = { feed_forward: false, rate_hz: 200 };
     const body = new FormData();
     body.append("request", new Blob([JSON.stringify(request)], { type: "application/json" }));
     body.append("robot", chosen.files[0]);
     if (chosen.files[1]) body.append("urdf", chosen.files[1]);
     try {
-      const campaign = await post("campaigns", body);
+      const campaign = await move("campaigns", body, chosen.report.name, backend.value);
       location.hash = `#/campaigns/${campaign.id}`;
-    } catch (error) { said.textContent = error.message; begin.disabled = false; }
+    } catch (error) { render(said, explained(error)); begin.disabled = false; }
   } },
   h("label", { for: "backend" }, "Arm", backend), h("label", { for: "length" }, "Motion", length), h("label", { for: "time" }, "Time of the simulated arm", time),
-  h("label", { for: "conceal" }, "The simulated arm conceals", conceal), h("label", { for: "conceal-joint" }, "at", joints), clearLabel, h("div", { class: "row" }, begin));
+  h("label", { for: "conceal" }, "The simulated arm conceals", conceal), h("label", { for: "conceal-joint" }, "at", joints),
+  h("label", { class: "check", for: "plan" }, plan, "Plan a further motion even where the diagnosis leaves nothing open."), clearLabel, h("div", { class: "row" }, begin));
   render(root, h("h1", { text: "New campaign" }), h("p", { class: "lead", text: "A motion is designed, driven twice, and the arm identified and diagnosed. Stop, above, ends it at any moment." }), drop, said, sheet, form);
   if (again) {
     const robot = await getJson(`campaigns/${again}/robot`, signal);

@@ -1,9 +1,10 @@
 // A diagnosis as a story: where, what, how much, the proof, what next.
 
-import { download, getJson, post } from "./api.js";
-import { chance, figures, h, moment, number, percent, render, s, section, table, tabs, title, unit, withError } from "./dom.js";
+import { download, getJson } from "./api.js";
+import { chance, explained, figures, h, moment, number, percent, render, s, section, table, tabs, title, unit, withError } from "./dom.js";
 import { VARIABLES, heatMap } from "./heat.js";
 import { waiting } from "./identifications.js";
+import { move } from "./leases.js";
 import { jobList } from "./lists.js";
 import { group, plot, zoomButtons } from "./plots.js";
 
@@ -167,9 +168,9 @@ function nextSection(job, result, signal) {
   const button = h("button", { type: "button", class: "primary", text: "Run it on the simulated arm", onclick: async () => {
     button.disabled = true;
     try {
-      const run = await post("runs", await nextRun(job));
+      const run = await move("runs", await nextRun(job), job.robot, "sim");
       location.hash = `#/runs/${run.id}`;
-    } catch (error) { said.textContent = error.message; button.disabled = false; }
+    } catch (error) { render(said, explained(error)); button.disabled = false; }
   } });
   if (job.links.next_trajectory) {
     getJson(job.links.next_trajectory, signal).then((trajectory) => render(place, h("p", { class: "note", text: `Planned: ${(trajectory.segments ?? []).length} segments, within the robot file's limits.` }))).catch(() => {});
@@ -179,11 +180,21 @@ function nextSection(job, result, signal) {
     job.links.next_trajectory ? h("div", { class: "row" }, button, h("button", { type: "button", onclick: () => download(job.links.next_trajectory, `next-${job.id}.json`), text: "Save the motion" })) : null, said);
 }
 
+/** How the simulated arm was run that the recordings are of, with what it conceals; a plain one where they are of none. */
+async function sameArm(job) {
+  for (const { name } of job.recordings) {
+    const id = /^run-(.+)\.csv$/.exec(name)?.[1];
+    const run = id ? await getJson(`runs/${encodeURIComponent(id)}`).catch(() => null) : null;
+    if (run?.backend?.name === "sim") return { ...run.options, backend: run.backend };
+  }
+  return { backend: { name: "sim" } };
+}
+
 /** A run of the planned motion with the robot that was diagnosed. */
 async function nextRun(job) {
-  const [robot, trajectory] = await Promise.all([getJson(`diagnoses/${job.id}/robot`), getJson(job.links.next_trajectory)]);
+  const [robot, trajectory, arm] = await Promise.all([getJson(`diagnoses/${job.id}/robot`), getJson(job.links.next_trajectory), sameArm(job)]);
   const form = new FormData();
-  form.append("request", new Blob([JSON.stringify({ backend: { name: "sim" }, trajectory })], { type: "application/json" }));
+  form.append("request", new Blob([JSON.stringify({ ...arm, trajectory })], { type: "application/json" }));
   appendRobot(form, robot);
   return form;
 }

@@ -59,7 +59,9 @@ export function chance(value) {
 }
 
 export function percent(share) {
-  return Number.isFinite(share) ? `${(100 * share).toPrecision(2)} %` : "–";
+  if (!Number.isFinite(share)) return "–";
+  const percents = 100 * share;
+  return `${Math.abs(percents) < 99.5 ? percents.toPrecision(2) : percents.toFixed(0)} %`;
 }
 
 /** A moment as people say it. */
@@ -93,6 +95,14 @@ export function state(name) {
   const marks = { succeeded: "●", finished: "●", failed: "✕", damaged: "✕", interrupted: "✕", cancelled: "■", stopped: "■" };
   const kind = ["succeeded", "finished"].includes(name) ? "good" : marks[name] ? "bad" : "live";
   return h("span", { class: `state ${kind}` }, h("span", { "aria-hidden": "true" }, marks[name] ?? "◐"), ` ${name}`);
+}
+
+/** What went wrong, and the page that explains its code: in a tab of its own, since this one may be watching an arm. */
+export function explained(problem) {
+  const { code } = problem;
+  const other = code === "forbidden" ? [" · ", h("button", { type: "button", class: "link", text: "Use another key", onclick: () => window.dispatchEvent(new CustomEvent("tauscope:ask-key", { detail: problem })) })] : null;
+  const more = code ? h("a", { href: `/docs/errors/${encodeURIComponent(code)}`, target: "_blank", rel: "noopener", text: `What ${code} means` }) : null;
+  return [problem.detail ?? problem.message, more ? [" · ", more] : null, other];
 }
 
 /** Large numbers at the top of a page. */

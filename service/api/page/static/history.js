@@ -1,61 +1,74 @@
-// A robot over time: which model is in use, how its parameters move, and what is done by itself.
+// A robot over time: which model is in use, how its parameters move, and what somebody should know.
 
 import { getJson, post } from "./api.js";
-import { h, moment, number, render, section, table, tabs } from "./dom.js";
+import { explained, h, moment, number, percent, render, section, table, tabs } from "./dom.js";
 import { plot } from "./plots.js";
+import { scheduleSection } from "./schedules.js";
 
 const STATES = { active: "in use", kept: "was in use", refused: "refused", unreadable: "damaged" };
 const DAY_MS = 86_400_000;
 
 export async function showHistory(root, { signal, show }) {
-  const [{ models }, { events }, { schedules }] = await Promise.all([
-    getJson("models?limit=200", signal), getJson("events?open=true", signal), getJson("schedules", signal)]);
+  const [{ models }, { events }, schedules] = await Promise.all([
+    getJson("models?limit=200", signal), getJson("events?open=true", signal), scheduleSection(signal)]);
   const robots = [...new Set(models.map((each) => each.robot))];
   const place = h("div", {});
   const choose = (chosen) => showRobot(place, robots[chosen], models.filter((each) => each.robot === robots[chosen]), signal);
   render(root, h("h1", { text: "Over time" }), h("p", { class: "lead", text: "Models that were judged, the drift of their parameters, and what is done by itself." }),
-    events.length ? h("ul", { class: "cautions" }, events.map((event) => h("li", {}, `${event.robot}: ${event.text} `,
-      h("button", { type: "button", class: "quiet", text: "Take note", onclick: async (click) => {
-        const reason = prompt("What is it about? The answer is kept with the event.");
-        if (!reason) return;
-        click.target.disabled = true;
-        await post(`events/${event.number}/acknowledge`, { reason });
-        show();
-      } })))) : h("p", { class: "note", text: "No drift that nobody has taken note of." }),
-    robots.length > 1 ? tabs("Robot", robots, 0, choose) : null, place, scheduleSection(schedules));
+    events.length ? h("ul", { class: "cautions" }, events.map((event) => noteForm(event, show))) : h("p", { class: "note", text: "No drift that nobody has taken note of." }),
+    robots.length > 1 ? tabs("Robot", robots, 0, choose) : null, place, schedules);
   if (robots.length) await choose(0);
   else render(place, h("p", { class: "lead", text: "No model has been judged yet: identify an arm first." }));
 }
 
+/** An event, and where its cause is written down: in the page, so that Stop stays within reach. */
+function noteForm(event, show) {
+  const said = h("span", { role: "status" });
+  const reason = h("input", { id: `why-${event.number}`, required: true, maxlength: "1000", autocomplete: "off" });
+  const form = h("form", { class: "row", onsubmit: async (submitted) => {
+    submitted.preventDefault();
+    try {
+      await post(`events/${event.number}/acknowledge`, { reason: reason.value });
+      show();
+    } catch (error) { render(said, explained(error)); }
+  } }, h("label", { for: reason.id }, "What is it about? Kept with the event", reason), h("button", { type: "submit", text: "Take note" }), said);
+  return h("li", {}, `${event.robot}: ${event.text}`, form);
+}
+
 async function showRobot(place, robot, models, signal) {
-  const trend = await getJson(`trend?robot=${encodeURIComponent(robot)}`, signal).catch(() => ({ parameters: [] }));
+  const { parameters } = await getJson(`trend?robot=${encodeURIComponent(robot)}`, signal);
+  const reference = models.find((each) => each.is_reference)?.id;
   const drawn = h("div", {});
-  const moved = [...trend.parameters].sort((a, b) => Math.abs(b.line?.in_std ?? 0) - Math.abs(a.line?.in_std ?? 0));
+  const moved = [...parameters].sort((a, b) => Math.abs(b.line?.in_std ?? 0) - Math.abs(a.line?.in_std ?? 0));
   const select = h("select", { id: "trend", onchange: () => draw() }, moved.map((each) => h("option", { value: each.name, text: each.name })));
-  function draw() {
-    const chosen = moved.find((each) => each.name === select.value);
-    if (!chosen || chosen.points.length < 2) { render(drawn, h("p", { class: "note", text: "Drawn from two models on." })); return; }
-    const start = Date.parse(chosen.points[0].time);
-    const days = chosen.points.map((each) => (Date.parse(each.time) - start) / DAY_MS);
-    const end = (sign) => chosen.points.map((each) => each.value + sign * 1.96 * each.std);
-    const line = chosen.line;
-    render(drawn,
-      plot({ label: chosen.name, raw: true, tall: true, x: days, xLabel: `days since ${moment(chosen.points[0].time)}`, yLabel: "SI", bands: [{ series: [1, 2] }], series: [
-        { label: "high", values: end(1), colour: "--band", hidden: true }, { label: "low", values: end(-1), colour: "--band", hidden: true },
-        { label: "estimate, with its 95 % band", values: chosen.points.map((each) => each.value), colour: "--after", width: 2 }] }).element,
-      line ? h("p", { class: "note", text: `${number(line.slope, 3)} ± ${number(line.slope_std, 2)} a week, ${number(line.in_std, 3)} standard errors from standing still.` }) : null);
-  }
+  const draw = () => render(drawn, trendOf(moved.find((each) => each.name === select.value), reference));
   render(place, section("models", `Models of ${robot}`,
     table("Models", ["model", "state", "source", "judged", "why"], models.map((each) => [
       h("a", { href: `#/identifications/${encodeURIComponent(each.id)}`, text: moment(each.created) }), `${STATES[each.state] ?? each.state}${each.is_reference ? ", reference" : ""}`, each.source, moment(each.considered),
       each.gates.filter((gate) => !gate.passed).map((gate) => gate.reason).join("; ") || "passed every gate"]), 5)),
-  trend.parameters.length ? section("trend-of", "Parameters", h("form", { class: "sheet" }, h("label", { for: "trend" }, "Parameter, the most moved first", select)), drawn) : null);
+  moved.length ? section("trend-of", "Parameters", h("form", { class: "sheet" }, h("label", { for: "trend" }, "Parameter, the most moved first", select)), drawn) : null);
   if (moved.length) draw();
 }
 
-function scheduleSection(schedules) {
-  if (!schedules.length) return section("schedules", "Schedules", h("p", { class: "lead", text: "Nothing is done by itself." }));
-  const when = (definition) => definition.cron ?? (definition.every_s ? `every ${number(definition.every_s / 3600, 3)} h` : "–");
-  return section("schedules", "Schedules", table("Schedules", ["name", "robot", "what", "when", "due next"], schedules.map((each) =>
-    [each.name, each.robot ?? "–", each.definition.kind ?? "–", when(each.definition), each.next_due ? moment(each.next_due) : "not enabled"]), 5));
+/** A parameter in every model that was in use, and what the line through it says. */
+function trendOf({ name, points, line }, reference) {
+  if (points.length < 2) return h("p", { class: "note", text: "Drawn from two models on." });
+  const start = Date.parse(points[0].time);
+  const end = (sign) => points.map((each) => each.value + sign * 1.96 * each.std);
+  return [
+    plot({ label: name, raw: true, tall: true, x: points.map((each) => (Date.parse(each.time) - start) / DAY_MS), xLabel: `days since ${moment(points[0].time)}`, yLabel: "SI", bands: [{ series: [1, 2] }], series: [
+      { label: "high", values: end(1), colour: "--band", hidden: true }, { label: "low", values: end(-1), colour: "--band", hidden: true },
+      { label: "estimate, with its 95 % band", values: points.map((each) => each.value), colour: "--after", width: 2, marks: true }] }).element,
+    h("p", { id: "trend-words", text: changeOf(points, reference) }),
+    line ? h("p", { class: "note", text: `The line through all ${line.count}: ${number(line.slope, 3)} ± ${number(line.slope_std, 2)} a week, ${number(Math.abs(line.in_std), 3)} standard errors from standing still.` }) : null,
+  ];
+}
+
+/** What the newest model says, beside the one that drift is counted from. */
+function changeOf(points, reference) {
+  const from = points.find((each) => each.model === reference) ?? points[0];
+  const to = points[points.length - 1];
+  const std = Math.hypot(from.std, to.std);
+  const share = from.value ? ` (${to.value > from.value ? "+" : "−"}${percent(Math.abs((to.value - from.value) / from.value))})` : "";
+  return `From ${number(from.value, 3)} to ${number(to.value, 3)}${share} since the reference: ${number(Math.abs(to.value - from.value) / std, 2)} standard errors of the difference.`;
 }

@@ -1,7 +1,7 @@
 // Identifications: how well the model explains the torque, its parameters, and its friction.
 
 import { download, follow, getJson } from "./api.js";
-import { figures, h, moment, number, percent, render, s, section, state, table, tabs, withError } from "./dom.js";
+import { explained, figures, h, moment, number, percent, render, s, section, state, table, tabs, withError } from "./dom.js";
 import { jobList } from "./lists.js";
 import { group, plot, zoomButtons } from "./plots.js";
 
@@ -36,7 +36,7 @@ export async function showIdentification(root, { id, signal, show }) {
 
 export function waiting(root, head, job, signal, show) {
   const said = h("p", { role: "status" }, state(job.state), job.step ? ` ${job.step}` : "");
-  render(root, ...head, said, job.problem ? h("p", { role: "alert", text: job.problem.detail }) : null);
+  render(root, ...head, said, job.problem ? h("p", { role: "alert" }, explained(job.problem)) : null);
   if (job.problem || ["failed", "cancelled", "interrupted", "damaged"].includes(job.state)) return null;
   return follow(job.links.events, signal, (event) => {
     if (event.step) render(said, state("running"), ` ${event.step}`);

@@ -1,14 +1,17 @@
 // The shell: which view is shown, whether the service can be reached, and the button that stops every arm.
 
-import { getJson, post, useKey } from "./api.js";
-import { h, render } from "./dom.js";
+import { getJson } from "./api.js";
+import { explained, h, render } from "./dom.js";
 import { recolour } from "./plots.js";
 import { showCampaign, showCampaigns, showNewCampaign } from "./campaigns.js";
 import { showDiagnoses, showDiagnosis } from "./diagnoses.js";
+import { askForKey, isAsked, keyButton } from "./keys.js";
+import { keepLeases } from "./leases.js";
 import { showHistory } from "./history.js";
 import { showIdentification, showIdentifications } from "./identifications.js";
 import { showRecording, showRecordings } from "./recordings.js";
 import { showRun, showRuns } from "./runs.js";
+import { stopEverything } from "./stop.js";
 
 const VIEWS = [
   [/^\/$/, showCampaigns], [/^\/new$/, showNewCampaign], [/^\/campaigns\/([^/]+)$/, showCampaign],
@@ -48,32 +51,19 @@ async function show() {
     await found[1](content, { id: found[0][1] && decodeURIComponent(found[0][1]), signal, show });
   } catch (error) {
     if (signal.aborted) return;
-    if (error.status === 401) await askForKey(error.message);
-    else render(content, h("h1", { text: "This cannot be shown" }), h("p", { role: "alert", text: error.message }),
+    if (error.status === 401) needKey(error);
+    else render(content, h("h1", { text: "This cannot be shown" }), h("p", { role: "alert" }, explained(error)),
       h("button", { type: "button", onclick: show, text: "Try again" }));
   }
 }
 
-function askForKey(message) {
-  if (document.querySelector("dialog[open]")) return Promise.resolve();
-  const input = h("input", { type: "password", autocomplete: "off", required: true, id: "key" });
-  const dialog = h("dialog", { "aria-labelledby": "key-title" },
-    h("h2", { id: "key-title", text: "An API key is needed" }), h("p", { class: "note", text: message }),
-    h("label", { for: "key" }, "Key", input),
-    h("div", { class: "row" }, h("button", { type: "button", class: "primary", text: "Go on", onclick: () => {
-      useKey(input.value);
-      dialog.close();
-      dialog.remove();
-      show();
-    } })));
-  document.body.append(dialog);
-  dialog.showModal();
-  return Promise.resolve();
-}
+/** Ask for a key; what could not be shown without it is shown then. */
+const needKey = (problem) => askForKey(problem, show);
 
 /** Whether the service answers, and what moves. */
 async function pulse() {
   const quick = AbortSignal.timeout(PULSE_MS * 1.5);
+  if (isAsked()) { setTimeout(pulse, PULSE_MS); return; }
   try {
     const [runs, campaigns] = await Promise.all([getJson("runs?limit=8", quick), getJson("campaigns?limit=8", quick)]);
     live = {
@@ -84,7 +74,7 @@ async function pulse() {
   } catch (error) {
     if (error.status === 401) {
       connection(true);
-      await askForKey(error.message);
+      needKey(error);
     } else connection(error.status !== undefined);
   }
   setTimeout(pulse, PULSE_MS);
@@ -106,34 +96,22 @@ function notice(text) {
   document.getElementById("notice").textContent = text;
 }
 
-/** Stop everything that moves: what is known at once, then what a fresh list says; tried until the service has heard. */
 async function stopAll() {
   stopButton.classList.add("pressed");
   stopButton.textContent = "Stopping";
-  const asked = [...live.campaigns.map((each) => each.links.stop), ...live.runs.map((each) => each.links.stop)];
-  const ask = (path) => post(path, undefined, { keepalive: true, signal: AbortSignal.timeout(3000) }).catch((error) => {
-    if (error.status === undefined) throw error;
-  });
-  for (let attempt = 0; attempt < 60; attempt += 1) {
-    try {
-      await Promise.all(["stop", ...asked].map(ask));
-      const fresh = AbortSignal.timeout(3000);
-      const [runs, campaigns] = await Promise.all([getJson("runs?limit=20", fresh), getJson("campaigns?limit=20", fresh)]);
-      const going = [
-        ...campaigns.campaigns.filter((each) => ["queued", "waiting", "running"].includes(each.state)),
-        ...runs.runs.filter((run) => !["finished", "stopped", "failed", "interrupted", "damaged"].includes(run.state)),
-      ];
-      await Promise.all(going.map((each) => ask(each.links.stop)));
-      notice(going.length || asked.length ? "Stop was sent, and the service has taken it." : "Nothing was moving.");
-      break;
-    } catch {
-      notice("Stop could not be sent. It is tried again. Use the arm's own emergency stop now.");
-      await new Promise((done) => setTimeout(done, 500));
-    }
-  }
+  const known = [...live.campaigns, ...live.runs].map((each) => each.links.stop);
+  const refused = await stopEverything(known, notice);
   stopButton.classList.remove("pressed");
   stopButton.textContent = "Stop";
-  setTimeout(() => { if (reached) notice(""); }, 6000);
+  if (refused?.status === 401) needKey(refused);
+  if (!refused) setTimeout(() => { if (reached) notice(""); }, 6000);
+}
+
+/** Which arms this tab has, and that they stop with it. */
+function tellLeases(arms, lost) {
+  const shown = document.getElementById("lease");
+  shown.textContent = arms.length ? `This tab has the lease of ${arms.join(" and ")}: where it is closed, or its connection is gone for ten seconds, the arm stops.` : "";
+  if (lost) notice(lost);
 }
 
 function theme(choice) {
@@ -155,6 +133,9 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", recolour);
 stopButton.addEventListener("click", stopAll);
 window.addEventListener("hashchange", async () => { await show(); content.focus({ preventScroll: true }); window.scrollTo(0, 0); });
 window.addEventListener("tauscope:back", show);
+window.addEventListener("tauscope:ask-key", (event) => needKey(event.detail));
+keyButton(document.getElementById("key-change"), () => needKey({ message: "The key of this tab is replaced." }));
+keepLeases(tellLeases);
 theme(localStorage.getItem("tauscope-theme") ?? "auto");
 getJson("/healthz").then(({ version }) => { document.getElementById("version").textContent = `Tauscope ${version}`; }).catch(() => {});
 show();

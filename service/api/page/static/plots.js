@@ -58,7 +58,7 @@ export function thinned(time, columns, from, to, buckets) {
  * A plot over a common axis.
  *
  * spec: { label, x: column, xLabel, yLabel, height, group, log, band: [low, high],
- *         series: [{ label, values, colour, width, dash, points, fillTo }] }
+ *         series: [{ label, values, colour, width, dash, points: in place of a line, marks: on the line }] }
  */
 export function plot(spec) {
   const holder = h("div", { class: `canvas ${spec.tall ? "tall" : ""}`, tabindex: "0", role: "group", "aria-label": `${spec.label}. Arrow keys move, plus and minus zoom, zero shows everything.` });
@@ -129,7 +129,7 @@ export function plot(spec) {
       series: [{ label: spec.xLabel }, ...spec.series.map((each) => ({
         label: each.label, stroke: () => css(each.colour), width: each.width ?? 1.25, dash: each.dash, show: each.show ?? true,
         spanGaps: false, paths: each.points ? () => null : undefined,
-        points: { show: each.points ?? false, size: each.points ? 5 : 0, fill: () => css(each.colour), stroke: () => css(each.colour) },
+        points: { show: Boolean(each.points || each.marks), size: each.points ? 5 : each.marks ? 8 : 0, fill: () => css(each.colour), stroke: () => css(each.colour) },
       }))],
       bands: (spec.bands ?? []).map((each) => ({ series: each.series, fill: () => css("--band") })),
       hooks: {

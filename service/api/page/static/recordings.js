@@ -1,7 +1,7 @@
 // Recordings: what lies on the server, and what one of them holds.
 
 import { download, getJson, getSamples, post } from "./api.js";
-import { bytes, figures, h, moment, number, render, section, table } from "./dom.js";
+import { bytes, explained, figures, h, moment, number, render, section, table } from "./dom.js";
 import { items } from "./lists.js";
 import { group, jointStyle, plot, zoomButtons } from "./plots.js";
 
@@ -15,7 +15,7 @@ export async function showRecordings(root, { signal, show }) {
     try {
       await post("recordings", form);
       show();
-    } catch (error) { said.textContent = error.message; }
+    } catch (error) { render(said, explained(error)); }
   } });
   const newest = [...recordings].sort((a, b) => b.modified.localeCompare(a.modified));
   render(root, h("h1", { text: "Recordings" }), h("p", { class: "lead", text: "CSV, Parquet or MCAP; each one continuous motion." }),

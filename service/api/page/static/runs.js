@@ -2,7 +2,7 @@
 
 import { armDrawing } from "./arm.js";
 import { download, follow, getJson, post } from "./api.js";
-import { figures, h, moment, number, render, section, state, table } from "./dom.js";
+import { explained, figures, h, moment, number, render, section, state, table } from "./dom.js";
 import { jobList } from "./lists.js";
 import { group, jointStyle, plot } from "./plots.js";
 
@@ -18,7 +18,7 @@ export async function showRun(root, { id, signal, show }) {
   const status = h("div", { class: "row", role: "status" }, state(run.state));
   render(root, 
     h("p", { class: "eyebrow", text: `Run · ${run.backend?.name ?? ""}` }), h("h1", { text: run.robot ?? id }), h("p", { class: "meta", text: moment(run.created) }), status,
-    run.problem ? h("p", { role: "alert", text: run.problem.detail }) : null,
+    run.problem ? h("p", { role: "alert" }, explained(run.problem)) : null,
     monitor?.element,
     monitor ? null : finished(run));
   if (monitor) {
@@ -34,6 +34,7 @@ export async function showRun(root, { id, signal, show }) {
 
 function finished(run) {
   const timing = run.timing;
+  const sent = h("span", { class: "hint", role: "status", text: " harmless: it has ended" });
   return [
     timing ? figures([
       ["Rate", `${number(timing.achieved_rate_hz, 4)} Hz`, `of ${number(timing.rate_hz, 4)} Hz`],
@@ -44,7 +45,7 @@ function finished(run) {
     run.recording?.name ? h("div", { class: "row" }, h("a", { class: "button primary", href: `#/recordings/${encodeURIComponent(run.recording.name)}`, text: "Look at the recording" }),
       Object.entries(run.links.recordings).map(([format, path]) => h("button", { type: "button", onclick: () => download(path, `run-${run.id}.${format}`), text: format.toUpperCase() }))) : null,
     run.worst_following?.length ? section("following", "Largest distance of arm and target", table("Following", ["joint", "distance [rad or m]"], run.worst_following.map((value, place) => [`${place + 1}`, number(value, 3)]))) : null,
-    h("p", {}, h("button", { type: "button", class: "quiet", onclick: async () => { await post(run.links.stop); }, text: "Send stop again" }), h("span", { class: "hint", text: " harmless: it has ended" })),
+    h("p", {}, h("button", { type: "button", class: "quiet", onclick: () => post(run.links.stop).catch((error) => render(sent, " ", explained(error))), text: "Send stop again" }), sent),
   ];
 }
 
