@@ -21,14 +21,16 @@ from service.jobs.identification_order import IdentificationOptions, Identificat
 from service.jobs.identification_work import run_identification
 from service.jobs.identification_workspace import IdentificationWorkspace
 from service.jobs.index_keeper import ChangedItem, IndexKeeper, open_index
+from service.jobs.lease import LONGEST_TTL_S, Lease
 from service.jobs.lease_errors import LeasedError, LeaseError, LeaseLostError, LeaseNeededError, NotArmedError
-from service.jobs.leases import LONGEST_TTL_S, Lease, Leases
+from service.jobs.leases import Leases
 from service.jobs.messages import without_folders
 from service.jobs.model_keeper import ModelKeeper
 from service.jobs.motions import DesignedMotion, Motion, ready_motion, take_trajectory
 from service.jobs.parameter_trends import ParameterTrend, parameter_trends
 from service.jobs.permits import Permit
-from service.jobs.queue import JobKind, JobQueue, QueueFullError
+from service.jobs.queue import JobQueue, QueueFullError
+from service.jobs.queued_job import JobKind
 from service.jobs.record import JobProblem, JobRecord
 from service.jobs.run_desk import RunDesk, run_recording_name
 from service.jobs.run_leader import ControlProcess, Live, StartControl

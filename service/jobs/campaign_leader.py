@@ -20,7 +20,8 @@ from service.jobs.excitation_workspace import ExcitationWorkspace
 from service.jobs.identification_submission import hand_in_identification
 from service.jobs.motions import StepFailedError, require_succeeded, wait_for_end
 from service.jobs.permits import FREE, Permit
-from service.jobs.queue import CANCELLED, INTERNAL, INTERRUPTED, JobKind, JobQueue, QueueFullError
+from service.jobs.queue import CANCELLED, INTERNAL, INTERRUPTED, JobQueue, QueueFullError
+from service.jobs.queued_job import JobKind
 from service.jobs.record import JobProblem
 from service.jobs.run_desk import RunDesk, run_recording_name
 from service.jobs.run_order import RunRequestRecord
@@ -37,7 +38,7 @@ POLL_S = 0.2
 """How often the progress of a run is told [s]."""
 
 ROOM_POLL_S = 0.5
-"""How often a queue that is full is asked again [s]."""
+"""How often a queue, or a disk, that is full is asked again [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,28 +121,34 @@ class CampaignLeader:
 
     def lead(self) -> None:
         """Take the campaign to its end; never raises."""
+        self._move(JobState.RUNNING)
         try:
-            self._move(JobState.RUNNING)
+            end = self._taken_to_its_end()
+        finally:
+            self._release_arm()
+        # a disk that is full now may take it later; else it becomes `interrupted` with the next start
+        while end is not None and not self._move(*end) and not self._is_closing:
+            threading.Event().wait(ROOM_POLL_S)
+
+    def _taken_to_its_end(self) -> tuple[JobState, JobProblem | None] | None:
+        """How it ended; None where it goes on after the next start."""
+        try:
             self._go()
         except StoppedError:
             if self._is_closing and self._workspace.read_made().recordings:
-                return  # its analysis goes on after the next start, and so does the job that is in the queue
+                return None  # the job that is in the queue goes on then, too
             self._cancel_jobs()
             if self._is_closing:
-                self._move(JobState.INTERRUPTED, INTERRUPTED)
-            else:
-                self._move(JobState.CANCELLED, CANCELLED)
+                return JobState.INTERRUPTED, INTERRUPTED
+            return JobState.CANCELLED, CANCELLED
         except StepFailedError as error:
-            self._move(JobState.FAILED, error.problem)
+            return JobState.FAILED, error.problem
         except TauscopeError as error:
-            self._move(JobState.FAILED, JobProblem(code=error.code, detail=str(error)))
+            return JobState.FAILED, JobProblem(code=error.code, detail=str(error))
         except Exception:
             _log.exception("campaign %s failed for an unforeseen reason", self._workspace.folder.name)
-            self._move(JobState.FAILED, INTERNAL)
-        else:
-            self._move(JobState.SUCCEEDED)
-        finally:
-            self._release_arm()
+            return JobState.FAILED, INTERNAL
+        return JobState.SUCCEEDED, None
 
     def _go(self) -> None:
         """Every step that is not done yet, one after the other."""
@@ -287,21 +294,23 @@ class CampaignLeader:
         jobs = [(shop.excitations, made.excitation), (shop.excitations, made.held_out_excitation)]
         jobs += [(shop.identifications, made.identification), (shop.diagnoses, made.diagnosis)]
         for kind, identifier in jobs:
-            with suppress(NotFoundError):
+            # one that a full disk does not let be cancelled is done for nobody
+            with suppress(NotFoundError, OSError):
                 if identifier is not None:
                     shop.jobs.cancel(kind, identifier)
 
-    def _move(self, state: JobState, problem: JobProblem | None = None) -> None:
-        """Write the campaign's new state, if it may follow the present one."""
+    def _move(self, state: JobState, problem: JobProblem | None = None) -> bool:
+        """Write the campaign's new state, if it may follow the present one; False where the disk does not take it."""
         record = self._workspace.read_record()
         if record is None or not record.may_become(state):
-            return
+            return True
         self.state = state
         try:
             self._workspace.write_record(record.moved(state, datetime.now(UTC), problem))
         except OSError:
-            # The disk is full or gone: the campaign becomes `interrupted` with the next start.
             _log.exception("the state of campaign %s could not be written", self._workspace.folder.name)
+            return False
+        return True
 
 
 def _run_problem(identifier: str, record: RunRecord | None) -> JobProblem:

@@ -7,7 +7,8 @@ from pathlib import Path
 from service.jobs.diagnosis_order import DiagnosisOptions, DiagnosisOrder
 from service.jobs.diagnosis_workspace import DiagnosisWorkspace
 from service.jobs.identification_submission import ordered_on_server
-from service.jobs.queue import JobKind, JobQueue
+from service.jobs.queue import JobQueue
+from service.jobs.queued_job import JobKind
 from service.store import RecordingStore
 
 

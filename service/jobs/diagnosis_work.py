@@ -6,10 +6,10 @@ from functools import partial
 from pathlib import Path
 
 from service.diagnosis import Diagnosis, DiagnosisDocument, against_model, against_simulation, diagnose, document
+from service.diagnosis.documents.plots import diagnosis_plots
 from service.diagnosis.extended_model import model_document
 from service.diagnosis.next_experiment import PlannedExperiment, planned_experiment
-from service.diagnosis.plots import diagnosis_plots
-from service.errors import RecordingError, TauscopeError
+from service.errors import ExcitationError, RecordingError, TauscopeError
 from service.excitation import trajectory_json
 from service.jobs.diagnosis_order import DiagnosisOrder
 from service.jobs.diagnosis_workspace import ROLES, DiagnosisWorkspace
@@ -63,7 +63,7 @@ class _Work:
         held_out = self._read(order.held_out, robot, "held_out")
         found = diagnose(robot, recordings, held_out, order.options.to_options(), self.begin)
         found = self._compared(found, order, robot)
-        planned = planned_experiment(found, self.begin, asked=order.options.next_trajectory)
+        planned = self._planned(found, asked=order.options.next_trajectory)
         self.begin("write result")
         name = None if planned is None else self.workspace.trajectory.name
         if planned is not None:
@@ -73,6 +73,14 @@ class _Work:
         told = document(found, planned, name)
         write_atomically(self.workspace.report, self._report(found, told, planned, order).encode())
         write_atomically(self.workspace.result, told.model_dump_json(by_alias=True, indent=1).encode())
+
+    def _planned(self, found: Diagnosis, *, asked: bool) -> PlannedExperiment | None:
+        """The next experiment; limits that allow none cost nobody what was found."""
+        try:
+            return planned_experiment(found, self.begin, asked=asked)
+        except ExcitationError as error:
+            self.begin(f"no next experiment: {error}")
+            return None
 
     def _report(
         self,

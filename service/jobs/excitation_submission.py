@@ -5,7 +5,8 @@ from pathlib import Path
 
 from service.jobs.excitation_order import ExcitationDesignOptions, ExcitationOrder
 from service.jobs.excitation_workspace import ExcitationWorkspace
-from service.jobs.queue import JobKind, JobQueue
+from service.jobs.queue import JobQueue
+from service.jobs.queued_job import JobKind
 
 
 def hand_in_excitation(

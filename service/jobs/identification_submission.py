@@ -6,7 +6,8 @@ from pathlib import Path
 
 from service.jobs.identification_order import IdentificationOptions, IdentificationOrder, OrderedRecording
 from service.jobs.identification_workspace import IdentificationWorkspace
-from service.jobs.queue import JobKind, JobQueue
+from service.jobs.queue import JobQueue
+from service.jobs.queued_job import JobKind
 from service.store import RecordingStore
 
 

@@ -17,12 +17,12 @@ _log = logging.getLogger("tauscope.jobs")
 
 @dataclass(frozen=True)
 class ChangedItem:
-    """An item of which a file is not what it was when the item ended.
+    """An item of which a file is not what it was when the item ended; or a recording that is not what was kept.
 
     kind, identifier : str
-        of the item
+        of the item; ``recording`` and its name
     path : str
-        of the file, below the item's folder
+        of the file, below the item's folder; empty for a recording
     """
 
     kind: str
@@ -77,7 +77,7 @@ class IndexKeeper:
             self._sync_recordings()
 
     def check(self, *, deep: bool = True) -> list[ChangedItem]:
-        """Compare the files of every item that has ended with what they were then.
+        """Compare the files of every item that has ended with what they were then, and recordings with what was kept.
 
         Parameters
         ----------
@@ -90,7 +90,7 @@ class IndexKeeper:
             shown as damaged in the index from now on
         """
         self.sync(thorough=True)
-        found = []
+        found = [ChangedItem("recording", name, "") for name in self._recordings.damaged(deep=deep)]
         for kind, store in self._items.items():
             damaged = self.index.damaged(kind)
             for identifier, (_, is_final) in sorted(self._known[kind].items()):

@@ -10,63 +10,15 @@ import secrets
 import threading
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 from service.jobs.device_claims import DeviceClaims
-from service.jobs.lease_errors import LeasedError, LeaseLostError, LeaseNeededError, NotArmedError
-from service.jobs.permits import FREE, Permit
+from service.jobs.lease import Lease
+from service.jobs.lease_errors import LeasedError, LeaseLostError, LeaseNeededError
+from service.jobs.lease_numbers import next_number
+from service.jobs.lease_permits import LeasePermit, UnleasedPermit
+from service.jobs.permits import Permit
 from service.robot.messages import one_line
-from service.store import write_atomically
-
-LONGEST_TTL_S = 60.0
-"""Longest time for which a lease may be given without a sign of life [s]."""
-
-
-@dataclass(eq=False)
-class Lease:
-    """One lease.
-
-    Attributes are replaced one at a time and never need a lock to be read.
-
-    id : str
-        public name
-    number : int
-        for fencing: a later lease has a higher one
-    device : str
-        the arm
-    holder : str
-        who has it, in words
-    owner : str
-        whose it is: no other caller can use its token
-    ttl_s : float
-        how long it lasts without a sign of life [s]
-    secret : str
-        second part of the token
-    ends : float
-        when it ends, on the clock of `Leases` [s]
-    is_armed : bool
-        whether the arm may move
-    lost : str or None
-        why it does not hold any more; None while it does
-    """
-
-    id: str
-    number: int
-    device: str
-    holder: str
-    owner: str
-    ttl_s: float
-    secret: str
-    ends: float
-    is_armed: bool = False
-    lost: str | None = None
-
-    @property
-    def token(self) -> str:
-        """What its holder shows."""
-        return f"{self.number}-{self.secret}"
-
 
 LeaseEnd = Callable[[Lease, str], None]
 """Told that a lease has ended, and why; called by whoever notices, so that it must return at once."""
@@ -145,7 +97,7 @@ class Leases:
                 if not take:
                     raise self._leased(present)
                 self._finish(present, f"{holder} took the arm")
-            number = self._next_number()
+            number = next_number(self._counter)
             lease = Lease(
                 id=f"lease-{number}",
                 number=number,
@@ -297,12 +249,12 @@ class Leases:
             if there is no such leave
         """
         if token is not None:
-            permit: Permit = _LeasePermit(self, self.require(device, token, owner))
+            permit: Permit = LeasePermit(self.require(device, token, owner), self.end_of)
         elif is_needed:
             hint = "POST /api/v1/leases, arm the lease, and send its token as header Lease-Token"
             raise LeaseNeededError(one_line(f"{device}: moves for whoever has its lease; {hint}"))
         else:
-            permit = _NoLeasePermit(self, device)
+            permit = UnleasedPermit(device, self.require_unleased)
         permit.require()
         return permit
 
@@ -353,60 +305,3 @@ class Leases:
         return LeasedError(
             one_line(f"{lease.device}: {lease.holder} has its lease, for {left:.1f} s more unless it is renewed")
         )
-
-    def _next_number(self) -> int:
-        """A number above all before, kept before it is used."""
-        try:
-            last = int(self._counter.read_text(encoding="ascii"))
-        except FileNotFoundError:
-            last = 0
-        except (OSError, ValueError):
-            # The seconds of our era are more than any number that was counted one by one.
-            last = int(time.time())
-        write_atomically(self._counter, str(last + 1).encode())
-        return last + 1
-
-
-class _LeasePermit:
-    """Leave by a lease that was shown."""
-
-    def __init__(self, leases: Leases, lease: Lease) -> None:
-        self._leases, self._lease = leases, lease
-
-    def require(self) -> None:
-        """Refuse what its end would stop at once."""
-        lost = self._leases.end_of(self._lease)
-        if lost is not None:
-            raise LeaseLostError(one_line(f"{self._lease.device}: lease {self._lease.number} ended: {lost}"))
-        if not self._lease.is_armed:
-            hint = f"POST /api/v1/leases/{self._lease.id}/arm first"
-            raise NotArmedError(one_line(f"{self._lease.device}: its lease is not armed; {hint}"))
-
-    def end(self) -> str | None:
-        """Why the motion has to end."""
-        lost = self._leases.end_of(self._lease)
-        if lost is not None:
-            return f"lease {self._lease.number} of {self._lease.holder} ended: {lost}"
-        return None if self._lease.is_armed else f"lease {self._lease.number} of {self._lease.holder} was disarmed"
-
-    def stopped(self) -> None:
-        """A stop disarms."""
-        self._lease.is_armed = False
-
-
-class _NoLeasePermit:
-    """Leave for one motion, by the arm's claim alone; nobody can lease the arm while it lasts."""
-
-    def __init__(self, leases: Leases, device: str) -> None:
-        self._leases, self._device = leases, device
-
-    def require(self) -> None:
-        """Refuse an arm that is leased."""
-        self._leases.require_unleased(self._device)
-
-    def end(self) -> str | None:
-        """The motion may go on."""
-        return FREE.end()
-
-    def stopped(self) -> None:
-        """Nothing to take back."""

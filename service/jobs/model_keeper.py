@@ -35,6 +35,7 @@ class ModelKeeper:
         self._site = site
         self._identifications = items["identification"]
         self._runs = items["run"]
+        self._strange: set[str] = set()
 
     def consider_new(self) -> list[ModelEntry]:
         """Judge every identification in the index that was not judged yet.
@@ -52,7 +53,7 @@ class ModelKeeper:
         return [entry for identifier in self.history.unjudged(self._site) if (entry := self._consider(identifier))]
 
     def _consider(self, identifier: str) -> ModelEntry | None:
-        """Judge one identification; None where it was removed or judged meanwhile."""
+        """Judge one identification; None where it was removed or judged meanwhile, or names an unknown robot."""
         try:
             workspace = IdentificationWorkspace(self._identifications.folder(identifier))
         except NotFoundError:
@@ -71,6 +72,11 @@ class ModelKeeper:
         try:
             entry = self.history.consider(candidate, datetime.now(UTC))
         except IntegrityError:
+            return None
+        except NotFoundError as error:  # the order was damaged; one such identification holds up no service
+            if identifier not in self._strange:
+                _log.warning("identification %s is not judged, its order may be damaged: %s", identifier, error)
+            self._strange.add(identifier)
             return None
         _log.info("model %s of %s is %s", identifier, entry.robot, entry.state)
         return entry

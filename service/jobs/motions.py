@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from service.errors import AcquisitionError
 from service.jobs.excitation_workspace import ExcitationWorkspace
-from service.jobs.queue import JobKind, JobQueue
+from service.jobs.queue import JobQueue
+from service.jobs.queued_job import JobKind
 from service.jobs.record import JobProblem, JobRecord
 from service.jobs.run_workspace import RunWorkspace
 from service.jobs.states import JobState

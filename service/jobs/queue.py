@@ -3,31 +3,21 @@
 import logging
 import threading
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from dataclasses import dataclass
 from pathlib import Path
 
 from service.errors import LimitExceededError, NotFoundError
+from service.jobs.queued_job import JobKind, QueuedJob
 from service.jobs.record import JobProblem, JobRecord
 from service.jobs.states import JobState
 from service.jobs.workspace import Workspace
-from service.store import ItemStore
-
-Work = Callable[[Path], JobProblem | None]
-"""Does the job of a folder; returns why it failed. It may run in another process."""
 
 _log = logging.getLogger("tauscope.jobs")
 
 INTERRUPTED = JobProblem(code="interrupted", detail="the service ended before this job did; hand it in again")
 CANCELLED = JobProblem(code="cancelled", detail="the job was cancelled on request")
-MOST_ATTEMPTS = 3
-"""How often the work of a job is begun whose service was killed meanwhile: it may be what brought the service down."""
-
-TOO_OFTEN = JobProblem(
-    code="interrupted",
-    detail=f"the service ended {MOST_ATTEMPTS} times in the middle of this job; look into its log, and hand less in",
-)
 WORKER_LOST = JobProblem(
     code="worker-lost",
     detail="the process that worked on this job ended unexpectedly, perhaps for want of memory; send less data",
@@ -39,26 +29,12 @@ class QueueFullError(LimitExceededError):
     """So many jobs are waiting that no further one is accepted."""
 
 
-@dataclass(frozen=True, eq=False)
-class JobKind:
-    """A kind of job: where its folders lie and what is done with them.
-
-    items : ItemStore
-        folders of the jobs
-    work : callable
-        does the job of a folder
-    """
-
-    items: ItemStore
-    work: Work
-
-
 @dataclass(frozen=True)
-class _Job:
-    """A job that has not ended."""
+class _End:
+    """How a job ended."""
 
-    kind: JobKind
-    identifier: str
+    state: JobState
+    problem: JobProblem | None
 
 
 class JobQueue:
@@ -85,16 +61,18 @@ class JobQueue:
         self._slots = slots
         self._most_waiting = most_waiting
         self._lock = threading.RLock()
-        self._waiting: deque[_Job] = deque()
-        self._running: dict[_Job, Future[JobProblem | None]] = {}
+        self._waiting: deque[QueuedJob] = deque()
+        self._running: dict[QueuedJob, Future[JobProblem | None]] = {}
+        self._unwritten: dict[QueuedJob, _End] = {}
+        self._is_hindered = False
         self._is_closed = False
         for kind in kinds:
             kind.items.tidy()
-        jobs = [_Job(kind, identifier) for kind in kinds for identifier in kind.items.identifiers()]
-        unfinished = [(record.created, job) for job in jobs if (record := _take_up(job)) is not None]
+        jobs = [QueuedJob(kind, identifier) for kind in kinds for identifier in kind.items.identifiers()]
+        unfinished = [(record.created, job) for job in jobs if (record := job.take_up()) is not None]
         with self._lock:
             self._waiting.extend(job for _, job in sorted(unfinished, key=lambda pair: pair[0]))
-            self._fill_slots()
+            self._go_on()
 
     def submit(self, kind: JobKind, staged: Path) -> str:
         """Take a job.
@@ -120,9 +98,9 @@ class JobQueue:
             if self._is_closed or len(self._waiting) >= self._most_waiting:
                 raise QueueFullError(f"{len(self._waiting)} jobs are waiting already; try again when one has ended")
             Workspace(staged).write_record(JobRecord(state=JobState.QUEUED, created=kind.items.clock()))
-            job = _Job(kind, kind.items.publish(staged))
+            job = QueuedJob(kind, kind.items.publish(staged))
             self._waiting.append(job)
-            self._fill_slots()
+            self._go_on()
             return job.identifier
 
     def cancel_or_remove(self, kind: JobKind, identifier: str) -> bool:
@@ -150,6 +128,7 @@ class JobQueue:
         with self._lock:
             if self.cancel(kind, identifier):
                 return False
+            self._pass_over(QueuedJob(kind, identifier))
             kind.items.remove(identifier)
             return True
 
@@ -174,17 +153,35 @@ class JobQueue:
             if there is no such job
         """
         with self._lock:
-            job, workspace = _Job(kind, identifier), Workspace(kind.items.folder(identifier))
-            if not _move(job, JobState.CANCELLED, CANCELLED):
+            job, workspace = QueuedJob(kind, identifier), Workspace(kind.items.folder(identifier))
+            if workspace.has_ended() or not job.move(JobState.CANCELLED, CANCELLED):
                 return False
-            workspace.ask_to_stop()
-            if job in self._waiting:
-                self._waiting.remove(job)
+            self._pass_over(job)
+            try:
+                workspace.ask_to_stop()
+            except OSError:
+                _log.warning("the work of job %s could not be told that nobody wants it", identifier, exc_info=True)
             return True
 
     def waiting(self) -> int:
         """How many jobs wait."""
         return len(self._waiting)
+
+    def settle(self) -> None:
+        """Do what a full disk was in the way of: write the ends that it did not take, and begin what waits.
+
+        To be called again and again; while nothing is in the way there is nothing to do.
+
+        Raises
+        ------
+        OSError
+            if the disk is in the way still
+        """
+        with self._lock:
+            try:
+                self._write_ends()
+            finally:
+                self._fill_slots()
 
     def close(self) -> None:
         """End the work; whatever has not ended by itself waits for the next start."""
@@ -192,87 +189,71 @@ class JobQueue:
             self._is_closed = True
             self._waiting.clear()
             for job in self._running:
-                _give_up(job)
+                job.give_up()
         self._executor.shutdown(wait=True, cancel_futures=True)
+
+    def _pass_over(self, job: QueuedJob) -> None:
+        """A job does not wait any more."""
+        if job in self._waiting:
+            self._waiting.remove(job)
+
+    def _go_on(self) -> None:
+        """As `settle`, where nobody can be told: what cannot be written now is written by a later call."""
+        try:
+            self.settle()
+            self._is_hindered = False
+        except OSError:
+            if not self._is_hindered:
+                _log.exception("the state of a job could not be written; it is tried again")
+            self._is_hindered = True
 
     def _fill_slots(self) -> None:
         """Hand waiting jobs to the executor while it has room."""
         while self._waiting and len(self._running) < self._slots and not self._is_closed:
+            is_wanted = self._waiting[0].move(JobState.RUNNING)
             job = self._waiting.popleft()
-            _move(job, JobState.RUNNING)
-            try:
-                future = self._executor.submit(job.kind.work, job.kind.items.folder(job.identifier))
-            except (BrokenExecutor, RuntimeError, OSError):
-                _log.exception("job %s could not be handed to a worker", job.identifier)
-                _move(job, JobState.FAILED, WORKER_LOST)
-                continue
-            self._running[job] = future
-            future.add_done_callback(lambda done, ended=job: self._end(ended, done))
+            if is_wanted:  # else it is damaged, or somebody removed it by hand
+                self._hand_over(job)
 
-    def _end(self, job: _Job, future: "Future[JobProblem | None]") -> None:
+    def _hand_over(self, job: QueuedJob) -> None:
+        """Have the executor do a job."""
+        try:
+            future = self._executor.submit(job.kind.work, job.folder)
+        except NotFoundError:
+            return
+        except (BrokenExecutor, RuntimeError, OSError):
+            _log.exception("job %s could not be handed to a worker", job.identifier)
+            self._unwritten[job] = _End(JobState.FAILED, WORKER_LOST)
+            self._write_ends()
+            return
+        self._running[job] = future
+        future.add_done_callback(lambda done: self._end(job, done))
+
+    def _end(self, job: QueuedJob, future: "Future[JobProblem | None]") -> None:
         """Take note that the work of a job has ended, and begin the next."""
-        problem = _problem_of(job.identifier, future)
+        problem = self._problem_of(job, future)
         with self._lock:
             self._running.pop(job, None)
-            try:
-                _move(job, JobState.SUCCEEDED if problem is None else JobState.FAILED, problem)
-            except OSError:
-                # The disk is full or gone: the job is done again with the next start.
-                _log.exception("the state of job %s could not be written", job.identifier)
-            self._fill_slots()
+            self._unwritten[job] = _End(JobState.SUCCEEDED if problem is None else JobState.FAILED, problem)
+            self._go_on()
 
+    def _write_ends(self) -> None:
+        """Write how jobs ended; what fails is left for the next time, or done again after the next start."""
+        for job, end in list(self._unwritten.items()):
+            job.move(end.state, end.problem)
+            del self._unwritten[job]
 
-def _move(job: _Job, state: JobState, problem: JobProblem | None = None) -> bool:
-    """Write a job's new state, if it may follow the present one; False where it may not or the job is gone."""
-    items = job.kind.items
-    try:
-        workspace = Workspace(items.folder(job.identifier))
-    except NotFoundError:
-        return False
-    record = workspace.read_record()
-    if record is None or not record.may_become(state):
-        return False
-    workspace.write_record(record.moved(state, items.clock(), problem))
-    return True
-
-
-def _take_up(job: _Job) -> JobRecord | None:
-    """Have a job wait that an earlier service left unfinished; None for one that has ended, or ends here."""
-    items = job.kind.items
-    workspace = Workspace(items.folder(job.identifier))
-    record = workspace.read_record()
-    if record is None or record.state.is_end:
-        workspace.tell_lost_end()
-        return None
-    if record.attempts >= MOST_ATTEMPTS:
-        _move(job, JobState.INTERRUPTED, TOO_OFTEN)
-        return None
-    if record.state is not JobState.QUEUED:
-        workspace.write_record(record.moved(JobState.QUEUED, items.clock()))
-    return record
-
-
-def _give_up(job: _Job) -> None:
-    """Have a job wait whose work is ended with the service."""
-    items = job.kind.items
-    try:
-        workspace = Workspace(items.folder(job.identifier))
-        record = workspace.read_record()
-        if record is not None and record.may_become(JobState.QUEUED):
-            workspace.write_record(record.given_up(items.clock()))
-    except (NotFoundError, OSError):
-        _log.exception("the state of job %s could not be written", job.identifier)
-
-
-def _problem_of(identifier: str, future: "Future[JobProblem | None]") -> JobProblem | None:
-    """Why the work of a job has no result; None where it has one."""
-    try:
-        return future.result()
-    except CancelledError:
-        return INTERRUPTED
-    except BrokenExecutor:
-        _log.error("job %s: its worker process ended unexpectedly", identifier)
-        return WORKER_LOST
-    except Exception:
-        _log.exception("job %s failed for an unforeseen reason", identifier)
-        return INTERNAL
+    def _problem_of(self, job: QueuedJob, future: "Future[JobProblem | None]") -> JobProblem | None:
+        """Why the work of a job has no result; None where it has one."""
+        try:
+            return future.result()
+        except CancelledError:
+            return INTERRUPTED
+        except BrokenExecutor:
+            if self._is_closed:  # its process was ended with the service
+                return INTERRUPTED
+            _log.error("job %s: its worker process ended unexpectedly", job.identifier)
+            return WORKER_LOST
+        except Exception:
+            _log.exception("job %s failed for an unforeseen reason", job.identifier)
+            return INTERNAL

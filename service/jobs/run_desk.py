@@ -60,6 +60,7 @@ class RunDesk:
         self._lock = threading.Lock()
         self._led: LedWork[RunLeader] = LedWork()
         self._is_closed = False
+        self._unkept: dict[str, RunWorkspace] = {}
         items.tidy()
         for identifier in items.identifiers():
             self._end(RunWorkspace(items.folder(identifier)), None)
@@ -170,6 +171,17 @@ class RunDesk:
         """What is known of each run that goes on."""
         return [leader.live for leader in self._led.leaders()]
 
+    def settle(self) -> None:
+        """Keep the recordings that a full disk did not take; to be called again and again.
+
+        Raises
+        ------
+        OSError
+            if the disk is in the way still
+        """
+        for workspace in list(self._unkept.values()):
+            self._conclude(workspace)
+
     def stop_every(self) -> list[str]:
         """Stop every run that goes on, and go on taking further ones; takes no lock. The runs' identifiers."""
         return [identifier for identifier in self._led.identifiers() if self.stop(identifier) is not None]
@@ -210,13 +222,17 @@ class RunDesk:
 
     def _conclude(self, workspace: RunWorkspace) -> None:
         """Keep the recording of a run that has ended among the recordings, and tell the end; done once."""
+        identifier = workspace.folder.name
         if workspace.has_told_end():
+            self._unkept.pop(identifier, None)
             return
+        self._unkept[identifier] = workspace
         try:
             self._keep_recording(workspace)
-        except (TauscopeError, OSError):
-            _log.exception("the recording of run %s could not be kept", workspace.folder.name)
+        except TauscopeError:
+            _log.exception("the recording of run %s could not be kept", identifier)
         workspace.tell_end()
+        self._unkept.pop(identifier, None)
 
     def _keep_recording(self, workspace: RunWorkspace) -> None:
         """Give the CSV of a run a name among the recordings; both names share the bytes on the disk."""

@@ -8,6 +8,7 @@ from pathlib import Path
 from service.errors import TauscopeError
 from service.jobs.device_claims import BusyError
 from service.jobs.interlock import objection
+from service.jobs.lease_errors import LeasedError
 from service.jobs.messages import without_folders
 from service.jobs.queue import QueueFullError
 from service.jobs.run_order import BackendChoice
@@ -17,6 +18,9 @@ from service.store.database import FiringEntry, ScheduleBook, ScheduleEntry
 from service.store.items import utc_now
 
 _log = logging.getLogger("tauscope.jobs")
+
+_Outcome = tuple[str, str | None, tuple[str, str] | None]
+"""State of a firing, its reason, and what was started."""
 
 
 class ScheduleKeeper:
@@ -42,6 +46,7 @@ class ScheduleKeeper:
         self.repeater = repeater
         self._data_folder = data_folder
         self._clock = clock
+        self._unwritten: dict[int, _Outcome] = {}
         book.interrupt_claims()
 
     def tick(self) -> None:
@@ -52,6 +57,7 @@ class ScheduleKeeper:
         StoreError
             if the database does not answer
         """
+        self._write_down()
         while (asked := self.book.claim_asked(self._clock())) is not None:
             self._fire(*asked, lateness=None)
         for entry in self.book.due(self._clock()):
@@ -83,17 +89,23 @@ class ScheduleKeeper:
     def _fire(self, number: int, entry: ScheduleEntry, lateness: timedelta | None) -> None:
         """Start what a schedule repeats, or write down why not."""
         try:
-            state, reason, item = self._outcome(entry, parse_schedule(entry), lateness)
+            outcome = self._outcome(entry, parse_schedule(entry), lateness)
         except Exception as error:
             _log.exception("schedule %s failed for an unforeseen reason", entry.name)
-            state, reason, item = "failed", f"a fault of Tauscope's own ({type(error).__name__}); see the log", None
-        self.book.finish(number, state, reason, item)
+            outcome = "failed", f"a fault of Tauscope's own ({type(error).__name__}); see the log", None
+        self._unwritten[number] = outcome
+        state, reason, _ = outcome
         _log.info("schedule %s: %s%s", entry.name, state, "" if reason is None else f" ({reason})")
+        self._write_down()
 
-    def _outcome(
-        self, entry: ScheduleEntry, definition: ScheduleDefinition, lateness: timedelta | None
-    ) -> tuple[str, str | None, tuple[str, str] | None]:
-        """State of a firing, its reason, and what was started."""
+    def _write_down(self) -> None:
+        """Give firings their ends; what the database does not take now it is given with the next tick."""
+        for number, outcome in list(self._unwritten.items()):
+            self.book.finish(number, *outcome)
+            self._unwritten.pop(number, None)
+
+    def _outcome(self, entry: ScheduleEntry, definition: ScheduleDefinition, lateness: timedelta | None) -> _Outcome:
+        """What came of a firing."""
         if lateness is not None and self._is_too_late(entry, definition, lateness):
             minutes = lateness.total_seconds() / 60
             return "missed", f"no service looked at it until {minutes:.0f} minutes later; it is due again", None
@@ -102,7 +114,7 @@ class ScheduleKeeper:
             return "skipped", reason, None
         try:
             return "started", None, self.repeater.start(entry, self._last_start(entry))
-        except (BusyError, QueueFullError, NothingToDoError) as error:
+        except (BusyError, LeasedError, QueueFullError, NothingToDoError) as error:
             return "skipped", str(error), None
         except TauscopeError as error:
             return "failed", without_folders(str(error), self._data_folder), None

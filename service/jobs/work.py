@@ -7,6 +7,11 @@ from service.errors import TauscopeError
 from service.jobs.messages import without_folders
 from service.jobs.record import JobProblem
 from service.jobs.workspace import Workspace
+from service.store import is_disk_full
+
+STORAGE_FULL = JobProblem(
+    code="storage-full", detail="the service's disk was full; remove recordings or items, and hand the job in again"
+)
 
 
 class StoppedError(Exception):
@@ -36,6 +41,10 @@ def do_work(workspace: Workspace, work: Callable[[], None], *folders: Path) -> J
         return JobProblem(code="cancelled", detail="the job was cancelled")
     except TauscopeError as error:
         return JobProblem(code=error.code, detail=without_folders(str(error), *folders, workspace.folder))
+    except OSError as error:
+        if not is_disk_full(error):
+            raise
+        return STORAGE_FULL
     return None
 
 

@@ -1,5 +1,6 @@
 """Processes that do the work: the service stays alive when one of them dies, and none of them outlives the service."""
 
+import gc
 import multiprocessing
 import os
 import signal
@@ -34,7 +35,7 @@ class WorkerPool(Executor):
         """
         self._workers = workers
         self._lock = threading.Lock()
-        self._is_shut = False
+        self._pool: ProcessPoolExecutor | None
         self._pool, self._lifeline = self._new_pool()
 
     def submit(
@@ -62,7 +63,7 @@ class WorkerPool(Executor):
             after `shutdown`
         """
         with self._lock, _one_thread_each():
-            if self._is_shut:
+            if self._pool is None:
                 raise RuntimeError("the pool is shut down")
             try:
                 return self._pool.submit(fn, *args, **kwargs)
@@ -82,13 +83,15 @@ class WorkerPool(Executor):
             end the processes at once, in the middle of their work
         """
         with self._lock:
-            self._is_shut = True
+            pool, self._pool = self._pool, None
             if cancel_futures:
                 self._lifeline.close()
-            pool = self._pool
-        pool.shutdown(wait=wait, cancel_futures=cancel_futures)
-        if not cancel_futures:
-            self._lifeline.close()
+        if pool is not None:
+            pool.shutdown(wait=wait, cancel_futures=cancel_futures)
+        self._lifeline.close()
+        # A pool whose processes were ended is part of a cycle, and holds semaphores that outlive this process.
+        del pool
+        gc.collect()
 
     def _new_pool(self) -> tuple[ProcessPoolExecutor, Connection]:
         """A pool, and the end of the pipe whose closing ends its processes."""

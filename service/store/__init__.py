@@ -1,6 +1,6 @@
 """What is kept: recordings and the folders of finished and waiting work, as plain files that are never half written."""
 
-from service.store.atomic import write_atomically
+from service.store.atomic import is_disk_full, write_atomically
 from service.store.event_log import EventLog, LogFollower, LoggedEvent
 from service.store.folder_lock import FolderLock
 from service.store.incoming import IncomingFile, KeptFile, hash_file
@@ -25,6 +25,7 @@ __all__ = [
     "RecordingStore",
     "StoredRecording",
     "hash_file",
+    "is_disk_full",
     "is_file_name",
     "is_identifier",
     "item_stores",

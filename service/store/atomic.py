@@ -1,5 +1,6 @@
 """Files that are either there as a whole or not at all, also after a crash or a power loss."""
 
+import errno
 import os
 import tempfile
 from pathlib import Path
@@ -43,3 +44,14 @@ def sync_folder(folder: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
+
+
+def is_disk_full(error: OSError) -> bool:
+    """Whether something failed for want of room: no fault of ours, and over as soon as there is room again.
+
+    Parameters
+    ----------
+    error : OSError
+        of a call that writes
+    """
+    return error.errno in (errno.ENOSPC, errno.EDQUOT)

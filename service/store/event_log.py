@@ -1,5 +1,6 @@
 """What happened, line by line: appended by several processes, read by any number of followers, kept over restarts."""
 
+import errno
 import json
 import os
 from collections.abc import Mapping
@@ -52,14 +53,16 @@ class EventLog:
         Raises
         ------
         OSError
-            if it cannot be written
+            if it cannot be written, or only in part; what is there of it is passed over by readers
         """
         line = json.dumps(content, ensure_ascii=False, allow_nan=False).encode() + b"\n"
         descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o640)
         try:
             size = os.fstat(descriptor).st_size
             is_torn = size > 0 and os.pread(descriptor, 1, size - 1) != b"\n"
-            os.write(descriptor, b"\n" + line if is_torn else line)
+            line = b"\n" + line if is_torn else line
+            if os.write(descriptor, line) < len(line):
+                raise OSError(errno.ENOSPC, "the disk took a part of a line only", str(self.path))
         finally:
             os.close(descriptor)
 

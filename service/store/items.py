@@ -57,10 +57,21 @@ class ItemStore:
         -------
         str
             the item's identifier
+
+        Raises
+        ------
+        OSError
+            if the disk does not take it; the folder stays staged
         """
         identifier = staged_identifier(staged)
-        staged.rename(self.root / identifier)
-        sync_folder(self.root)
+        published = self.root / identifier
+        staged.rename(published)
+        try:
+            sync_folder(self.root)
+        except OSError:
+            # Nobody is told of it: an item that is there all the same would have nobody to see to it.
+            published.rename(staged)
+            raise
         return identifier
 
     def discard(self, staged: Path) -> None:
@@ -111,8 +122,10 @@ class ItemStore:
         """
         going = self.root / f"{_REMOVED}{identifier}"
         self.folder(identifier).rename(going)
-        sync_folder(self.root)
-        shutil.rmtree(going, ignore_errors=True)
+        try:
+            sync_folder(self.root)
+        finally:
+            shutil.rmtree(going, ignore_errors=True)  # also, and above all, where the disk is full
 
     def tidy(self) -> None:
         """Remove what a crash left half made or half removed; to be called before anything is staged."""

@@ -1,19 +1,21 @@
 """Recordings on the server: regular files in one folder, known by name, never overwritten."""
 
-import json
 import os
 import shutil
 import stat
 import tempfile
+import threading
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
 from service.errors import NotFoundError, RecordingError
 from service.robot.messages import one_line, shown
-from service.store.atomic import sync_folder, write_atomically
+from service.store.atomic import sync_folder
 from service.store.incoming import KeptFile, hash_file
 from service.store.names import FILE_NAME_RULE, is_file_name
+from service.store.recording_hashes import RecordingHashes
 
 _HASHES = ".sha256"
 _INCOMING = ".incoming-"
@@ -35,12 +37,15 @@ class StoredRecording:
         when it was last written, in UTC
     sha256 : str or None
         of its bytes, in hexadecimal; None where it was not computed yet
+    is_damaged : bool
+        whether it was sent or recorded, and its bytes are not those any more
     """
 
     name: str
     size: int
     modified: datetime
     sha256: str | None
+    is_damaged: bool = False
 
 
 class RecordingStore:
@@ -58,7 +63,8 @@ class RecordingStore:
             holds the recordings
         """
         self.root = root
-        (root / _HASHES).mkdir(parents=True, exist_ok=True)
+        self._hashes = RecordingHashes(root / _HASHES)
+        self._naming = threading.Lock()
 
     def stage(self) -> Path:
         """A new hidden folder on the same disk, for a file that is still arriving; `discard` it in the end."""
@@ -144,11 +150,14 @@ class RecordingStore:
         NotFoundError
             if there is no such recording
         """
-        digest = self.digest(name)
-        return _described(name, self._status(name), digest)
+        status = self._status(name)
+        known = self._hashes.of(name, status)
+        if known is None:
+            known = self._hashes.remember(name, status, hash_file(self.root / name))
+        return StoredRecording(name, status.st_size, _modified(status), known.sha256, known.is_damaged)
 
     def digest(self, name: str) -> str:
-        """The sha256 of a recording's bytes, in hexadecimal; computed where it is not known.
+        """The sha256 of a recording's bytes, in hexadecimal, for who will work with them.
 
         Parameters
         ----------
@@ -159,24 +168,44 @@ class RecordingStore:
         ------
         NotFoundError
             if there is no such recording
+        RecordingError
+            if it is damaged
         """
-        status = self._status(name)
-        digest = self._known_hash(name, status)
-        if digest is None:
-            digest = hash_file(self.root / name)
-            self._remember_hash(name, status, digest)
-        return digest
+        found = self.find(name)
+        if found.sha256 is None or found.is_damaged:
+            hint = "restore it from a backup, or remove it and send it again"
+            raise RecordingError(f"{name}: is damaged, its bytes are not those that were kept; {hint}")
+        return found.sha256
 
     def entries(self) -> list[StoredRecording]:
-        """All recordings, by name."""
+        """All recordings, by name; of those that were sent or recorded, and changed since, the hash is looked at."""
         found = []
         for entry in sorted(self.root.iterdir()):
             try:
                 status = self._status(entry.name)
-            except NotFoundError:
+                known = self._hashes.of(entry.name, status)
+                if known is None and self._hashes.is_kept(entry.name):
+                    found.append(self.find(entry.name))
+                    continue
+            except (NotFoundError, FileNotFoundError):
                 continue
-            found.append(_described(entry.name, status, self._known_hash(entry.name, status)))
+            sha256, is_damaged = (None, False) if known is None else (known.sha256, known.is_damaged)
+            found.append(StoredRecording(entry.name, status.st_size, _modified(status), sha256, is_damaged))
         return found
+
+    def damaged(self, *, deep: bool) -> list[str]:
+        """Names of the recordings that were sent or recorded and whose bytes are not those any more.
+
+        Parameters
+        ----------
+        deep : bool
+            whether every byte is looked at, or only at what has another size or another time
+        """
+        if deep:
+            for entry in self.entries():
+                with suppress(NotFoundError, FileNotFoundError):  # removed meanwhile
+                    self._hashes.remember(entry.name, self._status(entry.name), hash_file(self.root / entry.name))
+        return [entry.name for entry in self.entries() if entry.is_damaged]
 
     def remove(self, name: str) -> None:
         """Remove a recording.
@@ -192,13 +221,14 @@ class RecordingStore:
             if there is no such recording
         """
         self.path(name).unlink(missing_ok=True)
-        self._hash_path(name).unlink(missing_ok=True)
+        self._hashes.forget(name)
         sync_folder(self.root)
 
     def tidy(self) -> None:
-        """Remove uploads that a crash cut off; to be called before anything arrives."""
+        """Remove what a crash left of uploads; to be called before anything arrives."""
         for entry in self.root.glob(f"{_INCOMING}*"):
             self.discard(entry)
+        self._hashes.tidy(self.holds)
 
     def _status(self, name: str) -> os.stat_result:
         """Size and times of a recording, which has to be a regular file directly in the folder."""
@@ -214,41 +244,24 @@ class RecordingStore:
         return status
 
     def _give_name(self, file: KeptFile) -> bool:
-        """Link the file to its name, which fails where the name is in use; True where it is new."""
+        """Link the file to its name, which fails where the name is in use; True where it is new.
+
+        What its bytes are is written down first: no recording is ever there of which that is not known.
+        """
         target = self.root / file.name
-        try:
+        with self._naming:
+            if os.path.lexists(target):
+                if target.is_symlink() or not target.is_file() or hash_file(target) != file.sha256:
+                    text = f"{file.name}: another recording of this name lies on the server; choose another name"
+                    raise NameTakenError(text)
+                return False
+            file.path.chmod(0o640)
+            self._hashes.keep(file.name, file.path.stat(), file.sha256)
             os.link(file.path, target)
-        except FileExistsError:
-            if target.is_symlink() or not target.is_file() or hash_file(target) != file.sha256:
-                text = f"{file.name}: another recording of this name lies on the server; choose another name"
-                raise NameTakenError(text) from None
-            return False
-        target.chmod(0o640)
-        sync_folder(self.root)
-        self._remember_hash(file.name, self._status(file.name), file.sha256)
+            sync_folder(self.root)
         return True
 
-    def _hash_path(self, name: str) -> Path:
-        """Where the sha256 of a recording is remembered."""
-        return self.root / _HASHES / f"{name}.json"
 
-    def _known_hash(self, name: str, status: os.stat_result) -> str | None:
-        """The remembered sha256, unless the file was written since."""
-        try:
-            known = json.loads(self._hash_path(name).read_bytes())
-            if (known["size"], known["modified_ns"]) == (status.st_size, status.st_mtime_ns):
-                return str(known["sha256"])
-        except (OSError, ValueError, TypeError, KeyError):
-            # Missing or damaged: it is only a memory of what can be computed again.
-            return None
-        return None
-
-    def _remember_hash(self, name: str, status: os.stat_result, digest: str) -> None:
-        """Keep a sha256 with the size and time of the file that it belongs to."""
-        known = {"size": status.st_size, "modified_ns": status.st_mtime_ns, "sha256": digest}
-        write_atomically(self._hash_path(name), json.dumps(known).encode())
-
-
-def _described(name: str, status: os.stat_result, digest: str | None) -> StoredRecording:
-    """The entry of a file."""
-    return StoredRecording(name, status.st_size, datetime.fromtimestamp(status.st_mtime, UTC), digest)
+def _modified(status: os.stat_result) -> datetime:
+    """When a file was last written."""
+    return datetime.fromtimestamp(status.st_mtime, UTC)

@@ -34,6 +34,7 @@ from service.jobs import (
     StartControl,
     Workshop,
     Workspace,
+    campaign_leader,
 )
 from service.store import ItemStore, RecordingStore
 
@@ -144,6 +145,28 @@ def test_a_campaign_from_its_beginning_to_its_end(tmp_path: Path) -> None:
     assert [entry.name for entry in order.recordings] == [f"run-{made.run}.csv"]
     assert [entry.name for entry in order.held_out] == [f"run-{made.held_out_run}.csv"]
     assert (made.recordings, made.held_out) == ((f"run-{made.run}.csv",), (f"run-{made.held_out_run}.csv",))
+
+
+def test_a_full_disk_delays_a_campaigns_end_and_not_the_arm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(campaign_leader, "ROOM_POLL_S", 0.01)
+    is_full, was_refused = threading.Event(), threading.Event()
+    is_full.set()
+    write = CampaignWorkspace.write_record
+
+    def on_a_full_disk(workspace: CampaignWorkspace, record: JobRecord) -> None:
+        if record.state.is_end and is_full.is_set():
+            was_refused.set()
+            raise OSError(28, "No space left on device")
+        write(workspace, record)
+
+    monkeypatch.setattr(CampaignWorkspace, "write_record", on_a_full_disk)
+    bench = Bench(tmp_path)
+    campaign = bench.submit()
+    assert was_refused.wait(60.0)
+    assert bench.record(campaign).state is JobState.RUNNING
+    bench.claims.require_free(BackendChoice(name="sim").device("arm"))
+    is_full.clear()
+    assert bench.ended(campaign).state is JobState.SUCCEEDED
 
 
 def test_a_campaign_that_ends_with_a_diagnosis_of_the_same_recordings(tmp_path: Path) -> None:

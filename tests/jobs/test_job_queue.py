@@ -1,5 +1,7 @@
 """The queue: order, slots, cancelling, failures of every kind, restart."""
 
+import contextlib
+import shutil
 from concurrent.futures import BrokenExecutor
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
@@ -9,7 +11,8 @@ import pytest
 from jobs.executors import InlineExecutor, ManualExecutor
 from service.errors import NotFoundError
 from service.jobs import JobKind, JobProblem, JobQueue, JobState, QueueFullError, Workspace
-from service.jobs.queue import Work
+from service.jobs.queued_job import Work
+from service.jobs.work import do_work
 from service.store import ItemStore
 
 
@@ -227,8 +230,13 @@ def test_closing_leaves_jobs_for_the_next_start_and_takes_nothing_more(
         queue.submit(items.stage())
 
 
+@pytest.mark.parametrize("then", ["there is room again", "restart"])
 def test_a_full_disk_when_a_job_ends_does_not_stop_the_queue(
-    items: ItemStore, executor: ManualExecutor, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    then: str,
+    items: ItemStore,
+    executor: ManualExecutor,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
 ) -> None:
     queue = make_queue(items, executor)
     unlucky, following = queue.submit(items.stage()), queue.submit(items.stage())
@@ -242,8 +250,112 @@ def test_a_full_disk_when_a_job_ends_does_not_stop_the_queue(
     executor.run()
     assert state_of(items, following) == "running"
     assert "could not be written" in caplog.text
-    make_queue(items, ManualExecutor())
-    assert state_of(items, unlucky) == "running"  # its result was never told: it is done again
+    if "restart" in then:
+        make_queue(items, ManualExecutor())
+        assert state_of(items, unlucky) == "running"  # its end was never told: it is done again
+    else:
+        queue.queue.settle()
+        assert state_of(items, unlucky) == "succeeded"
+
+
+def full_disk(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Workspace, "write_record", full)
+
+
+def test_a_full_disk_before_a_job_begins_delays_it(
+    items: ItemStore, executor: ManualExecutor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    queue = make_queue(items, executor)
+    first, second = queue.submit(items.stage()), queue.submit(items.stage())
+    with monkeypatch.context() as patched:
+        full_disk(patched)
+        executor.run()
+        with pytest.raises(OSError, match="No space"):
+            queue.queue.settle()
+    assert [state_of(items, job) for job in (first, second)] == ["running", "queued"]
+    queue.queue.settle()
+    assert [state_of(items, job) for job in (first, second)] == ["succeeded", "running"]
+
+
+def test_a_disk_that_is_full_between_a_state_and_its_event_delays_a_job_too(
+    items: ItemStore, executor: ManualExecutor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The record says that it runs or has ended already: it is begun, or its end is told, all the same."""
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    queue = make_queue(items, executor)
+    first, second = queue.submit(items.stage()), queue.submit(items.stage())
+    with monkeypatch.context() as patched:
+        patched.setattr(Workspace, "_tell_state", full)
+        executor.run()
+        with contextlib.suppress(OSError):
+            queue.queue.settle()
+        with contextlib.suppress(OSError):
+            queue.queue.settle()
+    queue.queue.settle()
+    executor.run()
+    assert [state_of(items, job) for job in (first, second)] == ["succeeded", "succeeded"]
+    assert all(Workspace(items.folder(job)).has_told_end() for job in (first, second))
+
+
+def test_a_job_that_the_disk_does_not_take_is_no_job(
+    items: ItemStore, executor: ManualExecutor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(_: Path) -> None:
+        raise OSError(28, "No space left on device")
+
+    queue, staged = make_queue(items, executor), items.stage()
+    with monkeypatch.context() as patched:
+        patched.setattr("service.store.items.sync_folder", full)
+        with pytest.raises(OSError, match="No space"):
+            queue.submit(staged)
+    assert (items.identifiers(), queue.queue.waiting(), executor.tasks) == ([], 0, [])
+    assert queue.submit(staged) in items.identifiers()
+
+
+@pytest.mark.parametrize("loss", ["damaged and removed", "gone"])
+def test_a_waiting_job_that_is_lost_holds_up_nobody(loss: str, items: ItemStore, executor: ManualExecutor) -> None:
+    queue = make_queue(items, executor)
+    _, lost, following = (queue.submit(items.stage()) for _ in range(3))
+    if loss == "gone":
+        shutil.rmtree(items.folder(lost))
+    else:
+        (items.folder(lost) / "state.json").write_bytes(b"")
+        assert queue.cancel_or_remove(lost)
+    executor.run()
+    assert state_of(items, following) == "running"
+    assert len(executor.tasks) == 1
+
+
+def test_a_full_disk_when_a_waiting_job_is_cancelled(
+    items: ItemStore, executor: ManualExecutor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(_: Workspace) -> None:
+        raise OSError(28, "No space left on device")
+
+    queue = make_queue(items, executor)
+    _, waiting = queue.submit(items.stage()), queue.submit(items.stage())
+    monkeypatch.setattr(Workspace, "ask_to_stop", full)
+    assert not queue.cancel_or_remove(waiting)
+    executor.run()
+    assert executor.tasks == []
+    assert state_of(items, waiting) == "cancelled"
+
+
+def test_work_for_which_the_disk_has_no_room_says_so(items: ItemStore) -> None:
+    def fill(folder: Path) -> JobProblem | None:
+        def work() -> None:
+            raise OSError(28, "No space left on device", str(folder))
+
+        return do_work(Workspace(folder), work)
+
+    job = make_queue(items, InlineExecutor(), fill).submit(items.stage())
+    assert (state_of(items, job), problem_of(items, job)) == ("failed", "storage-full")
 
 
 def test_jobs_of_several_kinds_take_their_turns(tmp_path: Path, executor: ManualExecutor) -> None:

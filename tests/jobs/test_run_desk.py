@@ -258,6 +258,29 @@ def test_a_run_that_never_moved_leaves_no_recording(bench: Bench) -> None:
     assert not bench.recordings.holds(run_recording_name(run))
 
 
+@pytest.mark.parametrize("then", ["there is room again", "restart"])
+def test_a_recording_that_a_full_disk_did_not_take_is_kept_afterwards(
+    then: str, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patched:
+        patched.setattr("service.store.recording_hashes.write_atomically", full)
+        run = bench.submit()
+        bench.controls.next().finish()
+        assert bench.ended(run) is RunState.FINISHED
+        assert not bench.recordings.holds(run_recording_name(run))
+        with pytest.raises(OSError, match="No space"):
+            bench.desk.settle()
+    if then == "restart":
+        bench.open()
+    else:
+        bench.desk.settle()
+    assert bench.recordings.path(run_recording_name(run)).read_text(encoding="utf-8") == CSV
+    assert bench.told(run)[-1] == "finished"
+
+
 def test_removing(bench: Bench) -> None:
     run = bench.submit()
     control = bench.controls.next()

@@ -10,7 +10,7 @@ import pytest
 
 from databases import address, database, postgres
 from service.errors import NotFoundError, StoreError, TauscopeError
-from service.jobs import BusyError, Repeater, ScheduleDefinition, ScheduleKeeper
+from service.jobs import BusyError, LeasedError, Repeater, ScheduleDefinition, ScheduleKeeper
 from service.jobs.interlock import FOLDER
 from service.jobs.schedule_start import NothingToDoError
 from service.store.database import Database, FiringEntry, Index, ScheduleBook, ScheduleEntry
@@ -130,6 +130,7 @@ def test_what_still_goes_on_is_not_started_again(service: Service, clock: Clock,
     ("error", "state", "reason"),
     [
         (BusyError("arm on sim: run 7 has it"), "skipped", "arm on sim: run 7 has it"),
+        (LeasedError("arm on sim: Ann has its lease"), "skipped", "arm on sim: Ann has its lease"),
         (NothingToDoError("no recording is newer"), "skipped", "no recording is newer"),
         (TauscopeError("the robot file is gone"), "failed", "the robot file is gone"),
         (ZeroDivisionError(), "failed", "a fault of Tauscope's own (ZeroDivisionError); see the log"),
@@ -275,3 +276,23 @@ def test_a_database_that_does_not_answer_delays_and_loses_nothing(
             service.keeper.tick()
     service.keeper.tick()
     assert (starts.started, service.states()) == (["nightly"], ["started"])
+
+
+def test_what_was_started_while_the_database_was_locked_is_written_down_afterwards(
+    service: Service, clock: Clock, starts: Starts, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    service.book.put(schedule())
+    clock.go(hours=1)
+
+    def locked(*_: object) -> None:
+        raise StoreError("locked")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(ScheduleBook, "finish", locked)
+        with pytest.raises(StoreError):
+            service.keeper.tick()
+    assert service.states() == ["claimed"]
+    service.keeper.tick()
+    (firing,) = service.firings()
+    assert (firing.state, firing.item) == ("started", ("campaign", "item-1"))
+    assert starts.started == ["nightly"]

@@ -1,7 +1,11 @@
 """Logs that grow: numbers that stay, followers that go on where they ended, lines that never mix."""
 
+import errno
 import json
 import multiprocessing
+import resource
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -9,6 +13,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from service.store import EventLog
+
+
+@contextmanager
+def no_file_beyond(size: int) -> Iterator[None]:
+    """As a disk that becomes full in the middle of a write: the system takes what still fits."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 @pytest.fixture
@@ -92,6 +107,15 @@ def append_many(path: Path, name: str) -> None:
     log = EventLog(path)
     for n in range(200):
         log.append({"name": name, "n": n, "filling": "x" * 300})
+
+
+def test_a_line_that_the_disk_takes_a_part_of_is_an_error_and_can_be_written_again(log: EventLog) -> None:
+    log.append({"n": 1})
+    with no_file_beyond(log.path.stat().st_size + 5), pytest.raises(OSError, match="part of a line") as raised:
+        log.append({"n": 2})
+    assert raised.value.errno == errno.ENOSPC
+    log.append({"n": 2})
+    assert contents(log) == [(1, 1), (3, 2)]
 
 
 def test_lines_of_several_processes_never_mix(log: EventLog) -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from service.errors import LimitExceededError, NotFoundError, RecordingError
 from service.store import IncomingFile, KeptFile, NameTakenError, RecordingStore
+from service.store.recording_hashes import RecordingHashes
 
 
 @pytest.fixture
@@ -112,3 +113,74 @@ def test_uploads_that_a_crash_cut_off_are_tidied_away(store: RecordingStore) -> 
     arrive(store, "a.csv", b"x")
     store.tidy()
     assert [entry.name for entry in store.root.iterdir()] == [".sha256"]
+
+
+@pytest.mark.parametrize("damage", ["one bit", "cut off", "emptied"])
+@pytest.mark.parametrize("is_told_by_its_time", [True, False])
+def test_a_kept_recording_that_is_damaged_is_shown_as_such(
+    damage: str, is_told_by_its_time: bool, store: RecordingStore
+) -> None:
+    store.keep(arrive(store, "a.csv", b"content"))
+    path = store.path("a.csv")
+    before = path.stat()
+    path.write_bytes({"one bit": b"bontent", "cut off": b"cont", "emptied": b""}[damage])
+    if not is_told_by_its_time:
+        os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
+    else:
+        os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns + 1))
+    is_seen_at_once = is_told_by_its_time or damage != "one bit"
+    assert [entry.is_damaged for entry in store.entries()] == [is_seen_at_once]
+    assert store.damaged(deep=False) == (["a.csv"] if is_seen_at_once else [])
+    assert store.damaged(deep=True) == ["a.csv"]
+    assert store.find("a.csv").is_damaged
+    with pytest.raises(RecordingError, match=r"a\.csv: is damaged.*send it again"):
+        store.digest("a.csv")
+    path.write_bytes(b"content")  # restored
+    assert store.damaged(deep=True) == []
+    assert store.digest("a.csv") == hashlib.sha256(b"content").hexdigest()
+
+
+def test_a_full_disk_keeps_no_recording_of_which_nothing_is_known(
+    store: RecordingStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    arrived = arrive(store, "a.csv", b"content")
+    store.keep(arrive(store, "b.csv", b"before"))
+    with monkeypatch.context() as patched:
+        patched.setattr("service.store.recording_hashes.write_atomically", full)
+        with pytest.raises(OSError, match="No space"):
+            store.keep(arrived)
+        os.utime(store.path("b.csv"))
+        assert store.find("b.csv").sha256 == hashlib.sha256(b"before").hexdigest()  # looking needs no room
+    assert [entry.name for entry in store.entries()] == ["b.csv"]
+
+
+def test_a_crash_before_a_recording_has_its_name_leaves_nothing_behind(
+    store: RecordingStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def die(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "link", die)
+        with pytest.raises(KeyboardInterrupt):
+            store.keep(arrive(store, "a.csv", b"content"))
+    again = RecordingStore(store.root)
+    again.tidy()
+    (store.root / "a.csv").write_bytes(b"put there by hand")
+    assert [entry.is_damaged for entry in again.entries()] == [False]
+
+
+def test_every_flipped_bit_of_what_is_remembered_is_noticed(store: RecordingStore) -> None:
+    store.keep(arrive(store, "a.csv", b"content"))
+    hashes, status = RecordingHashes(store.root / ".sha256"), store.path("a.csv").stat()
+    (memory,) = (store.root / ".sha256").iterdir()
+    content, known = memory.read_bytes(), hashes.of("a.csv", status)
+    assert known is not None
+    for bit in range(8 * len(content)):
+        flipped = bytearray(content)
+        flipped[bit // 8] ^= 1 << (bit % 8)
+        memory.write_bytes(flipped)
+        assert hashes.of("a.csv", status) in (None, known)

@@ -7,7 +7,8 @@ from service.store.database.index import Index
 from service.store.database.model_entries import ModelEntry, ModelEventEntry
 from service.store.database.model_history import ModelHistory
 from service.store.database.model_judgement import Candidate, compared
-from service.store.database.schedule_book import FiringEntry, ScheduleBook, ScheduleEntry
+from service.store.database.schedule_book import ScheduleBook
+from service.store.database.schedule_entries import FiringEntry, ScheduleEntry
 from service.store.database.tables import ITEM_CLASSES
 
 __all__ = [

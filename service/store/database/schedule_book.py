@@ -1,7 +1,5 @@
 """The book of schedules: who takes a firing on has it alone, however many services look at the same database."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
@@ -11,74 +9,8 @@ from sqlalchemy.orm import Session
 from service.errors import NotFoundError
 from service.robot.messages import nearest, one_line, shown
 from service.store.database.database import Database
+from service.store.database.schedule_entries import FiringEntry, ScheduleEntry, firing_entry, schedule_entry
 from service.store.database.schedule_tables import Firing, Schedule
-from service.store.database.tables import Item
-
-UNDECIDED = ("asked", "claimed")
-"""States of a firing that will become another one."""
-
-
-@dataclass(frozen=True)
-class ScheduleEntry:
-    """A schedule.
-
-    name : str
-        of it
-    site : str or None
-        of the data folder whose service does it; None for whichever comes first
-    definition, order, files : mapping
-        when it is due, what is done then, and the robot's files as text
-    created : datetime
-        when it was set up first
-    next_due : datetime or None
-        when it is due next; None while it is not enabled
-    """
-
-    name: str
-    site: str | None
-    definition: Mapping[str, Any]
-    order: Mapping[str, Any]
-    files: Mapping[str, str]
-    created: datetime
-    next_due: datetime | None
-
-
-@dataclass(frozen=True)
-class FiringEntry:
-    """One time that a schedule was due.
-
-    number : int
-        of the firing
-    schedule : str
-        name of the schedule
-    due : datetime
-        when it was
-    is_asked : bool
-        whether somebody asked for it
-    state : str
-        as in the table
-    reason : str or None
-        why nothing was started
-    site : str or None
-        of the data folder whose service took it on
-    item : (str, str) or None
-        kind and identifier of what was started
-    item_state : str or None
-        where that stands, as far as the index knows
-    is_final : bool
-        whether nothing will change any more
-    """
-
-    number: int
-    schedule: str
-    due: datetime
-    is_asked: bool
-    state: str
-    reason: str | None
-    site: str | None
-    item: tuple[str, str] | None
-    item_state: str | None
-    is_final: bool
 
 
 class ScheduleBook:
@@ -146,12 +78,12 @@ class ScheduleBook:
             if there is none
         """
         with self._database.reading() as session:
-            return _entry(_schedule(session, name))
+            return schedule_entry(_schedule(session, name))
 
     def schedules(self) -> list[ScheduleEntry]:
         """All schedules of all sites, by name."""
         with self._database.reading() as session:
-            return [_entry(row) for row in session.scalars(select(Schedule).order_by(Schedule.name))]
+            return [schedule_entry(row) for row in session.scalars(select(Schedule).order_by(Schedule.name))]
 
     def due(self, now: datetime) -> list[ScheduleEntry]:
         """Schedules that this site may do and that are due, the longest first.
@@ -163,7 +95,7 @@ class ScheduleBook:
         """
         query = select(Schedule).where(Schedule.next_due <= now, self._is_mine()).order_by(Schedule.next_due)
         with self._database.reading() as session:
-            return [_entry(row) for row in session.scalars(query)]
+            return [schedule_entry(row) for row in session.scalars(query)]
 
     def claim(self, entry: ScheduleEntry, next_due: datetime | None, now: datetime) -> int | None:
         """Take the firing of a schedule on that is due; once only, whoever else tries.
@@ -246,7 +178,7 @@ class ScheduleBook:
             if firing is None:
                 return None
             firing.state, firing.claimed, firing.site, firing.boot = "claimed", now, self.site, self._boot
-            return firing.id, _entry(firing.schedule)
+            return firing.id, schedule_entry(firing.schedule)
 
     def withdraw(self, number: int) -> bool:
         """Take back what was asked for; False where somebody has taken it on.
@@ -305,7 +237,7 @@ class ScheduleBook:
             firing = session.get(Firing, number)
             if firing is None:
                 raise NotFoundError(f"there is no firing {number}; list those of the schedule")
-            return _firing(session, firing)
+            return firing_entry(session, firing)
 
     def firings(self, name: str, limit: int) -> list[FiringEntry]:
         """The firings of a schedule, the newest first.
@@ -325,7 +257,7 @@ class ScheduleBook:
         with self._database.reading() as session:
             query = select(Firing).where(Firing.schedule_id == _schedule(session, name).id)
             rows = session.scalars(query.order_by(Firing.id.desc()).limit(limit)).all()
-            return [_firing(session, row) for row in rows]
+            return [firing_entry(session, row) for row in rows]
 
     def _is_mine(self) -> ColumnElement[bool]:
         """Of schedules that this site may do."""
@@ -346,26 +278,3 @@ def _schedule(session: Session, name: str) -> Schedule:
         hint = nearest(name, known) if known else "there are none yet"
         raise NotFoundError(one_line(f"no schedule {shown(name)}; {hint}"))
     return row
-
-
-def _entry(row: Schedule) -> ScheduleEntry:
-    """What is given out of a schedule."""
-    return ScheduleEntry(row.name, row.site, row.definition, row.order, row.files, row.created, row.next_due)
-
-
-def _firing(session: Session, row: Firing) -> FiringEntry:
-    """What is given out of a firing, and where that stands which it started."""
-    item = None
-    if row.item_kind is not None and row.item_identifier is not None:
-        item = row.item_kind, row.item_identifier
-    state, is_final = None, row.state not in UNDECIDED
-    if item is not None:
-        query = select(Item.state, Item.is_final).where(
-            Item.site == row.site, Item.kind == item[0], Item.identifier == item[1]
-        )
-        found = session.execute(query).one_or_none()
-        # What is not in the index yet goes on; what is not in it any more was removed, which is told by the folder.
-        state, is_final = (None, False) if found is None else (found[0], found[1])
-    return FiringEntry(
-        row.id, row.schedule.name, row.due, row.is_asked, row.state, row.reason, row.site, item, state, is_final
-    )
