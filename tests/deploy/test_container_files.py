@@ -5,6 +5,7 @@ import json
 import re
 import shutil
 import subprocess
+from ipaddress import ip_address, ip_network
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +55,22 @@ def test_only_the_proxy_is_reached_from_outside(compose: dict[str, Any]) -> None
     assert compose["networks"]["inside"]["internal"] is True
 
 
+def test_who_starts_first_does_not_get_the_address_of_another(compose: dict[str, Any]) -> None:
+    """Networks give the lowest free address to who asked for none, unless they are told where to begin."""
+    (given,) = compose["networks"]["inside"]["ipam"]["config"]
+    subnet, drawn = ip_network(given["subnet"]), ip_network(given["ip_range"])
+    joined = [service["networks"] for service in compose["services"].values() if isinstance(service["networks"], dict)]
+    fixed = [ip_address(networks["inside"]["ipv4_address"]) for networks in joined]
+    assert len(set(fixed)) == 2
+    assert all(address in subnet and address not in drawn for address in fixed)
+
+
+def test_the_image_asks_only_the_service_how_it_is(compose: dict[str, Any]) -> None:
+    for name, service in compose["services"].items():
+        if service["image"] == "tauscope" and name != "tauscope":
+            assert service["healthcheck"] == {"disable": True}, name
+
+
 def test_containers_may_do_little(compose: dict[str, Any]) -> None:
     for name, service in compose["services"].items():
         assert service["security_opt"] == ["no-new-privileges:true"], name
@@ -73,8 +90,8 @@ def test_the_image_is_built_in_two_stages_and_runs_as_nobody() -> None:
     stages = [number for number, line in enumerate(lines) if line.startswith("FROM ")]
     assert len(stages) == 2
     last = lines[stages[1] :]
-    assert "USER 10001:10001" in last
-    assert last.index("USER 10001:10001") < next(n for n, line in enumerate(last) if line.startswith("CMD"))
+    assert "USER 10001" in last
+    assert last.index("USER 10001") < next(n for n, line in enumerate(last) if line.startswith("CMD"))
     assert any("--require-hashes" in line for line in lines)
     assert not [line for line in lines if re.search(r"curl|wget|ADD ", line)]
     copied = [line.split()[1] for line in lines if line.startswith("COPY") and "--from" not in line]
@@ -94,9 +111,13 @@ def commands() -> list[list[str]]:
     return [json.loads(cmd), named.split(), start.split()]
 
 
-@pytest.mark.parametrize("command", commands(), ids=["image", "compose", "systemd"])
+@pytest.mark.parametrize(
+    ("command", "data_folder"),
+    list(zip(commands(), ["/var/lib/tauscope/data", "/var/lib/tauscope/data", "/var/lib/tauscope"], strict=True)),
+    ids=["image", "compose", "systemd"],
+)
 def test_the_program_understands_how_it_is_started(
-    command: list[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    command: list[str], data_folder: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seen: list[Settings] = []
     monkeypatch.setattr("service.cli.serving.serve", lambda settings, _: seen.append(settings))
@@ -104,7 +125,7 @@ def test_the_program_understands_how_it_is_started(
     assert program == "tauscope"
     assert main(words) == 0
     (settings,) = seen
-    assert (str(settings.data_folder), settings.log_format) == ("/var/lib/tauscope", "json")
+    assert (str(settings.data_folder), settings.log_format) == (data_folder, "json")
 
 
 def test_the_proxy_and_compose_agree(compose: dict[str, Any]) -> None:
