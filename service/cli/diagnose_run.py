@@ -21,6 +21,7 @@ from service.diagnosis import (
 )
 from service.diagnosis.extended_model import read_model
 from service.diagnosis.next_experiment import PlannedExperiment, planned_experiment
+from service.errors import ExcitationError
 from service.identification import Options
 from service.recording import EffortKind, Recording, read_recording
 from service.robot import Robot, read_robot
@@ -93,7 +94,7 @@ def run_diagnose(request: DiagnoseRequest) -> None:
     typer.BadParameter
         where files are given twice or are missing, or an output would destroy an input
     TauscopeError
-        where the data or the robot cannot answer
+        where the data or the robot cannot answer; where limits allow no next experiment, after all else was written
     """
     compared = request.compared
     inputs = (*request.recordings, *request.held_out, *compared)
@@ -132,8 +133,10 @@ def run_diagnose(request: DiagnoseRequest) -> None:
     if request.json is None:
         show_diagnosis(output(), outcome.document)
     if STANDARD_OUTPUT not in outputs:
-        for path in outputs:
+        for path in filter(files.__contains__, outputs):
             output().print(plain(f"wrote {path}"), soft_wrap=True)
+    if outcome.refusal is not None:  # what was found is kept
+        raise outcome.refusal
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,6 +149,8 @@ class Outcome:
         the same as plain data
     planned : PlannedExperiment or None
         the motion to record next, where anything is open or it was asked for
+    refusal : ExcitationError or None
+        why there is none although it was asked for
     recordings : tuple of Recording
         as they were read
     """
@@ -153,6 +158,7 @@ class Outcome:
     diagnosis: Diagnosis
     document: DiagnosisDocument
     planned: PlannedExperiment | None
+    refusal: ExcitationError | None
     recordings: tuple[Recording, ...]
 
 
@@ -188,9 +194,13 @@ def diagnose_files(request: DiagnoseRequest, progress: Callable[[str], None]) ->
         progress("compare with the model")
         found = against_model(found)
     path = request.outputs.next_trajectory
-    planned = planned_experiment(found, progress, asked=path is not None)
+    planned, refusal = None, None
+    try:
+        planned = planned_experiment(found, progress, asked=path is not None)
+    except ExcitationError as error:
+        refusal = error
     where = None if path is None or planned is None else str(path)
-    return Outcome(found, document(found, planned, where), planned, recordings)
+    return Outcome(found, document(found, planned, where), planned, refusal, recordings)
 
 
 def _read(paths: Sequence[Path], robot: Robot, progress: Callable[[str], None]) -> Iterator[Recording]:

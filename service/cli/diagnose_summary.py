@@ -4,7 +4,8 @@ from rich.console import Console
 
 from service.cli.terminal import plain, table
 from service.diagnosis import DiagnosisDocument
-from service.report.diagnosis_words import VERDICTS, difference_table, residual_table, shift_table
+from service.report.diagnosis_tables import difference_table, residual_table, shift_table
+from service.report.diagnosis_words import VERDICTS
 from service.report.quantities import significant
 from service.report.table import Table
 

@@ -17,6 +17,8 @@ from service.store import FOLDERS, RECORDINGS, FolderLock, RecordingStore, item_
 from service.store.database import FILE_NAME, Database, Index, ModelHistory
 from service.store.items import utc_now
 
+_OWN_FILES = "its state, its order or its result"
+
 
 @dataclass(frozen=True, eq=False)
 class OpenStore:
@@ -126,13 +128,16 @@ def check_store(data: Path | None, database: str | None, *, quick: bool) -> None
         progress(f"compare the files of {store.folder}")
         changed = store.keeper.check(deep=not quick)
         count = sum(len(store.keeper.index.stamps(kind)) for kind in item_stores(store.folder))
+        recordings = len(RecordingStore(store.folder / RECORDINGS).entries())
+    kept = f"{counted(count, 'item')} and {counted(recordings, 'recording')}"
     if not changed:
-        output().print(plain(f"{store.folder}: {counted(count, 'item')}, all as they were"), soft_wrap=True)
+        output().print(plain(f"{store.folder}: {kept}, all as they were"), soft_wrap=True)
         return
-    rows = [(item.kind, item.identifier, item.path or "its state, its order or its result") for item in changed]
+    own = {"recording": "its bytes"}
+    rows = [(item.kind, item.identifier, item.path or own.get(item.kind, _OWN_FILES)) for item in changed]
     output().print(table("Missing or changed", Table(("kind", "item", "file"), rows, words=3)))
-    hint = "restore it from a backup, or remove the item"
-    raise StoreError(f"{store.folder}: {counted(len(changed), 'item')} of {count} damaged; {hint}")
+    hint = "restore what is damaged from a backup, or remove it"
+    raise StoreError(f"{store.folder}: of {kept}, {len(changed)} damaged; {hint}")
 
 
 def prune_store(

@@ -6,24 +6,26 @@ from collections.abc import Iterator
 from markupsafe import Markup
 
 from service.diagnosis import Diagnosis, DiagnosisDocument
+from service.diagnosis.documents.plots import DiagnosisPlots, diagnosis_plots
 from service.diagnosis.next_experiment import PlannedExperiment
-from service.diagnosis.plots import DiagnosisPlots, diagnosis_plots
 from service.report.csv_text import csv_text
+from service.report.diagnosis_tables import (
+    detectable_table,
+    difference_table,
+    located_table,
+    residual_table,
+    shift_table,
+)
 from service.report.diagnosis_words import (
     HEADLINES,
     cautions,
     constancy_sentence,
-    detectable_table,
-    difference_table,
     effect_title,
     file_title,
     finding_facts,
-    located_table,
     location_sentence,
     noise_ratios,
     place_title,
-    residual_table,
-    shift_table,
     summary_sentences,
 )
 from service.report.heat_map import heat_map, heat_table

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 
 from markupsafe import Markup, escape
 
-from service.diagnosis.plots import ResidualHistogram
+from service.diagnosis.documents.plots import ResidualHistogram
 from service.report.quantities import significant
 from service.report.table import Table
 

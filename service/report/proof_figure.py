@@ -5,8 +5,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from service.diagnosis.residual_spectrum import ResidualSpectrum
-from service.diagnosis.torque_overlay import TorqueOverlay
+from service.diagnosis.documents.residual_spectrum import ResidualSpectrum
+from service.diagnosis.documents.torque_overlay import TorqueOverlay
 from service.report.quantities import power_of_ten
 from service.report.svg import BAND, INK, MEASURED, MUTED, PREDICTED, RESIDUAL, draw_svg
 

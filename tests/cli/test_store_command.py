@@ -28,14 +28,14 @@ def data(tmp_path: Path) -> Path:
 def test_a_sound_folder_and_then_a_changed_file(run: Run, data: Path) -> None:
     ended = run("store", "check", "--data", data)
     assert (ended.status, ended.err) == (0, "")
-    assert "12 items, all as they were" in ended.out
+    assert "12 items and 7 recordings, all as they were" in ended.out
     (result,) = (data / "diagnoses").glob("*/result.json")
     result.write_bytes(result.read_bytes().replace(b"noise_std", b"noise_stD"))
     quick = run("store", "check", "--data", data, "--quick")
     assert quick.status == 0
     ended = run("store", "check", "--data", data)
     assert ended.status == 1
-    assert "1 item of 12 damaged" in ended.err
+    assert "of 12 items and 7 recordings, 1 damaged" in ended.err
     assert result.parent.name in ended.out
     assert "result.json" in ended.out
 
