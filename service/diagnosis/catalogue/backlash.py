@@ -15,8 +15,12 @@ from service.recording.recording import Array
 GAPS = np.array([1e-4, 3e-4, 1e-3, 3e-3, 1e-2])
 """Gaps looked at, relative to the joint's range of motion."""
 
-BANDS = np.array([4.0, 1.0, 0.35])
+BANDS = np.array([2.0, 1.0, 0.35])
 """Bands to which the load is smoothed, relative to the common one."""
+
+FARTHEST_FLOWN = 1.3
+"""Gap that is flown over, relative to b, beyond which no teeth are as far apart: on simulated arms it is 0.75 to
+0.9 of b, and 2 or more where something else is taken for play."""
 
 
 def place_between_teeth(load: Array, inertia: Array, gap: float, rate_hz: float) -> Array:
@@ -92,6 +96,18 @@ class Backlash(Deflection):
             bounds = np.array([0.5 * gaps[0], bands[-1]]), np.array([2.0 * gaps[-1], bands[0]])
             made.append(cls(joint, mesh(gaps, bands), *bounds))
         return made
+
+    def is_consistent(self, coefficients: Array, shape: Array) -> bool:
+        """Whether the gap that the link flies over is the one by which it moves.
+
+        Parameters
+        ----------
+        coefficients : (1,) float64
+            b [rad or m]
+        shape : (2,) float64
+            gap that is flown over [rad or m], band of the load [Hz]
+        """
+        return bool(shape[0] <= FARTHEST_FLOWN * coefficients[0])
 
     def deflection(self, load: Array, inertia: Array, shape: Array, rate_hz: float) -> Array:
         """Place between the teeth.

@@ -37,6 +37,9 @@ Narrower it rounds off how the joint sticks at its reversals, always to the same
 bristles; wider its noise blurs the step to either side. The rows' weights know of both, but what tells asymmetric
 friction from a constant is lost in either: it is seen with a third more standard errors at 0.5 than at 1."""
 
+AT_MOST_BLURRED = 1.0
+"""…and up to which it is opened where it would otherwise show corners of friction's steps, below."""
+
 QUIET = 0.4
 """…and up to which it is opened for what the torque is at single samples, where no band takes that noise out again."""
 
@@ -44,7 +47,8 @@ STATE_BANDS = (2.0, 8.0)
 """Narrowest and widest band of the motion relative to the common one."""
 
 STEPS_SEEN = 2.5
-"""Width of the motion's own band, over that of the comparison, that shows no corners of friction's steps."""
+"""Width of the motion's own band, over that of the comparison, that shows no corners of friction's steps. Where noise
+alone sets the comparison, a joint's own band is opened that far."""
 
 
 def diagnosis_cutoff(conditioners: Sequence[Conditioner], identification: Identification, steepness: Array) -> float:
@@ -73,9 +77,7 @@ def diagnosis_cutoff(conditioners: Sequence[Conditioner], identification: Identi
     return min(identified, widest, max(noisiest, steps / STEPS_SEEN))
 
 
-def state_cutoffs(
-    conditioner: Conditioner, cutoff_hz: float | None, steepness: Array | None, blurred: float
-) -> Array | None:
+def state_cutoffs(conditioner: Conditioner, cutoff_hz: float | None, steepness: Array | None) -> Array | None:
     """Cut-off of each joint's own smoothing, (n,) [Hz]; None for no filter.
 
     Parameters
@@ -86,15 +88,36 @@ def state_cutoffs(
         of the common band [Hz]; None for no filter
     steepness : (n,) float64 or None
         K_v of every joint's friction [s/rad or s/m]
-    blurred : float
-        as of `step_band`
     """
     if cutoff_hz is None:
         return None
-    narrowest, widest = (ratio * cutoff_hz for ratio in STATE_BANDS)
     if steepness is None:
-        return np.full(conditioner.robot.joint_count, narrowest)
-    return np.clip(step_bands(conditioner, steepness, blurred), narrowest, widest)
+        return _within(np.zeros(conditioner.robot.joint_count), cutoff_hz)
+    without_corners = np.minimum(STEPS_SEEN * cutoff_hz, step_bands(conditioner, steepness, AT_MOST_BLURRED))
+    return _within(np.maximum(step_bands(conditioner, steepness, BLURRED), without_corners), cutoff_hz)
+
+
+def quiet_cutoffs(conditioner: Conditioner, cutoff_hz: float | None, steepness: Array | None) -> Array | None:
+    """The same for what the torque is at single samples.
+
+    Parameters
+    ----------
+    conditioner : Conditioner
+        a recording
+    cutoff_hz : float or None
+        of the common band [Hz]; None for no filter
+    steepness : (n,) float64 or None
+        K_v of every joint's friction [s/rad or s/m]
+    """
+    if cutoff_hz is None or steepness is None:
+        return state_cutoffs(conditioner, cutoff_hz, steepness)
+    return _within(step_bands(conditioner, steepness, QUIET), cutoff_hz)
+
+
+def _within(bands: Array, cutoff_hz: float) -> Array:
+    """Bands, neither narrower nor wider than `STATE_BANDS` allow."""
+    narrowest, widest = (ratio * cutoff_hz for ratio in STATE_BANDS)
+    return np.clip(bands, narrowest, widest)
 
 
 def step_bands(conditioner: Conditioner, steepness: Array, blurred: float) -> Array:

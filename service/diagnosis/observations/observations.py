@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from service.diagnosis.observations.band import BLURRED, QUIET, STATE_BANDS, state_cutoffs
+from service.diagnosis.observations.band import STATE_BANDS, quiet_cutoffs, state_cutoffs
 from service.diagnosis.observations.row_weighting import RowWeighting
 from service.diagnosis.observations.spikes import without_spikes
 from service.diagnosis.observations.whitening import JointNoise
@@ -187,8 +187,8 @@ class Observations:
             K_v of every joint's friction, for the band of the motion itself [s/rad or s/m]
         """
         starts = [float(c.recording.samples(0, 1).time[0]) for c in conditioners]
-        bands = [state_cutoffs(c, cutoff_hz, steepness, BLURRED) for c in conditioners]
-        quiet = [state_cutoffs(c, cutoff_hz, steepness, QUIET) for c in conditioners]
+        bands = [state_cutoffs(c, cutoff_hz, steepness) for c in conditioners]
+        quiet = [quiet_cutoffs(c, cutoff_hz, steepness) for c in conditioners]
         apart = [c.as_one_motion(band) for c, band in zip(conditioners, bands, strict=True)]
         prepared = Dataset(apart, robot, base, cutoff_hz)
         return Observations(
