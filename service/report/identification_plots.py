@@ -12,6 +12,7 @@ from service.recording.recording import Array
 from service.report.decimation import envelope_indices
 from service.report.friction_curve import friction_curve
 from service.report.series import TorqueSeries, torque_series
+from service.robot import JointType
 
 MOST_POINTS = 4000
 """Points of one joint's torque: more than any screen is wide, so that a zoom shows more."""
@@ -55,6 +56,9 @@ class IdentificationPlots(PlotDocument):
     schema_id: Literal["tauscope.identification-plots/1"] = Field(
         default="tauscope.identification-plots/1", alias="schema", description="name and version of this form"
     )
+    joint_types: dict[str, JointType] = Field(
+        default={}, description="how each joint moves, by its name: its units are Nm and rad, or N and m"
+    )
     torque: list[TorqueCurve] = Field(description="one a joint, of the first held-out recording, or the first at all")
     friction: list[FrictionPlot] = Field(description="one a joint")
 
@@ -75,6 +79,7 @@ def identification_plots(
     shown = torque_series(identification, held_out[0]) if held_out else series[0]
     names = [joint.name for joint in identification.robot.joints]
     return IdentificationPlots(
+        joint_types={joint.name: joint.type for joint in identification.robot.joints},
         torque=[_torque(shown, place, name, held_out=bool(held_out)) for place, name in enumerate(names)],
         friction=[_friction(identification, series, place, name) for place, name in enumerate(names)],
     )

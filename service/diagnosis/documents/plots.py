@@ -18,6 +18,7 @@ from service.diagnosis.findings.diagnosed import Diagnosis
 from service.diagnosis.model.residual import residual_rows
 from service.diagnosis.observations.observations import Observations
 from service.recording.recording import Array
+from service.robot import JointType
 
 MOST_POINTS = 1500
 """Points of one joint's residual, over all recordings."""
@@ -63,6 +64,9 @@ class DiagnosisPlots(Document):
     schema_id: Literal["tauscope.diagnosis-plots/1"] = Field(
         default="tauscope.diagnosis-plots/1", alias="schema", description="name and version of this document's form"
     )
+    joint_types: dict[str, JointType] = Field(
+        default={}, description="how each joint moves, by its name: its units are Nm and rad, or N and m"
+    )
     curves: list[ResidualCurve] = Field(description="one a joint and recording")
     histograms: list[ResidualHistogram] = Field(description="one a joint and variable")
     overlays: list[TorqueOverlay] = Field(
@@ -93,6 +97,7 @@ def diagnosis_plots(diagnosis: Diagnosis) -> DiagnosisPlots:
             histogram = _histogram(described.name, variable, values, rows, noise)
             histograms += [] if histogram is None else [histogram]
     return DiagnosisPlots(
+        joint_types={joint.name: joint.type for joint in diagnosis.robot.joints},
         curves=curves,
         histograms=histograms,
         overlays=torque_overlays(diagnosis),

@@ -1,7 +1,7 @@
 // A diagnosis as a story: where, what, how much, the proof, what next.
 
 import { download, getJson } from "./api.js";
-import { chance, explained, figures, h, moment, number, percent, render, s, section, table, tabs, title, unit, withError } from "./dom.js";
+import { chance, explained, figures, h, moment, number, percent, render, s, section, table, tabs, title, unit, unitsOf, withError } from "./dom.js";
 import { VARIABLES, heatMap } from "./heat.js";
 import { waiting } from "./identifications.js";
 import { move } from "./leases.js";
@@ -68,6 +68,7 @@ function whereSection(result, plots) {
     if (!own) { render(place, h("p", { class: "note", text: "It does not vary there." })); return; }
     const middle = own.before.map((_, k) => (own.edges[k] + own.edges[k + 1]) / 2);
     const curve = plots.curves.find((each) => each.joint === joint.value);
+    const units = unitsOf(plots.joint_types?.[joint.value]);
     const range = bin === null ? null : [own.edges[bin], own.edges[bin + 1]];
     const inside = (k) => {
       const value = variable.value === "time" ? curve.time[k] : curve.states[variable.value]?.[k];
@@ -76,27 +77,29 @@ function whereSection(result, plots) {
     const series = [{ label: "without the findings", values: curve.before, colour: "--before" }, { label: "with them", values: curve.after, colour: "--after" }];
     if (range) series.push({ label: `${variable.value} ${number(range[0], 3)} … ${number(range[1], 3)}`, values: curve.before.map((value, k) => (inside(k) ? value : null)), colour: "--c4", points: true });
     render(place, 
-      plot({ label: `Rms of the residual of ${joint.value} by ${variable.value}`, raw: true, x: middle, xLabel: `${variable.value} [SI]`, yLabel: "Nm or N", series: [
+      plot({ label: `Rms of the residual of ${joint.value} by ${variable.value}`, raw: true, x: middle, xLabel: `${variable.value} [${units[variable.value]}]`, yLabel: units.torque, series: [
         { label: "without the findings", values: own.before, colour: "--before", width: 2 }, { label: "with them", values: own.after, colour: "--after", width: 2 },
         { label: "noise", values: own.before.map(() => own.noise), colour: "--muted", dash: [5, 4] }] }).element,
-      plot({ label: `Residual of ${joint.value} over time${range ? ", the chosen part marked" : ""}`, raw: true, x: curve.time, xLabel: `time in ${curve.recording} [s]`, yLabel: "Nm or N", noise: 2 * own.noise, series }).element);
+      plot({ label: `Residual of ${joint.value} over time${range ? ", the chosen part marked" : ""}`, raw: true, x: curve.time, xLabel: `time in ${curve.recording} [s]`, yLabel: units.torque, noise: 2 * own.noise, series }).element);
   }
   joint.onchange = variable.onchange = () => look();
   draw("before");
   look();
   const significant = result.mismatch.filter((each) => each.significant);
   return section("where", "Where",
-    significant.length ? h("ul", { class: "plain" }, significant.map((each) => h("li", { text: located(each) }))) : h("p", { text: "At no joint is there more than noise." }),
+    significant.length ? h("ul", { class: "plain" }, significant.map((each) => h("li", { text: located(each, unitsOf(plots.joint_types?.[each.joint])) }))) : h("p", { text: "At no joint is there more than noise." }),
     result.findings.length ? tabs("Map", ["Without the findings", "With them"], 0, (chosen) => draw(chosen ? "after" : "before")) : null,
     map, h("p", { class: "note", text: "Each cell holds as many samples as any other of its row and group. Click one to see the residual there, or choose:" }),
     h("form", { class: "sheet" }, h("label", { for: "where-joint" }, "Joint", joint), h("label", { for: "where-state" }, "State", variable)), place);
 }
 
-function located(entry) {
-  const where = entry.where ? `, ${(100 * entry.where.share).toFixed(0)} % of it at a ${entry.where.variable.replaceAll("_", " ")} of ${entry.where.range.map((v) => number(v, 2)).join(" to ")}` : "";
+function located(entry, units) {
+  const where = entry.where ? `, ${(100 * entry.where.share).toFixed(0)} % of it at a ${entry.where.variable.replaceAll("_", " ")} of ${entry.where.range.map((v) => number(v, 2)).join(" to ")}${unitBehind(units, entry.where.variable)}` : "";
   const when = entry.time ? `, ${(100 * entry.time.share).toFixed(0)} % between ${entry.time.range.map((v) => number(v, 3)).join(" and ")} s` : "";
-  return `${entry.joint}: ${number(entry.excess_rms, 3)} rms beyond the noise${where}${when}.`;
+  return `${entry.joint}: ${number(entry.excess_rms, 3)} ${units.torque} rms beyond the noise${where}${when}.`;
 }
+
+const unitBehind = (units, variable) => (units[variable] ? ` ${units[variable]}` : "");
 
 function whatSection(result) {
   const total = result.findings.reduce((sum, each) => sum + each.gain, 0);
@@ -142,13 +145,14 @@ function proofSection(plots) {
     const curve = plots.overlays[joint];
     const spectrum = plots.spectra.find((each) => each.joint === curve.joint);
     const together = group();
+    const units = unitsOf(plots.joint_types?.[curve.joint]);
     const left = (values) => curve.measured.map((value, k) => value - values[k]);
     render(place, zoomButtons(together),
-      plot({ label: `Torque of ${curve.joint}`, x: curve.time, xLabel: "time [s]", yLabel: "Nm or N", group: together, tall: true, series: [
+      plot({ label: `Torque of ${curve.joint}`, x: curve.time, xLabel: "time [s]", yLabel: units.torque, group: together, tall: true, series: [
         { label: "measured", values: curve.measured, colour: "--measured", width: 4 }, { label: "model without the findings", values: curve.before, colour: "--before" }, { label: "with them", values: curve.after, colour: "--after" }] }).element,
-      plot({ label: "Residual", x: curve.time, xLabel: "time [s]", yLabel: "Nm or N", group: together, noise: 2 * curve.noise, series: [
+      plot({ label: "Residual", x: curve.time, xLabel: "time [s]", yLabel: units.torque, group: together, noise: 2 * curve.noise, series: [
         { label: "without the findings", values: left(curve.before), colour: "--before" }, { label: "with them", values: left(curve.after), colour: "--after" }] }).element,
-      spectrum ? plot({ label: "Spectrum of the residual", raw: true, log: true, x: spectrum.frequency, xLabel: "frequency [Hz]", yLabel: "(Nm)²/Hz or N²/Hz", series: [
+      spectrum ? plot({ label: "Spectrum of the residual", raw: true, log: true, x: spectrum.frequency, xLabel: "frequency [Hz]", yLabel: units.spectrum, series: [
         { label: "without the findings", values: spectrum.before, colour: "--before" }, { label: "with them", values: spectrum.after, colour: "--after" }, { label: "noise", values: spectrum.noise, colour: "--muted", dash: [5, 4] }] }).element : null);
   }
   if (!plots.overlays.length) return section("proof", "The proof", h("p", { text: "This diagnosis was made before proofs were kept." }));

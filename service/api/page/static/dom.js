@@ -46,6 +46,17 @@ export function number(value, digits = 4) {
 /** A unit behind its number; that of a ratio is not said. */
 export const unit = (name) => (name === "1" ? "" : ` ${name}`);
 
+const OF_ANY = { time: "s", temperature: "°C", motor_position: "rad" };
+const REVOLUTE = { ...OF_ANY, position: "rad", velocity: "rad/s", acceleration: "rad/s²", load: "Nm", torque: "Nm", spectrum: "(Nm)²/Hz" };
+const PRISMATIC = { ...OF_ANY, position: "m", velocity: "m/s", acceleration: "m/s²", load: "N", torque: "N", spectrum: "N²/Hz" };
+
+/** Units of a joint that moves in this way; both where nobody has said. */
+export function unitsOf(type) {
+  if (type === "prismatic") return PRISMATIC;
+  if (type === "revolute") return REVOLUTE;
+  return Object.fromEntries(Object.entries(REVOLUTE).map(([name, own]) => [name, own === PRISMATIC[name] ? own : `${own} or ${PRISMATIC[name]}`]));
+}
+
 /** A value and its standard error, to the error's second digit. */
 export function withError(value, std) {
   if (!Number.isFinite(std) || std <= 0) return number(value);

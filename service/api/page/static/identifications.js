@@ -1,7 +1,7 @@
 // Identifications: how well the model explains the torque, its parameters, and its friction.
 
 import { download, follow, getJson } from "./api.js";
-import { explained, figures, h, moment, number, percent, render, s, section, state, table, tabs, withError } from "./dom.js";
+import { explained, figures, h, moment, number, percent, render, s, section, state, table, tabs, unitsOf, withError } from "./dom.js";
 import { jobList } from "./lists.js";
 import { group, plot, zoomButtons } from "./plots.js";
 
@@ -28,7 +28,7 @@ export async function showIdentification(root, { id, signal, show }) {
       ["Noise known from", result.noise_method === "periods" ? "repetition" : "the residual", result.joints.map((name, place) => `${name} ${number(result.noise_std[place], 2)}`).join(", ")],
     ]),
     h("div", { class: "row" }, h("button", { type: "button", class: "primary", onclick: () => download(job.links.report, `identification-${id}.html`), text: "Download the report" }),
-      Object.entries(job.links.exports).map(([format, path]) => h("button", { type: "button", onclick: () => download(path, exportName(result.robot, format)), text: format }))),
+      Object.entries(job.links.exports).map(([format, path]) => h("button", { type: "button", onclick: () => download(path, exportName(result.robot, format)), text: EXPORT_WORDS[format] ?? format }))),
     result.unidentifiable?.length ? h("p", { class: "note", text: `No motion of this arm shows ${result.unidentifiable.join(", ")}.` }) : null,
     torqueSection(result, plots), frictionSection(plots), parameterSection(result));
   return null;
@@ -44,6 +44,7 @@ export function waiting(root, head, job, signal, show) {
   });
 }
 
+const EXPORT_WORDS = { json: "JSON", yaml: "YAML", c: "C header", python: "Python module", urdf: "URDF", mjcf: "MJCF" };
 const exportName = (robot, format) => `${robot}.${{ json: "json", yaml: "yaml", c: "h", python: "py", urdf: "urdf", mjcf: "xml" }[format] ?? format}`;
 
 function torqueSection(result, plots) {
@@ -51,11 +52,12 @@ function torqueSection(result, plots) {
   function choose(joint) {
     const curve = plots.torque[joint];
     const together = group();
+    const units = unitsOf(plots.joint_types?.[curve.joint]);
     const measured = curve.measured.map((value) => value ?? NaN);
     render(place, zoomButtons(together),
-      plot({ label: `Torque of ${curve.joint}`, x: curve.time, xLabel: "time [s]", yLabel: "Nm or N", group: together, tall: true, series: [
+      plot({ label: `Torque of ${curve.joint}`, x: curve.time, xLabel: "time [s]", yLabel: units.torque, group: together, tall: true, series: [
         { label: "measured", values: measured, colour: "--measured", width: 2.2 }, { label: "model", values: curve.predicted, colour: "--after" }] }).element,
-      plot({ label: "Residual", x: curve.time, xLabel: "time [s]", yLabel: "Nm or N", group: together, noise: 2 * result.noise_std[joint],
+      plot({ label: "Residual", x: curve.time, xLabel: "time [s]", yLabel: units.torque, group: together, noise: 2 * result.noise_std[joint],
         series: [{ label: "measured − model", values: measured.map((value, k) => value - curve.predicted[k]), colour: "--before" }] }).element);
   }
   choose(0);
@@ -68,6 +70,7 @@ function frictionSection(plots) {
   const place = h("div", {});
   function choose(joint) {
     const curve = plots.friction[joint];
+    const units = unitsOf(plots.joint_types?.[curve.joint]);
     const velocity = [...curve.velocity, ...curve.measured_velocity];
     const order = velocity.map((_, k) => k).sort((a, b) => velocity[a] - velocity[b]);
     const spread = (values, offset) => order.map((k) => values[k - offset] ?? null);
@@ -75,7 +78,7 @@ function frictionSection(plots) {
     const low = curve.friction.map((value, k) => value - 1.96 * curve.std[k]);
     // Every curve on one axis: where a curve has no point of its own, it is carried on between its neighbours.
     const carried = (values) => order.map((k) => (k < curve.velocity.length ? values[k] : interpolated(curve.velocity, values, velocity[k])));
-    render(place, plot({ label: `Friction of ${curve.joint}`, raw: true, tall: true, x: order.map((k) => velocity[k]), xLabel: "velocity [rad/s or m/s]", yLabel: "Nm or N",
+    render(place, plot({ label: `Friction of ${curve.joint}`, raw: true, tall: true, x: order.map((k) => velocity[k]), xLabel: `velocity [${units.velocity}]`, yLabel: units.torque,
       bands: [{ series: [1, 2] }], series: [
         { label: "95 % high", values: carried(high), colour: "--band", hidden: true }, { label: "95 % low", values: carried(low), colour: "--band", hidden: true },
         { label: "model, with its 95 % band", values: carried(curve.friction), colour: "--after", width: 2 },
