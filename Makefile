@@ -26,7 +26,7 @@ $(INSTALLED): constraints-dev.txt pyproject.toml
 	$(BIN)/python -m pip install -qq --disable-pip-version-check --no-deps --no-build-isolation -e .
 	@touch $@
 
-demo: $(INSTALLED) ## a whole campaign on the paper's arm, simulated; look into demo-output/
+demo: $(INSTALLED) ## a whole campaign on the paper's arm, simulated, and in a terminal the page; look into demo-output/
 	$(BIN)/tauscope demo --out demo-output
 
 prove: $(INSTALLED) ## concealed effects: the quick set, and its page with pictures; look into proof-output/

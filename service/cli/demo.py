@@ -5,6 +5,7 @@ without one.
 """
 
 import io
+import socket
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -20,6 +21,7 @@ from service.cli.identify_run import Outcome, Request, identify_files, write_out
 from service.cli.identify_summary import show_identification
 from service.cli.output_files import write_file
 from service.cli.run_session import keep_recording, run_to_end, why_unfinished
+from service.cli.serving import run_server
 from service.cli.terminal import Told, output, plain, shown_percent, shown_progress, table
 from service.diagnosis import DiagnosisDocument
 from service.errors import AcquisitionError
@@ -46,6 +48,9 @@ FILES = (ROBOT, SCENARIO, TRAIN_TRAJECTORY, HELD_OUT_TRAJECTORY, TRAIN, HELD_OUT
 
 DATA = "service"
 """Data folder of a service, which holds a campaign on an arm that conceals an effect."""
+
+PORT = 8000
+"""Where the page is, unless something else is there already."""
 
 CONCEALED = {"torque_noise_std": list(NOISE_STD_NM), "seed": 1} | {
     "effects": [{"effect": "joint_spring", "joint": 1, "stiffness": 0.6}]
@@ -81,13 +86,15 @@ class Comparison:
         return (self.value - self.truth) / self.std
 
 
-def run_demo(folder: Path) -> None:
+def run_demo(folder: Path, *, page: bool) -> None:
     """Design, run, identify, compare, and say where everything is.
 
     Parameters
     ----------
     folder : Path
         where the files go
+    page : bool
+        whether to show the page afterwards, until interrupted
 
     Raises
     ------
@@ -117,7 +124,12 @@ def run_demo(folder: Path) -> None:
     _show(output(), folder, outcome, compare(arm, outcome.identification))
     with shown_percent() as told:
         found = run_campaign(folder / DATA, example_robot("paper_arm"), CONCEALED, told)
-    _show_page(output(), folder / DATA, found)
+    _show_findings(output(), found)
+    if page:
+        show_page(folder / DATA)
+    else:
+        hint = f"Look at it: tauscope serve --data {folder / DATA} (or make page), then open http://127.0.0.1:{PORT}"
+        output().print(plain(hint), soft_wrap=True)
 
 
 def design_motion(robot: Path, out: Path, options: ExcitationOptions, told: Told) -> None:
@@ -238,15 +250,33 @@ def _show(console: Console, folder: Path, outcome: Outcome, comparisons: list[Co
         console.print(plain(f"wrote {folder / name}"), soft_wrap=True)
 
 
-def _show_page(console: Console, data: Path, found: DiagnosisDocument) -> None:
-    """What was found on an arm that conceals something, and where to look at it."""
+def _show_findings(console: Console, found: DiagnosisDocument) -> None:
+    """What was found on an arm that conceals something."""
     console.print()
     console.print(plain("The same arm once more, a spring concealed at its first joint; what the diagnosis found:"))
     for finding in found.findings:
         console.print(plain(f"{finding.effect} at {finding.joint}: {finding.statement}"), soft_wrap=True)
     console.print(plain(f"verdict: {found.verdict}"))
     console.print()
-    console.print(
-        plain(f"Look at it: tauscope serve --data {data} (or make page), then open http://127.0.0.1:8000"),
-        soft_wrap=True,
-    )
+
+
+def show_page(data: Path) -> None:
+    """Serve the page until interrupted.
+
+    Parameters
+    ----------
+    data : Path
+        the service's data folder
+    """
+    run_server(data, port=_free_port())
+
+
+def _free_port() -> int:
+    """`PORT`, or none in particular where that is taken."""
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(("127.0.0.1", PORT))
+        except OSError:
+            return 0
+    return PORT

@@ -1,5 +1,6 @@
 """``tauscope demo``: its arguments."""
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +11,14 @@ def demo(
     out: Annotated[Path, typer.Option(metavar="DIR", file_okay=False, help="Folder for the results.")] = Path(
         "demo-output"
     ),
+    page: Annotated[
+        bool | None,
+        typer.Option(
+            "--page/--no-page",
+            show_default=False,
+            help="Show the page with what was found, until Ctrl-C; by default where the output is a terminal.",
+        ),
+    ] = None,
 ) -> None:
     """Run a whole campaign on a simulated arm.
 
@@ -21,7 +30,9 @@ def demo(
     ----------
     out : Path
         folder for the results
+    page : bool or None
+        whether to show the page afterwards
     """
     from service.cli.demo import run_demo
 
-    run_demo(out)
+    run_demo(out, page=sys.stdout.isatty() if page is None else page)

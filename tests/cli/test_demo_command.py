@@ -1,21 +1,28 @@
 """``tauscope demo``."""
 
 import json
+import signal
+import socket
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from unittest.mock import Mock
+from urllib.request import urlopen
 
 import numpy as np
 import pytest
 
 from cli.conftest import Ended
+from service.cli import demo_command
 from service.cli.demo import (
     DATA,
     FILES,
     HELD_OUT,
     HELD_OUT_TRAJECTORY,
     NOISE_STD_NM,
+    PORT,
     REPORT,
     RESULT,
     ROBOT,
@@ -45,6 +52,44 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     ended = subprocess.run(command, check=False, capture_output=True, text=True, timeout=300)
     assert (ended.returncode, ended.stderr) == (0, "")
     return folder, ended.stdout
+
+
+@pytest.mark.parametrize(
+    ("is_terminal", "asked", "shown"),
+    [(True, None, True), (False, None, False), (True, False, False), (False, True, True)],
+)
+def test_where_the_output_is_a_terminal_it_ends_with_a_running_page(
+    monkeypatch: pytest.MonkeyPatch, is_terminal: bool, asked: bool | None, shown: bool
+) -> None:
+    said: list[bool] = []
+    monkeypatch.setattr("service.cli.demo.run_demo", lambda _, *, page: said.append(page))
+    monkeypatch.setattr(sys, "stdout", Mock(isatty=lambda: is_terminal))
+    demo_command.demo(Path("out"), asked)
+    assert said == [shown]
+
+
+@in_whole_demo
+def test_the_page_has_the_finished_campaign_at_another_port_where_its_own_is_taken(demo: tuple[Path, str]) -> None:
+    data = str(demo[0] / DATA)
+    code = f"from pathlib import Path; from service.cli.demo import show_page; show_page(Path({data!r}))"
+    with port_taken(PORT), subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as service:
+        assert service.stdout is not None
+        address = service.stdout.readline().split()[2].rstrip(",")
+        with urlopen(f"{address}/api/v1/campaigns", timeout=60) as answer:
+            (campaign,) = json.load(answer)["campaigns"]
+        service.send_signal(signal.SIGINT)
+    assert campaign["state"] == "succeeded"
+    assert not address.endswith(f":{PORT}")
+
+
+@contextmanager
+def port_taken(port: int) -> Iterator[None]:
+    """By us, or by whoever has it."""
+    with socket.socket() as holder:
+        with suppress(OSError):
+            holder.bind(("127.0.0.1", port))
+            holder.listen()
+        yield
 
 
 @in_whole_demo
