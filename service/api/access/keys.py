@@ -176,6 +176,7 @@ class KeyFile:
             yield keys
             write_atomically(self.path, _KeyList(keys=tuple(keys)).model_dump_json(indent=1).encode())
         finally:
+            fcntl.flock(lock, fcntl.LOCK_UN)  # closing does not: a process forked meanwhile holds the descriptor, too
             os.close(lock)
 
 

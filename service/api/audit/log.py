@@ -102,6 +102,7 @@ class AuditLog:
             os.write(descriptor, b"\n" + line if last else line)
             os.fsync(descriptor)
         finally:
+            fcntl.flock(descriptor, fcntl.LOCK_UN)  # closing does not where a process forked meanwhile holds it, too
             os.close(descriptor)
         if is_new:
             sync_folder(self.path.parent)

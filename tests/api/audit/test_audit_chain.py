@@ -1,7 +1,9 @@
 """The audit log: chained, shared by processes, and every kind of tampering is found."""
 
+import fcntl
 import json
 import multiprocessing
+import os
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -129,6 +131,19 @@ def test_processes_share_one_chain(tmp_path: Path) -> None:
         process.join()
     found = AuditLog(tmp_path).verify()
     assert (found.entries, found.fault) == (100, None)
+
+
+def test_a_process_forked_in_the_middle_does_not_keep_the_log_locked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    inherited: list[int] = []
+    monkeypatch.setattr(os, "fsync", lambda descriptor: inherited.append(os.dup(descriptor)))
+    log = AuditLog(tmp_path)
+    log.append("ann", "act")
+    other = os.open(log.path, os.O_RDWR)
+    fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)  # raises where it is still locked
+    for descriptor in (other, *inherited):
+        os.close(descriptor)
 
 
 def test_no_log_is_no_good_log(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
