@@ -2,8 +2,13 @@
 
 A residual that leaves noise behind is rarely white: filters, friction and what the model lacks colour it. Standard
 errors that ignore this are too small. An order that is fixed instead of chosen finds colour in white noise.
+
+What a known filter does to white noise need not be learnt from it: where the band's filter is told, its colour is taken
+out first, and the order chosen says what colour there is besides. Ten orders spent on a low-pass would leave the
+density at low frequency, which is what standard errors rest on, uncertain by a fifth and more.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import log
 
@@ -14,6 +19,16 @@ from scipy import signal
 from service.recording.recording import Array
 
 LARGEST_ORDER = 30
+
+FILTER_ORDER = 24
+"""Orders that stand for the band's filter: the density in the pass band is that of all orders to 1 %."""
+
+FILTER_FLOOR = 1e-2
+"""White noise that is added to a filtered residual, as a share of its variance: the stop band is empty, and an
+autoregression that is to follow it that far down needs hundreds of orders."""
+
+FILTERED_LAGS = LARGEST_ORDER + FILTER_ORDER
+"""Lags that a model of a filtered residual needs."""
 
 UNBROKEN_SHARE = 0.3
 """Where samples are missing, orders end where fewer than this share of so many consecutive samples are all there: what
@@ -116,21 +131,29 @@ class AutocovarianceSum:
 
     def __init__(self, lags: int = LARGEST_ORDER) -> None:
         self._sums = LaggedProducts(np.zeros(lags + 1), np.zeros(lags + 1), np.zeros(lags + 1))
+        self._white = np.zeros(lags + 1)
 
-    def add(self, piece: LaggedProducts) -> None:
+    def add(self, piece: LaggedProducts, filtered_white: Array | None = None) -> None:
         """Add one piece.
 
         Parameters
         ----------
         piece : LaggedProducts
-            its products, to the same largest lag
+            its products; lags that only one of the two has are left out
+        filtered_white : (K + 1,) float64 or None
+            autocovariance of white noise that passed the filter which the residual passed; None where it passed none
         """
-        self._sums.products[:] += piece.products
-        self._sums.counts[:] += piece.counts
-        self._sums.spans[:] += piece.spans
+        both = slice(min(len(piece.products), len(self._sums.products)))
+        self._sums.products[both] += piece.products[both]
+        self._sums.counts[both] += piece.counts[both]
+        self._sums.spans[both] += piece.spans[both]
+        if filtered_white is None:
+            self._white[0] += piece.counts[0]
+        else:
+            self._white += piece.counts[0] / filtered_white[0] * filtered_white
 
     def model(self) -> Autoregression:
-        """The autoregressive model of smallest BIC = N log σ_ε² + p log N, by Levinson's recursion."""
+        """The filter's colour times the autoregressive model of smallest BIC = N log σ_ε² + p log N."""
         count = float(self._sums.counts[0])
         if count < 2 or self._sums.products[0] <= 0.0:
             return Autoregression(np.empty(0), 0.0, 0.0)
@@ -138,20 +161,49 @@ class AutocovarianceSum:
         taper = self._sums.spans / self._sums.spans[0]
         covariance = taper * self._sums.products / np.maximum(self._sums.counts, 1.0)
         present = count / self._sums.spans[0]
-        unbroken = LARGEST_ORDER if present == 1.0 else np.log(UNBROKEN_SHARE) / np.log(present)
-        largest = int(min(LARGEST_ORDER, len(covariance) - 1, count // 10, unbroken))
-        variance = float(covariance[0])
-        best, best_score = (np.empty(0), variance), count * log(variance)
-        coefficients = np.zeros(largest)
-        for order in range(1, largest + 1):
-            before = coefficients[: order - 1]
-            reflection = float(covariance[order] - before @ covariance[order - 1 : 0 : -1]) / variance
-            before -= reflection * before[::-1]
-            coefficients[order - 1] = reflection
-            variance *= 1.0 - reflection**2
-            if variance <= 0.0:
-                break
-            score = count * log(variance) + order * log(count)
-            if score < best_score:
-                best, best_score = (coefficients[:order].copy(), variance), score
-        return Autoregression(*best, variance=float(covariance[0]))
+        unbroken = np.inf if present == 1.0 else np.log(UNBROKEN_SHARE) / np.log(present)
+        reach = int(min(len(covariance) - 1, count // 10, unbroken))
+        whitener = np.ones(1)
+        if self._white[1:].any():
+            whitener = _prediction_error_filter(_floored(self._white), min(FILTER_ORDER, reach // 2))
+            covariance = _floored(covariance)
+        whitened = _filtered(covariance[: reach + 1], whitener)
+        orders = list(_levinson(whitened, min(LARGEST_ORDER, len(whitened) - 1)))
+        scores = [count * log(variance) + len(found) * log(count) for found, variance in orders]
+        coefficients, variance = orders[int(np.argmin(scores))]
+        both = np.convolve(whitener, np.append(1.0, -coefficients))
+        return Autoregression(-both[1:], variance, variance=float(covariance[0]))
+
+
+def _levinson(covariance: Array, largest: int) -> Iterator[tuple[Array, float]]:
+    """Coefficients and innovation variance of the autoregressions of order 0, 1 … by Levinson's recursion."""
+    variance = float(covariance[0])
+    coefficients = np.zeros(largest)
+    yield np.empty(0), variance
+    for order in range(1, largest + 1):
+        before = coefficients[: order - 1]
+        reflection = float(covariance[order] - before @ covariance[order - 1 : 0 : -1]) / variance
+        before -= reflection * before[::-1]
+        coefficients[order - 1] = reflection
+        variance *= 1.0 - reflection**2
+        if variance <= 0.0:
+            return
+        yield coefficients[:order].copy(), variance
+
+
+def _floored(covariance: Array) -> Array:
+    """The autocovariance with the white noise of `FILTER_FLOOR` added."""
+    return np.append((1.0 + FILTER_FLOOR) * covariance[0], covariance[1:])
+
+
+def _prediction_error_filter(covariance: Array, order: int) -> Array:
+    """1 - Σ a_k z⁻ᵏ that whitens noise of this autocovariance."""
+    *_, (coefficients, _variance) = _levinson(covariance, order)
+    return np.append(1.0, -coefficients)
+
+
+def _filtered(covariance: Array, taps: Array) -> Array:
+    """Autocovariance of what leaves a filter of K taps, from that of what enters it: shorter by K - 1 lags."""
+    both_sides = np.append(covariance[:0:-1], covariance)
+    leaving = np.convolve(both_sides, np.correlate(taps, taps, "full"), "valid")
+    return leaving[len(leaving) // 2 :]

@@ -7,7 +7,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from service.identification.autocorrelation import AutocovarianceSum, Autoregression, LaggedProducts
+from service.identification.autocorrelation import (
+    FILTERED_LAGS,
+    LARGEST_ORDER,
+    AutocovarianceSum,
+    Autoregression,
+    LaggedProducts,
+)
 from service.identification.dataset import PreparedMotion
 from service.identification.structure import ModelStructure
 from service.recording.conditioning import AllPass, Stretch, split_periods
@@ -129,7 +135,7 @@ class _Sums:
         self._torque_squares = zeros.copy()
         self._period_squares, self._period_count = zeros.copy(), zeros.copy()
         self._raw_lags = tuple(AutocovarianceSum() for _ in range(joint_count))
-        self._band_lags = tuple(AutocovarianceSum() for _ in range(joint_count))
+        self._band_lags = tuple(AutocovarianceSum(FILTERED_LAGS) for _ in range(joint_count))
         self._unfiltered, self._unaveraged = True, True
 
     def add(self, prepared: PreparedMotion, predicted: Array) -> None:
@@ -138,11 +144,14 @@ class _Sums:
         self._unfiltered = self._unfiltered and isinstance(motion.band, AllPass)
         self._unaveraged = self._unaveraged and motion.repetitions == 1
         band = prepared.reduced_torque - motion.band.reduce(predicted)
+        filtered_white = motion.band.filtered_white(FILTERED_LAGS)
+        lags = LARGEST_ORDER if filtered_white is None else FILTERED_LAGS
         lagged = [
-            LaggedProducts.of(row * prepared.row_weight, used) for row, used in zip(band, prepared.used, strict=True)
+            LaggedProducts.of(row * prepared.row_weight, used, lags)
+            for row, used in zip(band, prepared.used, strict=True)
         ]
         for total, products in zip(self._band_lags, lagged, strict=True):
-            total.add(products)
+            total.add(products, filtered_white)
         self._band_squares += motion.repetitions * _squares(band, prepared.used)
         self._torque_squares += motion.repetitions * _squares(prepared.reduced_torque, prepared.used)
         self._band_count += motion.repetitions * prepared.used.sum(axis=1)

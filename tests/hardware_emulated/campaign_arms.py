@@ -104,3 +104,9 @@ def deviations(found: IdentificationDocument, truth: Robot) -> dict[str, float]:
             assert std is not None
             result[f"{name} of {friction.joint}"] = (getattr(friction, name) - getattr(coefficients, name)) / std
     return result
+
+
+def assert_within(errors: float, far: dict[str, float]) -> None:
+    """Every parameter is found within so many of its standard errors; else those that are not are named."""
+    missed = {name: round(distance, 2) for name, distance in far.items() if not abs(distance) < errors}
+    assert not missed, f"farther than {errors} standard errors: {missed}"

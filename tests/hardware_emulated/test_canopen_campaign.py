@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from drivers.canopen import CanopenArm, DriveJoint
-from hardware_emulated.campaign_arms import deviations, six_joints, three_joints
+from hardware_emulated.campaign_arms import assert_within, deviations, six_joints, three_joints
 from hardware_emulated.canopen_robot import GEAR, write_canopen_arm
 from hardware_emulated.stepped_clock import SteppedClock
 from service.acquisition import RunOptions, RunRecord, RunState, run_trajectory
@@ -77,5 +77,5 @@ def test_parameters_are_found_within_their_errors(name: str, tmp_path: Path) -> 
     told = read_robot(write_canopen_arm(arm, tmp_path / "told.json", tmp_path / "unused", knows_model=False))
     found = document(identify(told, [recording]))
     far = deviations(found, read_robot(tmp_path / "arm.json"))
-    assert max(map(abs, far.values())) < 4.0, far
+    assert_within(4.0, far)
     assert len(found.base_parameters) >= 3 * len(arm["joints"])

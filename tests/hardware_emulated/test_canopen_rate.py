@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from hardware_emulated.campaign_arms import deviations, six_joints, three_joints
+from hardware_emulated.campaign_arms import assert_within, deviations, six_joints, three_joints
 from hardware_emulated.canopen_rig import ANSWER_PATIENCE_S
 from hardware_emulated.canopen_robot import GEAR, write_canopen_arm
 from hardware_emulated.counted import against_the_clock, require_all_counted
@@ -68,5 +68,5 @@ def test_a_campaign_at_200_hz(name: str, tmp_path: Path) -> None:
         found = document(identify(told, [read_recording(tmp_path / "run" / "recording.csv")]))
         far = deviations(found, read_robot(tmp_path / "arm.json"))
         print(f"largest deviation {max(map(abs, far.values())):.2f} standard errors of {len(far)}")
-        assert max(map(abs, far.values())) < 4.0, far
+        assert_within(4.0, far)
         assert len(found.base_parameters) >= 3 * len(arm["joints"])

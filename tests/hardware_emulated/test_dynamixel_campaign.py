@@ -17,6 +17,7 @@ from drivers import ControlMode, StopPolicy
 from drivers.dynamixel import DynamixelArm
 from hardware_emulated.campaign_arms import (
     TORQUE_PER_MILLIAMPERE,
+    assert_within,
     deviations,
     six_joints,
     three_joints,
@@ -110,7 +111,7 @@ def test_parameters_are_found_within_their_errors(name: str, tmp_path: Path) -> 
     truth = read_robot(tmp_path / "arm.json")
     found = document(identify(told, [recording]))
     far = deviations(found, truth)
-    assert max(map(abs, far.values())) < 4.0, far
+    assert_within(4.0, far)
     assert len(found.base_parameters) >= 3 * len(arm["joints"])
 
 
@@ -125,7 +126,7 @@ def test_a_host_that_is_late_shifts_no_parameter(lateness_ns: float, tmp_path: P
     told = read_robot(write_robot(arm, tmp_path / "told.json", "unused", knows_model=False))
     found = identify(told, [read_recording(tmp_path / "run" / "recording.csv")])
     far = deviations(document(found), read_robot(tmp_path / "arm.json"))
-    assert max(map(abs, far.values())) < 4.0, far
+    assert_within(4.0, far)
     # what the servos read is the noise that was put in, and hardly more
     assert np.all(found.residuals.noise_std < 1.4 * NOISE_MA * TORQUE_PER_MILLIAMPERE)
 

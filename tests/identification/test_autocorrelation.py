@@ -5,7 +5,14 @@ import pytest
 from numpy.typing import NDArray
 from scipy import linalg, signal, stats
 
-from service.identification.autocorrelation import LARGEST_ORDER, AutocovarianceSum, Autoregression, LaggedProducts
+from service.identification.autocorrelation import (
+    FILTERED_LAGS,
+    LARGEST_ORDER,
+    AutocovarianceSum,
+    Autoregression,
+    LaggedProducts,
+)
+from service.recording.conditioning import Decimator
 
 Array = NDArray[np.float64]
 
@@ -79,6 +86,39 @@ def test_an_autoregression_stays_one_where_samples_are_missed() -> None:
     assert np.median(orders) <= 3
     assert 15.0 <= np.median(ratios) <= 23.0
     assert max(ratios) < 60.0
+
+
+def low_density(model: Autoregression) -> float:
+    """Spectral density at frequency zero, of unit density 1."""
+    return float(model.innovation_variance / (1.0 - model.coefficients.sum()) ** 2)
+
+
+def filtered_model(raw: Array, band: Decimator) -> Autoregression:
+    """The model of what a low-pass leaves of a residual."""
+    total = AutocovarianceSum(FILTERED_LAGS)
+    rows = band.reduce(raw)
+    products = LaggedProducts.of(rows, np.ones(len(rows), dtype=bool), FILTERED_LAGS)
+    total.add(products, band.filtered_white(FILTERED_LAGS))
+    return total.model()
+
+
+@pytest.mark.parametrize(("rate_hz", "cutoff_hz"), [(200.0, 12.4), (1000.0, 5.0), (100.0, 30.0)])
+def test_white_noise_behind_a_filter_is_told_to_a_few_percent(rate_hz: float, cutoff_hz: float) -> None:
+    """The density at low frequency is 1 / D; its one unknown factor has the relative deviation √(2 / N)."""
+    band = Decimator.design(rate_hz, cutoff_hz)
+    raw = np.random.default_rng(10).standard_normal((40, 2000 * band.factor + len(band.kernel)))
+    found = np.array([low_density(filtered_model(row, band)) for row in raw]) * band.factor
+    assert abs(found.mean() - 1.0) < 0.03
+    assert found.std() < 0.1
+
+
+def test_colour_behind_a_filter_is_found_beside_the_filters() -> None:
+    """AR(1) of 0.995 at 200 Hz below 12 Hz: most of its power lies below 0.2 Hz."""
+    band = Decimator.design(200.0, 12.0)
+    innovations = np.random.default_rng(11).standard_normal((20, 200_000))
+    raw = signal.lfilter([1.0], [1.0, -0.995], innovations, axis=-1)
+    found = np.array([low_density(filtered_model(row, band)) for row in raw]) * band.factor
+    assert np.median(found) == pytest.approx(1.0 / 0.005**2, rel=0.1)
 
 
 def test_pieces_add_up() -> None:

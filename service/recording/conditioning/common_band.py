@@ -57,6 +57,16 @@ class BandFilter(Protocol):
         """
         ...
 
+    def filtered_white(self, lags: int) -> Array | None:
+        """Autocovariance of white noise that passed, up to a factor, (lags + 1,); None where it is white still.
+
+        Parameters
+        ----------
+        lags : int
+            largest lag
+        """
+        ...
+
 
 @dataclass(frozen=True)
 class AllPass:
@@ -87,6 +97,15 @@ class AllPass:
             where a sample was measured
         """
         return measured
+
+    def filtered_white(self, lags: int) -> None:
+        """None: white noise stays white.
+
+        Parameters
+        ----------
+        lags : int
+            largest lag
+        """
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,6 +191,17 @@ class Decimator:
         in_long_gaps = share.reduce(_in_long_gaps(measured, self.factor // 4).astype(float))
         return (in_long_gaps <= MASKED_FRACTION) & (missed <= BRIDGED_FRACTION)
 
+    def filtered_white(self, lags: int) -> Array:
+        """Autocovariance of white noise that passed: Σ_i h_i h_{i + kD}, (lags + 1,).
+
+        Parameters
+        ----------
+        lags : int
+            largest lag
+        """
+        every = np.correlate(self.kernel, self.kernel, "full")[len(self.kernel) - 1 :: self.factor]
+        return np.pad(every[: lags + 1], (0, max(0, lags + 1 - len(every))))
+
     def _outputs(self, count: int) -> int:
         return max(0, (count - len(self.kernel)) // self.factor + 1)
 
@@ -242,3 +272,12 @@ class HarmonicBand:
         """
         whole = measured.mean(axis=-1, keepdims=True) >= 1.0 - MASKED_FRACTION
         return np.broadcast_to(whole, (*measured.shape[:-1], 2 * self.harmonics + 1))
+
+    def filtered_white(self, lags: int) -> None:
+        """None: white noise stays white.
+
+        Parameters
+        ----------
+        lags : int
+            largest lag
+        """

@@ -91,6 +91,14 @@ def test_scattered_losses_leave_rows_but_a_lasting_one_does_not() -> None:
     assert used[np.abs(centre - 9100) > len(band.kernel)].all()
 
 
+@pytest.mark.parametrize("cutoff", [5.0, 60.0, 240.0])
+def test_white_noise_behind_the_band_has_the_autocovariance_that_the_band_tells(cutoff: float) -> None:
+    """The covariance of y = H e is H Hᵀ, H the whole filter as a matrix."""
+    band = Decimator.design(1000.0, cutoff)
+    matrix = band.reduce(np.eye(len(band.kernel) + 40 * band.factor)).T
+    np.testing.assert_allclose(band.filtered_white(40), (matrix @ matrix.T)[0], atol=1e-15)
+
+
 @pytest.mark.parametrize("cutoff", [3.0, 30.0, 200.0])
 def test_no_row_rests_on_more_than_it_may(cutoff: float) -> None:
     band = Decimator.design(1000.0, cutoff)
