@@ -26,12 +26,27 @@ _ARRIVED = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class _Reached:
-    """What a cycle has come to: position and velocity of the targets sent, targets asked for, who is behind them."""
+    """What a cycle has come to.
+
+    position, velocity : (n,) float64
+        targets sent, and how fast a drive in time goes there
+    begin : (n,) float64
+        where drives were by then
+    wanted : (n,) float64
+        targets asked for
+    behind : (n,) bool
+        joints that are still on their way to them
+    """
 
     position: Array
     velocity: Array
+    begin: Array
     wanted: Array
     behind: NDArray[np.bool_]
+
+    def after(self, part: float) -> Array:
+        """Where drives are when so much of the cycle over which they interpolate has passed."""
+        return self.position if part >= 1.0 else self.begin + max(0.0, part) * (self.position - self.begin)
 
 
 class TargetLimiter:
@@ -40,7 +55,8 @@ class TargetLimiter:
     Targets that move within the limits are passed on as they are. One that leaps is approached with the speed limit at
     most, and with bounded acceleration, so that the joint does not run past it. So are all after a host has skipped
     cycles: a drive interpolates over the cycle that it was told, however late a target comes, and the way of several
-    would be a leap to it.
+    would be a leap to it. Nor may a target in time follow upon a late one as if that had been in time: the drive is not
+    there yet, and has what is left of that way before it as well.
     """
 
     def __init__(self, limits: DriveLimits, position: Array, cycle_s: float) -> None:
@@ -57,7 +73,8 @@ class TargetLimiter:
         """
         self._limits = limits
         rest, not_behind = np.zeros_like(position), np.zeros(len(position), dtype=np.bool_)
-        self._before = self._reached = _Reached(position.copy(), rest, position.copy(), not_behind)
+        self._before = self._reached = _Reached(position.copy(), rest, position.copy(), position.copy(), not_behind)
+        self._sent_ns = 0
         self._cycle_s = cycle_s
         self._grid = CycleGrid(cycle_s)
 
@@ -76,16 +93,20 @@ class TargetLimiter:
         if cycles > 0:
             self._before = replace(self._reached, behind=self._reached.behind | (cycles > 1))
         wanted = np.clip(setpoint.position, limits.position_low, limits.position_high)
-        self._reached = self._step(self._before, wanted)
+        place = self._reached.after(1e-9 * (now_ns - self._sent_ns) / self._cycle_s)
+        self._reached, self._sent_ns = self._step(self._before, place, wanted), now_ns
         return Setpoint(self._reached.position, np.clip(setpoint.torque, -limits.torque, limits.torque))
 
-    def _step(self, before: _Reached, wanted: Array) -> _Reached:
-        """Where the joints are sent in a cycle, on their way to where they are wanted."""
-        reach = SPEED_MARGIN * self._limits.velocity * (1.0 + _SLACK) * self._cycle_s
-        behind = before.behind | (np.abs(wanted - before.position) > reach)
+    def _step(self, before: _Reached, place: Array, wanted: Array) -> _Reached:
+        """Where the joints are sent in a cycle, on their way to where they are wanted; `place` is where they are."""
+        way = np.minimum(self._limits.velocity, _FASTEST) * self._cycle_s
+        reach = SPEED_MARGIN * (1.0 + _SLACK) * way
+        behind = before.behind | (np.abs(wanted - before.position) > reach) | (np.abs(wanted - place) > reach)
         position = np.where(behind, self._approached(before, wanted), wanted)
         velocity = (position - before.position) / self._cycle_s
-        return _Reached(position, velocity, wanted, behind & (np.abs(wanted - position) > _ARRIVED))
+        is_too_far = behind & (np.abs(position - place) > way)
+        position = np.where(is_too_far, place + np.copysign(way, position - place), position)
+        return _Reached(position, velocity, place, wanted, behind & (np.abs(wanted - position) > _ARRIVED))
 
     def _approached(self, before: _Reached, wanted: Array) -> Array:
         """One step towards targets that are far, no faster beside them than can still be taken back in time."""

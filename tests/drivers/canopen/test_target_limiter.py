@@ -45,12 +45,45 @@ def test_a_leap_is_approached_at_the_speed_limit_and_not_overrun() -> None:
     assert sent[-1] == pytest.approx(1.0, abs=1e-9)
 
 
-@given(arrays(np.int64, 100, elements=st.integers(0, int(0.85 * CYCLE_NS))))
+def interpolated_speed(sent: np.ndarray, instants_ns: np.ndarray) -> np.ndarray:
+    """Speed of a drive that goes from where it is to every target within the cycle that it was told, in a line."""
+    place, speeds = 0.0, []
+    for target, until_ns in zip(sent, np.diff(instants_ns, append=instants_ns[-1] + CYCLE_NS), strict=True):
+        speeds.append((target - place) / CYCLE_S)
+        place += min(1.0, until_ns / CYCLE_NS) * (target - place)
+    return np.abs(speeds)
+
+
+LATENESS_NS = arrays(np.int64, 100, elements=st.integers(0, int(0.85 * CYCLE_NS)))
+
+
+@given(LATENESS_NS)
 def test_a_target_that_comes_late_goes_no_further_than_one_in_time(late_ns: np.ndarray) -> None:
     """A drive interpolates over the cycle that it was told: the steps have to be those of whole cycles."""
     late_ns[0] = 0
     in_time = np.arange(100) * CYCLE_NS
-    np.testing.assert_array_equal(sent_towards(1.0, (in_time + late_ns).tolist()), sent_towards(1.0, in_time.tolist()))
+    late, expected = (sent_towards(1.0, instants.tolist()) for instants in (in_time + late_ns, in_time))
+    assert np.all(late <= expected + 1e-12)
+    assert np.all(np.diff(late) >= 0.0)
+
+
+@given(LATENESS_NS)
+def test_a_drive_goes_no_faster_where_the_next_target_follows_soon_upon_a_late_one(late_ns: np.ndarray) -> None:
+    late_ns[0] = 0
+    instants = np.arange(100) * CYCLE_NS + late_ns
+    assert interpolated_speed(sent_towards(1.0, instants.tolist()), instants).max() <= SPEED * (1.0 + 1e-6)
+
+
+@given(LATENESS_NS)
+def test_nor_does_it_on_a_motion_near_the_limit(late_ns: np.ndarray) -> None:
+    """At speeds up to 0.95 of the limit, which one late target and the next would make 1.8 of it."""
+    late_ns[0] = 0
+    cycles = np.arange(100)
+    plan = 0.95 * SPEED * CYCLE_S * (cycles - 20.0 * (1.0 - np.exp(-cycles / 20.0)))
+    limiter, instants = TargetLimiter(BOUNDS, np.zeros(2), CYCLE_S), cycles * CYCLE_NS + late_ns
+    sent = [limiter.limited(setpoint(q), now).position[0] for q, now in zip(plan, instants.tolist(), strict=True)]
+    assert interpolated_speed(np.array(sent), instants).max() <= 1.4 * SPEED_MARGIN * SPEED * (1.0 + 1e-6)
+    assert np.all(sent <= plan + 1e-12)
 
 
 def test_no_cycle_makes_up_for_those_that_a_late_host_skipped() -> None:
