@@ -2,7 +2,7 @@
 
 import { armDrawing } from "./arm.js";
 import { download, follow, getJson, post } from "./api.js";
-import { explained, figures, h, moment, number, render, section, state, table } from "./dom.js";
+import { explained, figures, h, moment, number, render, section, state, table, unitsOf } from "./dom.js";
 import { jobList } from "./lists.js";
 import { group, jointStyle, plot } from "./plots.js";
 
@@ -15,12 +15,13 @@ export const showRuns = jobList("runs", "Runs", "Motions that were played on an 
 export async function showRun(root, { id, signal, show }) {
   const run = await getJson(`runs/${id}`, signal);
   const monitor = ENDS.includes(run.state) ? null : liveMonitor(id);
+  const arm = monitor ? [] : await jointsOf(id);
   const status = h("div", { class: "row", role: "status" }, state(run.state));
   render(root, 
     h("p", { class: "eyebrow", text: `Run · ${run.backend?.name ?? ""}` }), h("h1", { text: run.robot ?? id }), h("p", { class: "meta", text: moment(run.created) }), status,
     run.problem ? h("p", { role: "alert" }, explained(run.problem)) : null,
     monitor?.element,
-    monitor ? null : finished(run));
+    monitor ? null : finished(run, arm));
   if (monitor) {
     let current = run.state;
     await follow(run.links.events, signal, (event) => {
@@ -32,7 +33,7 @@ export async function showRun(root, { id, signal, show }) {
   }
 }
 
-function finished(run) {
+function finished(run, arm) {
   const timing = run.timing;
   const sent = h("span", { class: "hint", role: "status", text: " harmless: it has ended" });
   return [
@@ -44,7 +45,7 @@ function finished(run) {
     ]) : null,
     run.recording?.name ? h("div", { class: "row" }, h("a", { class: "button primary", href: `#/recordings/${encodeURIComponent(run.recording.name)}`, text: "Look at the recording" }),
       Object.entries(run.links.recordings).map(([format, path]) => h("button", { type: "button", onclick: () => download(path, `run-${run.id}.${format}`), text: format.toUpperCase() }))) : null,
-    run.worst_following?.length ? section("following", "Largest distance of arm and target", table("Following", ["joint", "distance [rad or m]"], run.worst_following.map((value, place) => [`${place + 1}`, number(value, 3)]))) : null,
+    run.worst_following?.length ? section("following", "Largest distance of arm and target", table("Following", ["joint", "distance"], run.worst_following.map((value, place) => [nameOf(arm, place), `${number(value, 3)} ${unitsOf(arm[place]?.type).position}`]))) : null,
     h("p", {}, h("button", { type: "button", class: "quiet", onclick: () => post(run.links.stop).catch((error) => render(sent, " ", explained(error))), text: "Send stop again" }), sent),
   ];
 }
@@ -60,14 +61,15 @@ export function liveMonitor(id) {
   const times = [];
   let charts = null;
   let drawing = null;
+  let arm = [];
   const rows = { position: [], effort: [] };
 
-  getJson(`runs/${id}/robot`).then(({ report }) => { drawing = armDrawing(report); render(pose, drawing.element); }).catch(() => {});
+  getJson(`runs/${id}/robot`).then(({ report }) => { arm = report.joints; drawing = armDrawing(report); render(pose, drawing.element); }).catch(() => {});
 
   function begin(count) {
     const together = group();
     const make = (label, key, unit) => plot({ label, x: [0, 1], xLabel: "time [s]", yLabel: unit, raw: true, group: together,
-      series: Array.from({ length: count }, (_, joint) => ({ label: `joint ${joint + 1}`, values: [null, null], ...jointStyle(joint) })), key });
+      series: Array.from({ length: count }, (_, joint) => ({ label: nameOf(arm, joint), values: [null, null], ...jointStyle(joint) })), key });
     charts = { position: make("Position", "position", "rad or m"), effort: make("Torque", "effort", "Nm or N") };
     for (const key of ["position", "effort"]) rows[key] = Array.from({ length: count }, () => []);
     render(plots, charts.position.element, charts.effort.element);
@@ -87,14 +89,19 @@ export function liveMonitor(id) {
     drawing?.pose(data.position);
     words.textContent = `${number(data.time_s, 3)} of ${number(data.duration_s, 3)} s`;
     jitter.textContent = `Loop: ${number(data.lateness_us?.p99, 3)} µs late at 99 %, ${number(data.lateness_us?.max, 3)} µs at most; ${data.missed_periods} cycles missed, ${data.lost_rows} rows lost.`;
-    render(joints, jointTable(data));
+    render(joints, jointTable(data, arm));
   }
 
   const element = h("section", { "aria-label": "Live" }, bar, words, h("div", { class: "split" }, pose, h("div", {}, joints, jitter)), plots);
   return { element, take };
 }
 
-function jointTable(data) {
+/** The joints of the arm that a run moves; none where its robot file cannot be read. */
+const jointsOf = (id) => getJson(`runs/${id}/robot`).then(({ report }) => report.joints, () => []);
+
+const nameOf = (arm, joint) => arm[joint]?.name ?? `joint ${joint + 1}`;
+
+function jointTable(data, arm) {
   const gauge = (share) => h("span", { class: `gauge ${share > 1 - NEAR ? "near" : ""}`, "aria-hidden": "true" }, h("span", { "width%": Math.min(Math.max(100 * share, 0), 100) }));
   const rows = data.position.map((value, joint) => {
     const [low, high] = data.position_range.map((each) => each[joint]);
@@ -102,8 +109,9 @@ function jointTable(data) {
     const place = bounded ? (value - low) / (high - low) : null;
     const limit = data.torque_limit[joint];
     const load = limit ? Math.abs(data.effort[joint]) / limit : null;
-    return [`${joint + 1}`, number(value, 4), bounded ? h("span", {}, gauge(2 * Math.abs(place - 0.5)), ` ${number(data.position_room[joint], 3)} left`) : "no limit",
-      number(data.effort[joint], 4), load === null ? "no limit" : h("span", {}, gauge(load), ` ${(100 * load).toFixed(0)} %`)];
+    const unit = unitsOf(arm[joint]?.type);
+    return [nameOf(arm, joint), `${number(value, 4)} ${unit.position}`, bounded ? h("span", {}, gauge(2 * Math.abs(place - 0.5)), ` ${number(data.position_room[joint], 3)} left`) : "no limit",
+      `${number(data.effort[joint], 4)} ${unit.torque}`, load === null ? "no limit" : h("span", {}, gauge(load), ` ${(100 * load).toFixed(0)} %`)];
   });
   return table("Joints now", ["joint", "position", "room to the limit", "torque", "of its limit"], rows);
 }
