@@ -18,7 +18,8 @@ from drivers.dynamixel.preparation import (
     ServoTask,
     commissioning_writes,
     current_cap,
-    enabling_writes,
+    preparing_writes,
+    taking_writes,
     watchdog_steps,
 )
 from drivers.dynamixel.servo import JointServo, make_servo
@@ -105,9 +106,12 @@ def _connection(servos: Sequence[JointServo]) -> Iterator[PlannedFrame]:
 
 
 def _enabling(servos: Sequence[JointServo], tasks: Sequence[ServoTask]) -> Iterator[PlannedFrame]:
-    """Goal, limits, watchdog, torque, one servo after the other."""
+    """Mode and limits of all servos; then, one servo after the other, its place for a goal, watchdog, torque."""
     for servo, task in zip(servos, tasks, strict=True):
-        for write in enabling_writes(servo, _DELIVERED, task, holds=False):
+        for write in preparing_writes(servo, _DELIVERED, task, holds=False):
+            yield _write(servo, "enable", write.item.name, write.value, write.reason)
+    for servo, task in zip(servos, tasks, strict=True):
+        for write in taking_writes(servo, task, holds=False):
             yield _write(servo, "enable", write.item.name, write.value, write.reason)
 
 

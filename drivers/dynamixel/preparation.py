@@ -116,10 +116,10 @@ def commissioning_writes(servo: JointServo, settings: Mapping[str, int], *, hold
     return [RegisterWrite(items[name], value, why) for name, value, why in wanted if settings[name] != value]
 
 
-def enabling_writes(
+def preparing_writes(
     servo: JointServo, settings: Mapping[str, int], task: ServoTask, *, holds: bool
 ) -> list[RegisterWrite]:
-    """What is written to take a servo under power where it stands, in order.
+    """What is written to a servo long before it is taken under power: all that does not depend on where it is then.
 
     Parameters
     ----------
@@ -130,30 +130,44 @@ def enabling_writes(
     task : ServoTask
         what it shall do
     holds : bool
-        whether it has torque already, in the right mode
+        whether it has torque already, in the right mode: then it stays where it is from the first write on
     """
     items = servo.model.items
     tracks = task.mode is ControlMode.POSITION
-    writes: list[RegisterWrite] = []
-
-    def write(name: str, value: int, reason: str) -> None:
-        writes.append(RegisterWrite(items[name], value, reason))
-
-    if tracks:
-        write("Goal Position", task.present, "stay where it is")
+    wanted: list[tuple[str, int, str]] = []
+    if holds and tracks:
+        wanted.append(("Goal Position", task.present, "stay where it is"))
     if not holds and settings["Operating Mode"] != (mode := operating_mode(servo, task.mode)):
-        write("Operating Mode", mode, "position under a cap of current" if tracks else "current")
-        if tracks:
-            write("Goal Position", task.present, "stay where it is, also after the change of mode")
-    write("Goal PWM", settings["PWM Limit"], "current is the cap, not voltage")
+        wanted.append(("Operating Mode", mode, "position under a cap of current" if tracks else "current"))
+    wanted.append(("Goal PWM", settings["PWM Limit"], "current is the cap, not voltage"))
     if tracks:
-        write("Profile Acceleration", 0, "follow each goal at once")
-        write("Profile Velocity", task.velocity_cap, "largest speed")
-    write("Goal Current", task.current_cap if tracks else 0, "cap of current" if tracks else "no current yet")
-    write("Bus Watchdog", task.watchdog_steps, f"stop after {task.watchdog_steps * WATCHDOG_STEP_S:g} s of silence")
+        wanted.append(("Profile Acceleration", 0, "follow each goal at once"))
+        wanted.append(("Profile Velocity", task.velocity_cap, "largest speed"))
+    current = task.current_cap if tracks else 0
+    wanted.append(("Goal Current", current, "cap of current" if tracks else "no current yet"))
+    return [RegisterWrite(items[name], value, why) for name, value, why in wanted]
+
+
+def taking_writes(servo: JointServo, task: ServoTask, *, holds: bool) -> list[RegisterWrite]:
+    """What is written to take a prepared servo under power, at once after it has told where it is.
+
+    Parameters
+    ----------
+    servo : JointServo
+        of which
+    task : ServoTask
+        what it shall do, with the Present Position of this moment: a joint that falls is caught here, not carried back
+    holds : bool
+        whether it has torque already
+    """
+    items = servo.model.items
+    seconds = task.watchdog_steps * WATCHDOG_STEP_S
+    wanted = [("Bus Watchdog", task.watchdog_steps, f"stop after {seconds:g} s of silence")]
     if not holds:
-        write("Torque Enable", 1, "torque on")
-    return writes
+        if task.mode is ControlMode.POSITION:
+            wanted.insert(0, ("Goal Position", task.present, "stay where it is"))
+        wanted.append(("Torque Enable", 1, "torque on"))
+    return [RegisterWrite(items[name], value, why) for name, value, why in wanted]
 
 
 def watchdog_steps(watchdog_s: float) -> int:

@@ -11,8 +11,9 @@ from drivers.dynamixel.preparation import (
     ServoTask,
     commissioning_writes,
     current_cap,
-    enabling_writes,
     position_counts,
+    preparing_writes,
+    taking_writes,
     watchdog_steps,
 )
 from drivers.dynamixel.servo import JointServo, make_servo
@@ -44,42 +45,46 @@ def values(writes: list[RegisterWrite]) -> dict[str, int]:
 
 
 def test_torque_comes_last_and_after_goal_and_watchdog() -> None:
-    writes = enabling_writes(servo(), SETTINGS, TASK, holds=False)
-    order = names(writes)
-    assert order[-1] == "Torque Enable"
-    assert order[0] == "Goal Position"
-    assert order.index("Bus Watchdog") < order.index("Torque Enable")
-    # The goal again after the change of mode: a change may reset goals.
-    assert order.index("Operating Mode") < len(order) - 1 - order[::-1].index("Goal Position")
-    assert values(writes) == {
+    assert names(taking_writes(servo(), TASK, holds=False)) == ["Goal Position", "Bus Watchdog", "Torque Enable"]
+    assert values(taking_writes(servo(), TASK, holds=False)) == {
         "Goal Position": 2100,
-        "Operating Mode": 5,
-        "Goal PWM": 885,
-        "Profile Acceleration": 0,
-        "Profile Velocity": 80,
-        "Goal Current": 300,
         "Bus Watchdog": 5,
         "Torque Enable": 1,
     }
 
 
+def test_limits_are_written_before_a_servo_is_taken_and_the_mode_before_them() -> None:
+    writes = preparing_writes(servo(), SETTINGS, TASK, holds=False)
+    # a change of mode resets what depends on it
+    assert names(writes)[0] == "Operating Mode"
+    assert values(writes) == {
+        "Operating Mode": 5,
+        "Goal PWM": 885,
+        "Profile Acceleration": 0,
+        "Profile Velocity": 80,
+        "Goal Current": 300,
+    }
+
+
 def test_current_mode_starts_without_current() -> None:
     task = ServoTask(ControlMode.TORQUE, 300, 80, 2100, 5)
-    written = values(enabling_writes(servo(), SETTINGS, task, holds=False))
+    written = values(preparing_writes(servo(), SETTINGS, task, holds=False))
     assert written["Operating Mode"] == 0
     assert written["Goal Current"] == 0
     assert "Goal Position" not in written
+    assert names(taking_writes(servo(), task, holds=False)) == ["Bus Watchdog", "Torque Enable"]
 
 
 def test_servo_that_holds_is_taken_over_without_letting_go() -> None:
-    order = names(enabling_writes(servo(), SETTINGS | {"Operating Mode": 5}, TASK, holds=True))
+    order = names(preparing_writes(servo(), SETTINGS | {"Operating Mode": 5}, TASK, holds=True))
     assert order[0] == "Goal Position"
-    assert not {"Torque Enable", "Operating Mode"} & set(order)
+    assert "Operating Mode" not in order
+    assert names(taking_writes(servo(), TASK, holds=True)) == ["Bus Watchdog"]
 
 
 @pytest.mark.parametrize("number", [2020, 4030])
 def test_p_and_y_track_positions_in_mode_3_with_goal_current_as_cap(number: int) -> None:
-    written = values(enabling_writes(servo(number), SETTINGS | {"Operating Mode": 0}, TASK, holds=False))
+    written = values(preparing_writes(servo(number), SETTINGS | {"Operating Mode": 0}, TASK, holds=False))
     assert written["Operating Mode"] == 3
     assert written["Goal Current"] == 300
 
