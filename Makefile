@@ -42,7 +42,7 @@ test: $(INSTALLED) ## the quick tests
 # A file is one process's: its tests share what they have built.
 test-slow: $(INSTALLED) ## the tests that take long or need something of the host
 	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder -m "(slow or system) and not realtime" $(PYTEST_FLAGS)
-	$(BIN)/pytest -m realtime --reruns 2 --only-rerun MachineStoodStill $(PYTEST_FLAGS)
+	$(BIN)/pytest -m realtime --reruns 4 --only-rerun MachineStoodStill $(PYTEST_FLAGS)
 
 bench: $(INSTALLED) ## time and memory; leave the machine alone meanwhile
 	@set -e; for script in tests/benchmarks/benchmark_*.py; do echo "== $$script"; $(BIN)/python $$script; done

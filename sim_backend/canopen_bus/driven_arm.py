@@ -10,13 +10,10 @@ from sim_backend.canopen_bus.axis import AxisDemand, AxisMeasurement, AxisMode
 from sim_backend.canopen_bus.drive import EmulatedDrive
 from sim_backend.device.inertia import InertiaSchedule
 from sim_backend.device.servo import Servo
-from sim_backend.device.target import Target
+from sim_backend.device.target import Target, catching_up_acceleration
 from sim_backend.scenario import Scenario
 
 Array = NDArray[np.float64]
-
-ACCELERATION = 20.0
-"""With which a joint catches up with targets that leapt: what arms of this size have torque for [rad/s² or m/s²]."""
 
 FASTEST = 1.25
 """Of a joint's speed limit: the voltage of its motor lets it turn no faster."""
@@ -72,6 +69,7 @@ class DrivenArm:
         self._servo = Servo(robot, InertiaSchedule(robot, scenario.effects), period_s)
         limits = (joint.limits.velocity for joint in robot.joints)
         self._fastest = np.array([np.inf if limit is None else FASTEST * limit for limit in limits])
+        self._acceleration = catching_up_acceleration(robot)
         self._torque_noise, self._rng = torque_noise, np.random.default_rng(0)
         self._drives = drives
         self._period_s = period_s
@@ -163,8 +161,8 @@ class DrivenArm:
     def _target(self, joints: list[int], kind: Kind) -> Target:
         """A target for joints, which begins where their last one was."""
         period = kind[1] / self._period_s or None
-        acceleration = np.full(len(joints), ACCELERATION)
-        target = Target(self._goal[joints], self._goal_rate[joints], acceleration, self._period_s, period)
+        goal, rate, acceleration = self._goal[joints], self._goal_rate[joints], self._acceleration[joints]
+        target = Target(goal, rate, acceleration, self._period_s, period)
         unlimited = np.full(len(joints), np.inf)
         target.limit(-unlimited, unlimited, self._fastest[joints])
         return target

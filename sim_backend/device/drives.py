@@ -11,16 +11,10 @@ from sim_backend.device.activity import Activity
 from sim_backend.device.faults import FaultCode
 from sim_backend.device.inertia import InertiaSchedule
 from sim_backend.device.servo import Servo
-from sim_backend.device.target import STOP_TIME_S, Target
+from sim_backend.device.target import STOP_TIME_S, Target, catching_up_acceleration
 from sim_backend.scenario import Scenario
 
 Array = NDArray[np.float64]
-
-DEFAULT_ACCELERATION = 20.0
-"""With which a target catches up with setpoints that leapt, where the robot file states no limit [rad/s² or m/s²]."""
-
-ROOM = 2.0
-"""Multiple of the robot file's acceleration that setpoints may have without counting as a leap."""
 
 _MARGIN = 2e-3
 
@@ -57,8 +51,7 @@ class Drives:
     def __init__(self, robot: Robot, scenario: Scenario, motion: Motion, tick_s: float) -> None:
         self._servo = Servo(robot, InertiaSchedule(robot, scenario.effects), tick_s)
         self._tick_s = tick_s
-        stated = [joint.limits.acceleration for joint in robot.joints]
-        self._acceleration = np.array([DEFAULT_ACCELERATION if a is None else ROOM * a for a in stated])
+        self._acceleration = catching_up_acceleration(robot)
         self._zero = np.zeros(robot.joint_count)
         self._target = self._target_at(motion)
         self._fastest = np.full(robot.joint_count, np.inf)

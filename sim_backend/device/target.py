@@ -7,6 +7,7 @@ positions that it belongs to, it would make the drive's torque ripple in step wi
 import numpy as np
 from numpy.typing import NDArray
 
+from service.robot.robot import Robot
 from sim_backend.device.setpoint_spline import SetpointSpline
 
 Array = NDArray[np.float64]
@@ -14,9 +15,26 @@ Array = NDArray[np.float64]
 STOP_TIME_S = 0.1
 """A hold brings every joint to rest in this time, all at once and so on the path that the arm is on [s]."""
 
+DEFAULT_ACCELERATION = 20.0
+"""With which a target catches up with setpoints that leapt, where the robot file states no limit [rad/s² or m/s²]."""
+
+ROOM = 2.0
+"""Multiple of the robot file's acceleration that setpoints may have without counting as a leap."""
 
 _ROUNDING = 1e-9
 _LEAP = 0.02
+
+
+def catching_up_acceleration(robot: Robot) -> Array:
+    """Acceleration with which each joint catches up, (n,): an arm that runs out of torque on the way overshoots.
+
+    Parameters
+    ----------
+    robot : Robot
+        the arm
+    """
+    stated = [joint.limits.acceleration for joint in robot.joints]
+    return np.array([DEFAULT_ACCELERATION if limit is None else ROOM * limit for limit in stated])
 
 
 class Target:
