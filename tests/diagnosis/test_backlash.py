@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 from concealed.trial import effect_trial
 from service.diagnosis import diagnose, document
-from service.diagnosis.catalogue.backlash import DAMPING, place_between_springs, place_between_teeth
+from service.diagnosis.catalogue.backlash import DAMPING, SpringyTeeth, place_between_springs, place_between_teeth
 
 RATE = 1000.0
 TIME = np.arange(4000) / RATE
@@ -90,6 +90,13 @@ def test_on_springy_teeth_it_is_where_a_solver_with_small_steps_has_it() -> None
     solved = solve_ivp(rates, (0.0, TIME[-1]), start, t_eval=TIME, max_step=1e-3, rtol=1e-6, atol=1e-9).y[0]
     found = gap * place_between_springs(load, inertia, gap, 1.0 / stiffness, RATE)
     assert np.std(found - solved) < 0.05 * np.std(solved)
+
+
+def test_a_link_of_no_known_inertia_crosses_at_once_however_its_teeth_give_way() -> None:
+    """A fit may know of none where little is excited, though the arm's setting had one."""
+    load = 3.0 * np.sin(2.0 * np.pi * 0.7 * TIME)
+    place = SpringyTeeth(0).deflection(load, np.zeros(len(TIME)), np.array([1e-3, 10.0, 1e-4]), RATE)
+    np.testing.assert_array_equal(place, np.where(load >= 0.0, 0.5, -0.5))
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(1e-6, 1.0), st.floats(1e-6, 1e-2))

@@ -248,15 +248,17 @@ class SpringyTeeth(Backlash):
         return bool(1.0 / SAME < coefficients[0] / shape[0] < SAME)
 
     def deflection(self, load: Array, inertia: Array, shape: Array, rate_hz: float) -> Array:
-        """Place between and on the teeth.
+        """Place between and on the teeth; where no inertia is known that could swing, as on stiff ones.
 
         Parameters
         ----------
         load, inertia : (N,) float64
-            of the link [Nm or N, kg m² or kg]
+            of the link, inertia zero where it is not known [Nm or N, kg m² or kg]
         shape : (3,) float64
             gap that is crossed [rad or m], band of the load [Hz], compliance of the teeth [rad/Nm or m/N]
         rate_hz : float
             sampling rate [Hz]
         """
+        if not inertia.all():
+            return place_between_teeth(load, inertia, float(shape[0]), rate_hz)
         return place_between_springs(load, inertia, float(shape[0]), float(shape[2]), rate_hz)
