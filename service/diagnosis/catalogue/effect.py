@@ -39,7 +39,7 @@ class Effect(ABC):
 
     Columns of an effect `of_motion_alone` are the same beside every model, and are made once; those of one that
     `has_step` change with K_v of its joint.
-    What a sensor does not pass on, `swallows`, may be more than what was measured; no other effect's torque can be.
+    What a sensor does not pass on, or a spring carries for the motor, `may_exceed_measured`; nothing else can.
     An effect that is `screened` is looked for beside the nominal model; any other becomes a finding by comparison with
     a given model.
     One that does not do the same whenever the motion does, that does not `repeats_with_motion`, passes for noise there.
@@ -57,7 +57,7 @@ class Effect(ABC):
     repeats: ClassVar[bool] = False
     of_motion_alone: ClassVar[bool] = False
     has_step: ClassVar[bool] = False
-    swallows: ClassVar[bool] = False
+    may_exceed_measured: ClassVar[bool] = False
     screened: ClassVar[bool] = True
     repeats_with_motion: ClassVar[bool] = True
     arguments: ClassVar[frozenset[str] | None] = None

@@ -25,9 +25,13 @@ CLEARLY_BETTER = 10.0
 
 
 class JointSpring(Effect):
-    """τ = k (q - q_0), k < 0 where a counterbalance pushes away; the constant is in the nominal model's offset."""
+    """τ = k (q - q_0), k < 0 where a counterbalance pushes away; the constant is in the nominal model's offset.
+
+    What a counterbalance carries the motor need not: its torque may well be more than was measured.
+    """
 
     of_motion_alone: ClassVar[bool] = True
+    may_exceed_measured: ClassVar[bool] = True
     id: ClassVar[str] = "joint_spring"
     arguments: ClassVar[frozenset[str] | None] = frozenset({"position"})
     equation: ClassVar[str] = "tau = k (q - q_0)"
@@ -69,6 +73,7 @@ class CableForce(Effect):
     """
 
     of_motion_alone: ClassVar[bool] = True
+    may_exceed_measured: ClassVar[bool] = True
     id: ClassVar[str] = "cable_force"
     arguments: ClassVar[frozenset[str] | None] = frozenset({"position"})
     equation: ClassVar[str] = "tau = +-k max(+-(q - q_t), 0)^p"

@@ -31,7 +31,7 @@ class TorqueGainError(Effect):
     remedy: ClassVar[str] = "correct the joint's torque_constant by 1 + g"
     revealing_motion: ClassVar[str] = "fast motion of neighbouring joints that share inertia, or a known added mass"
     coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("g", "1"),)
-    swallows: ClassVar[bool] = True
+    may_exceed_measured: ClassVar[bool] = True
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
@@ -66,7 +66,7 @@ class Saturation(Effect):
     remedy: ClassVar[str] = "record within the sensor's or the drive's linear range"
     revealing_motion: ClassVar[str] = "the same motion slower and without payload, well below the level"
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("c", "{tau}", logarithmic=True),)
-    swallows: ClassVar[bool] = True
+    may_exceed_measured: ClassVar[bool] = True
 
     @classmethod
     def of_levels(cls, setting: Setting, parts: Array) -> list[Effect]:

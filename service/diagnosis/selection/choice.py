@@ -158,7 +158,7 @@ def outsized(option: Option, observations: Observations) -> bool:
         the recordings
     """
     term = option.fit.model.terms[-1]
-    if term.effect.swallows:
+    if term.effect.may_exceed_measured:
         return False
     touched = list(term.effect.touched(observations.robot.joint_count))
     own, measured = np.zeros(len(touched)), np.zeros(len(touched))
