@@ -88,6 +88,12 @@ def hardening(arm: SimulatedArm, rigid: Array) -> Array:
     return at_joint(2, 0.4 * (angle + 0.5 * angle**3))
 
 
+def balanced(arm: SimulatedArm, rigid: Array) -> Array:
+    """A counterbalance that carries more than the motor ever had to, and a motor with few teeth."""
+    angle = arm.exact.exact.position[:, 1]
+    return at_joint(1, 9.0 * (angle - 0.2) + np.sin(6.8 * angle + 0.4))
+
+
 def unknown(arm: SimulatedArm, rigid: Array) -> Array:
     """Nothing of the catalogue: two other joints' angles multiply."""
     q = arm.exact.exact.position
@@ -107,7 +113,7 @@ CASES: dict[str, tuple[EffectTorque, str, str, dict[str, float]]] = {
 }
 
 
-OTHERS: dict[str, EffectTorque] = {"unknown": unknown, "bent": bent, "hardening": hardening}
+OTHERS: dict[str, EffectTorque] = {"unknown": unknown, "bent": bent, "hardening": hardening, "balanced": balanced}
 
 
 @cache
@@ -200,6 +206,18 @@ def test_where_it_leaves_much_the_second_effect_is_doubted() -> None:
     assert waves, "what the curve leaves of the cube is significant, and a wave takes it up"
     assert waves[0].probability < 0.9
     assert f"beside {first.effect}@joint3 it is so small that it may be an error" in waves[0].statement
+
+
+@pytest.mark.slow
+def test_a_spring_that_carries_more_than_was_measured_is_one_and_what_it_had_hidden_is_found_too() -> None:
+    found = {(finding.effect, finding.joint): finding.parameters for finding in told("balanced").findings}
+    assert list(found) == [("joint_spring", "joint2"), ("cogging", "joint2")]
+    assert found["joint_spring", "joint2"][0].value == pytest.approx(
+        9.0, abs=4.0 * found["joint_spring", "joint2"][0].std
+    )
+    order, amplitude, _ = found["cogging", "joint2"]
+    assert order.value == pytest.approx(6.8, abs=4.0 * order.std)
+    assert amplitude.value == pytest.approx(1.0, abs=4.0 * amplitude.std)
 
 
 def test_the_parameters_that_had_hidden_an_effect_are_told() -> None:

@@ -116,7 +116,7 @@ class Selector:
         dropped = [each for each in grown if each not in choices]
         choices = [with_rivals(each, dropped) for each in choices]
         fit, choices = without_proxies(nominal, fit, choices, self.fitter, self.admission)
-        fit, choices = self._settled(fit, choices)
+        fit, choices = self._settled_without_superfluous(fit, choices)
         fit, choices = without_errors_of_larger_ones(nominal, fit, choices, self.fitter, self.admission)
         return Selection(nominal, fit, tuple(choices), tuple(rejected))
 
@@ -143,18 +143,27 @@ class Selector:
     ) -> tuple[Fit, list[Choice], list[Choice]]:
         """A model with one effect after the other, as long as one is significant and confirmed."""
         names = [joint.name for joint in fit.model.structure.robot.joints]
+        refused = list(rejected)
         while len(choices) < MOST_TERMS:
-            choice = self._next(fit, choices, rejected)
+            choice = self._next(fit, choices, refused)
+            rejected += [each for each in refused if each not in rejected]
             if choice is None:
                 break
             choices = [*choices, choice]
             fit = choice.options[0].fit
+            refused = [each for each in refused if not self._meet(each, choice)]
             progress(f"found {choice.options[0].candidate.effect.name(names)}")
         return fit, choices, rejected
 
+    def _meet(self, refused: Choice, found: Choice) -> bool:
+        """Whether one effect was refused beside a model that another one, found since, has changed where it acts."""
+        count = self.screen.observations.robot.joint_count
+        one, other = [set(each.options[0].candidate.effect.touched(count)) for each in (refused, found)]
+        return bool(one & other)
+
     def _next(self, fit: Fit, choices: Sequence[Choice], rejected: list[Choice]) -> Choice | None:
         """The best significant and confirmed option; what held-out recordings refuse is added to `rejected`."""
-        refused = {place_of(choice.options[0].candidate) for choice in rejected}
+        refused = {_chosen(choice) for choice in rejected}
         table, before = self._table(fit, choices, refused), len(rejected)
         while len(rejected) < MOST_REJECTED:
             choice = self._best(table, choices)
@@ -163,7 +172,7 @@ class Selector:
             if choice.confirmation.confirmed(cautious=not self.pure_error):
                 return with_rivals(choice, rejected[before:])
             rejected.append(choice)
-            table.refuse(place_of(choice.options[0].candidate))
+            table.refuse(_chosen(choice))
         return None
 
     def _best(self, table: Table, choices: Sequence[Choice]) -> Choice | None:
@@ -178,11 +187,12 @@ class Selector:
         closest = [table.refined(each) for each in significant if each.gain > WORTH_REFINING * top]
         closest.sort(key=lambda each: -each.score)
         near = CLOSE * self.admission.inflation(fit) + EQUIVALENT * FORMULA_ERROR * closest[0].gain
-        fitted = [table.fitted(each) for each in closest[:MOST_FITTED] if each.score > closest[0].score - near]
+        tried = [each for each in closest[:MOST_FITTED] if each.score > closest[0].score - near]
+        fitted = [table.fitted(each) for each in tried]
         fitted = [each for each in fitted if is_physical(each, fit) and not outsized(each, self.screen.observations)]
         fitted.sort(key=lambda each: -each.score)
         for option in fitted:
-            known = place_of(option.candidate) in [place_of(choice.options[0].candidate) for choice in choices]
+            known = place_of(option.candidate) in [_chosen(choice) for choice in choices]
             p_value = self.admission.p_value(option, fit, blocks=not known)
             if isinstance(option.candidate.effect, TimeLocalEffect):
                 p_value = min(1.0, p_value / UNCONFIRMED)
@@ -198,13 +208,13 @@ class Selector:
                     continue
                 alike = equivalents(chosen, below, fit, self.screen, self.admission.inflation(chosen.fit))
                 return Choice(distinct([chosen, *alike]), confirmation, p_value / level)
-        for each in closest:  # none of the largest is significant by the stricter measure: look below
+        for each in tried:  # none of the largest is significant by the stricter measure: look below
             table.refuse(place_of(each))
         return self._best(table, choices)
 
     def _table(self, fit: Fit, choices: Sequence[Choice], refused: set[Place]) -> Table:
         """What may be added to a model with some choices."""
-        chosen = [place_of(choice.options[0].candidate) for choice in choices]
+        chosen = [_chosen(choice) for choice in choices]
         return Table(fit, self.screen, self.fitter, lambda each: self.allowed(each, chosen, refused))
 
     def allowed(self, candidate: Candidate, chosen: Sequence[Place], refused: set[Place]) -> bool:
@@ -224,8 +234,8 @@ class Selector:
             return False
         if place in chosen:
             return candidate.effect.repeats and chosen.count(place) < MOST_REPEATS
-        others = {each for each in chosen if each[0] not in UNCOUNTED}
-        return place[0] in UNCOUNTED or len(others) < MOST_EFFECTS
+        kinds = {effect for effect, _ in chosen if effect not in UNCOUNTED}
+        return place[0] in UNCOUNTED or place[0] in kinds or len(kinds) < MOST_EFFECTS
 
     def _option(self, fit: Fit, term: Term) -> Option:
         """A term that was not screened for, fitted."""
@@ -235,6 +245,17 @@ class Selector:
             term.effect, term.shape, term.coefficients, 0.0, found.gram[0], True, 1.0, found.gram[0, 0, 0]
         )
         return fitted_option(candidate, fit, self.fitter)
+
+    def _settled_without_superfluous(self, fit: Fit, choices: list[Choice]) -> tuple[Fit, list[Choice]]:
+        """The same with each choice settled, until none that took another's place has made a third superfluous."""
+        for _ in range(MOST_EFFECTS):
+            before, (fit, choices) = {_chosen(each) for each in choices}, self._settled(fit, list(choices))
+            if {_chosen(each) for each in choices} == before:
+                break
+            count, (fit, choices) = len(choices), without_superfluous(fit, choices, self.fitter, self.admission)
+            if len(choices) == count:
+                break
+        return fit, choices
 
     def _settled(self, fit: Fit, choices: list[Choice]) -> tuple[Fit, list[Choice]]:
         """Every choice with its alternatives beside all the others, in the place of one that has turned out better."""
@@ -268,11 +289,7 @@ class Selector:
         """A choice with its alternatives fitted anew beside all the others, those kept that explain nearly as much."""
         choice, terms = choices[place], list(fit.model.terms)
         effect = terms[place].effect
-        if (
-            effect.repeats
-            and sum(place_of(other.options[0].candidate) == place_of(choice.options[0].candidate) for other in choices)
-            > 1
-        ):
+        if effect.repeats and sum(_chosen(other) == _chosen(choice) for other in choices) > 1:
             return replace(choice, options=choice.options[:1])
         without = self.fitter.fit(with_terms(fit.model, [*terms[:place], *terms[place + 1 :]]))
         own = replace(choice.options[0], fit=fit, gain=without.energy - fit.energy)
@@ -299,3 +316,8 @@ class Selector:
         if self.held_out is None:
             return None
         return self.held_out.confirm(fit, option.fit, self.fitter)
+
+
+def _chosen(choice: Choice) -> Place:
+    """The effect that is in the model, and where."""
+    return place_of(choice.options[0].candidate)
