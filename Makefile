@@ -39,9 +39,10 @@ page: $(INSTALLED) ## the page at http://127.0.0.1:8000 with what `make demo` ha
 test: $(INSTALLED) ## the quick tests
 	$(BIN)/pytest -n 2 $(PYTEST_FLAGS)
 
-# A file is one process's: its tests share what they have built.
+# A file is one process's: its tests share what they have built. The limit ends what hangs, and no test that a busy
+# machine makes slow: one diagnosis of half a minute has taken five.
 test-slow: $(INSTALLED) ## the tests that take long or need something of the host
-	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder -m "(slow or system) and not realtime" $(PYTEST_FLAGS)
+	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder --timeout 900 -m "(slow or system) and not realtime" $(PYTEST_FLAGS)
 	$(BIN)/pytest -m realtime --reruns 4 --only-rerun MachineStoodStill $(PYTEST_FLAGS)
 
 bench: $(INSTALLED) ## time and memory; leave the machine alone meanwhile
