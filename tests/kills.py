@@ -10,7 +10,7 @@ from standstill import STANDSTILL_S, Onlooker
 
 T = TypeVar("T")
 
-KILLS = int(os.environ.get("TAUSCOPE_KILLS", "50"))
+KILLS = int(os.environ.get("TAUSCOPE_KILLS", "100"))
 
 
 def killed_often(kill: Callable[[], T | None], times: int = KILLS) -> list[T]:

@@ -12,7 +12,7 @@ import canopen
 
 from drivers.canopen.claim import BusClaim, ClaimedError
 from drivers.canopen.configuration import BusConfiguration
-from drivers.canopen.serial_adapter import SerialAdapterBus
+from drivers.canopen.interfaces import ONE_PROCESS, open_interface
 from drivers.canopen.service_data import NodeDictionary, PumpedSdoClient
 from drivers.clock import Clock, MonotonicClock
 from drivers.errors import DriverError, DriverErrorKind
@@ -64,15 +64,20 @@ class CanBus:
         self._handlers: dict[int, FrameHandler] = {}
         self._heartbeat_period_ns = 0
         self._next_heartbeat_ns = 0
-        self._claim = _claimed(configuration) if bus is None else None
+        self._claim: BusClaim | None = None
         try:
-            self._bus = bus or _open(configuration)
-        except (can.CanError, OSError, ValueError, NotImplementedError, ImportError) as error:
+            self._claim = _claimed(configuration) if bus is None else None
+            self._bus = bus or open_interface(
+                configuration.interface, configuration.channel, configuration.bit_rate, configuration.options
+            )
+        # a missing option is a TypeError of python-can's
+        except (can.CanError, OSError, ValueError, NotImplementedError, ImportError, TypeError) as error:
             self._release()
             text = " ".join(str(error).split())
             raise DriverError(
                 DriverErrorKind.CANNOT_CONNECT,
-                f"CAN bus {self._name} cannot be opened ({text}); check the adapter, its name and who else uses it",
+                f"CAN bus {self._name} cannot be opened ({text}); check the adapter, its name, who else uses it, and "
+                "drive.options",
             ) from error
         self._network.bus = self._bus
 
@@ -216,20 +221,16 @@ class CanBus:
 
 
 def _claimed(configuration: BusConfiguration) -> BusClaim | None:
-    """The claim on an interface that several programs may open; None where the adapter lets in one alone."""
-    if configuration.interface != "socketcan":
+    """The claim on an interface that several programs may open; None where only one can."""
+    if configuration.interface in ONE_PROCESS:
         return None
+    name = configuration.channel
+    if configuration.interface != "socketcan":
+        name = "-".join([configuration.interface, name, *(str(one) for one in configuration.options.values())])
     try:
-        return BusClaim(configuration.channel)
+        return BusClaim(name)
     except ClaimedError as error:
         raise DriverError(
             DriverErrorKind.CANNOT_CONNECT,
             f"CAN bus {configuration.channel} is driven by {error} already; end that first",
         ) from error
-
-
-def _open(configuration: BusConfiguration) -> can.BusABC:
-    """The bus that python-can knows by this name."""
-    if configuration.interface == "slcan":
-        return SerialAdapterBus(configuration.channel, configuration.bit_rate)
-    return can.Bus(interface=configuration.interface, channel=configuration.channel, bitrate=configuration.bit_rate)

@@ -2,13 +2,14 @@
 
 from dataclasses import dataclass
 
-from drivers.errors import DriverError, DriverErrorKind
-
 LARGEST_LOAD = 0.8
 """Share of the bus that cyclic frames may take; the rest is for heartbeats, emergencies and service data."""
 
 ASCII_FRAME_BYTES = 22
 """Characters of an 8-byte frame in the serial-line CAN protocol (slcan): ``t`` + 3 + 1 + 16 + return."""
+
+HIGHEST_BIT_RATE = 1e6
+"""Of classical CAN [bit/s]."""
 
 _SYNC_BYTES = 0
 
@@ -71,22 +72,15 @@ def largest_rate_hz(nodes: int, frames: CycleFrames, bit_rate: float, serial_bau
     float
         [Hz]
     """
-    bus = LARGEST_LOAD * bit_rate / cycle_bits(nodes, frames)
-    if serial_baud is None:
-        return bus
-    messages = 1 + nodes * (len(frames.received_bytes) + len(frames.sent_bytes))
-    return min(bus, serial_baud / 10.0 / (messages * ASCII_FRAME_BYTES))
+    bus_s = cycle_bits(nodes, frames) / (LARGEST_LOAD * bit_rate)
+    return 1.0 / max(bus_s, _serial_s(nodes, frames, serial_baud))
 
 
-def require_rate(
-    rate_hz: float, nodes: int, frames: CycleFrames, bit_rate: float, serial_baud: float | None = None
-) -> None:
-    """Refuse a rate that the bus cannot carry, and say what limits it.
+def rate_limit(nodes: int, frames: CycleFrames, bit_rate: float, serial_baud: float | None = None) -> str:
+    """What limits the rate, the bus or the adapter's serial line, and what to do about it.
 
     Parameters
     ----------
-    rate_hz : float
-        wanted cycles a second [Hz]
     nodes : int
         number of nodes
     frames : CycleFrames
@@ -95,20 +89,20 @@ def require_rate(
         of the bus [bit/s]
     serial_baud : float or None
         of the adapter's serial line [bit/s]; None where it is none
-
-    Raises
-    ------
-    DriverError
-        ``refused``: names the limit and the rate that is possible
     """
-    most = largest_rate_hz(nodes, frames, bit_rate, serial_baud)
-    if rate_hz <= most:
-        return
-    bus = largest_rate_hz(nodes, frames, bit_rate)
-    if most < bus:
-        limit, remedy = f"the adapter's serial line of {serial_baud:g} baud", "a faster adapter"
-    else:
-        limit, remedy = f"the bus at {bit_rate / 1e3:g} kbit/s with {nodes} nodes", "a higher bit rate or fewer PDOs"
-    raise DriverError(
-        DriverErrorKind.REFUSED, f"{rate_hz:g} Hz: {limit} carries at most {most:.0f} Hz; ask for less, or use {remedy}"
-    )
+    bus_s = cycle_bits(nodes, frames) / bit_rate
+    serial_s = _serial_s(nodes, frames, serial_baud)
+    if serial_s > bus_s / LARGEST_LOAD:
+        line = f"the adapter's serial line of {serial_baud:g} baud"
+        return f"{line} takes {serial_s * 1e3:.2f} ms of each cycle, use a faster adapter"
+    bus = f"the frames of {nodes} drives take {bus_s * 1e3:.2f} ms of each cycle at {bit_rate / 1e3:g} kbit/s"
+    remedy = ", use a higher bit rate" if bit_rate < HIGHEST_BIT_RATE else ""
+    return f"{bus}, and {100 * (1 - LARGEST_LOAD):.0f} % of the bus are kept free{remedy}"
+
+
+def _serial_s(nodes: int, frames: CycleFrames, serial_baud: float | None) -> float:
+    """Time of a cycle's frames on the adapter's serial line [s]."""
+    if serial_baud is None:
+        return 0.0
+    messages = 1 + nodes * (len(frames.received_bytes) + len(frames.sent_bytes))
+    return messages * ASCII_FRAME_BYTES * 10.0 / serial_baud

@@ -2,11 +2,12 @@
 
 On each joint: ``{node_id: 3, counts_per_turn: 65536}`` and, where they differ from the defaults, the other keys of
 `NodeConfiguration`; ``eds`` is the path of the drive's EDS or DCF file. The bus is the same for all joints and stands
-on the first: ``interface`` and ``channel`` as python-can takes them, ``bit_rate``.
+on the first: ``interface`` and ``channel`` as python-can takes them, ``bit_rate``, and ``options`` for what the
+interface takes besides.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from drivers.canopen.data_sheet.device_file import DeviceFile, read_device_file
 from drivers.canopen.data_sheet.needs import require_needed, require_target
 from drivers.canopen.data_sheet.settings import settings_of
 from drivers.canopen.data_sheet.text import DataSheetError
+from drivers.canopen.interfaces import OWN_OPTIONS
 from drivers.drive_block import (
     read_direction,
     read_positive,
@@ -27,7 +29,7 @@ from drivers.drive_block import (
 from drivers.errors import DriverError, DriverErrorKind
 
 _HIGHEST_NODE = 127
-_BUS_KEYS = ("interface", "channel", "bit_rate", "serial_baud")
+_BUS_KEYS = ("interface", "channel", "bit_rate", "serial_baud", "options")
 _NODE_KEYS = ("node_id", "counts_per_turn", "zero_count", "direction", "rated_torque_nm", "eds")
 
 
@@ -91,6 +93,8 @@ class BusConfiguration:
         [bit/s]
     serial_baud : float or None
         of an adapter on a true serial line [bit/s]
+    options : mapping of str to str, number or bool
+        what python-can's interface takes besides
     """
 
     nodes: tuple[NodeConfiguration, ...]
@@ -98,6 +102,7 @@ class BusConfiguration:
     channel: str
     bit_rate: int = 1_000_000
     serial_baud: float | None = None
+    options: Mapping[str, Any] = field(default_factory=dict)
 
 
 def read_configuration(joints: Sequence[DriveJoint]) -> BusConfiguration:
@@ -124,6 +129,7 @@ def read_configuration(joints: Sequence[DriveJoint]) -> BusConfiguration:
         channel=read_text(first, "channel", "name it as python-can does"),
         bit_rate=read_whole(first, "bit_rate", 1_000_000, least=10_000, most=1_000_000),
         serial_baud=read_positive(first, "serial_baud"),
+        options=_options(first),
     )
 
 
@@ -168,6 +174,17 @@ def _node(joint: DriveJoint) -> NodeConfiguration:
         rated_torque_nm=rated_torque_nm,
         device_file=_device_file(joint, node_id, reads_rated_torque=rated_torque_nm is None),
     )
+
+
+def _options(joint: DriveJoint) -> Mapping[str, Any]:
+    """What python-can's interface is given besides."""
+    options = joint.drive.get("options", {})
+    if not isinstance(options, Mapping) or not all(isinstance(value, str | int | float) for value in options.values()):
+        raise refusal(joint, "options", f"= {options!r}; give what python-can takes, as in {{host: 192.168.1.5}}")
+    for name in options:
+        if name in OWN_OPTIONS:
+            raise refusal(joint, f"options.{name}", "has a key of its own: interface, channel, bit_rate")
+    return dict(options)
 
 
 def _device_file(joint: DriveJoint, node_id: int, *, reads_rated_torque: bool) -> DeviceFile | None:

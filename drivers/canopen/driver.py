@@ -14,7 +14,7 @@ from drivers.canopen.emergency import HEARTBEAT_LOST
 from drivers.canopen.enabling import power_up
 from drivers.canopen.node import DriveNode
 from drivers.canopen.observation import blind_state, listed
-from drivers.canopen.session import Session, possible_rate_hz
+from drivers.canopen.session import Session, possible_rate_hz, rate_limited_by
 from drivers.canopen.state_machine import Goal
 from drivers.canopen.stopping import (
     POLICY_GOALS,
@@ -98,6 +98,7 @@ class CanopenArm:
             largest_rate_hz=possible_rate_hz(self._configuration),
             watchdog_range_s=WATCHDOG_RANGE_S,
             takes_feed_forward=False,
+            rate_limited_by=rate_limited_by(self._configuration),
             holds_before_torque=False,
         )
 

@@ -9,7 +9,7 @@ import numpy as np
 from drivers.backend import ControlMode
 from drivers.canopen.answer_time import AnswerTime
 from drivers.canopen.bus import SYNC_ID, CanBus
-from drivers.canopen.bus_budget import CycleFrames, largest_rate_hz
+from drivers.canopen.bus_budget import CycleFrames, largest_rate_hz, rate_limit
 from drivers.canopen.configuration import BusConfiguration
 from drivers.canopen.node import DriveNode
 from drivers.canopen.observation import arm_faults, arm_state
@@ -34,6 +34,17 @@ def possible_rate_hz(configuration: BusConfiguration) -> float:
         bus and drives
     """
     return largest_rate_hz(len(configuration.nodes), CYCLE_FRAMES, configuration.bit_rate, configuration.serial_baud)
+
+
+def rate_limited_by(configuration: BusConfiguration) -> str:
+    """What keeps the rate from being higher, and what to do about it.
+
+    Parameters
+    ----------
+    configuration : BusConfiguration
+        bus and drives
+    """
+    return rate_limit(len(configuration.nodes), CYCLE_FRAMES, configuration.bit_rate, configuration.serial_baud)
 
 
 @dataclass

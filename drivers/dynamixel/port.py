@@ -25,6 +25,7 @@ BITS_PER_BYTE = 10
 LEAST_LATENCY_S = 0.001
 """What an adapter adds to every answer at least [s]: one USB frame."""
 
+_TTY_DEVICES = Path("/sys/class/tty")
 _LONGEST_DRAIN_NS = 2_000_000
 _QUIET_NS = 500_000
 _PSEUDO_TERMINALS = range(136, 144)
@@ -235,6 +236,6 @@ def read_latency_timer_ms(path: str) -> int | None:
     """
     name = os.path.basename(os.path.realpath(path))
     try:
-        return int(Path("/sys/class/tty", name, "device/latency_timer").read_text())
+        return int((_TTY_DEVICES / name / "device" / "latency_timer").read_text())
     except (OSError, ValueError):
         return None

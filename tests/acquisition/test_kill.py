@@ -248,7 +248,7 @@ def test_the_arm_stops_and_the_run_is_interrupted(site: Site, victim: str, how: 
 @pytest.mark.realtime
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize(("victim", "how"), CASES)
-def test_fifty_times_each(site: Site, victim: str, how: signal.Signals) -> None:
+def test_a_hundred_times_each(site: Site, victim: str, how: signal.Signals) -> None:
     rng = np.random.default_rng([2, CASES.index((victim, how))])
     states = killed_often(lambda: kill_once(site, victim, how, rng))
     assert states.count("state running") >= KILLS // 2, states

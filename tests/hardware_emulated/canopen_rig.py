@@ -9,9 +9,8 @@ import numpy as np
 import sim_backend.examples
 from arm_rigs import START, Rig, Watched
 from drivers import Backend
-from drivers.canopen.configuration import DriveJoint
 from drivers.canopen.driver import CanopenArm
-from hardware_emulated.canopen_robot import COUNTS_PER_TURN, GEAR, RATED_TORQUE_MNM, write_canopen_robot
+from hardware_emulated.canopen_robot import COUNTS_PER_TURN, GEAR, RATED_TORQUE_MNM, drive_joints, write_canopen_robot
 from hardware_emulated.emulated_rig import FAULTS, EmulatedRig
 from hardware_emulated.stepped_clock import SteppedClock
 from service.robot import read_robot
@@ -59,10 +58,7 @@ class CanopenRig(EmulatedRig):
         return self._arm()
 
     def _arm(self) -> CanopenArm:
-        return CanopenArm(self._joints(), patience_s=ANSWER_PATIENCE_S)
-
-    def _joints(self) -> list[DriveJoint]:
-        return [DriveJoint(joint.name, GEAR, joint.drive or {}) for joint in self.robot.joints]
+        return CanopenArm(drive_joints(self.robot), patience_s=ANSWER_PATIENCE_S)
 
 
 class SteppedCanopenRig(CanopenRig):
@@ -89,7 +85,7 @@ class SteppedCanopenRig(CanopenRig):
         return np.array(self._emulator.state["position"])
 
     def _arm(self) -> CanopenArm:
-        return CanopenArm(self._joints(), patience_s=STEPPED_PATIENCE_S, clock=self._clock)
+        return CanopenArm(drive_joints(self.robot), patience_s=STEPPED_PATIENCE_S, clock=self._clock)
 
 
 @contextmanager

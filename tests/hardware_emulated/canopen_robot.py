@@ -6,6 +6,9 @@ from typing import Any
 
 from ruamel.yaml import YAML
 
+from drivers.canopen import DriveJoint
+from service.robot import Robot
+
 GEAR = 50.0
 COUNTS_PER_TURN = 65_536
 RATED_TORQUE_MNM = 400
@@ -47,3 +50,8 @@ def write_canopen_arm(
     told = {key: value for key, value in arm.items() if knows_model or key != "model"}
     path.write_text(json.dumps({**told, "joints": joints}), encoding="utf-8")
     return path
+
+
+def drive_joints(robot: Robot) -> list[DriveJoint]:
+    """The joints of such an arm, as the driver sees them."""
+    return [DriveJoint(joint.name, GEAR, joint.drive or {}) for joint in robot.joints]

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.canopen import CanopenArm, DriveJoint
+from drivers.canopen import CanopenArm
 from hardware_emulated.campaign_arms import assert_within, deviations, six_joints, three_joints
-from hardware_emulated.canopen_robot import GEAR, write_canopen_arm
+from hardware_emulated.canopen_robot import GEAR, drive_joints, write_canopen_arm
 from hardware_emulated.stepped_clock import SteppedClock
 from service.acquisition import RunOptions, RunRecord, RunState, run_trajectory
 from service.acquisition.backends import Connection
@@ -46,9 +46,8 @@ def play(arm: dict[str, Any], folder: Path, faults: list[InjectedFault], design:
         torque_noise=TORQUE_NOISE,
         stepped=True,
     )
-    joints = [DriveJoint(joint.name, GEAR, joint.drive or {}) for joint in robot.joints]
     with EmulatorProcess(order) as emulator:
-        backend = CanopenArm(joints, patience_s=0.5, clock=SteppedClock(emulator))
+        backend = CanopenArm(drive_joints(robot), patience_s=0.5, clock=SteppedClock(emulator))
         emulator.inject(*faults)
         return run_trajectory(
             robot,

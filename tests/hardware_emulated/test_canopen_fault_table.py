@@ -8,9 +8,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from drivers.canopen import CanopenArm, DriveJoint
+from drivers.canopen import CanopenArm
 from hardware_emulated.campaign_arms import three_joints
-from hardware_emulated.canopen_robot import GEAR, write_canopen_arm
+from hardware_emulated.canopen_robot import drive_joints, write_canopen_arm
 from hardware_emulated.fault_runs import Site, fault_site
 from hardware_emulated.fault_table import FaultTable
 from hardware_emulated.stepped_clock import SteppedClock
@@ -33,8 +33,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
 
 
 def arm_of(site: Site) -> CanopenArm:
-    joints = [DriveJoint(joint.name, GEAR, joint.drive or {}) for joint in site.robot.joints]
-    return CanopenArm(joints, patience_s=0.1, clock=SteppedClock(site.emulator))
+    return CanopenArm(drive_joints(site.robot), patience_s=0.1, clock=SteppedClock(site.emulator))
 
 
 TABLE = FaultTable(

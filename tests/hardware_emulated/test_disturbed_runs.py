@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers.canopen import CanopenArm, DriveJoint
+from drivers.canopen import CanopenArm
 from drivers.canopen.leap_filter import FASTEST, SLACK_S
 from hardware_emulated.campaign_arms import three_joints
-from hardware_emulated.canopen_robot import GEAR, write_canopen_arm
+from hardware_emulated.canopen_robot import drive_joints, write_canopen_arm
 from hardware_emulated.fault_runs import Site, fault_site
 from hardware_emulated.fault_table import outcome
 from hardware_emulated.stepped_clock import SteppedClock
@@ -75,8 +75,7 @@ def largest_error(folder: Path, trace: list[dict]) -> float:
 def test_a_run_ends_in_a_definite_state_and_nothing_moves_without_a_host(site: Site, number: int) -> None:
     site.emulator.reset()
     clock = SteppedClock(site.emulator)
-    joints = [DriveJoint(joint.name, GEAR, joint.drive or {}) for joint in site.robot.joints]
-    record, folder = site.run(CanopenArm(joints, patience_s=0.1, clock=clock), str(number), "canopen")
+    record, folder = site.run(CanopenArm(drive_joints(site.robot), patience_s=0.1, clock=clock), str(number), "canopen")
     found = outcome(record)
     print(NETEM, found)
     if "corrupt" not in NETEM:

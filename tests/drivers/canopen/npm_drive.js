@@ -27,7 +27,8 @@ function drive(id) {
     variable(0x1017, U16, 0);
     array(0x1016, [U32]);
     const word = variable(0x6040, U16, 0), status = variable(0x6041, U16, 0x0240);
-    for (const [index, type, value] of [[0x6007, I16, 1], [0x603F, U16, 0], [0x605A, I16, 2], [0x605E, I16, 2],
+    const abort = variable(0x6007, I16, 1), quickStop = variable(0x605A, I16, 2);
+    for (const [index, type, value] of [[0x603F, U16, 0], [0x605E, I16, 2],
         [0x6060, I8, 0], [0x6061, I8, 0], [0x606C, I32, 0], [0x6071, I16, 0], [0x6072, U16, 2000],
         [0x6076, U32, 1000], [0x6077, I16, 0], [0x6502, U32, (1 << 7) | (1 << 9)]])
         variable(index, type, value);
@@ -39,6 +40,7 @@ function drive(id) {
     eds.addTransmitPdo({ cobId: 0x180 + id, transmissionType: 1, dataObjects: [status, torque, actual] });
     eds.addTransmitPdo({ cobId: 0x280 + id, transmissionType: 1, dataObjects: [velocity, error] });
     eds.setSyncCobId(0x80);
+    eds.setEmcyCobId(0x80 + id);
 
     const device = new Device({ id, eds });
     const obey = () => {
@@ -47,6 +49,12 @@ function drive(id) {
     };
     word.on('update', obey);
     device.pdo.on('pdo', obey);
+    device.nmt.on('timeout', (master) => { // their consumer of 0x1016 says so
+        if (master !== 127 || status.value !== 0x1227 || abort.value !== 3) return;
+        status.value = quickStop.value === 6 ? 0x0207 : 0x0240;
+        error.value = 0x8130;
+        device.emcy.write(0x8130);
+    });
     device.addListener('message', ({ id: cobId, data }) => {
         process.stdout.write(`${cobId.toString(16)} ${Buffer.from(data).toString('hex')}\n`);
     });

@@ -35,6 +35,10 @@ def test_the_bus_stands_on_the_first_joint() -> None:
         ({"interface": ""}, {}, "joint shoulder: drive.interface is missing"),
         ({}, {"direction": 0}, "joint elbow: drive.direction = 0"),
         ({}, {"gear": 3}, "joint elbow: drive.gear is not known; known keys: "),
+        ({"options": 3}, {}, "joint shoulder: drive.options = 3; give what python-can takes"),
+        ({"options": {"host": ["a"]}}, {}, "joint shoulder: drive.options = {'host': ['a']}; give what python-can"),
+        ({"options": {"bitrate": 1}}, {}, "joint shoulder: drive.options.bitrate has a key of its own"),
+        ({}, {"options": {"host": "a"}}, "joint elbow: drive.options differs from that of shoulder"),
         ({}, {"rated_torque_nm": True}, "joint elbow: drive.rated_torque_nm = True; give a positive number"),
     ],
 )

@@ -3,7 +3,9 @@
 Only the power states and the motion of a drive, which durand leaves to its user, are written here.
 """
 
+import struct
 from collections.abc import Iterator
+from pathlib import Path
 from uuid import uuid4
 
 import can
@@ -13,6 +15,7 @@ import pytest
 from drivers import ControlMode, DriveLimits, Setpoint, StopPolicy
 from drivers.canopen import CanopenArm, DriveJoint, scan_bus
 from patience import eventually
+from sim_backend.driver.virtual_clock import VirtualClock
 
 durand = pytest.importorskip("durand")
 
@@ -80,13 +83,16 @@ def drives(channel: str) -> Iterator[list[ForeignDrive]]:
         bus.shutdown()
 
 
+def joints_on(channel: str) -> list[DriveJoint]:
+    bus = {"interface": "virtual", "channel": channel}
+    blocks = [{"node_id": 4, "counts_per_turn": COUNTS, **bus}, {"node_id": 9, "counts_per_turn": COUNTS}]
+    return [DriveJoint(f"joint{number}", GEAR, block) for number, block in enumerate(blocks, 1)]
+
+
 @pytest.fixture
 def arm(channel: str, drives: list[ForeignDrive]) -> Iterator[CanopenArm]:
     assert drives
-    bus = {"interface": "virtual", "channel": channel}
-    blocks = [{"node_id": 4, "counts_per_turn": COUNTS, **bus}, {"node_id": 9, "counts_per_turn": COUNTS}]
-    joints = [DriveJoint(f"joint{number}", GEAR, block) for number, block in enumerate(blocks, 1)]
-    one = CanopenArm(joints, patience_s=0.1)
+    one = CanopenArm(joints_on(channel), patience_s=0.1)
     yield one
     one.disconnect()
 
@@ -120,21 +126,61 @@ def test_foreign_drives_are_enabled_where_they_stand_moved_and_stopped(
     assert eventually(lambda: [drive.read(0x6041) for drive in drives] == [0x0207, 0x0207])
 
 
-def test_a_run_decodes_cleanly_by_python_cans_own_log(
-    channel: str, drives: list[ForeignDrive], arm: CanopenArm, tmp_path
-) -> None:
-    """Every frame of a run has an identifier that CANopen knows and the length that its service has."""
-    assert drives
-    listener = can.Bus(interface="virtual", channel=channel)
-    with can.Logger(str(tmp_path / "run.asc")) as log:
-        notifier = can.Notifier(listener, [log], timeout=0.05)
+CYCLES, CYCLE_S, STEP = 40, 0.005, 0.002
+"""Of a run that is logged: how many, how long [s], and how far each of them goes [rad]."""
+
+LENGTHS = {
+    0x000: {2}, 0x080: {0, 8}, 0x180: {8}, 0x200: {6}, 0x280: {6}, 0x580: {8}, 0x600: {8}, 0x700: {1},
+}  # fmt: skip
+"""Bytes that a service of CANopen has: network management, SYNC or emergency, process data, service data, heartbeat."""
+
+
+def logged_run(channel: str, joints: list[DriveJoint], log_file: Path) -> list[can.Message]:
+    """A run from connecting to stopping, by python-can's own log of it; no cycle is late."""
+    arm = CanopenArm(joints, patience_s=0.5, clock=VirtualClock(0, lambda _: None))
+    with can.Bus(interface="virtual", channel=channel) as listener:
         arm.connect()
-        arm.enable(ControlMode.POSITION, LIMITS, StopPolicy.HOLD, 1.0)
+        state = arm.enable(ControlMode.POSITION, LIMITS, StopPolicy.HOLD, 1.0, CYCLE_S)
+        place = state.position
+        for _ in range(CYCLES):
+            place = place + STEP
+            arm.clock.wait_until_ns(state.time_ns + round(CYCLE_S * 1e9))
+            state = arm.exchange(Setpoint(place, np.zeros(2)))
         arm.stop(StopPolicy.HOLD)
-        notifier.stop()
-    listener.shutdown()
-    messages = list(can.LogReader(str(tmp_path / "run.asc")))
-    assert len(messages) > 200
-    lengths = {0x000: {2}, 0x080: {0, 8}, 0x180: {8}, 0x200: {6}, 0x280: {6}, 0x580: {8}, 0x600: {8}, 0x700: {1}}
+        arm.disconnect()
+        with can.Logger(str(log_file)) as log:
+            while (message := listener.recv(0.0)) is not None:
+                log(message)
+    return list(can.LogReader(str(log_file)))
+
+
+@pytest.mark.parametrize("form", ["asc", "log", "blf"])
+def test_a_run_decodes_cleanly_by_python_cans_own_log(
+    channel: str, drives: list[ForeignDrive], tmp_path: Path, form: str
+) -> None:
+    """Every frame is one that CANopen knows, and what they hold is the run: by struct alone, not by our decoders."""
+    messages = logged_run(channel, joints_on(channel), tmp_path / f"run.{form}")
     for message in messages:
-        assert message.dlc in lengths[message.arbitration_id & 0x780], message
+        assert message.dlc in LENGTHS[message.arbitration_id & 0x780], message
+        assert not message.is_error_frame
+        assert not message.is_extended_id
+    by_identifier = {
+        identifier: [bytes(message.data) for message in messages if message.arbitration_id == identifier]
+        for identifier in {message.arbitration_id for message in messages}
+    }
+    assert not any(data[0] == 0x80 for node in (4, 9) for data in by_identifier[0x600 + node]), "the master aborts none"
+    assert by_identifier[0x000] == [b"\x80\x00", b"\x01\x00"], "pre-operational, then started"
+    assert set(by_identifier[0x700 + 127]) == {b"\x05"}, "the master's heartbeat"
+    count = 2.0 * np.pi / (COUNTS * GEAR)
+    for node, start, drive in zip((4, 9), START, drives, strict=True):
+        orders = [struct.unpack("<Hi", data) for data in by_identifier[0x200 + node]]
+        moved = [target for word, target in orders if word == 0x0F and target != start]
+        np.testing.assert_allclose(moved, start + np.arange(1, CYCLES + 1) * STEP / count, atol=1.0)
+        elsewhere = {target for word, target in orders if word != 0x0F} - {start, *moved}
+        assert not elsewhere, "without power its target is where the joint is"
+        states = [struct.unpack("<Hhi", data) for data in by_identifier[0x180 + node]]
+        assert {word for word, _, _ in states} <= {0x0240, 0x0221, 0x0223, 0x1227, 0x0207}
+        assert drive.read(0x6064) == moved[-1]
+    # one target for each node, then SYNC
+    cycle = [one.arbitration_id for one in messages if one.arbitration_id in (0x204, 0x209, 0x080)]
+    assert cycle == [0x204, 0x209, 0x080] * (len(cycle) // 3)

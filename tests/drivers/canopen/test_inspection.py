@@ -1,11 +1,13 @@
 """What can be said of a CAN bus without moving anything: doctor, scan, and the frames of a run."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from drivers import ControlMode, DriveLimits, DriverError
-from drivers.canopen import DriveJoint, examine, plan_frames, scan_bus
-from drivers.inspection import PHASES, Severity
+from drivers.canopen import DriveJoint, can_interfaces, examine, plan_frames, scan_bus
+from drivers.inspection import PHASES, Finding, Severity
 from emulated_can_bus import COUNTS_PER_TURN, GEAR, EmulatedBus
 
 LIMITS = DriveLimits(np.full(2, -1.0), np.full(2, 1.0), np.full(2, 2.0), np.full(2, 10.0))
@@ -92,3 +94,21 @@ def test_a_dry_run_needs_the_rated_torque() -> None:
     limits = DriveLimits(*(np.full(1, value) for value in (-1.0, 1.0, 2.0, 10.0)))
     with pytest.raises(DriverError, match="rated_torque_nm"):
         list(plan_frames(joints, ControlMode.POSITION, limits, 0.1, np.zeros((1, 1))))
+
+
+@pytest.mark.parametrize(
+    ("flags", "severity", "words", "remedy"),
+    [
+        ("0x1", Severity.GOOD, "CAN interface, up", ""),
+        ("0x0", Severity.WARNING, "CAN interface, down", "ip link set can7 up type can bitrate 1000000"),
+    ],
+)
+def test_can_interfaces_of_the_machine(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, flags: str, severity: Severity, words: str, remedy: str
+) -> None:
+    for name, kind in (("can7", "280"), ("eth0", "1")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "type").write_text(f"{kind}\n")
+        (tmp_path / name / "flags").write_text(f"{flags}\n")
+    monkeypatch.setattr("drivers.canopen.doctor._NETWORK", tmp_path)
+    assert can_interfaces() == [Finding(severity, "can7", words, remedy)]

@@ -1,13 +1,18 @@
 """A question to a group, and what comes late: the length of an answer says which question it belongs to."""
 
 from collections import deque
+from collections.abc import Callable
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from drivers.clock import MonotonicClock
 from drivers.dynamixel.bus import ServoBus
 from drivers.dynamixel.control_table import BYTES_BEFORE_STATE, find_model, model_names
 from drivers.dynamixel.models import family_of
+from drivers.dynamixel.packets import encode_write
+from drivers.errors import DriverError, DriverErrorKind
 from sim_backend.dynamixel_bus.framing import status_frame
 
 BLOCK = find_model(1020).state_block
@@ -100,3 +105,49 @@ def test_every_table_has_bytes_before_its_state() -> None:
         known = {item.address + k for item in model.items.values() for k in range(item.size)}
         start = model.state_block.address
         assert known >= set(range(start - BYTES_BEFORE_STATE, start)), name
+
+
+STATUSES = st.builds(status_frame, st.sampled_from((*SERVOS, 4, 253)), st.integers(0, 255), st.binary(max_size=14))
+"""Whole packets, of servos that were asked and of others, with any error byte and of any length."""
+
+NOISE = st.lists(st.binary(max_size=40) | STATUSES | st.just(encode_write(1, 64, b"\x01")), max_size=12)
+"""What may come in place of an answer: pieces, answers to other questions, instructions that are echoed."""
+
+
+@given(NOISE, st.booleans())
+def test_whatever_comes_a_group_answers_with_its_own_or_not_at_all(noise: list[bytes], fast: bool) -> None:
+    line = Line()
+    bus = ServoBus(line)  # pyright: ignore[reportArgumentType]
+    for _ in range(2):
+        line.coming.extend(noise)
+        answers = bus.sync_read(SERVOS, BLOCK, fast=fast, spare=BYTES_BEFORE_STATE)
+        line.coming.clear()
+        assert answers.statuses.keys() <= set(SERVOS)
+        for servo, status in answers.statuses.items():
+            assert status.servo == servo
+            assert BLOCK.decode(status.data).keys() == {item.name for item in BLOCK.items}
+
+
+@given(NOISE)
+def test_whatever_comes_a_servo_is_read_written_and_pinged_or_refused_in_one_line(noise: list[bytes]) -> None:
+    line = Line()
+    bus = ServoBus(line)  # pyright: ignore[reportArgumentType]
+    item = find_model(1020).items["Goal Position"]
+    for ask_one in (lambda: bus.read(1, item), lambda: bus.write(1, item, 7), lambda: bus.ping(1), bus.ping_all):
+        line.coming.extend(noise)
+        error = refusal(ask_one)
+        line.coming.clear()
+        if error is None:
+            continue
+        assert error.kind in (DriverErrorKind.CANNOT_CONNECT, DriverErrorKind.REFUSED)
+        assert "\n" not in str(error)
+        assert ";" in str(error), "what happened; what to do"
+
+
+def refusal(ask_one: Callable[[], object]) -> DriverError | None:
+    """The error in which a question ends, if it does."""
+    try:
+        ask_one()
+    except DriverError as error:
+        return error
+    return None
