@@ -124,12 +124,11 @@ def _assemble(ground: _Ground, executor: Executor | None, start: StartControl | 
     recordings.tidy()
     identifications, diagnoses, excitations = kinds = _kinds(settings, items)
     pool = executor or open_executor(settings.workers)
-    jobs = JobQueue(
-        kinds,
-        TimedExecutor(pool, metrics.job_seconds),
-        slots=pool.width if isinstance(pool, ClusterExecutor) else settings.workers,
-        most_waiting=settings.max_waiting,
-    )
+    timed, most = TimedExecutor(pool, metrics.job_seconds), settings.max_waiting
+    if isinstance(pool, ClusterExecutor):  # it comes and goes, and so do its workers
+        jobs = JobQueue(kinds, timed, slots=lambda: pool.width, most_waiting=most, is_there=pool.is_there)
+    else:
+        jobs = JobQueue(kinds, timed, slots=settings.workers, most_waiting=most)
     audit = AuditTrail(AuditLog(settings.data_folder))
     claims = DeviceClaims(settings.max_arms)
     leases = Leases(claims, settings.data_folder / "lease-number", on_end=partial(_note_end, audit))

@@ -5,6 +5,7 @@ from service.jobs.campaign_leader import Workshop
 from service.jobs.campaign_order import CampaignLinks, CampaignOrder, HeldOutMotion
 from service.jobs.campaign_workspace import CampaignWorkspace
 from service.jobs.check_work import check_kept_recording
+from service.jobs.cluster_executor import ClusterExecutor
 from service.jobs.device_claims import BusyError, DeviceClaims
 from service.jobs.diagnosis_order import DiagnosisOptions, DiagnosisOrder
 from service.jobs.diagnosis_work import run_diagnosis
@@ -14,7 +15,7 @@ from service.jobs.excitation_order import ExcitationDesignOptions, ExcitationOrd
 from service.jobs.excitation_submission import hand_in_excitation
 from service.jobs.excitation_work import check_trajectory, read_designed_trajectory, run_excitation
 from service.jobs.excitation_workspace import ExcitationWorkspace
-from service.jobs.executors import ClusterExecutor, open_executor
+from service.jobs.executors import open_executor
 from service.jobs.exports import EXPORT_FILES, ExportFormat
 from service.jobs.housekeeping import Housekeeping
 from service.jobs.identification_order import IdentificationOptions, IdentificationOrder, OrderedRecording
