@@ -143,7 +143,7 @@ def _add_common_answers(document: dict[str, Any]) -> None:
                 continue
             operation["security"] = [{"key": []}, {}]
             operation["x-tauscope-scope"] = scope.value
-            met = list(_COMMON)
+            met: list[str] = list(_COMMON)
             if is_noted(method.upper(), path) and not is_stop(method.upper(), path):
                 met.append("storage-full")  # of the audit log, if of nothing else
             if method == "post" and is_repeatable(path):

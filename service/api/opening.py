@@ -22,6 +22,7 @@ from service.jobs import (
     CampaignDesk,
     ClusterExecutor,
     DeviceClaims,
+    DriftWatch,
     Housekeeping,
     JobKind,
     JobQueue,
@@ -78,9 +79,10 @@ def open_services(
         lock.release()
         raise
     services = _assemble(_Ground(settings, access, database, site), executor, start)
-    _watch(services)
+    drift = DriftWatch(services.models.history, site)
+    _watch(services, drift)
     housekeeping = Housekeeping(
-        [services.jobs.settle, services.runs.settle, services.index.sync, services.models.consider_new]
+        [services.jobs.settle, services.runs.settle, services.index.sync, services.models.consider_new, drift.look]
     )
     clock = Housekeeping([services.schedules.tick])  # apart: an interlock may take its time
     housekeeping.start()
@@ -173,10 +175,11 @@ def _kinds(settings: Settings, items: Mapping[str, ItemStore]) -> tuple[JobKind,
     )
 
 
-def _watch(services: Services) -> None:
+def _watch(services: Services, drift: DriftWatch) -> None:
     """Numbers that are asked for when somebody looks at the metrics."""
     metrics, folder = services.metrics, services.settings.data_folder
     metrics.loops.live = services.runs.lives
+    metrics.watch_drift(drift)
     metrics.watch("tauscope_jobs_waiting", "Jobs that wait", services.jobs.waiting)
     metrics.watch("tauscope_leases", "Leases that hold", lambda: len(services.leases.active()))
     metrics.watch("tauscope_audit_lost", "Entries that the audit log did not take", lambda: services.audit.lost)

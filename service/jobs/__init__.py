@@ -11,6 +11,7 @@ from service.jobs.diagnosis_order import DiagnosisOptions, DiagnosisOrder
 from service.jobs.diagnosis_work import run_diagnosis
 from service.jobs.diagnosis_workspace import ROLES as DIAGNOSIS_ROLES
 from service.jobs.diagnosis_workspace import DiagnosisWorkspace
+from service.jobs.drift_watch import DriftWatch
 from service.jobs.excitation_order import ExcitationDesignOptions, ExcitationOrder, ForbiddenBox
 from service.jobs.excitation_submission import hand_in_excitation
 from service.jobs.excitation_work import check_trajectory, read_designed_trajectory, run_excitation
@@ -66,6 +67,7 @@ __all__ = [
     "DiagnosisOptions",
     "DiagnosisOrder",
     "DiagnosisWorkspace",
+    "DriftWatch",
     "ExcitationDesignOptions",
     "ExcitationOrder",
     "ExcitationWorkspace",
