@@ -1,10 +1,11 @@
 """Taking a data folder and putting everything that the routes work with together; and letting go of it in order."""
 
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass
+from datetime import timedelta
 from functools import partial
 
 from service.api.access.gate import Access
@@ -43,8 +44,12 @@ from service.jobs import (
     run_identification,
     start_control,
 )
-from service.store import FolderLock, ItemStore, RecordingStore, item_stores, site_identifier
+from service.jobs.retention import RetentionKeeper, RetentionRule
+from service.store import FOLDERS, FolderLock, ItemStore, RecordingStore, item_stores, site_identifier
 from service.store.database import Database, Index, ModelHistory, ScheduleBook
+
+PRUNING_S = 3600.0
+"""How often what is old is removed, where the operator asked for it [s]."""
 
 REQUESTS_PER_S = 200.0
 """How often a key may call in the long run, where the operator says nothing [1/s]."""
@@ -86,6 +91,8 @@ def open_services(
     )
     clock = Housekeeping([services.schedules.tick])  # apart: an interlock may take its time
     housekeeping.start()
+    pruning = Housekeeping(_retention(services), PRUNING_S)
+    pruning.start()
     if settings.fires_schedules:
         clock.start()
     try:
@@ -97,6 +104,7 @@ def open_services(
             finally:
                 services.begin_to_close()
                 clock.close()
+                pruning.close()
                 services.runs.close()
                 services.campaigns.close()
                 services.audit.note("service", "ended")
@@ -173,6 +181,28 @@ def _kinds(settings: Settings, items: Mapping[str, ItemStore]) -> tuple[JobKind,
         JobKind(items["diagnosis"], partial(run_diagnosis, **where)),
         JobKind(items["excitation"], run_excitation),
     )
+
+
+def _retention(services: Services) -> list[Callable[[], object]]:
+    """What removes old items; nothing where the operator did not ask for it."""
+    settings, jobs = services.settings, services.jobs
+    if settings.prune_older_than_days is None:
+        return []
+    kinds = frozenset(settings.prune_kinds or FOLDERS)
+    rule = RetentionRule(timedelta(days=settings.prune_older_than_days), kinds, settings.prune_recordings)
+    removers: dict[str, Callable[[str], object]] = {
+        "identification": partial(jobs.cancel_or_remove, services.identifications),
+        "diagnosis": partial(jobs.cancel_or_remove, services.diagnoses),
+        "excitation": partial(jobs.cancel_or_remove, services.excitations),
+        "run": services.runs.remove,
+        "campaign": services.campaigns.remove,
+    }
+
+    def note(kind: str, name: str) -> None:
+        services.audit.note("service", "pruned", subject=name, kind=kind)
+
+    history = services.models.history
+    return [RetentionKeeper(rule, services.index, history, services.recordings, removers, note).tidy]
 
 
 def _watch(services: Services, drift: DriftWatch) -> None:
