@@ -131,8 +131,12 @@ class ClusterExecutor(Executor):
         """
         self._closing.set()
         self._watcher.join(2 * PATIENCE_S)
-        self._executor.shutdown(wait=wait and not cancel_futures and self.is_there())
-        self._client.close()
+        try:
+            self._executor.shutdown(wait=wait and not cancel_futures and self.is_there())
+            self._client.close()
+        except Exception:  # a scheduler that is away holds up nobody who leaves
+            if self.is_there():
+                raise
 
     def _open_client(self) -> "Client":
         """A connection of its own; raises what Dask raises."""

@@ -176,6 +176,22 @@ class TestASchedulerThatDies:
 
             assert eventually(are_done, 90)
 
+    @pytest.mark.parametrize("is_given_up", [False, True], ids=["a moment ago", "given up by Dask"])
+    def test_it_is_left_in_good_order_all_the_same(self, is_given_up: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+        pytest.importorskip("distributed", reason="needs tauscope[fleet]")
+        monkeypatch.setattr("service.jobs.cluster_executor.PATIENCE_S", 3)
+        port = str(free_port())
+        address = f"tcp://127.0.0.1:{port}"
+        with dask("scheduler", "--host", "127.0.0.1", "--port", port):
+            executor = opened_when_there(address)
+            future = executor.submit(divide, 1)
+        status = "closed" if is_given_up else "connecting"
+        assert eventually(lambda: executor._client.status == status, 60)
+        executor.shutdown(cancel_futures=True)
+        assert future.done()
+        with pytest.raises(RuntimeError, match="was left"):
+            executor.submit(divide, 1)
+
     def test_workers_that_come_later_are_counted(self) -> None:
         pytest.importorskip("distributed", reason="needs tauscope[fleet]")
         port = str(free_port())
