@@ -8,7 +8,10 @@ from fastapi.openapi.utils import get_openapi
 from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
-from service.api.access.scopes import needed_scope
+from service.api.access.scopes import is_stop, needed_scope
+from service.api.audit.recorder import is_noted
+from service.api.idempotency.repeatable import HEADER as ONCE
+from service.api.idempotency.repeatable import LONGEST_KEY, is_repeatable
 from service.api.problems import MEDIA_TYPE, problem_responses
 
 _REFERENCE = "#/components/schemas/{model}"
@@ -111,9 +114,21 @@ def _document(app: FastAPI, models: Sequence[type[BaseModel]]) -> dict[str, Any]
 _COMMON = ("bad-request", "host", "origin", "unauthorized", "forbidden", "rate-limited", "internal")
 """Problems that any request to the interface may meet, before its route or in it."""
 
+_REPEATED = ("invalid-request", "not-repeatable", "key-reused")
+"""Further problems of a request that comes with the header `ONCE`."""
+
+_ONCE_PARAMETER = {
+    "name": ONCE,
+    "in": "header",
+    "required": False,
+    "schema": {"type": "string", "minLength": 1, "maxLength": LONGEST_KEY, "pattern": f"^[!-~]{{1,{LONGEST_KEY}}}$"},
+    "description": "of the client's choice, for example a UUID: for a day, the same request with the same key is done"
+    " once, and answered as it was the first time",
+}
+
 
 def _add_common_answers(document: dict[str, Any]) -> None:
-    """Say of every operation that a key may be asked for, and what may come of any request."""
+    """Say of every operation that a key may be asked for, whether it is done once, and what may come of any request."""
     document["components"]["securitySchemes"] = {
         "key": {
             "type": "http",
@@ -128,7 +143,13 @@ def _add_common_answers(document: dict[str, Any]) -> None:
                 continue
             operation["security"] = [{"key": []}, {}]
             operation["x-tauscope-scope"] = scope.value
-            for status, answer in problem_responses(*_COMMON).items():
+            met: list[str] = list(_COMMON)
+            if is_noted(method.upper(), path) and not is_stop(method.upper(), path):
+                met.append("storage-full")  # of the audit log, if of nothing else
+            if method == "post" and is_repeatable(path):
+                operation.setdefault("parameters", []).append(_ONCE_PARAMETER)
+                met += _REPEATED
+            for status, answer in problem_responses(*met).items():
                 _merge_answer(operation["responses"], str(status), answer)
             operation["responses"] = dict(sorted(operation["responses"].items()))
 

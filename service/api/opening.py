@@ -1,10 +1,11 @@
 """Taking a data folder and putting everything that the routes work with together; and letting go of it in order."""
 
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass
+from datetime import timedelta
 from functools import partial
 
 from service.api.access.gate import Access
@@ -22,6 +23,7 @@ from service.jobs import (
     CampaignDesk,
     ClusterExecutor,
     DeviceClaims,
+    DriftWatch,
     Housekeeping,
     JobKind,
     JobQueue,
@@ -42,8 +44,12 @@ from service.jobs import (
     run_identification,
     start_control,
 )
-from service.store import FolderLock, ItemStore, RecordingStore, item_stores, site_identifier
+from service.jobs.retention import RetentionKeeper, RetentionRule
+from service.store import FOLDERS, FolderLock, ItemStore, RecordingStore, item_stores, site_identifier
 from service.store.database import Database, Index, ModelHistory, ScheduleBook
+
+PRUNING_S = 3600.0
+"""How often what is old is removed, where the operator asked for it [s]."""
 
 REQUESTS_PER_S = 200.0
 """How often a key may call in the long run, where the operator says nothing [1/s]."""
@@ -78,12 +84,15 @@ def open_services(
         lock.release()
         raise
     services = _assemble(_Ground(settings, access, database, site), executor, start)
-    _watch(services)
+    drift = DriftWatch(services.models.history, site)
+    _watch(services, drift)
     housekeeping = Housekeeping(
-        [services.jobs.settle, services.runs.settle, services.index.sync, services.models.consider_new]
+        [services.jobs.settle, services.runs.settle, services.index.sync, services.models.consider_new, drift.look]
     )
     clock = Housekeeping([services.schedules.tick])  # apart: an interlock may take its time
     housekeeping.start()
+    pruning = Housekeeping(_retention(services), PRUNING_S)
+    pruning.start()
     if settings.fires_schedules:
         clock.start()
     try:
@@ -95,6 +104,7 @@ def open_services(
             finally:
                 services.begin_to_close()
                 clock.close()
+                pruning.close()
                 services.runs.close()
                 services.campaigns.close()
                 services.audit.note("service", "ended")
@@ -124,12 +134,11 @@ def _assemble(ground: _Ground, executor: Executor | None, start: StartControl | 
     recordings.tidy()
     identifications, diagnoses, excitations = kinds = _kinds(settings, items)
     pool = executor or open_executor(settings.workers)
-    jobs = JobQueue(
-        kinds,
-        TimedExecutor(pool, metrics.job_seconds),
-        slots=pool.width if isinstance(pool, ClusterExecutor) else settings.workers,
-        most_waiting=settings.max_waiting,
-    )
+    timed, most = TimedExecutor(pool, metrics.job_seconds), settings.max_waiting
+    if isinstance(pool, ClusterExecutor):  # it comes and goes, and so do its workers
+        jobs = JobQueue(kinds, timed, slots=lambda: pool.width, most_waiting=most, is_there=pool.is_there)
+    else:
+        jobs = JobQueue(kinds, timed, slots=settings.workers, most_waiting=most)
     audit = AuditTrail(AuditLog(settings.data_folder))
     claims = DeviceClaims(settings.max_arms)
     leases = Leases(claims, settings.data_folder / "lease-number", on_end=partial(_note_end, audit))
@@ -174,10 +183,33 @@ def _kinds(settings: Settings, items: Mapping[str, ItemStore]) -> tuple[JobKind,
     )
 
 
-def _watch(services: Services) -> None:
+def _retention(services: Services) -> list[Callable[[], object]]:
+    """What removes old items; nothing where the operator did not ask for it."""
+    settings, jobs = services.settings, services.jobs
+    if settings.prune_older_than_days is None:
+        return []
+    kinds = frozenset(settings.prune_kinds or FOLDERS)
+    rule = RetentionRule(timedelta(days=settings.prune_older_than_days), kinds, settings.prune_recordings)
+    removers: dict[str, Callable[[str], object]] = {
+        "identification": partial(jobs.cancel_or_remove, services.identifications),
+        "diagnosis": partial(jobs.cancel_or_remove, services.diagnoses),
+        "excitation": partial(jobs.cancel_or_remove, services.excitations),
+        "run": services.runs.remove,
+        "campaign": services.campaigns.remove,
+    }
+
+    def note(kind: str, name: str) -> None:
+        services.audit.note("service", "pruned", subject=name, kind=kind)
+
+    history = services.models.history
+    return [RetentionKeeper(rule, services.index, history, services.recordings, removers, note).tidy]
+
+
+def _watch(services: Services, drift: DriftWatch) -> None:
     """Numbers that are asked for when somebody looks at the metrics."""
     metrics, folder = services.metrics, services.settings.data_folder
     metrics.loops.live = services.runs.lives
+    metrics.watch_drift(drift)
     metrics.watch("tauscope_jobs_waiting", "Jobs that wait", services.jobs.waiting)
     metrics.watch("tauscope_leases", "Leases that hold", lambda: len(services.leases.active()))
     metrics.watch("tauscope_audit_lost", "Entries that the audit log did not take", lambda: services.audit.lost)

@@ -47,6 +47,15 @@ class Settings(BaseModel):
         default=False,
         description="whether an arm moves by a lease only; where keys are asked for, it always does",
     )
+    prune_older_than_days: float | None = Field(
+        default=None, ge=0, description="what ended longer ago is removed, hour after hour [days]; null: nothing is"
+    )
+    prune_kinds: tuple[Literal["excitation", "run", "identification", "diagnosis", "campaign"], ...] = Field(
+        default=(), description="kinds of items that it is said of; empty: every kind"
+    )
+    prune_recordings: bool = Field(
+        default=False, description="whether recordings go too that nothing which stays was made from"
+    )
     names: tuple[str, ...] = Field(default=(), description="further host names by which the service may be called")
     requests_per_s: float | None = Field(
         default=None,

@@ -14,6 +14,9 @@ from service.report.quantities import counted
 
 TABLE = "table.csv"
 
+CLUSTER_PATIENCE_S = 60.0
+"""How long a robot waits for a cluster that is away, as when its scheduler is started anew [s]."""
+
 
 def run_fleet(verb: Literal["identify", "diagnose"], manifest: Path, out: Path, workers: int) -> None:
     """Analyse every robot of a manifest.
@@ -56,7 +59,7 @@ def _run(verb: str, manifest: Path, out: Path, workers: int, total: int) -> int:
     columns, work = (
         (IDENTIFICATION_COLUMNS, identify_robot) if verb == "identify" else (DIAGNOSIS_COLUMNS, diagnose_robot)
     )
-    executor = open_executor(workers)
+    executor = open_executor(workers, CLUSTER_PATIENCE_S)
     width = executor.width if isinstance(executor, ClusterExecutor) else workers
     failed = done = 0
     try:

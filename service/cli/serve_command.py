@@ -5,6 +5,8 @@ from typing import Annotated, Literal
 
 import typer
 
+from service.cli.store_command import Kind
+
 
 def serve(
     *,
@@ -59,6 +61,16 @@ def serve(
     requests_per_second: Annotated[
         float | None, typer.Option(min=0.1, help="How often a caller may call; 200 with API keys, else unlimited.")
     ] = None,
+    prune_older_than: Annotated[
+        float | None,
+        typer.Option(min=0.0, metavar="DAYS", help="Remove what ended longer ago, as `tauscope store prune` does."),
+    ] = None,
+    prune_kind: Annotated[
+        list[Kind] | None, typer.Option(help="Kind of item that may go so, once for each; every kind by default.")
+    ] = None,
+    prune_recordings: Annotated[
+        bool, typer.Option("--prune-recordings", help="Recordings too that nothing which stays was made from.")
+    ] = False,
 ) -> None:
     """Offer everything over HTTP.
 
@@ -92,11 +104,19 @@ def serve(
         whether an arm moves by a lease only
     requests_per_second : float or None
         how often a caller may call [1/s]
+    prune_older_than : float or None
+        age of what is removed, hour after hour [days]; nothing is where None
+    prune_kind : list of Kind or None
+        kinds of items; every kind where None
+    prune_recordings : bool
+        recordings too
     """
     from pydantic import SecretStr
 
     from service.cli.serving import run_server
 
+    if prune_older_than is None and (prune_kind or prune_recordings):
+        raise typer.BadParameter("--prune-kind and --prune-recordings need --prune-older-than")
     run_server(
         data,
         host=host,
@@ -112,4 +132,7 @@ def serve(
         log_format=log_format,
         require_lease=require_lease,
         requests_per_s=requests_per_second,
+        prune_older_than_days=prune_older_than,
+        prune_kinds=tuple(kind.value for kind in prune_kind or ()),
+        prune_recordings=prune_recordings,
     )

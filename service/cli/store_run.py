@@ -177,7 +177,8 @@ def prune_store(
         removal = plan_removal(store.keeper, ModelHistory(store.database), kept, rule, utc_now())
         if not dry_run:
             try:
-                remove(removal, item_stores(store.folder), kept, store.keeper)
+                removers = {kind: items.remove for kind, items in item_stores(store.folder).items()}
+                removal = remove(removal, removers, kept, store.keeper)
             except OSError as error:
                 raise StoreError(f"{store.folder}: cannot be removed from ({error.strerror or error})") from error
     rows = [(entry.kind, entry.identifier, entry.robot or ABSENT) for entry in removal.items]

@@ -5,16 +5,18 @@ from service.jobs.campaign_leader import Workshop
 from service.jobs.campaign_order import CampaignLinks, CampaignOrder, HeldOutMotion
 from service.jobs.campaign_workspace import CampaignWorkspace
 from service.jobs.check_work import check_kept_recording
+from service.jobs.cluster_executor import ClusterExecutor
 from service.jobs.device_claims import BusyError, DeviceClaims
 from service.jobs.diagnosis_order import DiagnosisOptions, DiagnosisOrder
 from service.jobs.diagnosis_work import run_diagnosis
 from service.jobs.diagnosis_workspace import ROLES as DIAGNOSIS_ROLES
 from service.jobs.diagnosis_workspace import DiagnosisWorkspace
+from service.jobs.drift_watch import DriftWatch
 from service.jobs.excitation_order import ExcitationDesignOptions, ExcitationOrder, ForbiddenBox
 from service.jobs.excitation_submission import hand_in_excitation
 from service.jobs.excitation_work import check_trajectory, read_designed_trajectory, run_excitation
 from service.jobs.excitation_workspace import ExcitationWorkspace
-from service.jobs.executors import ClusterExecutor, open_executor
+from service.jobs.executors import open_executor
 from service.jobs.exports import EXPORT_FILES, ExportFormat
 from service.jobs.housekeeping import Housekeeping
 from service.jobs.identification_order import IdentificationOptions, IdentificationOrder, OrderedRecording
@@ -65,6 +67,7 @@ __all__ = [
     "DiagnosisOptions",
     "DiagnosisOrder",
     "DiagnosisWorkspace",
+    "DriftWatch",
     "ExcitationDesignOptions",
     "ExcitationOrder",
     "ExcitationWorkspace",

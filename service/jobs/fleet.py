@@ -8,12 +8,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from service.errors import RecordingError
+from service.jobs.cluster_executor import ClusterAwayError
 from service.robot.messages import one_line, shown
 from service.store.names import FILE_NAME_RULE, is_file_name
 
 COLUMNS = ("name", "robot", "recordings", "held_out")
 SEPARATOR = ";"
 LOST = "the process that worked on it ended unexpectedly, perhaps for want of memory; send less data"
+AWAY = "the Dask cluster was away for too long; see to its scheduler, and give this robot once more"
 
 
 @dataclass(frozen=True)
@@ -95,8 +97,8 @@ def analyse_fleet(
     """Analyse every robot; results come as they are done.
 
     No more robots than `width` and as many again wait in the executor, so that the memory that is needed here does not
-    grow with the fleet. Where a worker dies, those that were in the executor with it are done again one by one: what
-    kills its worker then is to blame itself.
+    grow with the fleet. Where a worker dies, or a cluster goes away, those that were in the executor are done again one
+    by one: what kills its worker then is to blame itself.
 
     Parameters
     ----------
@@ -125,7 +127,7 @@ def analyse_fleet(
             if entry is None:
                 is_exhausted = True
             else:
-                pending[executor.submit(work, entry, folder)] = entry
+                pending[_submitted(executor, work, entry, folder)] = entry
         done, _ = wait(pending, return_when=FIRST_COMPLETED)
         for future in done:
             entry = pending.pop(future)
@@ -134,13 +136,25 @@ def analyse_fleet(
             else:
                 yield _result(future, entry)
     for entry in suspects:
-        yield _result(executor.submit(work, entry, folder), entry)
+        yield _result(_submitted(executor, work, entry, folder), entry)
+
+
+def _submitted(executor: Executor, work: FleetWork, entry: FleetEntry, folder: Path) -> "Future[FleetResult]":
+    """A robot in the executor; where that takes nothing, a future that says so."""
+    try:
+        return executor.submit(work, entry, folder)
+    except BrokenExecutor as error:
+        refused: Future[FleetResult] = Future()
+        refused.set_exception(error)
+        return refused
 
 
 def _result(future: "Future[FleetResult]", entry: FleetEntry) -> FleetResult:
     """What came of a robot, whatever it was."""
     try:
         return future.result()
+    except ClusterAwayError:
+        return FleetResult(entry, {}, AWAY)
     except BrokenExecutor:
         return FleetResult(entry, {}, LOST)
     except Exception as error:

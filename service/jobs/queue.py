@@ -3,13 +3,14 @@
 import logging
 import threading
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from dataclasses import dataclass
 from pathlib import Path
 
 from service.errors import LimitExceededError, NotFoundError
-from service.jobs.queued_job import JobKind, QueuedJob
+from service.jobs.cluster_executor import ClusterAwayError
+from service.jobs.queued_job import MOST_ATTEMPTS, JobKind, QueuedJob
 from service.jobs.record import JobProblem, JobRecord
 from service.jobs.states import JobState
 from service.jobs.workspace import Workspace
@@ -43,7 +44,15 @@ class JobQueue:
     Every method may be called from any thread.
     """
 
-    def __init__(self, kinds: Sequence[JobKind], executor: Executor, *, slots: int, most_waiting: int) -> None:
+    def __init__(
+        self,
+        kinds: Sequence[JobKind],
+        executor: Executor,
+        *,
+        slots: int | Callable[[], int],
+        most_waiting: int,
+        is_there: Callable[[], bool] = lambda: True,
+    ) -> None:
         """Make the queue; jobs that an earlier service left unfinished are done again, in their order.
 
         Parameters
@@ -52,13 +61,16 @@ class JobQueue:
             every kind of job that will be handed in
         executor : Executor
             where the work is done; shut down by `close`
-        slots : int
-            jobs that are in the executor at a time
+        slots : int or callable
+            jobs that are in the executor at a time; a callable tells how many at present, and waits for nothing
         most_waiting : int
             jobs that may wait
+        is_there : callable
+            whether the executor can work at present, and waits for nothing; jobs wait until it can
         """
         self._executor = executor
-        self._slots = slots
+        self._slots = slots if callable(slots) else lambda: slots
+        self._is_there = is_there
         self._most_waiting = most_waiting
         self._lock = threading.RLock()
         self._waiting: deque[QueuedJob] = deque()
@@ -167,8 +179,12 @@ class JobQueue:
         """How many jobs wait."""
         return len(self._waiting)
 
+    def can_work(self) -> bool:
+        """Whether the executor can work at present; jobs wait where it cannot."""
+        return self._is_there()
+
     def settle(self) -> None:
-        """Do what a full disk was in the way of: write the ends that it did not take, and begin what waits.
+        """Do what was hindered by a full disk or an executor that was away: write ends, and begin what waits.
 
         To be called again and again; while nothing is in the way there is nothing to do.
 
@@ -209,7 +225,7 @@ class JobQueue:
 
     def _fill_slots(self) -> None:
         """Hand waiting jobs to the executor while it has room."""
-        while self._waiting and len(self._running) < self._slots and not self._is_closed:
+        while self._waiting and len(self._running) < self._slots() and not self._is_closed and self._is_there():
             is_wanted = self._waiting[0].move(JobState.RUNNING)
             job = self._waiting.popleft()
             if is_wanted:  # else it is damaged, or somebody removed it by hand
@@ -221,6 +237,10 @@ class JobQueue:
             future = self._executor.submit(job.kind.work, job.folder)
         except NotFoundError:
             return
+        except ClusterAwayError:  # it went a moment ago
+            job.give_up()
+            self._waiting.appendleft(job)
+            return
         except (BrokenExecutor, RuntimeError, OSError):
             _log.exception("job %s could not be handed to a worker", job.identifier)
             self._unwritten[job] = _End(JobState.FAILED, WORKER_LOST)
@@ -231,22 +251,42 @@ class JobQueue:
 
     def _end(self, job: QueuedJob, future: "Future[JobProblem | None]") -> None:
         """Take note that the work of a job has ended, and begin the next."""
-        problem = self._problem_of(job, future)
+        end = self._end_of(job, future)
         with self._lock:
             self._running.pop(job, None)
-            self._unwritten[job] = _End(JobState.SUCCEEDED if problem is None else JobState.FAILED, problem)
+            self._unwritten[job] = end
             self._go_on()
 
     def _write_ends(self) -> None:
         """Write how jobs ended; what fails is left for the next time, or done again after the next start."""
         for job, end in list(self._unwritten.items()):
-            job.move(end.state, end.problem)
+            has_moved = job.move(end.state, end.problem)
             del self._unwritten[job]
+            if has_moved and end.state is JobState.QUEUED and not self._is_closed:
+                self._waiting.appendleft(job)
+
+    def _end_of(self, job: QueuedJob, future: "Future[JobProblem | None]") -> _End:
+        """How a job ended by what came of its work."""
+        try:
+            problem = self._problem_of(job, future)
+        except ClusterAwayError as error:
+            return self._end_of_lost(job, error)
+        return _End(JobState.SUCCEEDED if problem is None else JobState.FAILED, problem)
+
+    def _end_of_lost(self, job: QueuedJob, error: ClusterAwayError) -> _End:
+        """A job that was lost with its cluster waits again, unless that happened too often: it may be the cause."""
+        if job.attempts() >= MOST_ATTEMPTS:
+            _log.error("job %s: lost with its cluster %d times", job.identifier, MOST_ATTEMPTS)
+            return _End(JobState.FAILED, WORKER_LOST)
+        _log.warning("job %s waits again: %s", job.identifier, error)
+        return _End(JobState.QUEUED, None)
 
     def _problem_of(self, job: QueuedJob, future: "Future[JobProblem | None]") -> JobProblem | None:
-        """Why the work of a job has no result; None where it has one."""
+        """Why the work of a job has no result; None where it has one. Raises ClusterAwayError."""
         try:
             return future.result()
+        except ClusterAwayError:
+            raise
         except CancelledError:
             return INTERRUPTED
         except BrokenExecutor:

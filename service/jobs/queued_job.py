@@ -57,6 +57,14 @@ class QueuedJob:
         """Of the job; raises NotFoundError where it is gone."""
         return self.kind.items.folder(self.identifier)
 
+    def attempts(self) -> int:
+        """How often the work was begun and not given up in good order; 0 where nobody can tell."""
+        try:
+            record = Workspace(self.folder).read_record()
+        except NotFoundError:
+            return 0
+        return 0 if record is None else record.attempts
+
     def move(self, state: JobState, problem: JobProblem | None = None) -> bool:
         """Write a new state, if it may follow the present one.
 
@@ -107,7 +115,7 @@ class QueuedJob:
         return record
 
     def give_up(self) -> None:
-        """Have the job wait, because its work is ended with the service."""
+        """Have the job wait, because its work is ended with the service, or could not begin."""
         try:
             workspace = Workspace(self.folder)
             record = workspace.read_record()

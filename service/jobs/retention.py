@@ -1,13 +1,15 @@
 """What is kept for how long: old items go, and what is still relied upon stays."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 
+from service.errors import NotFoundError
 from service.jobs.index_keeper import IndexKeeper
 from service.jobs.item_facts import DAMAGED
-from service.store import ItemStore, RecordingStore
+from service.store import RecordingStore
 from service.store.database import ItemEntry, ItemQuery, ModelHistory
+from service.store.items import utc_now
 
 _ALL = 10**9
 
@@ -88,27 +90,95 @@ def plan_removal(
     return Removal(tuple(going), names)
 
 
-def remove(removal: Removal, items: Mapping[str, ItemStore], recordings: RecordingStore, keeper: IndexKeeper) -> None:
-    """Remove what was planned; no service may work with the folder.
+def remove(
+    removal: Removal,
+    removers: Mapping[str, Callable[[str], object]],
+    recordings: RecordingStore,
+    keeper: IndexKeeper,
+) -> Removal:
+    """Remove what was planned; what somebody else removed meanwhile is left out.
 
     Parameters
     ----------
     removal : Removal
         of `plan_removal`
-    items : mapping of str to ItemStore
-        folders of each kind of item
+    removers : mapping of str to callable
+        for each kind of item what removes one, given its identifier
     recordings : RecordingStore
         recordings on the server
     keeper : IndexKeeper
         brought up to date afterwards
+
+    Returns
+    -------
+    Removal
+        what went
 
     Raises
     ------
     OSError
         if something cannot be removed; what was removed before is gone
     """
-    for entry in removal.items:
-        items[entry.kind].remove(entry.identifier)
-    for name in removal.recordings:
-        recordings.remove(name)
+    items = tuple(entry for entry in removal.items if _is_gone(removers[entry.kind], entry.identifier))
+    names = tuple(name for name in removal.recordings if _is_gone(recordings.remove, name))
     keeper.sync(thorough=True)
+    return Removal(items, names)
+
+
+def _is_gone(remove_one: Callable[[str], object], name: str) -> bool:
+    """Whether it was there, and went."""
+    try:
+        remove_one(name)
+    except NotFoundError:
+        return False
+    return True
+
+
+class RetentionKeeper:
+    """A rule that is kept to while the service works, by the same ways by which its routes remove something."""
+
+    def __init__(
+        self,
+        rule: RetentionRule,
+        keeper: IndexKeeper,
+        history: ModelHistory,
+        recordings: RecordingStore,
+        removers: Mapping[str, Callable[[str], object]],
+        on_removed: Callable[[str, str], None],
+    ) -> None:
+        """Prepare; nothing goes before `tidy`.
+
+        Parameters
+        ----------
+        rule : RetentionRule
+            what may go
+        keeper : IndexKeeper
+            knows the items
+        history : ModelHistory
+            knows the models
+        recordings : RecordingStore
+            recordings on the server
+        removers : mapping of str to callable
+            for each kind of item what removes one, given its identifier
+        on_removed : callable
+            told the kind and the name of what went
+        """
+        self._rule, self._keeper, self._history = rule, keeper, history
+        self._recordings, self._removers, self._on_removed = recordings, removers, on_removed
+
+    def tidy(self) -> None:
+        """Remove what the rule lets go.
+
+        Raises
+        ------
+        StoreError
+            if the database does not answer; nothing goes then
+        OSError
+            if something cannot be removed
+        """
+        plan = plan_removal(self._keeper, self._history, self._recordings, self._rule, utc_now())
+        gone = remove(plan, self._removers, self._recordings, self._keeper)
+        for entry in gone.items:
+            self._on_removed(entry.kind, entry.identifier)
+        for name in gone.recordings:
+            self._on_removed("recording", name)

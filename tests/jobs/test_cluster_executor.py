@@ -2,19 +2,36 @@
 
 import os
 import signal
+import socket
+import subprocess
+import sys
+import time
 from collections.abc import Iterator
 from concurrent.futures import BrokenExecutor, Future, wait
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
 from jobs.paper_files import PAPER_ROBOT, write_recording
+from jobs.waiting import wait_until
+from patience import eventually
 from service.errors import StoreError
-from service.jobs import IdentificationOrder, IdentificationWorkspace, OrderedRecording, run_identification
-from service.jobs.executors import SCHEDULER, ClusterExecutor, open_executor
+from service.jobs import (
+    IdentificationOrder,
+    IdentificationWorkspace,
+    JobKind,
+    JobQueue,
+    JobState,
+    OrderedRecording,
+    Workspace,
+    run_identification,
+)
+from service.jobs.cluster_executor import SCHEDULER, ClusterAwayError, ClusterExecutor
+from service.jobs.executors import open_executor
 from service.jobs.worker_pool import WorkerPool
-from service.store import hash_file
+from service.store import ItemStore, hash_file
 
 if TYPE_CHECKING:
     from distributed import LocalCluster
@@ -57,7 +74,7 @@ def test_without_a_cluster_it_is_processes_of_our_own(monkeypatch: pytest.Monkey
 @pytest.mark.filterwarnings("ignore")
 def test_a_scheduler_that_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed", reason="needs tauscope[fleet]")
-    monkeypatch.setattr("service.jobs.executors.PATIENCE_S", 0.2)
+    monkeypatch.setattr("service.jobs.cluster_executor.PATIENCE_S", 0.2)
     monkeypatch.setenv(SCHEDULER, "tcp://127.0.0.1:1")
     with pytest.raises(StoreError, match=r"DASK_SCHEDULER_ADDRESS=tcp://127\.0\.0\.1:1: does not answer"):
         open_executor(1)
@@ -92,3 +109,117 @@ class TestOnACluster:
         wait([future], 120)
         assert future.result(0) is None
         assert workspace.read_result() is not None
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+@contextmanager
+def dask(program: str, *words: str) -> Iterator["subprocess.Popen[bytes]"]:
+    """A scheduler or a worker of its own, killed on leaving."""
+    command = [sys.executable, "-m", f"distributed.cli.dask_{program}", *words, "--no-dashboard"]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}  # workers import what is done
+    nowhere = subprocess.DEVNULL
+    with subprocess.Popen(command, env=environment, stdout=nowhere, stderr=nowhere) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+def stay(folder: Path) -> None:
+    """Work that ends by itself only where somebody says that it may; whoever is killed in it ends too."""
+    (folder / "begun").touch()
+    while not (folder.parent.parent / "go").exists():
+        time.sleep(0.05)
+
+
+class TestASchedulerThatDies:
+    pytestmark = CLUSTER
+
+    def test_its_jobs_are_done_when_it_is_back(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        """It is away for so long that Dask's own client gives up for good."""
+        pytest.importorskip("distributed", reason="needs tauscope[fleet]")
+        monkeypatch.setattr("service.jobs.cluster_executor.PATIENCE_S", 3)
+        port = str(free_port())
+        address = f"tcp://127.0.0.1:{port}"
+        scheduler = ("scheduler", "--host", "127.0.0.1", "--port", port)
+        worker = ("worker", address, "--nworkers", "1", "--nthreads", "1", "--no-nanny")
+        monkeypatch.setenv(SCHEDULER, address)
+        items = ItemStore(tmp_path / "jobs", "job")
+        kind = JobKind(items, stay)
+        with ExitStack() as later:
+            with dask(*scheduler), dask(*worker):
+                executor = opened_when_there(address)
+                later.callback(executor.shutdown, cancel_futures=True)
+                queue = JobQueue(
+                    [kind], executor, slots=lambda: executor.width, most_waiting=9, is_there=executor.is_there
+                )
+                running, waiting = (queue.submit(kind, items.stage()) for _ in range(2))
+                assert eventually((items.folder(running) / "begun").exists, 60)
+            assert eventually(lambda: executor._client.status == "closed", 60)
+            assert not queue.can_work()
+            with pytest.raises(ClusterAwayError):
+                executor.submit(divide, 1)
+            added = queue.submit(kind, items.stage())
+            assert {state(items, job) for job in (running, waiting, added)} == {"queued"}
+            (tmp_path / "go").touch()
+            later.enter_context(dask(*scheduler))
+            later.enter_context(dask(*worker))
+
+            def are_done() -> bool:
+                queue.settle()  # as housekeeping does
+                return {state(items, job) for job in (running, waiting, added)} == {"succeeded"}
+
+            assert eventually(are_done, 90)
+
+    @pytest.mark.parametrize("is_given_up", [False, True], ids=["a moment ago", "given up by Dask"])
+    def test_it_is_left_in_good_order_all_the_same(self, is_given_up: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+        pytest.importorskip("distributed", reason="needs tauscope[fleet]")
+        monkeypatch.setattr("service.jobs.cluster_executor.PATIENCE_S", 3)
+        port = str(free_port())
+        address = f"tcp://127.0.0.1:{port}"
+        with dask("scheduler", "--host", "127.0.0.1", "--port", port):
+            executor = opened_when_there(address)
+            future = executor.submit(divide, 1)
+        status = "closed" if is_given_up else "connecting"
+        assert eventually(lambda: executor._client.status == status, 60)
+        executor.shutdown(cancel_futures=True)
+        assert future.done()
+        with pytest.raises(RuntimeError, match="was left"):
+            executor.submit(divide, 1)
+
+    def test_workers_that_come_later_are_counted(self) -> None:
+        pytest.importorskip("distributed", reason="needs tauscope[fleet]")
+        port = str(free_port())
+        address = f"tcp://127.0.0.1:{port}"
+        with dask("scheduler", "--host", "127.0.0.1", "--port", port):
+            executor = opened_when_there(address)
+            assert executor.width == 1  # nobody is there, and whoever comes first has something to do
+            with dask("worker", address, "--nworkers", "1", "--nthreads", "3", "--no-nanny"):
+                wait_until(lambda: executor.width == 3)
+            executor.shutdown(cancel_futures=True)
+
+
+def opened_when_there(address: str) -> ClusterExecutor:
+    """The scheduler needs a moment to start."""
+    found: list[ClusterExecutor] = []
+
+    def is_there() -> bool:
+        try:
+            found.append(ClusterExecutor(address))
+        except StoreError:
+            return False
+        return True
+
+    assert eventually(is_there, 60)
+    return found[0]
+
+
+def state(items: ItemStore, job: str) -> JobState:
+    record = Workspace(items.folder(job)).read_record()
+    assert record is not None
+    return record.state

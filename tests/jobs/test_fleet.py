@@ -11,7 +11,8 @@ import pytest
 
 from jobs.executors import InlineExecutor, ManualExecutor
 from service.errors import RecordingError
-from service.jobs.fleet import LOST, FleetEntry, FleetResult, analyse_fleet, read_manifest
+from service.jobs.cluster_executor import ClusterAwayError
+from service.jobs.fleet import AWAY, LOST, FleetEntry, FleetResult, analyse_fleet, read_manifest
 from service.jobs.worker_pool import WorkerPool
 
 HEADER = "name,robot,recordings,held_out\n"
@@ -83,6 +84,24 @@ def test_those_that_were_in_a_pool_that_broke_are_done_again_one_by_one() -> Non
     found = list(analyse_fleet(entries(9), succeed, Path(), BreakingOnce(), 2))
     assert sorted(result.entry.row for result in found) == list(range(9))
     assert [result for result in found if result.error] == []
+
+
+@pytest.mark.parametrize(("most", "error"), [(5, None), (10**6, AWAY)], ids=["comes back", "stays away"])
+def test_a_cluster_that_is_away_loses_no_row(most: int, error: str | None) -> None:
+    class Away(InlineExecutor):
+        """Takes nothing for a while, or ever."""
+
+        refused = 0
+
+        def submit(self, fn, /, *args, **kwargs):
+            if self.refused < most:
+                self.refused += 1
+                raise ClusterAwayError("the scheduler is gone")
+            return super().submit(fn, *args, **kwargs)
+
+    found = list(analyse_fleet(entries(9), succeed, Path(), Away(), 2))
+    assert sorted(result.entry.row for result in found) == list(range(9))
+    assert {result.error for result in found} == {error}
 
 
 @pytest.mark.slow

@@ -31,7 +31,7 @@ class Audited:
 
     async def __call__(self, scope: AsgiScope, receive: Receive, send: Send) -> None:
         """Answer a request."""
-        if scope["type"] != "http" or not _is_noted(scope["method"], scope["path"]):
+        if scope["type"] != "http" or not is_noted(scope["method"], scope["path"]):
             return await self.app(scope, receive, send)
         trail = cast(AuditTrail, scope["app"].state.services.audit)
         method, path = scope["method"], scope["path"]
@@ -59,8 +59,16 @@ class Audited:
             trail.note(actor, action, address=address, status=status, subject=subject)
 
 
-def _is_noted(method: str, path: str) -> bool:
-    """Whether a request leaves an entry: not where it only reads, and not for signs of life."""
+def is_noted(method: str, path: str) -> bool:
+    """Whether a request leaves an entry: not where it only reads, and not for signs of life.
+
+    Parameters
+    ----------
+    method : str
+        of HTTP, in capitals
+    path : str
+        of the request
+    """
     return method not in ("GET", "HEAD", "OPTIONS") and not path.endswith("/heartbeat")
 
 

@@ -17,10 +17,13 @@ from service.api.problems import make_problem, problem_answer
 
 HEADER = "Idempotency-Key"
 
+LONGEST_KEY = 200
+"""Most characters of the header's value."""
+
 _REPEATABLE = re.compile(
     r"/api/v1/(runs|campaigns|identifications|diagnoses|excitations|recordings|schedules/[^/]+/run)"
 )
-_KEY = re.compile(r"[\x21-\x7e]{1,200}")
+_KEY = re.compile(rf"[\x21-\x7e]{{1,{LONGEST_KEY}}}")
 
 
 class Repeatable:
@@ -43,7 +46,7 @@ class Repeatable:
         if key is None or scope["method"] != "POST" or not is_repeatable(scope["path"]):
             return await self.app(scope, receive, send)
         if not _KEY.fullmatch(key):
-            text = f"header {HEADER}: give 1 to 200 characters without blanks, for example a UUID"
+            text = f"header {HEADER}: give 1 to {LONGEST_KEY} characters without blanks, for example a UUID"
             return await problem_answer(make_problem("invalid-request", text, scope["path"]))(scope, receive, send)
         store = cast(AnswerStore, scope["app"].state.services.answers)
         name = request_name(caller_of(scope).key or "local", scope["path"], key)

@@ -1,4 +1,4 @@
-"""What Prometheus is told: requests, jobs, runs, and how well the control loops kept their time."""
+"""What Prometheus is told: requests, jobs, runs, how well the control loops kept their time, and how models drift."""
 
 import threading
 import time
@@ -12,7 +12,7 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Histo
 from prometheus_client.registry import Collector
 
 from service.acquisition.record import RunRecord
-from service.jobs import Live
+from service.jobs import DriftWatch, Live
 
 CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 
@@ -54,6 +54,16 @@ class Metrics:
         """
         self.runs.labels(record.backend, record.state.value).inc()
         self.loops.add(record)
+
+    def watch_drift(self, drift: DriftWatch) -> None:
+        """Have it told how models drift.
+
+        Parameters
+        ----------
+        drift : DriftWatch
+            knows it
+        """
+        self.registry.register(ModelDrift(drift))
 
     def watch(self, name: str, text: str, value: Callable[[], float]) -> None:
         """Have a number asked for whenever somebody looks.
@@ -127,6 +137,39 @@ class LoopTimes(Collector):
         for state, count in Tally(live.state.value for live in lives).items():
             moving.add_metric([state], count)
         yield from (histogram, missed, stale, recent, moving)
+
+
+class ModelDrift(Collector):
+    """How far each robot's active model is from the one that drift is counted from; a series a parameter."""
+
+    def __init__(self, watch: DriftWatch) -> None:
+        """Prepare.
+
+        Parameters
+        ----------
+        watch : DriftWatch
+            knows it
+        """
+        self._watch = watch
+
+    def collect(self) -> Iterator[Metric]:
+        """Everything that is known of the models."""
+        labels = ["robot", "parameter"]
+        share = GaugeMetricFamily(
+            "tauscope_model_drift_ratio", "Change of a parameter since the reference, in parts of it", labels=labels
+        )
+        errors = GaugeMetricFamily(
+            "tauscope_model_drift_standard_errors", "The same change in its standard errors", labels=labels
+        )
+        events = GaugeMetricFamily(
+            "tauscope_model_drift_events", "Drifts beyond their bounds that nobody took note of", labels=["robot"]
+        )
+        for robot, found in self._watch.robots.items():
+            events.add_metric([robot], found.open_events)
+            for drift in found.drifts:
+                share.add_metric([robot, drift.name], drift.share)
+                errors.add_metric([robot, drift.name], drift.in_std)
+        yield from (share, errors, events)
 
 
 class TimedExecutor(Executor):

@@ -22,6 +22,8 @@ def obstacles(services: Services) -> list[str]:
         of the application
     """
     found = ["the service is ending"] if services.closing.is_set() else []
+    if not services.jobs.can_work():
+        found.append("the Dask cluster does not answer, and jobs wait for it")
     if services.audit.lost:
         found.append(f"{services.audit.lost} entries of the audit log were lost")
     return found + _disk_obstacles(services.settings.data_folder)

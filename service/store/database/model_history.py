@@ -3,7 +3,7 @@
 from datetime import datetime
 
 from sqlalchemy import select
-from sqlalchemy.orm import Session, undefer
+from sqlalchemy.orm import Session, aliased, undefer
 
 from service.errors import NotFoundError
 from service.identification import IdentificationDocument
@@ -152,6 +152,23 @@ class ModelHistory:
         with self._database.reading() as session:
             model = session.scalar(query)
             return None if model is None else _entry(model)
+
+    def active_and_reference(self, site: str) -> dict[str, tuple[str, str]]:
+        """Identifiers of the active model and of the one that drift is counted from, by name of the robot.
+
+        Parameters
+        ----------
+        site : str
+            of the data folder that holds the active one
+        """
+        active, reference = aliased(Model), aliased(Model)
+        query = (
+            select(Robot.name, active.identifier, reference.identifier)
+            .join(active, (active.robot_id == Robot.id) & active.is_active & (active.site == site))
+            .join(reference, (reference.robot_id == Robot.id) & reference.is_reference)
+        )
+        with self._database.reading() as session:
+            return {name: (now, then) for name, now, then in session.execute(query)}
 
     def models(self, robot: str | None, limit: int) -> list[ModelEntry]:
         """Models, the newest first.

@@ -1,6 +1,7 @@
 """Which requests leave which entries, and what happens where the log takes none."""
 
 import json
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -10,14 +11,16 @@ from starlette.testclient import TestClient
 
 from api.access.keyed import client_with, make_keys
 from api.conftest import HOST, IDENTIFICATIONS, RECORDINGS, connected
+from api.contract.test_route_scopes import CHANGING
 from api.motions import ROBOT, move_document
 from jobs.controls import HandControls, finish_at_once
 from jobs.executors import InlineExecutor
 from service.api import Settings, create_app
-from service.api.access.scopes import Scope
+from service.api.access.scopes import Scope, needed_scope
 from service.api.audit.log import AuditLog
 
 RUNS, LEASES = "/api/v1/runs", "/api/v1/leases"
+MOVING = (Scope.MOVE, Scope.ADMIN)
 MOTION = {"robot": ROBOT, "trajectory": move_document()}
 
 
@@ -53,6 +56,19 @@ def test_reading_leaves_none_and_refusals_do(settings: Settings) -> None:
         (f"DELETE {RECORDINGS}/nothing.csv", 404),
         (f"POST {IDENTIFICATIONS}", 422),
     ]
+
+
+def test_every_operation_that_changes_something_leaves_an_entry(settings: Settings) -> None:
+    """Signs of life apart, of which there are many."""
+    asked = [operation.split(" ") for operation in CHANGING if not operation.endswith("/heartbeat")]
+    addresses = [(method, re.sub(r"\{\w+\}", "7", path)) for method, path in asked]
+    entries = entries_after(settings, lambda client: [client.request(*address) for address in addresses])
+    noted = [entry["action"] for entry in entries if "status" in entry]
+    assert noted == [f"{method} {path}" for method, path in addresses]
+    first = [entry["action"] for entry in entries if entry["action"].startswith("asked: ")]
+    moves = [f"asked: {method} {path}" for method, path in addresses if needed_scope(method, path) in MOVING]
+    assert first == moves
+    assert len(moves) > 10
 
 
 def test_entries_name_the_key_and_hold_no_secret(settings: Settings) -> None:

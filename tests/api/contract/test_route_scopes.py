@@ -3,9 +3,11 @@
 import json
 import re
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 from fastapi import FastAPI
+from fastapi.routing import iter_route_contexts
 from starlette.testclient import TestClient
 
 from api.access.keyed import client_with, make_keys
@@ -54,8 +56,24 @@ OPEN: set[str] = {"GET /healthz", "GET /readyz"}
 """What anybody may ask, pages and the document itself apart."""
 
 
+UNDOCUMENTED: set[str] = {
+    "GET /",
+    "GET /docs",
+    "GET /docs/errors/{code}",
+    "GET /docs/how-to/{name}",
+    "GET /docs/pages.css",
+    "GET /openapi.json",
+    "GET /page/{name}",
+}
+"""Routes for people and programs of other kinds; nothing but reading."""
+
+
+def documented_paths() -> dict[str, Any]:
+    return json.loads(COMMITTED.read_text(encoding="utf-8"))["paths"]
+
+
 def operations() -> list[str]:
-    paths = json.loads(COMMITTED.read_text(encoding="utf-8"))["paths"]
+    paths = documented_paths()
     return sorted(f"{method.upper()} {path}" for path, methods in paths.items() for method in methods)
 
 
@@ -92,6 +110,7 @@ def test_who_may_do_what(operation: str, key: Scope | None, service: tuple[FastA
         assert answer.status_code != 401
         assert "forbidden" not in answer.text
         assert answer.status_code < 500, answer.text
+        assert str(answer.status_code) in documented_paths()[path][method.lower()]["responses"], answer.text
     elif key is None:
         assert_problem(answer, "unauthorized", 401)
     else:
@@ -114,8 +133,17 @@ def test_what_nobody_has_placed_is_not_read_without_a_key(path: str) -> None:
 
 
 def test_the_document_says_which_scope_is_needed() -> None:
-    paths = json.loads(COMMITTED.read_text(encoding="utf-8"))["paths"]
+    paths = documented_paths()
     for operation in operations():
         method, path = operation.split(" ")
         stated = paths[path][method.lower()].get("x-tauscope-scope")
         assert stated == (expected_scope(operation) and str(expected_scope(operation)))
+
+
+def test_every_route_is_in_the_document_or_only_shows_something(service: tuple[FastAPI, dict[Scope, str]]) -> None:
+    """What is in no document would be in none of these tests."""
+    app, _ = service
+    routes = list(iter_route_contexts(app.routes))
+    found = {f"{method} {route.path}" for route in routes for method in (route.methods or {"ANY"}) - {"HEAD"}}
+    assert found - set(operations()) == UNDOCUMENTED
+    assert set(operations()) <= found

@@ -1,6 +1,7 @@
 """Metrics: what was done is counted, loops as they are timed, and the names of things without number are no labels."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from fastapi import FastAPI
@@ -10,12 +11,15 @@ from starlette.testclient import TestClient
 from api.access.keyed import client_with
 from api.conftest import HOST
 from api.motions import ROBOT, move_document
+from identified import candidate, identified
 from jobs.controls import HandControls
 from jobs.executors import InlineExecutor, ManualExecutor
 from jobs.waiting import wait_until
 from service.acquisition import RunState
 from service.acquisition.timing import Timing
 from service.api import Settings, create_app
+from service.api.services import Services
+from snapshots import SNAPSHOTS, unpacked
 
 RUNS = "/api/v1/runs"
 MOTION = {"robot": ROBOT, "trajectory": move_document()}
@@ -95,6 +99,23 @@ def test_jobs_are_timed_by_kind_and_outcome(settings: Settings) -> None:
         found = samples(app)
         assert found["tauscope_job_seconds_count", ("excitation", "failed")] == 1.0
         assert found["tauscope_jobs_waiting", ()] == 0.0
+
+
+def test_how_models_drift(tmp_path: Path) -> None:
+    settings = Settings(data_folder=unpacked(SNAPSHOTS[-1], tmp_path))
+    app = create_app(settings, InlineExecutor())
+    with TestClient(app, base_url=HOST):
+        services: Services = app.state.services
+        (reference,) = (each for each in services.models.history.models("snapshot-arm", 10) if each.state == "active")
+        viscous = services.models.history.document(reference.identifier).friction[0].viscous
+        document = identified({"viscous": 1.5 * viscous}, friction__0__std__viscous=0.001)
+        newer = candidate(364, document, robot="snapshot-arm", site=reference.site, source=reference.source)
+        assert services.models.history.consider(newer, newer.created).state == "active"
+        of_robot = ("snapshot-arm",)
+        wait_until(lambda: samples(app).get(("tauscope_model_drift_events", of_robot)) == 1.0)
+        found, of_parameter = samples(app), ("viscous shoulder", *of_robot)
+        assert found["tauscope_model_drift_ratio", of_parameter] == pytest.approx(0.5)
+        assert found["tauscope_model_drift_standard_errors", of_parameter] > 6.0
 
 
 def test_requests_are_counted_by_the_pattern_of_their_route(app: FastAPI) -> None:

@@ -60,6 +60,11 @@ def test_a_service_that_ends_or_has_lost_entries(client: TestClient) -> None:
     assert "ending" in assert_problem(client.get("/readyz"), "not-ready", 503)["detail"]
 
 
+def test_a_cluster_that_is_away(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(services_of(client).jobs, "can_work", lambda: False)
+    assert "Dask cluster" in assert_problem(client.get("/readyz"), "not-ready", 503)["detail"]
+
+
 @pytest.fixture
 def logged() -> Iterator[io.StringIO]:
     """What is logged as JSON."""
