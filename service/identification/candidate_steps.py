@@ -24,15 +24,15 @@ COLLINEAR = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class JointGrid:
-    """One joint's candidate columns after projection.
+    """One joint's candidate columns after projection: a step of every slope, and v|v| as the last.
 
     slopes : (g,) float64
         candidate constants
-    gram : (g, g) float64
+    gram : (g + 1, g + 1) float64
         GᵀG of its columns, before projection
-    inner : (z, g) float64
+    inner : (z, g + 1) float64
         Q_jᵀ G: what the projection takes away
-    target : (g,) float64
+    target : (g + 1,) float64
         Gᵀ y after projection
     """
 
@@ -40,6 +40,11 @@ class JointGrid:
     gram: Array
     inner: Array
     target: Array
+
+    @property
+    def bend(self) -> int:
+        """The candidate v|v|: viscous friction that bends with speed, which the model itself does not have."""
+        return len(self.slopes)
 
     def block(self, other: "JointGrid", mine: list[int], theirs: list[int]) -> Array:
         """Projected Gram matrix between columns of two joints.
@@ -81,9 +86,9 @@ def projected_grids(
         every joint's candidates [s/rad or s/m]
     """
     joints = range(structure.robot.joint_count)
-    gram = [np.zeros((len(values), len(values))) for values in slopes]
-    cross = [np.zeros((len(shared), len(values))) for values in slopes]
-    target = [np.zeros(len(values)) for values in slopes]
+    gram = [np.zeros((len(values) + 1, len(values) + 1)) for values in slopes]
+    cross = [np.zeros((len(shared), len(values) + 1)) for values in slopes]
+    target = [np.zeros(len(values) + 1) for values in slopes]
     for prepared in motions:
         for joint in joints:
             columns = prepared.joint_columns(structure, joint)
@@ -92,7 +97,8 @@ def projected_grids(
             place = np.searchsorted(shared, index[kept])
             velocity = prepared.motion.velocity[:, joint]
             weight = prepared.used[joint] * (prepared.row_weight / noise_std[joint])
-            steps = weight * prepared.motion.band.reduce(smooth_sign(velocity, slopes[joint][:, None]))
+            candidates = np.vstack([smooth_sign(velocity, slopes[joint][:, None]), velocity * np.abs(velocity)])
+            steps = weight * prepared.motion.band.reduce(candidates)
             common = weight * columns[kept]
             residual = weight * prepared.reduced_torque[joint] - solution.parameters[place] @ common
             gram[joint] += steps @ steps.T
@@ -121,9 +127,9 @@ def total_gain(grids: list[JointGrid], chosen: list[list[int]]) -> float:
 class Conditional:
     """One joint's candidates after the chosen columns of all other joints are projected off as well.
 
-    gram : (g, g) float64
+    gram : (g + 1, g + 1) float64
         Gram matrix of the candidates
-    target : (g,) float64
+    target : (g + 1,) float64
         their products with the torque
     """
 
@@ -143,7 +149,7 @@ class Conditional:
         joint : int
             joint index, from 0
         """
-        grid, every = grids[joint], list(range(len(grids[joint].slopes)))
+        grid, every = grids[joint], list(range(len(grids[joint].target)))
         gram, target = grid.block(grid, every, every), grid.target
         others = [(grids[k], chosen[k]) for k in range(len(grids)) if k != joint]
         if not others:

@@ -80,6 +80,7 @@ def estimate_shapes(
     unit: Array,
     stribeck: Sequence[bool],
     speed: Array,
+    tight: Sequence[bool] | None = None,
 ) -> tuple[EstimatedShape, ...]:
     """Shape constants of all joints; those that the robot file states are kept.
 
@@ -100,6 +101,8 @@ def estimate_shapes(
         joints at which a Stribeck term of unknown δ may be proposed
     speed : (n,) float64
         rms velocity of every joint, which the candidates are relative to [rad/s or m/s]
+    tight : sequence of bool, length n, or None
+        joints whose K_v has a small standard error, which is as good as a profile that falls; none where None
 
     Returns
     -------
@@ -123,7 +126,8 @@ def estimate_shapes(
         residual_energy = factors[joint].rows * variance
         if stribeck[joint] and shape.delta is None:
             indices = _with_stribeck(conditional, grid, indices, shape, variance, residual_energy)
-        described.append(_described(conditional, grid, indices, shape, float(unit[joint]), residual_energy))
+        is_tight = tight is not None and tight[joint]
+        described.append(_described(conditional, grid, indices, shape, float(unit[joint]), residual_energy, is_tight))
     return tuple(described)
 
 
@@ -193,8 +197,15 @@ def _described(
     shape: FrictionShape,
     unit: float,
     residual_energy: float,
+    is_tight: bool,
 ) -> EstimatedShape:
-    """The joint's constants refined, with what the data can tell about them; `unit` is one noise variance."""
+    """The joint's constants refined, with what the data can tell about them; `unit` is one noise variance.
+
+    A gentle step has a long tail: A(K_v v) = 1 - 2/(π K_v v) for large v. It stands in for viscous friction that bends
+    with speed, which the model has no other column for, and the slope it takes for that is wrong at the low speeds that
+    it is there for. So K_v is known only where the passage through zero tells it: where steeper steps fit clearly worse
+    even beside a column v|v|. That column is for the question alone and never in the model.
+    """
     slopes = grid.slopes
     k_v, k_v_known = float(slopes[indices[0]]), True
     delta, delta_known = shape.delta, shape.delta is not None
@@ -202,8 +213,13 @@ def _described(
         steps = [k for k in _steps(grid, shape) if len(indices) == 1 or slopes[k] >= SEPARATION * slopes[indices[1]]]
         profile = conditional.gains([[k, *indices[1:]] for k in steps])
         k_v, k_v_known = _peak(profile, slopes[steps], KNOWN_BAND * unit)
-        if not k_v_known and len(indices) == 1:
-            k_v = _ordinary(profile, slopes[steps], grid, unit, residual_energy)
+        k_v_known = k_v_known or is_tight
+        if len(indices) == 1:
+            if k_v_known:
+                profile = conditional.gains([[k, grid.bend] for k in steps])
+                k_v_known = bool(profile[-1] <= profile.max() - KNOWN_BAND * unit)
+            if not k_v_known:
+                k_v = _ordinary(profile, slopes[steps], grid, unit, residual_energy)
     if shape.delta is None and len(indices) > 1:
         gentle = [d for d in range(GRID_POINTS) if slopes[indices[0]] >= SEPARATION * slopes[d]]
         profile = conditional.gains([[indices[0], d] for d in gentle])

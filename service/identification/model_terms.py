@@ -81,7 +81,8 @@ def _estimated_shapes(motions: Dataset, structure: ModelStructure, speed: Array)
         shape.delta is not None and not shape.delta_given and bool(gains[joint] >= SIGNIFICANT)
         for joint, shape in enumerate(proposed)
     ]
-    found = estimate_shapes(motions, structure, factors, noise_std, unit, supported, speed)
+    known = ["k_v" in names for names in tight]
+    found = estimate_shapes(motions, structure, factors, noise_std, unit, supported, speed, known)
     return tuple(
         _with_tight(shape, best, tight[joint]) for joint, (shape, best) in enumerate(zip(found, refined, strict=True))
     )
@@ -96,8 +97,8 @@ def _with_tight(shape: EstimatedShape, refined: EstimatedShape, tight: set[str])
     paired = shape.delta is not None and not shape.delta_given
     if paired:
         shape = replace(shape, delta=refined.delta, delta_identifiable="delta" in tight)
-    if not shape.k_v_given and (paired or "k_v" in tight):
-        shape = replace(shape, k_v=refined.k_v, k_v_identifiable=shape.k_v_identifiable or "k_v" in tight)
+    if not shape.k_v_given and (paired or (shape.k_v_identifiable and "k_v" in tight)):
+        shape = replace(shape, k_v=refined.k_v)
     return shape
 
 

@@ -17,7 +17,7 @@ from identification.simulated import (
     with_shapes,
     z_scores,
 )
-from service.identification import Identification, document, identify
+from service.identification import Identification, Options, document, identify
 from service.identification.friction_shape import shape_parameters
 from service.robot import FrictionCoefficients, FrictionShape, Model, Robot
 
@@ -182,6 +182,34 @@ def test_an_ideal_step_does_not_let_the_slope_run_away(noise: float) -> None:
             std = standard_errors(result)[column]
             # A smooth step of finite slope stands in for the sign: that misfit is a few thousandths of the level.
             assert abs(result.free_parameters[column] - level[joint]) <= 4.5 * std + 0.02 * level[joint]
+
+
+@pytest.mark.parametrize("level", [0.2, 0.5])
+@pytest.mark.parametrize("noise", [1.0, 3.0])
+def test_viscous_friction_that_bends_is_not_taken_for_a_gentle_step(level: float, noise: float) -> None:
+    """The tail of a gentle step fits friction that grows less than in proportion with speed; the truth has no slope."""
+    still = [FrictionCoefficients(0.0, 0.0, 0.5)] * 3
+    arm = simulate(paper_robot(), seed=3, friction=still)
+    velocity, speed = arm.exact.exact.velocity, rms_speed(arm)
+    bent = 2.0 * np.sign(velocity) - level * velocity * np.abs(velocity) / speed**2
+    for seed in range(2):
+        drawn = arm.white(noise * PAPER_NOISE, np.random.default_rng(seed))
+        recording = arm.recording(drawn, extra_torque=bent)
+        # So narrow a band blurs every passage through zero: what is left of a slope is its tail.
+        result = identify(unknown(arm.robot), [recording], options=Options(cutoff_hz=2.0))
+        for shape, own in zip(result.shapes, speed, strict=True):
+            assert not shape.k_v_identifiable
+            assert shape.delta is None
+            assert ORDINARY[0] <= shape.k_v * own <= STEEPEST
+
+
+def test_a_gentle_step_is_known_by_the_passage_through_zero() -> None:
+    """Beside it friction may bend as it likes: the slope of a step that is gentle indeed stays known."""
+    arm = simulate(with_shapes(paper_robot(), 25.0, 1.0), seed=2, friction=WITHOUT_STRIBECK)
+    for seed in range(4):
+        result = identified(arm, 0.1 * PAPER_NOISE, seed)
+        assert all(shape.k_v_identifiable for shape in result.shapes)
+        assert [shape.k_v for shape in result.shapes] == pytest.approx([25.0] * 3, rel=0.2)
 
 
 def test_a_joint_without_friction_has_none() -> None:

@@ -32,15 +32,15 @@ HELD_OUT_BOUNDS = {
     "franka-panda": (10.0, 1.81),
     "double-pendulum": (8.0, 10.1),
     "bam-xl330": (12.0, 29.7),
+    "staubli-tx40": (30.0, 21.1),
 }
-"""Cut-off [Hz] and held-out relative error [%] of the data README (LWR4+: its physically consistent figure); the TX40
-is in `test_found_defects`."""
+"""Cut-off [Hz] and held-out relative error [%] of the data README (LWR4+: its physically consistent figure)."""
 
-BANDS = {name: cutoff for name, (cutoff, _) in HELD_OUT_BOUNDS.items()} | {"staubli-tx40": 30.0}
+LESS_LEFT_OUT = "the recipe leaves out less of the edges than our conditioning, and counts rows it never learnt from"
 
 STANDARD = ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz", "m", "msx", "msy", "msz")
 
-ALL_SETS = (*BANDS, "odrive-cogging")
+ALL_SETS = (*HELD_OUT_BOUNDS, "odrive-cogging")
 
 
 @cache
@@ -129,16 +129,26 @@ def test_held_out_error_is_no_worse_than_the_readmes(name: str) -> None:
     assert 100.0 * result.held_out.relative_error <= bound
 
 
-@pytest.mark.parametrize("name", [name for name in HELD_OUT_BOUNDS if name != "bam-xl330"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "emps",
+        "kuka-lwr4",
+        "franka-panda",
+        "double-pendulum",
+        pytest.param("bam-xl330", marks=pytest.mark.xfail(reason=f"30.1 %: {LESS_LEFT_OUT}", strict=True)),
+        pytest.param("staubli-tx40", marks=pytest.mark.xfail(reason=f"21.2 %: {LESS_LEFT_OUT}", strict=True)),
+    ],
+)
 def test_held_out_error_by_the_readmes_own_recipe(name: str) -> None:
     cutoff, bound = HELD_OUT_BOUNDS[name]
     result = identified(name, cutoff)
     assert relative_error_by_recipe(result, result.parameters, real_set(name)[2]) <= bound
 
 
-@pytest.mark.parametrize("name", BANDS)
+@pytest.mark.parametrize("name", HELD_OUT_BOUNDS)
 def test_links_are_possible_and_nearly_as_good(name: str) -> None:
-    result = identified(name, BANDS[name])
+    result = identified(name, HELD_OUT_BOUNDS[name][0])
     found = document(result)
     for number, link in enumerate(links_of(found), 1):
         assert np.linalg.eigvalsh(pseudo_inertia(link)).min() > 0.0, f"link {number}"
@@ -151,9 +161,9 @@ def test_links_are_possible_and_nearly_as_good(name: str) -> None:
     assert consistent <= min(free_held_out_error(result, name), consistent) + 1.0
 
 
-@pytest.mark.parametrize("name", BANDS)
+@pytest.mark.parametrize("name", HELD_OUT_BOUNDS)
 def test_the_stated_links_are_the_model_that_was_judged(name: str) -> None:
-    result = identified(name, BANDS[name])
+    result = identified(name, HELD_OUT_BOUNDS[name][0])
     found = document(result)
     standard = np.concatenate([link.to_vector() for link in links_of(found)])
     names = [f"{parameter}{link + 1}" for link in range(result.robot.joint_count) for parameter in STANDARD]
@@ -162,9 +172,9 @@ def test_the_stated_links_are_the_model_that_was_judged(name: str) -> None:
     np.testing.assert_allclose(base, result.consistent_parameters[: len(base)], rtol=0, atol=1e-9 * np.abs(base).max())
 
 
-@pytest.mark.parametrize("name", BANDS)
+@pytest.mark.parametrize("name", HELD_OUT_BOUNDS)
 def test_the_stated_fit_is_the_recipes(name: str) -> None:
-    result = identified(name, BANDS[name])
+    result = identified(name, HELD_OUT_BOUNDS[name][0])
     assert result.held_out is not None
     by_recipe = relative_error_by_recipe(result, result.parameters, real_set(name)[2])
     assert 100.0 * result.held_out.relative_error == pytest.approx(by_recipe, rel=0.08)
