@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -52,6 +53,8 @@ def test_it_is_watched_through_reload_and_lost_connection_and_stopped(
     page.reload()
     expect(joints).to_be_visible()
     expect(page.locator(".canvas canvas").nth(1)).to_be_visible()
+    expect(page.get_by_role("button", name="joint1", exact=True).first).to_be_visible()
+    expect(page.get_by_text(re.compile(r"^([1-9]\.\d+|\d{2}.*) of 1502 s$"))).to_be_visible()
     visit.keep("page-live", tmp_path)
     visit.context.set_offline(True)
     expect(page.locator("#link-state")).to_have_text("Not connected")

@@ -55,7 +55,7 @@ function finished(run, arm) {
 export function liveMonitor(id) {
   const bar = h("progress", { max: "100", value: "0", "aria-label": t`Played` });
   const words = h("p", { class: "meta", text: t`Waiting for the arm` });
-  const joints = h("div", { class: "joints" });
+  const joints = h("div", { class: "joints-now" });
   const jitter = h("p", { class: "meta" });
   const plots = h("div", {});
   const pose = h("div", {});
@@ -65,7 +65,9 @@ export function liveMonitor(id) {
   let arm = [];
   const rows = { position: [], effort: [] };
 
-  getJson(`runs/${id}/robot`).then(({ report }) => { arm = report.joints; drawing = armDrawing(report); render(pose, drawing.element); }).catch(() => {});
+  let isKnown = false; // whether it has been answered what the joints are called
+  getJson(`runs/${id}/robot`).then(({ report }) => { arm = report.joints; drawing = armDrawing(report); render(pose, drawing.element); })
+    .catch(() => {}).finally(() => { isKnown = true; });
 
   function begin(count) {
     const together = group();
@@ -81,6 +83,7 @@ export function liveMonitor(id) {
     if (event.step) words.textContent = named(event.step);
     if (event.percent !== undefined && event.percent !== null) bar.value = event.percent;
     if (!data.position) return;
+    if (!isKnown) return;
     if (!charts) begin(data.position.length);
     if (times.length && data.time_s <= times[times.length - 1]) return;
     times.push(data.time_s);
