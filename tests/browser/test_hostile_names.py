@@ -47,13 +47,26 @@ def test_a_file_name_is_text_where_it_is_refused(visit: Visit) -> None:
     untouched(visit)
 
 
-def test_a_column_s_name_is_text(visit: Visit, service: Served) -> None:
-    rows = "".join(f"{k / 100},{k / 1000},{k % 7},0\n" for k in range(300))
+def test_a_column_s_name_is_text_where_it_is_told(visit: Visit, service: Served) -> None:
     head = MARKUP.replace(",", "").replace('"', "'")
-    content = f"t,q1,tau1,{head}\n{rows}".encode()
+    rows = "".join(f"{k / 100},{k / 1000},{k % 7}\n" for k in range(300))
+    content = f"t,q1,{head}\n{rows}".encode()
     assert service.client.post(RECORDINGS, files={"file": ("columns.csv", content)}).status_code == 201
     visit.go("/recordings/columns.csv")
-    expect(visit.page.get_by_role("heading", name="Channels")).to_be_visible()
+    expect(visit.page.get_by_role("alert").filter(has_text=f"the columns are t, q1, {head[:60]}")).to_be_visible()
+    untouched(visit)
+
+
+def test_a_robot_of_the_list_and_its_address_are_text(visit: Visit, service: Served) -> None:
+    parts = {
+        "robot": ("hostile.yaml", ROBOT.encode()),
+        "recordings": ("short.csv", b"t,q1,tau1\n0,0,0\n1,0.1,1\n2,0,0\n"),
+    }
+    assert service.client.post("/api/v1/identifications", files=parts).status_code == 202
+    visit.go("/robots")
+    visit.page.get_by_role("link", name=MARKUP).click()
+    expect(visit.page.get_by_role("heading", name=MARKUP, level=1)).to_be_visible()
+    expect(visit.page.get_by_role("img", name=f"Kinematic chain of {MARKUP}")).to_be_visible()
     untouched(visit)
 
 

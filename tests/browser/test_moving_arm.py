@@ -2,7 +2,9 @@
 
 import json
 import math
+import re
 from collections.abc import Mapping
+from pathlib import Path
 
 import pytest
 from playwright.sync_api import expect
@@ -39,7 +41,9 @@ def state(service: Served, identifier: str) -> str:
     return service.client.get(f"/api/v1/runs/{identifier}").json()["state"]
 
 
-def test_it_is_watched_through_reload_and_lost_connection_and_stopped(visit: Visit, service: Served) -> None:
+def test_it_is_watched_through_reload_and_lost_connection_and_stopped(
+    visit: Visit, service: Served, tmp_path: Path
+) -> None:
     page, identifier = visit.page, begin(service)
     visit.go(f"/runs/{identifier}")
     joints = page.get_by_role("region", name="Joints now")
@@ -48,6 +52,10 @@ def test_it_is_watched_through_reload_and_lost_connection_and_stopped(visit: Vis
     expect(page.locator("#link-state")).to_have_text("An arm is in use")
     page.reload()
     expect(joints).to_be_visible()
+    expect(page.locator(".canvas canvas").nth(1)).to_be_visible()
+    expect(page.get_by_role("button", name="joint1", exact=True).first).to_be_visible()
+    expect(page.get_by_text(re.compile(r"^([1-9]\.\d+|\d{2}.*) of 1502 s$"))).to_be_visible()
+    visit.keep("page-live", tmp_path)
     visit.context.set_offline(True)
     expect(page.locator("#link-state")).to_have_text("Not connected")
     expect(page.get_by_role("alert").filter(has_text="emergency stop")).to_be_visible()

@@ -1,6 +1,7 @@
 // The kinematic chain as a drawing that turns: joints along their axes, links between them, in any pose.
 
 import { h, s } from "./dom.js";
+import { named, t } from "./words.js";
 
 const multiply = (a, b) => Array.from({ length: 16 }, (_, k) => {
   const row = k >> 2;
@@ -41,7 +42,7 @@ export function armDrawing(report) {
   let azimuth = 0.7;
   let q = joints.map(() => 0);
   const svg = s("svg", { viewBox: "0 0 400 320", class: "arm", role: "img", tabindex: "0",
-    "aria-label": `Kinematic chain of ${report.name}: ${joints.length} joints. Arrow keys turn it.` });
+    "aria-label": t`Kinematic chain of ${report.name}: ${joints.length} joints. Arrow keys turn it.` });
 
   const reach = Math.max(0.1, joints.reduce((sum, joint) =>
     sum + Math.hypot(joint.before[3], joint.before[7], joint.before[11]) + Math.hypot(joint.after[3], joint.after[7], joint.after[11]), 0));
@@ -99,7 +100,7 @@ export function armDrawing(report) {
 export function jointRows(report, number) {
   const unit = (joint) => (joint.type === "prismatic" ? "m" : "rad");
   return report.joints.map((joint) => [
-    `${joint.number}`, joint.name, joint.type,
+    `${joint.number}`, joint.name, named(joint.type),
     joint.limits.position ? `${joint.limits.position.map((v) => number(v, 3)).join(" … ")} ${unit(joint)}` : "–",
     joint.limits.velocity ? `${number(joint.limits.velocity, 3)} ${unit(joint)}/s` : "–",
     joint.limits.torque ? `${number(joint.limits.torque, 3)} ${joint.type === "prismatic" ? "N" : "Nm"}` : "–",

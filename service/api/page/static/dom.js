@@ -1,5 +1,7 @@
 // Elements made from text only: whatever a name holds, it is never read as markup.
 
+import { language, named, t } from "./words.js";
+
 const LONG = 60; // letters of a cell that may fill several lines
 const SVG = "http://www.w3.org/2000/svg";
 
@@ -54,7 +56,7 @@ const PRISMATIC = { ...OF_ANY, position: "m", velocity: "m/s", acceleration: "m/
 export function unitsOf(type) {
   if (type === "prismatic") return PRISMATIC;
   if (type === "revolute") return REVOLUTE;
-  return Object.fromEntries(Object.entries(REVOLUTE).map(([name, own]) => [name, own === PRISMATIC[name] ? own : `${own} or ${PRISMATIC[name]}`]));
+  return Object.fromEntries(Object.entries(REVOLUTE).map(([name, own]) => [name, own === PRISMATIC[name] ? own : t`${own} or ${PRISMATIC[name]}`]));
 }
 
 /** A value and its standard error, to the error's second digit. */
@@ -75,15 +77,18 @@ export function percent(share) {
   return `${Math.abs(percents) < 99.5 ? percents.toPrecision(2) : percents.toFixed(0)} %`;
 }
 
+// English in the reader's own manner, as of Britain or of America.
+const LOCALE = navigator.languages.find((each) => each.startsWith(language)) ?? language;
+
 /** A moment as people say it. */
 export function moment(text) {
   if (!text) return "–";
-  return new Date(text).toLocaleString(undefined, { dateStyle: "medium", timeStyle: "short" });
+  return new Date(text).toLocaleString(LOCALE, { dateStyle: "medium", timeStyle: "short" });
 }
 
 /** An id such as load_dependent_friction as a heading. */
 export function title(id) {
-  const words = id.replaceAll("_", " ");
+  const words = named(id);
   return words.charAt(0).toUpperCase() + words.slice(1);
 }
 
@@ -105,15 +110,21 @@ export function table(caption, columns, rows, words = 1) {
 export function state(name) {
   const marks = { succeeded: "●", finished: "●", failed: "✕", damaged: "✕", interrupted: "✕", cancelled: "■", stopped: "■" };
   const kind = ["succeeded", "finished"].includes(name) ? "good" : marks[name] ? "bad" : "live";
-  return h("span", { class: `state ${kind}` }, h("span", { "aria-hidden": "true" }, marks[name] ?? "◐"), ` ${name}`);
+  return h("span", { class: `state ${kind}` }, h("span", { "aria-hidden": "true" }, marks[name] ?? "◐"), ` ${named(name)}`);
 }
 
 /** What went wrong, and the page that explains its code: in a tab of its own, since this one may be watching an arm. */
 export function explained(problem) {
   const { code } = problem;
-  const other = code === "forbidden" ? [" · ", h("button", { type: "button", class: "link", text: "Use another key", onclick: () => window.dispatchEvent(new CustomEvent("tauscope:ask-key", { detail: problem })) })] : null;
-  const more = code ? h("a", { href: `/docs/errors/${encodeURIComponent(code)}`, target: "_blank", rel: "noopener", text: `What ${code} means` }) : null;
-  return [problem.detail ?? problem.message, more ? [" · ", more] : null, other];
+  const other = code === "forbidden" ? [" · ", h("button", { type: "button", class: "link", text: t`Use another key`, onclick: () => window.dispatchEvent(new CustomEvent("tauscope:ask-key", { detail: problem })) })] : null;
+  const more = code ? h("a", { href: `/docs/errors/${encodeURIComponent(code)}`, target: "_blank", rel: "noopener", text: t`What ${code} means` }) : null;
+  return [h("span", { lang: "en", text: problem.detail ?? problem.message }), more ? [" · ", more] : null, other];
+}
+
+/** What the service doubts in a file; nothing where that is little. */
+export function cautions(findings) {
+  const doubts = findings.filter((each) => each.severity !== "info");
+  return doubts.length ? h("ul", { class: "cautions" }, doubts.map((each) => h("li", { lang: "en", text: `${each.where}: ${each.text}` }))) : null;
 }
 
 /** Large numbers at the top of a page. */

@@ -1,6 +1,7 @@
 // Where the residual is: joints × state, each cell the residual in it as a multiple of the noise.
 
 import { h, number, s } from "./dom.js";
+import { named, t } from "./words.js";
 
 const LEVELS = [1.1, 1.3, 1.6, 2, 3, 5, 10];
 export const VARIABLES = ["velocity", "position", "load", "acceleration", "time"];
@@ -12,15 +13,23 @@ const TOP = 24;
 
 const level = (ratio) => LEVELS.filter((edge) => ratio > edge).length;
 
-/** The map; `choose(joint, variable, bin)` is told which cell was clicked. */
+/** The map; `choose(joint, variable, bin, words)` is told which cell was clicked, or reached with the arrow keys. */
 export function heatMap(plots, joints, key, choose) {
   const group = (WIDTH - LABELS - GAP * (VARIABLES.length - 1)) / VARIABLES.length;
   const height = TOP + ROW * joints.length + 40;
   const parts = [];
+  const rows = joints.map(() => []);
+  let chosen = null;
+  function take(cell) {
+    chosen?.element.classList.remove("chosen");
+    chosen = cell;
+    cell.element.classList.add("chosen");
+    choose(joints[cell.row], cell.variable, cell.bin, cell.words);
+  }
   VARIABLES.forEach((variable, place) => {
     const left = LABELS + place * (group + GAP);
-    parts.push(s("text", { x: left, y: TOP - 8, text: variable }));
-    const words = variable === "time" ? ["start", "end"] : ["lowest", "highest"];
+    parts.push(s("text", { x: left, y: TOP - 8, text: named(variable) }));
+    const words = variable === "time" ? [t`start`, t`end`] : [t`lowest`, t`highest`];
     parts.push(s("text", { class: "small", x: left, y: height - 26, text: words[0] }));
     parts.push(s("text", { class: "small", x: left + group, y: height - 26, "text-anchor": "end", text: words[1] }));
     joints.forEach((joint, row) => {
@@ -29,20 +38,37 @@ export function heatMap(plots, joints, key, choose) {
       const step = group / own[key].length;
       own[key].forEach((value, bin) => {
         const ratio = value / own.noise;
-        const cell = s("rect", { class: `h${level(ratio)}`, x: left + bin * step, y: TOP + row * ROW, width: step, height: ROW - 3,
-          "data-cell": `${row}-${variable}-${bin}`, onclick: () => choose(joint, variable, bin) },
-        s("title", { text: `${joint}, ${variable} ${number(own.edges[bin], 3)} … ${number(own.edges[bin + 1], 3)}: ${number(ratio, 3)} × noise` }));
-        parts.push(cell);
+        const words = t`${joint}, ${named(variable)} ${number(own.edges[bin], 3)} … ${number(own.edges[bin + 1], 3)}: ${number(ratio, 3)} × noise`;
+        const cell = { row, place: rows[row].length, variable, bin, words };
+        cell.element = s("rect", { class: `h${level(ratio)}`, x: left + bin * step, y: TOP + row * ROW, width: step, height: ROW - 3,
+          "data-cell": `${row}-${variable}-${bin}`, onclick: () => take(cell) }, s("title", { text: words }));
+        rows[row].push(cell);
+        parts.push(cell.element);
       });
     });
   });
   joints.forEach((joint, row) => parts.push(s("text", { x: 0, y: TOP + row * ROW + 15, text: joint.length > 14 ? `${joint.slice(0, 13)}…` : joint })));
-  ["noise", ...LEVELS.map((edge) => `> ${edge} ×`)].forEach((word, place) => {
+  [t`noise`, ...LEVELS.map((edge) => `> ${edge} ×`)].forEach((word, place) => {
     const x = LABELS + 84 * place;
     parts.push(s("rect", { class: `h${place}`, x, y: height - 14, width: 16, height: 11 }));
     parts.push(s("text", { class: "small", x: x + 21, y: height - 5, text: word }));
   });
-  const label = `Residual by joint and state as a multiple of the noise, ${key === "before" ? "without" : "with"} the findings`;
-  return h("div", { class: "wide", tabindex: "0", role: "region", "aria-label": label },
+  const label = key === "before" ? t`Residual by joint and state as a multiple of the noise, without the findings` : t`Residual by joint and state as a multiple of the noise, with the findings`;
+  return h("div", { class: "wide", tabindex: "0", role: "region", "aria-label": label, onkeydown: (event) => {
+    const next = neighbour(rows, chosen, event.key);
+    if (!next) return;
+    event.preventDefault();
+    take(next);
+    next.element.scrollIntoView({ block: "nearest", inline: "nearest" });
+  } },
     s("svg", { class: "heat", viewBox: `0 0 ${WIDTH} ${height}`, role: "img", "aria-label": label }, parts));
+}
+
+/** The cell that an arrow key leads to; nothing for other keys, and beyond the edge. */
+function neighbour(rows, from, key) {
+  const [down, right] = { ArrowUp: [-1, 0], ArrowDown: [1, 0], ArrowLeft: [0, -1], ArrowRight: [0, 1] }[key] ?? [0, 0];
+  if (!down && !right) return null;
+  if (!from) return rows.find((row) => row.length)?.[0];
+  const row = rows[from.row + down];
+  return row?.[Math.min(from.place + right, row.length - (right ? 0 : 1))];
 }

@@ -1,6 +1,7 @@
 // Plots over uPlot: many samples thinned to what a screen shows, zoomed by mouse, keys or buttons, in step with each other.
 
 import { h } from "./dom.js";
+import { t } from "./words.js";
 
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const alive = new Set();
@@ -61,7 +62,7 @@ export function thinned(time, columns, from, to, buckets) {
  *         series: [{ label, values, colour, width, dash, points: in place of a line, marks: on the line }] }
  */
 export function plot(spec) {
-  const holder = h("div", { class: `canvas ${spec.tall ? "tall" : ""}`, tabindex: "0", role: "group", "aria-label": `${spec.label}. Arrow keys move, plus and minus zoom, zero shows everything.` });
+  const holder = h("div", { class: `canvas ${spec.tall ? "tall" : ""}`, tabindex: "0", role: "group", "aria-label": t`${spec.label}. Arrow keys move, plus and minus zoom, zero shows everything.` });
   const legend = h("div", { class: "legend" });
   const box = h("figure", { class: "plot" }, h("figcaption", {}, h("span", { text: spec.label }), legend), holder);
   const time = spec.x;
@@ -115,11 +116,14 @@ export function plot(spec) {
   };
   spec.group?.members.add(api);
 
+  /** Marks of an axis, written as all other numbers are: not in the manner of the browser's language. */
+  const marks = (_, values) => values.map((value) => (value === null ? "" : `${Number(value.toPrecision(10))}`.replace("-", "−")));
+
   function begin() {
     const text = 0.76 * parseFloat(getComputedStyle(document.documentElement).fontSize);
     const font = `${text.toFixed(1)}px system-ui, sans-serif`;
     const axis = (label, more) => ({
-      stroke: () => css("--muted"), font, labelFont: font, label, labelSize: 1.6 * text, space: 3.2 * text, grid: { stroke: () => css("--line"), width: 1 }, ticks: { stroke: () => css("--line"), width: 1 }, ...more,
+      stroke: () => css("--muted"), font, labelFont: font, label, values: marks, labelSize: 1.6 * text, space: 3.2 * text, grid: { stroke: () => css("--line"), width: 1 }, ticks: { stroke: () => css("--line"), width: 1 }, ...more,
     });
     chart = new window.uPlot({
       width: width(), height: height(), legend: { show: false }, padding: [8, 8, 0, 0],
@@ -179,7 +183,7 @@ export function plot(spec) {
     } }, swatch, each.label);
     legend.append(button);
   });
-  if (spec.noise) legend.append(h("span", { class: "key" }, h("span", { class: "swatch band", "aria-hidden": "true" }), "± 2 σ of the noise"));
+  if (spec.noise) legend.append(h("span", { class: "key" }, h("span", { class: "swatch band", "aria-hidden": "true" }), t`± 2 σ of the noise`));
   requestAnimationFrame(() => { if (holder.isConnected && window.uPlot && time.length > 1) begin(); });
   return api;
 }
@@ -192,11 +196,11 @@ export function zoomButtons(group) {
     const middle = (min + max) / 2;
     any().zoom(middle - (factor * (max - min)) / 2, middle + (factor * (max - min)) / 2);
   };
-  return h("div", { class: "zoom", role: "group", "aria-label": "Zoom" },
-    h("button", { type: "button", class: "quiet", onclick: by(0.5), "aria-label": "Zoom in", text: "+" }),
-    h("button", { type: "button", class: "quiet", onclick: by(2), "aria-label": "Zoom out", text: "−" }),
-    h("button", { type: "button", class: "quiet", onclick: () => any().full(), text: "All" }),
-    h("span", { class: "hint", text: "Drag to zoom, double-click for everything." }));
+  return h("div", { class: "zoom", role: "group", "aria-label": t`Zoom` },
+    h("button", { type: "button", class: "quiet", onclick: by(0.5), "aria-label": t`Zoom in`, text: "+" }),
+    h("button", { type: "button", class: "quiet", onclick: by(2), "aria-label": t`Zoom out`, text: "−" }),
+    h("button", { type: "button", class: "quiet", onclick: () => any().full(), text: t`All` }),
+    h("span", { class: "hint", text: t`Drag to zoom, double-click for everything.` }));
 }
 
 let groups = 0;
@@ -207,8 +211,11 @@ export function group() {
   return { key: `group-${groups}`, members: new Set() };
 }
 
-/** Colours of joints, told apart by dashes too where there are many. */
+// As many as everyone tells apart; what comes after them has dashes, and dots after those.
+const COLOURS = ["--c1", "--c2", "--c3", "--c4"];
+const DASHES = [undefined, [7, 4], [2, 3]];
+
+/** How the curve of a joint is drawn. */
 export function jointStyle(place) {
-  const colours = ["--c1", "--c2", "--c3", "--c4", "--c5", "--c6"];
-  return { colour: colours[place % colours.length], dash: place >= colours.length ? [6, 4] : undefined };
+  return { colour: COLOURS[place % COLOURS.length], dash: DASHES[Math.floor(place / COLOURS.length) % DASHES.length] };
 }

@@ -1,0 +1,68 @@
+// Robots: each arm that something is kept about, what it does at this moment, and what is known of it.
+
+import { armDrawing, jointRows } from "./arm.js";
+import { getJson } from "./api.js";
+import { cautions, figures, h, moment, number, percent, render, section, table, title } from "./dom.js";
+import { items } from "./lists.js";
+import { named, t } from "./words.js";
+
+const BACKENDS = ["sim", "dynamixel", "canopen"];
+const KINDS = { run: "runs", identification: "identifications", diagnosis: "diagnoses", campaign: "campaigns" };
+const STANDS_STILL = ["created", "finished", "stopped", "failed", "interrupted", "damaged"];
+const LATELY = 12;
+
+export async function showRobots(root, { signal }) {
+  const [{ robots }, { leases }] = await Promise.all([getJson("robots", signal), getJson("leases", signal)]);
+  const newest = [...robots].sort((a, b) => b.last_seen.localeCompare(a.last_seen));
+  render(root, h("h1", { text: t`Robots` }), h("p", { class: "lead", text: t`Every arm that something is kept about, the last one used first.` }),
+    items(newest.map((each) => ({ href: pageOf(each.name), name: each.name, middle: holderOf(leases, each.name), when: moment(each.last_seen) })),
+      t`No robot yet: begin a campaign with its file.`));
+}
+
+const pageOf = (robot) => `#/robots/${encodeURIComponent(robot)}`;
+
+/** Who has the lease of an arm, in words; nothing where nobody has. */
+function holderOf(leases, robot) {
+  const held = leases.filter(({ arm }) => BACKENDS.some((backend) => arm === `${robot} on ${backend}`));
+  return held.map(({ holder, armed }) => (armed ? t`${holder} has its lease, and it may move` : t`${holder} has its lease`)).join("; ");
+}
+
+export async function showRobot(root, { id: robot, signal }) {
+  const of = `robot=${encodeURIComponent(robot)}`;
+  const [{ items: all }, { models }, { leases }] = await Promise.all([getJson(`items?${of}&limit=200`, signal), getJson(`models?${of}&limit=200`, signal), getJson("leases", signal)]);
+  const here = all.filter((each) => each.is_here && each.kind in KINDS);
+  const moving = here.find((each) => each.kind === "run" && !STANDS_STILL.includes(each.state));
+  const used = here.find((each) => each.kind === "run" && each.state !== "created");
+  const model = models.find((each) => each.state === "active");
+  const error = here.find((each) => each.kind === "identification" && each.id === model?.id)?.figures;
+  const diagnosis = here.find((each) => each.kind === "diagnosis" && each.state === "succeeded");
+  const source = here.find((each) => each.state !== "damaged");
+  const path = source && `${KINDS[source.kind]}/${source.id}`;
+  const report = path ? await getJson(`${path}/robot`, signal).then((answer) => answer.report, () => null) : null;
+  const linkTo = (kind, id, words) => h("a", { href: `#/${KINDS[kind]}/${id}`, text: words });
+  render(root, h("p", { class: "eyebrow", text: t`Robot` }), h("h1", { text: robot }), h("p", { class: "meta", text: holderOf(leases, robot) || t`Nobody has its lease.` }),
+    figures([
+      [t`Now`, moving ? linkTo("run", moving.id, named(moving.state)) : t`at rest`, moving ? t`open it to watch` : t`no run of this service moves it`],
+      [t`Last run`, used ? linkTo("run", used.id, named(used.state)) : "–", used ? moment(used.created) : t`none yet`],
+      [t`Model in use`, model ? linkTo("identification", model.id, moment(model.created)) : "–", model ? explainedShare(error) : t`none has passed every gate`],
+      [t`Last verdict`, diagnosis ? linkTo("diagnosis", diagnosis.id, named(`${diagnosis.figures.verdict}`)) : "–", diagnosis ? moment(diagnosis.created) : t`none yet`],
+    ]),
+    report ? [
+      h("div", { class: "row" }, h("a", { class: "button primary", href: `#/new?robot=${path}`, text: t`New campaign with it` }), h("a", { class: "button", href: "#/history", text: t`Over time` })),
+      section("arm", t`The arm`, robotSheet(report), cautions(report.findings)),
+    ] : null,
+    section("lately", t`Lately`, items(here.slice(0, LATELY).map((each) => ({
+      href: `#/${KINDS[each.kind]}/${each.id}`, name: title(each.kind), state: each.state, when: moment(each.created) })), t`Nothing yet.`)));
+}
+
+/** How well a model did where it was judged. */
+function explainedShare(error) {
+  const relative = error?.held_out_error ?? error?.relative_error;
+  return typeof relative === "number" ? t`relative error ${percent(relative)}` : t`passed every gate`;
+}
+
+/** An arm as a drawing, and its joints with their limits. */
+export function robotSheet(report) {
+  return h("div", { class: "split" }, armDrawing(report).element,
+    table(t`Joints`, ["", t`joint`, t`type`, t`position`, t`velocity`, t`torque`], jointRows(report, number), 3));
+}
