@@ -58,6 +58,11 @@ def clipped(arm: SimulatedArm, rigid: Array) -> Array:
     return at_joint(0, np.clip(torque, -CLIP, CLIP) - torque)
 
 
+def turned_round(arm: SimulatedArm, rigid: Array) -> Array:
+    """A current that is wired, or told, the other way round: all of the joint's torque has the wrong sign."""
+    return at_joint(2, -2.0 * arm.exact.torque_exact[:, 2])
+
+
 def wrist(arm: SimulatedArm, rigid: Array) -> Array:
     common = arm.exact.exact.velocity[:, 1] + arm.exact.exact.velocity[:, 2]
     friction = 0.6 * np.sign(common)
@@ -108,6 +113,7 @@ CASES: dict[str, tuple[EffectTorque, str, str, dict[str, float]]] = {
     "few teeth": (few_teeth, "cogging", "joint1", {"order": FEW, "amplitude": 0.5, "phase": 0.4}),
     "many teeth": (many_teeth, "cogging", "joint1", {"order": MANY, "amplitude": 1.2, "phase": 0.4}),
     "clipped": (clipped, "torque_saturation", "joint1", {"c": CLIP, "a": 1.0}),
+    "turned round": (turned_round, "torque_gain_error", "joint3", {"g": -2.0}),
     "filtered": (filtered, "time_delay", "joint2", {"d": LAG}),
     "wrist": (wrist, "friction_coupling", "joint3", {"f": 0.6}),
 }

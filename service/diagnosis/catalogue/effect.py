@@ -121,6 +121,16 @@ class Effect(ABC):
         (columns,) = self.columns(signals, shape[None])
         return np.asarray(np.tensordot(coefficients, columns, axes=1), dtype=np.float64)
 
+    def factor(self, coefficients: Array) -> float:
+        """By how much it multiplies what the parameters of the plain model make at its joint: 1 where it only adds.
+
+        Parameters
+        ----------
+        coefficients : (c,) float64
+            values of the coefficients
+        """
+        return 1.0
+
     def rough_grid(self) -> Array:
         """Some of the grid's shapes, for those who only want to know what the effect may look like, (g, k)."""
         return self.grid

@@ -56,6 +56,16 @@ class TorqueGainError(Effect):
         """
         return per_joint_columns(signals.torque[self.joint][None, None])
 
+    def factor(self, coefficients: Array) -> float:
+        """1 + g: with a wrong sign every parameter works the other way round.
+
+        Parameters
+        ----------
+        coefficients : (1,) float64
+            g
+        """
+        return 1.0 + float(coefficients[0])
+
 
 class Saturation(Effect):
     """τ_recorded = τ - a (τ - r(τ)): what all curves r have in common; a is 1 where nothing else bends them."""

@@ -195,7 +195,7 @@ class Fitter:
         pieces = side_by_side(lambda piece: _moving_columns(model, piece), observations)
         result = []
         for joint in range(observations.robot.joint_count):
-            rigid = self._white_rigid(model, joint)
+            rigid = model.factor(joint) * self._white_rigid(model, joint)
             moving = observations.white(joint, [piece[joint].rows for piece in pieces])
             places = [model.structure.joint_columns(joint)[: len(rigid)], pieces[0][joint].index]
             result.append(JointColumns(np.concatenate(places).astype(np.intp), np.concatenate([rigid, moving])))
@@ -219,10 +219,11 @@ def _moving_columns(model: ExtendedModel, piece: Piece) -> list[JointColumns]:
     places: list[list[int]] = [[] for _ in joints]
     for joint in joints:
         terms = structure.joint_term_columns(joint, motion.velocity[:, joint], motion.acceleration[:, joint])
-        rows[joint].append(piece.repeated(motion.band.reduce(terms)))
+        factor = model.factor(joint)
+        rows[joint].append(piece.repeated(factor * motion.band.reduce(terms)))
         places[joint] += list(structure.joint_columns(joint)[-len(terms) :])
         of_constants, slopes = model.sensitivity_columns(piece, joint)
-        rows[joint].append(_with_steps_of_terms(piece.repeated(slopes), of_constants, joint, model, piece))
+        rows[joint].append(_with_steps_of_terms(piece.repeated(factor * slopes), of_constants, joint, model, piece))
         places[joint] += of_constants
     signals = model.signals(piece)
     for term, place in zip(model.terms, model.term_places(), strict=True):

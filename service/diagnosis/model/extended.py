@@ -202,6 +202,18 @@ class ExtendedModel:
         (columns,) = term.effect.columns(signals, term.shape[None])
         return np.asarray(np.tensordot(term.coefficients, columns, axes=1), dtype=np.float64)
 
+    def factor(self, joint: int) -> float:
+        """By how much the terms of a joint multiply what the plain model's parameters make there.
+
+        Parameters
+        ----------
+        joint : int
+            index, from 0
+        """
+        return float(
+            np.prod([term.effect.factor(term.coefficients) for term in self.terms if term.effect.joint == joint])
+        )
+
     def step_sensitivity(self, term: Term, signals: Signals) -> Array:
         """∂τ/∂log K_v of a term whose torque has friction's step in it, K_v of its own joint, (1, N) or (1, P, N).
 
