@@ -23,6 +23,7 @@ from service.diagnosis.selection.confirmation import Confirmation, HeldOut
 from service.diagnosis.selection.equivalence import EQUIVALENT, FORMULA_ERROR, equivalents, with_rivals
 from service.diagnosis.selection.interleaved import interleaved_confirmation
 from service.diagnosis.selection.outside import where_held_out_shows
+from service.diagnosis.selection.position_bias import is_position_noise
 from service.diagnosis.selection.pruning import without_errors_of_larger_ones, without_proxies, without_superfluous
 from service.diagnosis.selection.table import Table, fitted_option
 
@@ -190,6 +191,7 @@ class Selector:
         tried = [each for each in closest[:MOST_FITTED] if each.score > closest[0].score - near]
         fitted = [table.fitted(each) for each in tried]
         fitted = [each for each in fitted if is_physical(each, fit) and not outsized(each, self.screen.observations)]
+        fitted = [each for each in fitted if not is_position_noise(each, fit, self.screen)]
         fitted.sort(key=lambda each: -each.score)
         for option in fitted:
             known = place_of(option.candidate) in [_chosen(choice) for choice in choices]
