@@ -246,9 +246,11 @@ def test_the_document_is_the_contracts() -> None:
 def test_noise_of_the_positions_is_no_elasticity_that_resonates_within_the_band(
     seed: int, train: tuple[int, ...], held_out: tuple[int, ...]
 ) -> None:
-    """Found among 40 sound arms with one or two recordings: 4.7 to 6.4 standard errors, confirmed by held-out motion."""
+    """Of 40 sound arms with one or two recordings: 4.7 to 6.4 standard errors, confirmed by held-out motion."""
     rng = np.random.default_rng(seed)
-    rng.integers(1, 50), rng.integers(1, 3), rng.random()  # what had chosen the motions
+    for drawn_before in (50, 3):  # what had chosen the motions
+        rng.integers(1, drawn_before)
+    rng.random()
     found = diagnose(paper_robot(), recordings(train, None, rng), recordings(held_out, None, rng))
     assert found.verdict is Verdict.CONSISTENT
     assert not found.findings
