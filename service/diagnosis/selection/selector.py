@@ -152,15 +152,9 @@ class Selector:
                 break
             choices = [*choices, choice]
             fit = choice.options[0].fit
-            refused = [each for each in refused if not self._meet(each, choice)]
+            refused = [each for each in refused if not _at_one_joint(each, choice)]
             progress(f"found {choice.options[0].candidate.effect.name(names)}")
         return fit, choices, rejected
-
-    def _meet(self, refused: Choice, found: Choice) -> bool:
-        """Whether one effect was refused beside a model that another one, found since, has changed where it acts."""
-        count = self.screen.observations.robot.joint_count
-        one, other = [set(each.options[0].candidate.effect.touched(count)) for each in (refused, found)]
-        return bool(one & other)
 
     def _next(self, fit: Fit, choices: Sequence[Choice], rejected: list[Choice]) -> Choice | None:
         """The best significant and confirmed option; what held-out recordings refuse is added to `rejected`."""
@@ -236,8 +230,8 @@ class Selector:
             return False
         if place in chosen:
             return candidate.effect.repeats and chosen.count(place) < MOST_REPEATS
-        kinds = {effect for effect, _ in chosen if effect not in UNCOUNTED}
-        return place[0] in UNCOUNTED or place[0] in kinds or len(kinds) < MOST_EFFECTS
+        others = {each for each in chosen if each[0] not in UNCOUNTED}
+        return place[0] in UNCOUNTED or len(others) < MOST_EFFECTS
 
     def _option(self, fit: Fit, term: Term) -> Option:
         """A term that was not screened for, fitted."""
@@ -323,3 +317,12 @@ class Selector:
 def _chosen(choice: Choice) -> Place:
     """The effect that is in the model, and where."""
     return place_of(choice.options[0].candidate)
+
+
+def _at_one_joint(refused: Choice, found: Choice) -> bool:
+    """Whether one effect was refused beside a model that another one, found since, has changed at its own joint.
+
+    What belongs to the whole arm changes all joints a little, and is no reason to ask anew what motion has refuted.
+    """
+    (_, one), (_, other) = _chosen(refused), _chosen(found)
+    return one is not None and one == other
