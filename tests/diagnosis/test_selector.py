@@ -52,7 +52,7 @@ def grown(monkeypatch: pytest.MonkeyPatch, waves_at: int) -> tuple[list[Place], 
     monkeypatch.setattr(Selector, "_table", lambda self, fit, choices, refused: AnyTable(refused))
     monkeypatch.setattr(Selector, "_best", best)
     selector = Selector(SCREEN, FITTER, None, pure_error=True)
-    _, choices, rejected = selector._grown(FIT, [], [], lambda step: None)
+    _, choices, rejected = selector._grown(FIT, [], lambda step: None)
     return tuple([place_of(each.options[0].candidate) for each in found] for found in (choices, rejected))  # type: ignore[return-value]
 
 

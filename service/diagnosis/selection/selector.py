@@ -112,7 +112,7 @@ class Selector:
             if p_value < self.admission.level and confirmed:
                 choices.append(Choice((option,), confirmation, p_value, was_given=True))
                 fit = option.fit
-        fit, grown, rejected = self._grown(fit, choices, [], progress)
+        fit, grown, rejected = self._grown(fit, choices, progress)
         fit, choices = without_superfluous(fit, grown, self.fitter, self.admission)
         dropped = [each for each in grown if each not in choices]
         choices = [with_rivals(each, dropped) for each in choices]
@@ -131,7 +131,7 @@ class Selector:
         progress : callable
             told what was found
         """
-        fit, choices, rejected = self._grown(selection.fit, list(selection.choices), [], progress)
+        fit, choices, rejected = self._grown(selection.fit, list(selection.choices), progress)
         if len(choices) == len(selection.choices):
             return selection
         fit, choices = without_superfluous(fit, choices, self.fitter, self.admission)
@@ -140,11 +140,12 @@ class Selector:
         return Selection(selection.nominal, fit, tuple(choices), (*selection.rejected, *rejected))
 
     def _grown(
-        self, fit: Fit, choices: list[Choice], rejected: list[Choice], progress: Callable[[str], None]
+        self, fit: Fit, choices: list[Choice], progress: Callable[[str], None]
     ) -> tuple[Fit, list[Choice], list[Choice]]:
-        """A model with one effect after the other, as long as one is significant and confirmed."""
+        """A model with one effect after the other, as long as one is significant and confirmed; what was refused."""
         names = [joint.name for joint in fit.model.structure.robot.joints]
-        refused = list(rejected)
+        refused: list[Choice] = []
+        rejected: list[Choice] = []
         while len(choices) < MOST_TERMS:
             choice = self._next(fit, choices, refused)
             rejected += [each for each in refused if each not in rejected]
