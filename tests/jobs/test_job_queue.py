@@ -1,6 +1,5 @@
 """The queue: order, slots, cancelling, failures of every kind, restart."""
 
-import contextlib
 import shutil
 from concurrent.futures import BrokenExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -9,26 +8,11 @@ from pathlib import Path
 import pytest
 
 from jobs.executors import InlineExecutor, ManualExecutor
+from jobs.one_kind import make_queue, problem_of, state_of, succeed
 from service.errors import NotFoundError
 from service.jobs import JobKind, JobProblem, JobQueue, JobState, QueueFullError, Workspace
-from service.jobs.cluster_executor import ClusterAwayError
-from service.jobs.queued_job import MOST_ATTEMPTS, Work
-from service.jobs.work import do_work
+from service.jobs.queued_job import Work
 from service.store import ItemStore
-
-
-@pytest.fixture
-def items(tmp_path: Path) -> ItemStore:
-    return ItemStore(tmp_path / "jobs", "job")
-
-
-@pytest.fixture
-def executor() -> ManualExecutor:
-    return ManualExecutor()
-
-
-def succeed(_: Path) -> None:
-    return None
 
 
 def fail(_: Path) -> JobProblem:
@@ -37,38 +21,6 @@ def fail(_: Path) -> JobProblem:
 
 def crash(_: Path) -> None:
     raise ZeroDivisionError("a bug")
-
-
-class OneKind:
-    """A queue of jobs of one kind."""
-
-    def __init__(self, items: ItemStore, executor: ManualExecutor, work: Work, slots: int) -> None:
-        self.kind = JobKind(items, work)
-        self.queue = JobQueue([self.kind], executor, slots=slots, most_waiting=2)
-        self.close = self.queue.close
-
-    def submit(self, staged: Path) -> str:
-        return self.queue.submit(self.kind, staged)
-
-    def cancel_or_remove(self, identifier: str) -> bool:
-        return self.queue.cancel_or_remove(self.kind, identifier)
-
-
-def make_queue(items: ItemStore, executor: ManualExecutor, work: Work = succeed, slots: int = 1) -> OneKind:
-    return OneKind(items, executor, work, slots)
-
-
-def state_of(items: ItemStore, identifier: str) -> JobState:
-    record = Workspace(items.folder(identifier)).read_record()
-    assert record is not None
-    return record.state
-
-
-def problem_of(items: ItemStore, identifier: str) -> str:
-    record = Workspace(items.folder(identifier)).read_record()
-    assert record is not None
-    assert record.problem is not None
-    return record.problem.code
 
 
 @pytest.mark.parametrize("slots", [1, 2])
@@ -116,73 +68,6 @@ def test_an_executor_that_takes_nothing(refusal: Exception, items: ItemStore, ex
     executor.refusal = refusal
     job = make_queue(items, executor).submit(items.stage())
     assert (state_of(items, job), problem_of(items, job)) == ("failed", "worker-lost")
-
-
-def test_a_job_that_was_lost_with_its_cluster_is_done_again_before_the_others(
-    items: ItemStore, executor: ManualExecutor
-) -> None:
-    queue = make_queue(items, executor)
-    lost, following = queue.submit(items.stage()), queue.submit(items.stage())
-    executor.fail(ClusterAwayError("the scheduler is gone"))
-    assert (state_of(items, lost), state_of(items, following)) == ("running", "queued")
-    executor.run()
-    assert state_of(items, lost) == "succeeded"
-    executor.run()
-    assert state_of(items, following) == "succeeded"
-
-
-def test_a_job_that_takes_its_cluster_along_is_not_done_for_ever(items: ItemStore, executor: ManualExecutor) -> None:
-    job = make_queue(items, executor).submit(items.stage())
-    for _ in range(MOST_ATTEMPTS):
-        executor.fail(ClusterAwayError("the scheduler is gone"))
-    assert executor.tasks == []
-    assert (state_of(items, job), problem_of(items, job)) == ("failed", "worker-lost")
-
-
-def test_a_job_that_was_cancelled_while_its_cluster_went_stays_cancelled(
-    items: ItemStore, executor: ManualExecutor
-) -> None:
-    queue = make_queue(items, executor)
-    job = queue.submit(items.stage())
-    queue.cancel_or_remove(job)
-    executor.fail(ClusterAwayError("the scheduler is gone"))
-    assert executor.tasks == []
-    assert state_of(items, job) == "cancelled"
-
-
-@pytest.mark.parametrize("is_known", [True, False], ids=["known before", "noticed by the hand-over"])
-def test_jobs_wait_for_a_cluster_that_is_away(is_known: bool, items: ItemStore, executor: ManualExecutor) -> None:
-    there = [not is_known]
-
-    class Away(ManualExecutor):
-        def submit(self, fn, /, *args, **kwargs):
-            there[0] = False
-            raise ClusterAwayError("the scheduler is gone")
-
-    gone, kind = Away(), JobKind(items, succeed)
-    queue = JobQueue([kind], gone, slots=1, most_waiting=2, is_there=lambda: there[0])
-    jobs = [queue.submit(kind, items.stage()) for _ in range(2)]
-    assert not queue.can_work()
-    for _ in range(2 * MOST_ATTEMPTS):  # however long it takes
-        queue.settle()
-    assert [state_of(items, job) for job in jobs] == ["queued", "queued"]
-    gone.submit = executor.submit  # type: ignore[method-assign]
-    there[0] = True
-    queue.settle()
-    executor.run()
-    executor.run()
-    assert [state_of(items, job) for job in jobs] == ["succeeded", "succeeded"]
-
-
-def test_workers_that_come_later_are_made_use_of(items: ItemStore, executor: ManualExecutor) -> None:
-    width, kind = [1], JobKind(items, succeed)
-    queue = JobQueue([kind], executor, slots=lambda: width[0], most_waiting=5)
-    for _ in range(4):
-        queue.submit(kind, items.stage())
-    assert len(executor.tasks) == 1
-    width[0] = 3
-    queue.settle()
-    assert len(executor.tasks) == 3
 
 
 def test_too_many_waiting_jobs(items: ItemStore, executor: ManualExecutor) -> None:
@@ -298,94 +183,6 @@ def test_closing_leaves_jobs_for_the_next_start_and_takes_nothing_more(
         queue.submit(items.stage())
 
 
-@pytest.mark.parametrize("then", ["there is room again", "restart"])
-def test_a_full_disk_when_a_job_ends_does_not_stop_the_queue(
-    then: str,
-    items: ItemStore,
-    executor: ManualExecutor,
-    monkeypatch: pytest.MonkeyPatch,
-    caplog: pytest.LogCaptureFixture,
-) -> None:
-    queue = make_queue(items, executor)
-    unlucky, following = queue.submit(items.stage()), queue.submit(items.stage())
-    write = Workspace.write_record
-
-    def full_once(self: Workspace, record: object) -> None:
-        monkeypatch.setattr(Workspace, "write_record", write)
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(Workspace, "write_record", full_once)
-    executor.run()
-    assert state_of(items, following) == "running"
-    assert "could not be written" in caplog.text
-    if "restart" in then:
-        make_queue(items, ManualExecutor())
-        assert state_of(items, unlucky) == "running"  # its end was never told: it is done again
-    else:
-        queue.queue.settle()
-        assert state_of(items, unlucky) == "succeeded"
-
-
-def full_disk(monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(*_: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(Workspace, "write_record", full)
-
-
-def test_a_full_disk_before_a_job_begins_delays_it(
-    items: ItemStore, executor: ManualExecutor, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    queue = make_queue(items, executor)
-    first, second = queue.submit(items.stage()), queue.submit(items.stage())
-    with monkeypatch.context() as patched:
-        full_disk(patched)
-        executor.run()
-        with pytest.raises(OSError, match="No space"):
-            queue.queue.settle()
-    assert [state_of(items, job) for job in (first, second)] == ["running", "queued"]
-    queue.queue.settle()
-    assert [state_of(items, job) for job in (first, second)] == ["succeeded", "running"]
-
-
-def test_a_disk_that_is_full_between_a_state_and_its_event_delays_a_job_too(
-    items: ItemStore, executor: ManualExecutor, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The record says that it runs or has ended already: it is begun, or its end is told, all the same."""
-
-    def full(*_: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    queue = make_queue(items, executor)
-    first, second = queue.submit(items.stage()), queue.submit(items.stage())
-    with monkeypatch.context() as patched:
-        patched.setattr(Workspace, "_tell_state", full)
-        executor.run()
-        with contextlib.suppress(OSError):
-            queue.queue.settle()
-        with contextlib.suppress(OSError):
-            queue.queue.settle()
-    queue.queue.settle()
-    executor.run()
-    assert [state_of(items, job) for job in (first, second)] == ["succeeded", "succeeded"]
-    assert all(Workspace(items.folder(job)).has_told_end() for job in (first, second))
-
-
-def test_a_job_that_the_disk_does_not_take_is_no_job(
-    items: ItemStore, executor: ManualExecutor, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def full(_: Path) -> None:
-        raise OSError(28, "No space left on device")
-
-    queue, staged = make_queue(items, executor), items.stage()
-    with monkeypatch.context() as patched:
-        patched.setattr("service.store.items.sync_folder", full)
-        with pytest.raises(OSError, match="No space"):
-            queue.submit(staged)
-    assert (items.identifiers(), queue.queue.waiting(), executor.tasks) == ([], 0, [])
-    assert queue.submit(staged) in items.identifiers()
-
-
 @pytest.mark.parametrize("loss", ["damaged and removed", "gone"])
 def test_a_waiting_job_that_is_lost_holds_up_nobody(loss: str, items: ItemStore, executor: ManualExecutor) -> None:
     queue = make_queue(items, executor)
@@ -398,32 +195,6 @@ def test_a_waiting_job_that_is_lost_holds_up_nobody(loss: str, items: ItemStore,
     executor.run()
     assert state_of(items, following) == "running"
     assert len(executor.tasks) == 1
-
-
-def test_a_full_disk_when_a_waiting_job_is_cancelled(
-    items: ItemStore, executor: ManualExecutor, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def full(_: Workspace) -> None:
-        raise OSError(28, "No space left on device")
-
-    queue = make_queue(items, executor)
-    _, waiting = queue.submit(items.stage()), queue.submit(items.stage())
-    monkeypatch.setattr(Workspace, "ask_to_stop", full)
-    assert not queue.cancel_or_remove(waiting)
-    executor.run()
-    assert executor.tasks == []
-    assert state_of(items, waiting) == "cancelled"
-
-
-def test_work_for_which_the_disk_has_no_room_says_so(items: ItemStore) -> None:
-    def fill(folder: Path) -> JobProblem | None:
-        def work() -> None:
-            raise OSError(28, "No space left on device", str(folder))
-
-        return do_work(Workspace(folder), work)
-
-    job = make_queue(items, InlineExecutor(), fill).submit(items.stage())
-    assert (state_of(items, job), problem_of(items, job)) == ("failed", "storage-full")
 
 
 def test_jobs_of_several_kinds_take_their_turns(tmp_path: Path, executor: ManualExecutor) -> None:
