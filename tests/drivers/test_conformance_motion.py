@@ -7,7 +7,6 @@ import pytest
 
 from arm_rigs import (
     AT_REST,
-    RATE_HZ,
     START,
     Rig,
     allowed,
@@ -125,12 +124,9 @@ def test_a_far_target_is_approached_at_the_speed_limit(rig: Rig) -> None:
     # loops that swing answer the step with which it begins by more than the limit
     begin = len(states) // 4 if rig.swing > 0.0 else 0
     velocity = np.array([state.velocity for state in states[begin:]])
-    # a drive that misses a target, or takes it late, makes good for it with the next: as fast as allowed in the mean
-    # over a few of them. An emulated one may be the late one itself, which shows in its answers.
-    cycle_ns = 1e9 / RATE_HZ
-    waited = np.diff([state.time_ns for state in states])
-    is_late = waited.max() > 1.5 * cycle_ns or max(state.late_ns for state in states) > 0.5 * cycle_ns
-    span = 10 if is_late or rig.answers_within > 1 else 1
+    # by the machine's clock a drive takes a target late now and then, or two of them at once, and makes good for it: as
+    # fast as allowed in the mean over a few cycles; where frames are lost on purpose likewise
+    span = 10 if rig.is_real_time or rig.answers_within > 1 else 1
     speed = np.abs([np.nanmean(velocity[k : k + span], axis=0) for k in range(len(velocity) - span + 1)])
     assert np.nanmax(speed) < 1.3 * 0.5
     assert np.nanmax(speed) > 0.8 * 0.5
