@@ -45,7 +45,7 @@ from service.api.settings import Settings
 from service.identification.history import ModelPolicy
 from service.jobs import StartControl
 
-API_VERSION = "1.8.0"
+API_VERSION = "1.9.0"
 """Of the interface, not of the package; a change of tests/api/openapi.json goes with a change here."""
 
 PREFIX = "/api/v1"

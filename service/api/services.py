@@ -11,6 +11,7 @@ from fastapi import Depends, Request
 from service.api.access.gate import Access
 from service.api.audit.log import AuditTrail
 from service.api.idempotency.answers import AnswerStore
+from service.api.idempotency.passing import PassingAnswers
 from service.api.operations.metrics import Metrics
 from service.api.pulse import Pulse
 from service.api.settings import Settings
@@ -55,6 +56,8 @@ class Services:
         who did what
     answers : AnswerStore
         answers to requests that may be repeated
+    lease_answers : PassingAnswers
+        answers to those who take leases, which hold a secret
     metrics : Metrics
         what is counted
     index : IndexKeeper
@@ -82,6 +85,7 @@ class Services:
     leases: Leases
     audit: AuditTrail
     answers: AnswerStore
+    lease_answers: PassingAnswers
     metrics: Metrics
     pulse: Pulse
     index: IndexKeeper

@@ -235,7 +235,7 @@ class Client:
             take it from somebody else
         """
         wanted = {"robot": robot, "backend": backend, "ttl_s": ttl_s, "take": take}
-        taken = self._post("leases", LeaseAnswer, json_content(wanted))
+        taken = self._create("leases", LeaseAnswer, json_content(wanted))
         headers = {"Lease-Token": taken.token or ""}
         return HeldLease(
             taken,

@@ -20,10 +20,11 @@ from service.api import Settings, create_app
 from service.api.access.scopes import Scope
 from service.api.idempotency.answers import LIFE_S, AnswerStore, KeptAnswer
 from service.api.idempotency.fingerprint import Fingerprint
+from service.api.idempotency.passing import MOST, PassingAnswers
 from service.api.services import Services
 from service.jobs import RunDesk
 
-RUNS = "/api/v1/runs"
+RUNS, LEASES = "/api/v1/runs", "/api/v1/leases"
 MOTION = {"robot": ROBOT, "trajectory": move_document()}
 ONCE = {"Idempotency-Key": "6f2b6d0e-once"}
 
@@ -172,3 +173,32 @@ def test_services_hold_the_store(app: FastAPI) -> None:
     with connected(app):
         services: Services = app.state.services
         assert isinstance(services.answers, AnswerStore)
+
+
+def test_a_lease_is_taken_once_and_its_secret_is_on_no_disk(settings: Settings) -> None:
+    wanted = {"robot": "two-joint-arm", "backend": "sim"}
+    with connected(create_app(settings, InlineExecutor())) as client:
+        first, second = (client.post(LEASES, json=wanted, headers=ONCE) for _ in range(2))
+        assert (first.status_code, second.content) == (201, first.content)
+        assert len(client.get(LEASES).json()["leases"]) == 1
+        token = first.json()["token"].encode()
+        assert not [path for path in settings.data_folder.rglob("*") if path.is_file() and token in path.read_bytes()]
+    with connected(create_app(settings, InlineExecutor())) as client:
+        anew = client.post(LEASES, json=wanted, headers=ONCE)
+        assert anew.status_code == 201
+        assert anew.json()["number"] > first.json()["number"], "the first one ended with the service"
+
+
+def test_passing_answers_age_and_are_never_too_many() -> None:
+    now = 0.0
+    answers = PassingAnswers(lambda: now)
+    kept = KeptAnswer(fingerprint="", status=201, headers=(), body="")
+    for number in range(MOST + 1):
+        assert answers.begin(str(number))
+        answers.finish(str(number), kept)
+        now += 1.0
+    assert answers.find("0") is None
+    assert not answers.begin("1")
+    assert answers.find(str(MOST)) == kept
+    now += LIFE_S + 1.0
+    assert answers.begin(str(MOST)), "too old to be remembered"

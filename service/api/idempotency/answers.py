@@ -34,7 +34,7 @@ class KeptAnswer(StrictModel):
 
 
 class AnswerStore:
-    """Answers by the name of their request. Another store needs these three methods."""
+    """Answers by the name of their request."""
 
     def __init__(self, folder: Path, clock: Callable[[], float] = time.time) -> None:
         """Open the store; its folder is made where it is missing, and answers that are too old go.

@@ -13,15 +13,20 @@ from starlette.types import Scope as AsgiScope
 from service.api.access.gate import caller_of
 from service.api.idempotency.answers import AnswerStore, KeptAnswer, request_name
 from service.api.idempotency.fingerprint import Fingerprint
+from service.api.idempotency.passing import PassingAnswers
 from service.api.problems import make_problem, problem_answer
+from service.api.services import Services
 
 HEADER = "Idempotency-Key"
+
+Answers = AnswerStore | PassingAnswers
 
 LONGEST_KEY = 200
 """Most characters of the header's value."""
 
+_LEASES = "/api/v1/leases"
 _REPEATABLE = re.compile(
-    r"/api/v1/(runs|campaigns|identifications|diagnoses|excitations|recordings|schedules/[^/]+/run)"
+    r"/api/v1/(runs|campaigns|identifications|diagnoses|excitations|recordings|leases|schedules/[^/]+/run)"
 )
 _KEY = re.compile(rf"[\x21-\x7e]{{1,{LONGEST_KEY}}}")
 
@@ -48,7 +53,7 @@ class Repeatable:
         if not _KEY.fullmatch(key):
             text = f"header {HEADER}: give 1 to {LONGEST_KEY} characters without blanks, for example a UUID"
             return await problem_answer(make_problem("invalid-request", text, scope["path"]))(scope, receive, send)
-        store = cast(AnswerStore, scope["app"].state.services.answers)
+        store = _answers_of(scope)
         name = request_name(caller_of(scope).key or "local", scope["path"], key)
         is_underway = name in self._underway
         try:
@@ -66,7 +71,7 @@ class Repeatable:
 
     async def _answer_first(self, scope: AsgiScope, receive: Receive, send: Send, name: str) -> None:
         """Answer a request that is new, and keep the answer before it is sent."""
-        store = cast(AnswerStore, scope["app"].state.services.answers)
+        store = _answers_of(scope)
         fingerprint = Fingerprint(Headers(scope=scope).get("content-type", ""))
         answer = _Captured()
         await self.app(scope, _counted(receive, fingerprint), answer.take)
@@ -91,6 +96,12 @@ def is_repeatable(path: str) -> bool:
         of the request
     """
     return _REPEATABLE.fullmatch(path) is not None
+
+
+def _answers_of(scope: AsgiScope) -> Answers:
+    """Where the answers to a request are kept: a lease's secret never on the disk, it ends with the service anyway."""
+    services = cast(Services, scope["app"].state.services)
+    return services.lease_answers if scope["path"] == _LEASES else services.answers
 
 
 class _Captured:
@@ -126,7 +137,7 @@ def _counted(receive: Receive, fingerprint: Fingerprint) -> Receive:
     return received
 
 
-async def _repeated(scope: AsgiScope, receive: Receive, store: AnswerStore, name: str, is_underway: bool) -> Response:
+async def _repeated(scope: AsgiScope, receive: Receive, store: Answers, name: str, is_underway: bool) -> Response:
     """The answer to a request that came before."""
     fingerprint = Fingerprint(Headers(scope=scope).get("content-type", ""))
     more = True
