@@ -5,7 +5,6 @@ without one.
 """
 
 import io
-import socket
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -17,11 +16,11 @@ from ruamel.yaml import YAML
 from service.acquisition import BackendOrder, RunOptions, RunOrder, RunState
 from service.cli.demo_campaign import run_campaign
 from service.cli.demo_folder import prepare_folder
+from service.cli.demo_page import DATA, LEFT_FOR_S, PORT, PageShown, leave_page, show_page
 from service.cli.identify_run import Outcome, Request, identify_files, write_outcome
 from service.cli.identify_summary import show_identification
 from service.cli.output_files import write_file
 from service.cli.run_session import keep_recording, run_to_end, why_unfinished
-from service.cli.serving import run_server
 from service.cli.terminal import Told, output, plain, shown_percent, shown_progress, table
 from service.diagnosis import DiagnosisDocument
 from service.errors import AcquisitionError
@@ -45,12 +44,6 @@ RESULT, REPORT = "identification.json", "report.html"
 EXPORTS = ("friction.json", "friction.yaml", "friction.h", "friction.py", "model.xml")
 FILES = (ROBOT, SCENARIO, TRAIN_TRAJECTORY, HELD_OUT_TRAJECTORY, TRAIN, HELD_OUT, RESULT, REPORT, *EXPORTS)
 """What the demo writes, and may therefore write again."""
-
-DATA = "service"
-"""Data folder of a service, which holds a campaign on an arm that conceals an effect."""
-
-PORT = 8000
-"""Where the page is, unless something else is there already."""
 
 CONCEALED = {"torque_noise_std": list(NOISE_STD_NM), "seed": 1} | {
     "effects": [{"effect": "joint_spring", "joint": 1, "stiffness": 0.6}]
@@ -86,20 +79,20 @@ class Comparison:
         return (self.value - self.truth) / self.std
 
 
-def run_demo(folder: Path, *, page: bool) -> None:
+def run_demo(folder: Path, page: PageShown) -> None:
     """Design, run, identify, compare, and say where everything is.
 
     Parameters
     ----------
     folder : Path
         where the files go
-    page : bool
-        whether to show the page afterwards, until interrupted
+    page : PageShown
+        who shows the page afterwards
 
     Raises
     ------
     TauscopeError
-        where the folder holds somebody else's files of the same names, or cannot be written
+        where the folder holds somebody else's files of the same names, cannot be written, or the page not be served
     """
     prepare_folder(folder, (*FILES, DATA))
     arm = read_robot(example_robot("paper_arm"))
@@ -125,11 +118,13 @@ def run_demo(folder: Path, *, page: bool) -> None:
     with shown_percent() as told:
         found = run_campaign(folder / DATA, example_robot("paper_arm"), CONCEALED, told)
     _show_findings(output(), found)
-    if page:
-        show_page(folder / DATA)
-    else:
-        hint = f"Look at it: tauscope serve --data {folder / DATA} (or make page), then open http://127.0.0.1:{PORT}"
-        output().print(plain(hint), soft_wrap=True)
+    if page is PageShown.HERE:
+        return show_page(folder)
+    hint = f"tauscope serve --data {folder / DATA} (or make page)"
+    said = f"Look at it: {hint}, then open http://127.0.0.1:{PORT}"
+    if page is PageShown.LEFT:
+        said = f"Look at it: {leave_page(folder).address}, for {LEFT_FOR_S / 60.0:.0f} minutes; after that: {hint}"
+    output().print(plain(said), soft_wrap=True)
 
 
 def design_motion(robot: Path, out: Path, options: ExcitationOptions, told: Told) -> None:
@@ -258,25 +253,3 @@ def _show_findings(console: Console, found: DiagnosisDocument) -> None:
         console.print(plain(f"{finding.effect} at {finding.joint}: {finding.statement}"), soft_wrap=True)
     console.print(plain(f"verdict: {found.verdict}"))
     console.print()
-
-
-def show_page(data: Path) -> None:
-    """Serve the page until interrupted.
-
-    Parameters
-    ----------
-    data : Path
-        the service's data folder
-    """
-    run_server(data, port=_free_port())
-
-
-def _free_port() -> int:
-    """`PORT`, or none in particular where that is taken."""
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind(("127.0.0.1", PORT))
-        except OSError:
-            return 0
-    return PORT

@@ -16,7 +16,8 @@ def demo(
         typer.Option(
             "--page/--no-page",
             show_default=False,
-            help="Show the page with what was found, until Ctrl-C; by default where the output is a terminal.",
+            help="Show the page with what was found, until Ctrl-C. By default so in a terminal; elsewhere a process of"
+            " its own is left that shows it for a while.",
         ),
     ] = None,
 ) -> None:
@@ -31,8 +32,10 @@ def demo(
     out : Path
         folder for the results
     page : bool or None
-        whether to show the page afterwards
+        whether to show the page afterwards, until interrupted
     """
     from service.cli.demo import run_demo
+    from service.cli.demo_page import PageShown
 
-    run_demo(out, page=sys.stdout.isatty() if page is None else page)
+    by_default = PageShown.HERE if sys.stdout.isatty() else PageShown.LEFT
+    run_demo(out, {None: by_default, True: PageShown.HERE, False: PageShown.NOT}[page])

@@ -17,12 +17,10 @@ import pytest
 from cli.conftest import Ended
 from service.cli import demo_command
 from service.cli.demo import (
-    DATA,
     FILES,
     HELD_OUT,
     HELD_OUT_TRAJECTORY,
     NOISE_STD_NM,
-    PORT,
     REPORT,
     RESULT,
     ROBOT,
@@ -31,7 +29,8 @@ from service.cli.demo import (
     robot_text_without_model,
 )
 from service.cli.demo_folder import MARK, prepare_folder
-from service.errors import ExportError
+from service.cli.demo_page import DATA, PORT, PageShown, leave_page
+from service.errors import ExportError, StoreError
 from service.excitation import read_trajectory
 from service.recording import read_recording
 from service.robot import read_robot
@@ -48,7 +47,7 @@ def in_whole_demo(test: Callable[..., None]) -> Callable[..., None]:
 def demo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """The demo's folder and what it printed, run as a program of its own."""
     folder = tmp_path_factory.mktemp("demo") / "out"
-    command = [sys.executable, "-m", "service.cli", "demo", "--out", str(folder)]
+    command = [sys.executable, "-m", "service.cli", "demo", "--no-page", "--out", str(folder)]
     ended = subprocess.run(command, check=False, capture_output=True, text=True, timeout=300)
     assert (ended.returncode, ended.stderr) == (0, "")
     return folder, ended.stdout
@@ -56,13 +55,18 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
 
 @pytest.mark.parametrize(
     ("is_terminal", "asked", "shown"),
-    [(True, None, True), (False, None, False), (True, False, False), (False, True, True)],
+    [
+        (True, None, PageShown.HERE),
+        (False, None, PageShown.LEFT),
+        (True, False, PageShown.NOT),
+        (False, True, PageShown.HERE),
+    ],
 )
-def test_where_the_output_is_a_terminal_it_ends_with_a_running_page(
-    monkeypatch: pytest.MonkeyPatch, is_terminal: bool, asked: bool | None, shown: bool
+def test_it_ends_with_a_running_page_unless_none_is_wanted(
+    monkeypatch: pytest.MonkeyPatch, is_terminal: bool, asked: bool | None, shown: PageShown
 ) -> None:
-    said: list[bool] = []
-    monkeypatch.setattr("service.cli.demo.run_demo", lambda _, *, page: said.append(page))
+    said: list[PageShown] = []
+    monkeypatch.setattr("service.cli.demo.run_demo", lambda _, page: said.append(page))
     monkeypatch.setattr(sys, "stdout", Mock(isatty=lambda: is_terminal))
     demo_command.demo(Path("out"), asked)
     assert said == [shown]
@@ -70,8 +74,8 @@ def test_where_the_output_is_a_terminal_it_ends_with_a_running_page(
 
 @in_whole_demo
 def test_the_page_has_the_finished_campaign_at_another_port_where_its_own_is_taken(demo: tuple[Path, str]) -> None:
-    data = str(demo[0] / DATA)
-    code = f"from pathlib import Path; from service.cli.demo import show_page; show_page(Path({data!r}))"
+    folder = str(demo[0])
+    code = f"from pathlib import Path; from service.cli.demo_page import show_page; show_page(Path({folder!r}))"
     with port_taken(PORT), subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as service:
         assert service.stdout is not None
         address = service.stdout.readline().split()[2].rstrip(",")
@@ -80,6 +84,30 @@ def test_the_page_has_the_finished_campaign_at_another_port_where_its_own_is_tak
         service.send_signal(signal.SIGINT)
     assert campaign["state"] == "succeeded"
     assert not address.endswith(f":{PORT}")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("end", ["in time", "another demo", "folder gone"])
+def test_a_page_that_is_left_ends_by_itself(tmp_path: Path, end: str) -> None:
+    folder = tmp_path / "demo"
+    prepare_folder(folder, (*FILES, DATA))
+    page = leave_page(folder, 5.0 if end == "in time" else 300.0)
+    with urlopen(f"{page.address}/healthz", timeout=60) as answer:
+        assert answer.status == 200
+    if end == "another demo":
+        prepare_folder(folder, (*FILES, DATA))
+    elif end == "folder gone":
+        folder.rename(tmp_path / "elsewhere")
+    with page.process:  # which waits for its end
+        pass
+    assert page.process.returncode == -signal.SIGINT, "asked to end as by Ctrl-C, and ended in order"
+
+
+@pytest.mark.slow
+def test_a_page_that_does_not_come_up_says_why(tmp_path: Path) -> None:
+    (tmp_path / DATA).write_text("not a folder")
+    with pytest.raises(StoreError, match=f"{DATA}.*tauscope serve"):
+        leave_page(tmp_path)
 
 
 @contextmanager
