@@ -64,7 +64,8 @@ class DrivenArm:
         self.torque = np.zeros(count)
         self.stands_on_stand = True
         self.encoder_offset = np.zeros(count)
-        self._plant = scenario.plant(robot)
+        # one step a period unless its error asks for more: a processor that emulates by the clock has no time for two
+        self._plant = scenario.plant(robot, step_s=period_s)
         self._plant.place(position)
         self._servo = Servo(robot, InertiaSchedule(robot, scenario.effects), period_s)
         limits = (joint.limits.velocity for joint in robot.joints)

@@ -8,7 +8,7 @@ from sim_backend.canopen_bus.driven_arm import DrivenArm
 from sim_backend.canopen_bus.line import Line
 from sim_backend.canopen_bus.power_state import PowerState
 from sim_backend.canopen_bus.wire import Wire
-from sim_backend.emulation.device_clock import STEP_S, DeviceClock
+from sim_backend.emulation.device_clock import MOST_STEPS, STEP_S, DeviceClock
 from sim_backend.emulation.fault_kit import FaultKind, FaultSchedule, InjectedFault, faults_from
 
 _TICKS_PER_MEASUREMENT = 10
@@ -98,15 +98,17 @@ class CanEmulator:
                 self.driven.take_targets(now_s - self._clock.lost_s)
         self.advance_to(now_s)
 
-    def advance_to(self, now_s: float) -> None:
+    def advance_to(self, now_s: float, most_steps: int = MOST_STEPS) -> None:
         """Let time pass: not all at once where the machine stood still, so that the master is heard in between.
 
         Parameters
         ----------
         now_s : float
             present instant [s]
+        most_steps : int
+            after which it waits to be asked again
         """
-        self._clock.catch_up(now_s, self._step)
+        self._clock.catch_up(now_s, self._step, most_steps)
 
     def due(self, now_s: float) -> bytes:
         """Text that has reached the host by now.

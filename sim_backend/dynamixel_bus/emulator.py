@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from sim_backend.dynamixel_bus.arm import MovedArm
 from sim_backend.dynamixel_bus.bus import EmulatedBus
 from sim_backend.dynamixel_bus.servo import EmulatedServo
-from sim_backend.emulation.device_clock import ALL_STEPS, STEP_S, DeviceClock
+from sim_backend.emulation.device_clock import ALL_STEPS, MOST_STEPS, STEP_S, DeviceClock
 from sim_backend.emulation.fault_kit import faults_from
 
 Array = NDArray[np.float64]
@@ -108,15 +108,17 @@ class DynamixelEmulator:
         """When the next bytes reach the master; infinite where none are under way [s]."""
         return self._outgoing[0][0] if self._outgoing else float("inf")
 
-    def advance_to(self, now_s: float) -> None:
+    def advance_to(self, now_s: float, most_steps: int = MOST_STEPS) -> None:
         """Let time pass: not all at once where the machine stood still, so that the master is heard in between.
 
         Parameters
         ----------
         now_s : float
             present instant [s]
+        most_steps : int
+            after which it waits to be asked again
         """
-        self._clock.catch_up(now_s, self._step)
+        self._clock.catch_up(now_s, self._step, most_steps)
 
     def describe(self) -> dict[str, Any]:
         """Where the arm is and what its servos do."""

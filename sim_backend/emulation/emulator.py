@@ -2,6 +2,8 @@
 
 from typing import Any, ClassVar, Protocol
 
+from sim_backend.emulation.device_clock import MOST_STEPS
+
 
 class Emulator(Protocol):
     """Devices on one bus with the arm that they move; the instants are those of the server's clock."""
@@ -38,13 +40,15 @@ class Emulator(Protocol):
         """
         ...
 
-    def advance_to(self, now_s: float) -> None:
-        """Let time pass.
+    def advance_to(self, now_s: float, most_steps: int = MOST_STEPS) -> None:
+        """Let time pass: not all at once where the machine stood still, so that the master is heard in between.
 
         Parameters
         ----------
         now_s : float
             present instant [s]
+        most_steps : int
+            after which it waits to be asked again
         """
         ...
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from sim_backend.emulation.arrivals import Arrivals
+from sim_backend.emulation.device_clock import MOST_STEPS
 from sim_backend.emulation.emulator import EmulatorOrder
 from sim_backend.own_process import take_precedence
 
@@ -55,9 +56,9 @@ class EmulatorServer:
             with self._arrivals or contextlib.nullcontext():
                 print("ready", flush=True)  # noqa: T201 (whoever started this waits for the line)
                 while self._running:
-                    self._wait()
+                    ready = self._wait()
                     self._serve_master()
-                    self._serve_test()
+                    self._serve_test(ready)
                     self._write_trace()
         finally:
             self._port.close()
@@ -77,9 +78,12 @@ class EmulatorServer:
     def _now_s(self) -> float:
         return self._stepped_s if self._order.stepped else self._instant(time.monotonic_ns())
 
-    def _wait(self) -> None:
-        """Until something comes, an answer is due, or the physics want their step."""
-        wait_s = min(_PERIOD_S, max(0.0, self._emulator.next_due_s - self._now_s))
+    def _wait(self) -> list[Any]:
+        """Until something comes, an answer is due, or the physics want their step; what can be read then."""
+        due_s = self._emulator.next_due_s
+        if not self._order.stepped:
+            due_s = min(due_s, self._emulator.now_s + _PERIOD_S)
+        wait_s = min(_PERIOD_S, max(0.0, due_s - self._now_s))
         sources: list[Any] = [self._tests, sys.stdin]
         if self._arrivals is not None:
             sources.append(self._arrivals)
@@ -90,14 +94,21 @@ class EmulatorServer:
         ready = select.select(sources, [], [], wait_s)[0]
         if sys.stdin in ready and not os.read(sys.stdin.fileno(), 1):
             self._running = False
+        return ready
 
     def _serve_master(self) -> None:
-        """Take what the master sent, let time pass, send what has arrived at the master."""
+        """Take what the master sent, let time pass, send what has arrived at the master.
+
+        By the machine's clock no answer waits for more than the step that is under way: a master takes what comes much
+        later than usual for no sample.
+        """
         pieces, now_s = self._received()
         for piece, arrival_s in pieces:
             if self._emulator.hears(self._port.baud):
                 self._emulator.receive(piece, arrival_s)
-        self._emulator.advance_to(now_s)
+        if pieces:
+            self._send()
+        self._emulator.advance_to(now_s, MOST_STEPS if self._order.stepped else 1)
         self._send()
 
     def _send(self) -> None:
@@ -118,17 +129,15 @@ class EmulatorServer:
         """By the devices' clock [s]."""
         return max(0.0, (monotonic_ns - self._start_ns) * 1e-9)
 
-    def _serve_test(self) -> None:
+    def _serve_test(self, ready: list[Any]) -> None:
         """Answer the test, a line of JSON each way."""
-        with contextlib.suppress(BlockingIOError):
+        if self._tests in ready:
             self._test = self._tests.accept()[0]
             self._test.setblocking(False)
-        if self._test is None:
             return
-        try:
-            received = self._test.recv(_LONGEST_MESSAGE)
-        except BlockingIOError:
+        if self._test is None or self._test not in ready:
             return
+        received = self._test.recv(_LONGEST_MESSAGE)
         if not received:
             self._test, self._pending = None, b""
             return

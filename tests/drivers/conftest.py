@@ -35,8 +35,9 @@ MARKS = {
 MAKERS = [pytest.param(name, marks=MARKS.get(name, [])) for name in ALL_RIGS]
 
 
-@pytest.fixture(scope="session", params=MAKERS)
+@pytest.fixture(scope="module", params=MAKERS)
 def make_rig(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[], Rig]]:
+    # for one module: an emulator that moves an arm by the clock takes half a processor, and takes it from the others
     with ALL_RIGS[request.param](tmp_path_factory.mktemp("rig")) as maker:
         yield maker
 

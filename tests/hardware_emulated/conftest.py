@@ -1,4 +1,7 @@
-"""Emulated servos that several tests use one after the other, each of them as delivered; and the program itself."""
+"""Emulated servos that a module's tests use one after the other, each of them as delivered; and the program itself.
+
+No emulator outlives its module: one that moves an arm by the clock takes half a processor, and takes it from others.
+"""
 
 from collections.abc import Iterator
 
@@ -9,13 +12,13 @@ from hardware_emulated.dynamixel_bench import Bench, bench
 from prompt_process import prompt_process
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def three_servos(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
     with bench(tmp_path_factory.mktemp("servos")) as one:
         yield one
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def weightless_servos(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
     with bench(tmp_path_factory.mktemp("servos"), weight=0.0) as one:
         yield one

@@ -39,6 +39,8 @@ class Effect(ABC):
 
     Columns of an effect `of_motion_alone` are the same beside every model, and are made once; those of one that
     `has_step` change with K_v of its joint.
+    Columns that are a linear filter of the load are `linear_in_load`: noise of the positions, which changes the
+    predicted load, is in them as it is in the residual.
     What a sensor does not pass on, or a spring carries for the motor, `may_exceed_measured`; nothing else can.
     An effect that is `screened` is looked for beside the nominal model; any other becomes a finding by comparison with
     a given model.
@@ -57,6 +59,7 @@ class Effect(ABC):
     repeats: ClassVar[bool] = False
     of_motion_alone: ClassVar[bool] = False
     has_step: ClassVar[bool] = False
+    linear_in_load: ClassVar[bool] = False
     may_exceed_measured: ClassVar[bool] = False
     screened: ClassVar[bool] = True
     repeats_with_motion: ClassVar[bool] = True

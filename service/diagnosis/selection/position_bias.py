@@ -14,9 +14,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from service.diagnosis.catalogue import Signals
+from service.diagnosis.catalogue import Effect, Signals
 from service.diagnosis.catalogue.deflection import torque_of_deflection
-from service.diagnosis.catalogue.joint_elasticity import JointElasticity
 from service.diagnosis.fitting.fit import Fit
 from service.diagnosis.fitting.projection import moments
 from service.diagnosis.observations.observations import Piece
@@ -45,7 +44,7 @@ def is_position_noise(option: Option, fit: Fit, screen: Screen) -> bool:
         of the training recordings
     """
     term = option.fit.model.terms[-1]
-    if not isinstance(term.effect, JointElasticity):
+    if not term.effect.linear_in_load:
         return False
     signals = model_signals(fit.model, screen.observations)
     in_common = float(screen.at_shapes(term.effect, term.shape[None], fit, signals).target[0, 0])
@@ -55,13 +54,13 @@ def is_position_noise(option: Option, fit: Fit, screen: Screen) -> bool:
 
 
 def _drawn(
-    effect: JointElasticity, shape: Array, fit: Fit, screen: Screen, signals: list[Signals], rng: np.random.Generator
+    effect: Effect, shape: Array, fit: Fit, screen: Screen, signals: list[Signals], rng: np.random.Generator
 ) -> float:
     """(X n)ᵀ M (-G n) for one draw of n."""
     observations = screen.observations
     changes = [_predicted(own, _noise(piece, rng)) for piece, own in zip(observations, signals, strict=True)]
     moved = [
-        replace(own, load=piece.without_noise_of_inertia(change))  # an elasticity is linear in its load
+        replace(own, load=piece.without_noise_of_inertia(change))
         for piece, own, change in zip(observations, signals, changes, strict=True)
     ]
     rows = [piece.reduced(-change) for piece, change in zip(observations, changes, strict=True)]
