@@ -148,11 +148,14 @@ def test_feed_forward_counts_where_the_backend_says_so(rig: Rig) -> None:
     if not rig.backend.capabilities.takes_feed_forward:
         pytest.skip("the backend takes no feed-forward")
     enable(rig)
-    before = drive(rig, lambda _: setpoint(START), 0.05, rate_hz=500.0)[-1].effort
-    push = np.array([0.0, 1.5, 0.0])
-    # drives may interpolate over a few cycles: they are short here, for the drives' own loop works against the push
-    after = [state.effort for state in drive(rig, lambda _: setpoint(START, push), 0.02, rate_hz=500.0)]
-    assert max(rig.torque(effort - before)[1] for effort in after) > 0.5 * push[1]
+    push, rises = np.array([0.0, 1.5, 0.0]), []
+    # drives may interpolate over a few cycles: they are short here, for the drives' own loop works against the push; by
+    # the machine's clock it may have done so before anybody looks, but not each time
+    for _ in range(5 if rig.is_real_time else 1):
+        before = drive(rig, lambda _: setpoint(START), 0.05, rate_hz=500.0)[-1].effort
+        after = drive(rig, lambda _: setpoint(START, push), 0.02, rate_hz=500.0)
+        rises += [rig.torque(state.effort - before)[1] for state in after]
+    assert max(rises) > 0.5 * push[1]
 
 
 def test_the_state_has_the_joints_shape_and_si_units(rig: Rig) -> None:
