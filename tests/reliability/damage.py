@@ -20,7 +20,8 @@ def damage_something(data: Path, ledger: Ledger, note: Note, chance: random.Rand
     ]
     if draw < 0.4 and recordings:
         name = chance.choice(recordings)
-        if draw < 0.1:
+        # one of the two: where a recording and what is remembered of it are damaged, nobody can tell
+        if draw < 0.1 and not ledger.recordings[name].may_be_damaged:
             note("damage_memory", name, "")
             return _damaged(data / RECORDINGS / ".sha256" / f"{name}.json", chance)
         note("damage_recording", name, "")
