@@ -43,7 +43,7 @@ test: $(INSTALLED) ## the quick tests
 # machine makes slow: one diagnosis of half a minute has taken five.
 test-slow: $(INSTALLED) ## the tests that take long or need something of the host
 	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder --timeout 900 -m "(slow or system) and not realtime" $(PYTEST_FLAGS)
-	$(BIN)/pytest -m realtime --reruns 3 --only-rerun MachineStoodStill $(PYTEST_FLAGS)
+	$(BIN)/pytest -m realtime --reruns 4 --only-rerun MachineStoodStill $(PYTEST_FLAGS)
 
 bench: $(INSTALLED) ## time and memory; leave the machine alone meanwhile
 	@set -e; for script in tests/benchmarks/benchmark_*.py; do echo "== $$script"; $(BIN)/python $$script; done

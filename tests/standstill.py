@@ -2,8 +2,7 @@
 
 Machines are shared: the whole of one may be taken away for a tenth of a second, which no program can make good. A test
 of mark `realtime` that fails while that was seen to happen raises `MachineStoodStillError`, and is run again
-(``make test-slow``). A test that fails without it has failed. One for which the machine kept time in none of its tries
-has judged nothing: it is skipped, and the reason tells what was seen.
+(``make test-slow``). A test that fails without it has failed.
 """
 
 import os
@@ -69,19 +68,3 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
             if onlooker.longest_s < STANDSTILL_S:
                 raise
             raise MachineStoodStillError(f"for {1e3 * onlooker.longest_s:.0f} ms; the test failed: {error}") from error
-
-
-@pytest.hookimpl(wrapper=True)
-def pytest_runtest_makereport(
-    item: pytest.Item, call: pytest.CallInfo[None]
-) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    report = yield
-    reruns: int | None = item.config.getoption("reruns", None)
-    if call.excinfo is None or not call.excinfo.errisinstance(MachineStoodStillError) or not reruns:
-        return report
-    tries = getattr(item, "execution_count", 1)
-    if tries > reruns:
-        path, line, _ = item.location
-        report.outcome = "skipped"
-        report.longrepr = (path, line or 0, f"not judged: no time kept in {tries} tries, at last {call.excinfo.value}")
-    return report

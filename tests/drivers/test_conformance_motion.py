@@ -124,20 +124,19 @@ def test_a_far_target_is_approached_at_the_speed_limit(rig: Rig) -> None:
     states = drive(rig, lambda _: setpoint(START + 0.4), 0.6)
     # loops that swing answer the step with which it begins by more than the limit
     begin = len(states) // 4 if rig.swing > 0.0 else 0
-    speed = np.abs([state.velocity for state in states[begin:]])
-    if rig.is_real_time or rig.answers_within > 1:
-        # by the machine's clock a drive takes a target late now and then, or two at once, and makes good for it: it is
-        # as fast as allowed over a few cycles; where frames are lost on purpose likewise
-        speed = speed_over(10, states[begin:])
-    assert np.nanmax(speed) < 1.3 * 0.5
+    # by the machine's clock a drive takes a target late now and then and makes good for it: it is never farther than
+    # the limit allows since the beginning, which is asked more closely; where frames are lost on purpose likewise
+    is_smooth = not rig.is_real_time and rig.answers_within == 1
+    speed = np.abs([state.velocity for state in states[begin:]]) if is_smooth else mean_speed(states[begin:], 10)
+    assert np.nanmax(speed) < (1.3 if is_smooth else 1.2) * 0.5
     assert np.nanmax(speed) > 0.8 * 0.5
 
 
-def speed_over(cycles: int, states: list[ArmState]) -> NDArray[np.float64]:
-    """How far each joint comes in so many cycles, by their time; NaN where there is no reading."""
+def mean_speed(states: list[ArmState], cycles: int) -> NDArray[np.float64]:
+    """Speed of each joint in the mean since the first state, from so many cycles on; NaN where there is no reading."""
     position = np.array([state.position for state in states])
     time_s = 1e-9 * np.array([state.time_ns for state in states])[:, None]
-    return np.abs(position[cycles:] - position[:-cycles]) / (time_s[cycles:] - time_s[:-cycles])
+    return np.abs(position[cycles:] - position[0]) / (time_s[cycles:] - time_s[0])
 
 
 def test_torque_stays_below_the_cap(rig: Rig) -> None:

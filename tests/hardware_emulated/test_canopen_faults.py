@@ -12,7 +12,6 @@ from arm_rigs import START, drive, setpoint, wide_limits
 from drivers import ControlMode, DriverError, StopPolicy
 from hardware_emulated.canopen_rig import CanopenRig, canopen_rigs
 from sim_backend.emulation.fault_kit import FaultKind, InjectedFault
-from standstill import MachineStoodStillError
 
 pytestmark = [pytest.mark.realtime, pytest.mark.timeout(600)]
 
@@ -87,8 +86,6 @@ def test_every_fault_in_every_phase_ends_in_a_definite_state(make_rig, kind: Fau
     if kind in HARDWARE and phase in ("connect", "enable", "run"):
         assert HARDWARE[kind] in ended.message
     if kind is FaultKind.DUPLICATE:
-        if ended.ended_in == "stale":
-            raise MachineStoodStillError(f"sound drives answered too late; the test failed: {ended.message}")
         assert ended == Outcome("stopped", "")
     # whatever happened: without a host nothing under power moves
     seen = rig.watch(WATCHDOG_S + 0.8)
