@@ -13,7 +13,7 @@ from service.api.access.key_ring import KeyRing
 from service.api.access.keys import KeyFile
 from service.api.access.rate_limit import RateLimit
 from service.api.audit.log import AuditLog, AuditTrail
-from service.api.idempotency.answers import AnswerStore
+from service.api.idempotency.on_disk import AnswersOnDisk
 from service.api.idempotency.passing import PassingAnswers
 from service.api.operations.metrics import Metrics, TimedExecutor
 from service.api.pulse import Pulse
@@ -165,7 +165,7 @@ def _assemble(ground: _Ground, executor: Executor | None, start: StartControl | 
         access=ground.access,
         leases=leases,
         audit=audit,
-        answers=AnswerStore(settings.data_folder / "idempotency"),
+        answers=AnswersOnDisk(settings.data_folder / "idempotency"),
         lease_answers=PassingAnswers(),
         metrics=metrics,
         pulse=pulse,

@@ -10,8 +10,7 @@ from fastapi import Depends, Request
 
 from service.api.access.gate import Access
 from service.api.audit.log import AuditTrail
-from service.api.idempotency.answers import AnswerStore
-from service.api.idempotency.passing import PassingAnswers
+from service.api.idempotency.answers import Answers
 from service.api.operations.metrics import Metrics
 from service.api.pulse import Pulse
 from service.api.settings import Settings
@@ -54,9 +53,9 @@ class Services:
         who controls which arm
     audit : AuditTrail
         who did what
-    answers : AnswerStore
+    answers : Answers
         answers to requests that may be repeated
-    lease_answers : PassingAnswers
+    lease_answers : Answers
         answers to those who take leases, which hold a secret
     metrics : Metrics
         what is counted
@@ -84,8 +83,8 @@ class Services:
     access: Access
     leases: Leases
     audit: AuditTrail
-    answers: AnswerStore
-    lease_answers: PassingAnswers
+    answers: Answers
+    lease_answers: Answers
     metrics: Metrics
     pulse: Pulse
     index: IndexKeeper

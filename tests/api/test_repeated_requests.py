@@ -18,8 +18,9 @@ from jobs.controls import HandControls, finish_at_once
 from jobs.executors import InlineExecutor
 from service.api import Settings, create_app
 from service.api.access.scopes import Scope
-from service.api.idempotency.answers import LIFE_S, AnswerStore, KeptAnswer
+from service.api.idempotency.answers import LIFE_S, KeptAnswer
 from service.api.idempotency.fingerprint import Fingerprint
+from service.api.idempotency.on_disk import AnswersOnDisk
 from service.api.idempotency.passing import MOST, PassingAnswers
 from service.api.services import Services
 from service.jobs import RunDesk
@@ -147,13 +148,13 @@ def test_keys_that_are_none(key: str, client: TestClient) -> None:
 
 def test_answers_are_forgotten_after_a_day(settings: Settings) -> None:
     folder, now = settings.data_folder / "answers", [0.0]
-    store = AnswerStore(folder, clock=lambda: now[0])
+    store = AnswersOnDisk(folder, clock=lambda: now[0])
     assert store.begin("a")
     store.finish("a", KeptAnswer(fingerprint="f", status=202, headers=(("x", "y"),), body=""))
     now[0] = (folder / "a").stat().st_mtime + LIFE_S - 1.0
-    assert not AnswerStore(folder, clock=lambda: now[0]).begin("a")
+    assert not AnswersOnDisk(folder, clock=lambda: now[0]).begin("a")
     now[0] += 2.0
-    assert AnswerStore(folder, clock=lambda: now[0]).begin("a")
+    assert AnswersOnDisk(folder, clock=lambda: now[0]).begin("a")
 
 
 @given(body=st.binary(max_size=200), cuts=st.lists(st.integers(0, 400), max_size=6))
@@ -172,7 +173,7 @@ def test_the_fingerprint_does_not_depend_on_the_pieces_nor_on_the_boundary(body:
 def test_services_hold_the_store(app: FastAPI) -> None:
     with connected(app):
         services: Services = app.state.services
-        assert isinstance(services.answers, AnswerStore)
+        assert isinstance(services.answers, AnswersOnDisk)
 
 
 def test_a_lease_is_taken_once_and_its_secret_is_on_no_disk(settings: Settings) -> None:

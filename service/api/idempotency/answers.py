@@ -1,23 +1,15 @@
-"""Answers that are kept for those who ask again: one small file a request, written before anything is done."""
+"""Answers that are kept for those who ask again with the same key."""
 
 import base64
 import hashlib
-import os
-import threading
-import time
-from collections.abc import Callable
-from pathlib import Path
+from typing import Protocol
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 from service.api.models import StrictModel
-from service.store import write_atomically
-from service.store.atomic import sync_folder
 
 LIFE_S = 24 * 3600.0
 """How long an answer is kept [s]."""
-
-_TIDY_EVERY = 500
 
 
 class KeptAnswer(StrictModel):
@@ -33,27 +25,11 @@ class KeptAnswer(StrictModel):
         return base64.b64decode(self.body)
 
 
-class AnswerStore:
+class Answers(Protocol):
     """Answers by the name of their request."""
 
-    def __init__(self, folder: Path, clock: Callable[[], float] = time.time) -> None:
-        """Open the store; its folder is made where it is missing, and answers that are too old go.
-
-        Parameters
-        ----------
-        folder : Path
-            holds the answers
-        clock : callable
-            seconds of the same era as the files' times
-        """
-        self._folder, self._clock = folder, clock
-        self._lock = threading.Lock()
-        self._begun = 0
-        folder.mkdir(parents=True, exist_ok=True)
-        self._tidy()
-
     def begin(self, name: str) -> bool:
-        """Claim a request, durably, before anything is done.
+        """Claim a request before anything is done.
 
         Parameters
         ----------
@@ -68,19 +44,9 @@ class AnswerStore:
         Raises
         ------
         OSError
-            if that cannot be written
+            if that has to be written down and cannot be
         """
-        with self._lock:
-            self._begun += 1
-            if self._begun % _TIDY_EVERY == 0:
-                self._tidy()
-        try:
-            descriptor = os.open(self._folder / name, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
-        except FileExistsError:
-            return False
-        os.close(descriptor)
-        sync_folder(self._folder)
-        return True
+        ...
 
     def finish(self, name: str, answer: KeptAnswer | None) -> None:
         """Keep the answer, or forget a request that did nothing.
@@ -92,10 +58,7 @@ class AnswerStore:
         answer : KeptAnswer or None
             what was answered; None to forget
         """
-        if answer is None:
-            (self._folder / name).unlink(missing_ok=True)
-        else:
-            write_atomically(self._folder / name, answer.model_dump_json().encode())
+        ...
 
     def find(self, name: str) -> KeptAnswer | None:
         """The answer to a request; None where there is none (yet).
@@ -105,19 +68,7 @@ class AnswerStore:
         name : str
             of the request
         """
-        try:
-            return KeptAnswer.model_validate_json((self._folder / name).read_bytes())
-        except (OSError, ValidationError):
-            return None
-
-    def _tidy(self) -> None:
-        """Remove what is too old."""
-        for entry in self._folder.iterdir():
-            try:
-                if self._clock() - entry.stat().st_mtime > LIFE_S:
-                    entry.unlink(missing_ok=True)
-            except OSError:
-                continue
+        ...
 
 
 def request_name(caller: str, path: str, key: str) -> str:

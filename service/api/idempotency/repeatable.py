@@ -11,15 +11,12 @@ from starlette.types import ASGIApp, Message, Receive, Send
 from starlette.types import Scope as AsgiScope
 
 from service.api.access.gate import caller_of
-from service.api.idempotency.answers import AnswerStore, KeptAnswer, request_name
+from service.api.idempotency.answers import Answers, KeptAnswer, request_name
 from service.api.idempotency.fingerprint import Fingerprint
-from service.api.idempotency.passing import PassingAnswers
 from service.api.problems import make_problem, problem_answer
 from service.api.services import Services
 
 HEADER = "Idempotency-Key"
-
-Answers = AnswerStore | PassingAnswers
 
 LONGEST_KEY = 200
 """Most characters of the header's value."""
