@@ -33,10 +33,11 @@ LONGEST_LIFE_S = 300.0
 class Campaign:
     """Lives on one data folder after the other, until so many faults have struck."""
 
-    def __init__(self, seed: int) -> None:
+    def __init__(self, seed: int, keep: Path | None = None) -> None:
+        """`keep`: the folder for what is left where a promise was broken."""
         self.counts: Counter[str] = Counter()
         self.lives = 0
-        self._seed = seed
+        self._seed, self._keep = seed, keep
 
     def run(self, injections: int) -> None:
         """Raises SystemExit where a promise was broken, with what it takes to see it again."""
@@ -63,13 +64,24 @@ class Campaign:
         self.counts += watch.met
         if watch.violation is not None or status not in (0, -signal.SIGKILL):
             told = watch.violation or f"the service's process ended with {status}"
-            raise SystemExit(f"broken in life {plan.seed} ({plan}):\n{told}\nafter {dict(self.counts)}")
+            told = f"broken in life {plan.seed} ({plan}):\n{told}\nafter {dict(self.counts)}"
+            if self._keep is not None:
+                _keep_traces(self._keep, folder, ledger, told)
+            raise SystemExit(told)
         ledger.note("over", "")
         if status != 0:
             self.counts[plan.end] += 1
             ledger.note("killed", "")
         if chance.random() < 0.4 and damage_something(folder, ledger, ledger.note, chance):
             self.counts[DAMAGED_WHILE_DOWN] += 1
+
+
+def _keep_traces(keep: Path, folder: Path, ledger: Ledger, told: str) -> None:
+    """The data folder as it is and all that was noted of it: lives that are killed never go the same way twice."""
+    shutil.copytree(folder, keep / "data")
+    events = "".join(json.dumps(event) + "\n" for event in ledger.events)
+    (keep / "events.jsonl").write_text(events, encoding="utf-8")
+    (keep / "broken.txt").write_text(told + "\n", encoding="utf-8")
 
 
 class _Watch:
@@ -150,8 +162,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--injections", type=int, default=10_000)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--keep", type=Path, help="new folder for the traces of a broken promise")
     words = parser.parse_args()
-    campaign, begin = Campaign(words.seed), time.monotonic()
+    campaign, begin = Campaign(words.seed, words.keep), time.monotonic()
     campaign.run(words.injections)
     for kind, count in sorted(campaign.counts.items()):
         print(f"{count:6} {kind}")

@@ -41,9 +41,12 @@ class Ledger:
     """Requests for a job that were not answered: each may have left one that nobody knows."""
     excuses: set[str] = field(default_factory=set)
     """Reasons for which any job may fail as long as the present fault lasts."""
+    events: list[tuple[str, str, str]] = field(default_factory=list)
+    """All that was noted, in its order: for who looks for what broke a promise."""
 
     def note(self, what: str, key: str, value: str = "") -> None:
         """Take an event down, by its name."""
+        self.events.append((what, key, value))
         getattr(self, f"_{what}")(key, value)
 
     def unfinished(self) -> list[HandedInJob]:
