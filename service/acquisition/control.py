@@ -23,8 +23,8 @@ from service.acquisition.states import RunState
 from service.acquisition.stop_listener import StopListener
 from service.acquisition.task import OpenRecorder, RunTask, Surroundings
 from service.errors import AcquisitionError, TauscopeError
-from service.excitation import read_trajectory
 from service.robot import read_robot
+from service.trajectory import read_trajectory
 
 _LARGEST_EVENT = 4096
 

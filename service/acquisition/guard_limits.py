@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers import DriveLimits
-from service.excitation.limits import motion_limits
 from service.robot import JointType, Robot
+from service.trajectory.limits import motion_limits
 
 Array = NDArray[np.float64]
 

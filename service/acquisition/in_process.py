@@ -13,9 +13,9 @@ from service.acquisition.run import Run
 from service.acquisition.stop_request import ManualStop, Stops
 from service.acquisition.task import RunTask, Surroundings
 from service.errors import AcquisitionError
-from service.excitation import Trajectory
 from service.recording.journal_rows import JournalHeader
 from service.robot import Robot
+from service.trajectory import Trajectory
 
 
 def run_trajectory(

@@ -10,11 +10,11 @@ from service.acquisition.feed_forward import predicted_torque
 from service.acquisition.guard_limits import GuardLimits, guard_limits
 from service.acquisition.options import RunOptions, cycle_rate_hz
 from service.errors import AcquisitionError
-from service.excitation.limits import motion_limits
-from service.excitation.segments import MoveSegment
-from service.excitation.trajectory import Trajectory, ramp
 from service.recording.journal_rows import Phase
 from service.robot import Robot
+from service.trajectory.limits import motion_limits
+from service.trajectory.segments import MoveSegment
+from service.trajectory.trajectory import Trajectory, ramp
 
 Array = NDArray[np.float64]
 

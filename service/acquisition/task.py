@@ -11,9 +11,9 @@ from service.acquisition.progress import Report
 from service.acquisition.record import RunRecord
 from service.acquisition.recorder import Recorder
 from service.acquisition.stop_request import Stops
-from service.excitation import Trajectory
 from service.recording.journal_rows import JournalHeader
 from service.robot import Robot
+from service.trajectory import Trajectory
 
 OpenRecorder = Callable[[Path, JournalHeader, Stops, bool], Recorder]
 """Opens a journal: its path, its header, requests to stop, and whether the arm runs in real time."""

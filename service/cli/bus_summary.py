@@ -12,9 +12,9 @@ from service.acquisition.field_buses import bus_of, find_bus
 from service.acquisition.guard_limits import guard_limits
 from service.cli.terminal import output, plain, shown_progress, table
 from service.errors import AcquisitionError
-from service.excitation import read_trajectory
 from service.report.table import Table
 from service.robot import Robot, read_robot
+from service.trajectory import read_trajectory
 
 SHOWN_CYCLES = 3
 """Cycles of a run whose frames are shown."""

@@ -24,11 +24,12 @@ from service.cli.run_session import keep_recording, run_to_end, why_unfinished
 from service.cli.terminal import Told, output, plain, shown_percent, shown_progress, table
 from service.diagnosis import DiagnosisDocument
 from service.errors import AcquisitionError
-from service.excitation import ExcitationOptions, OptimiserProgress, design_excitation, write_trajectory
+from service.excitation import ExcitationOptions, OptimiserProgress, design_excitation
 from service.identification import Identification
 from service.report.quantities import given, with_uncertainty
 from service.report.table import Table
 from service.robot import Robot, read_robot
+from service.trajectory import write_trajectory
 from sim_backend.examples import example_robot
 
 NOISE_STD_NM = (0.5, 0.3, 0.7)

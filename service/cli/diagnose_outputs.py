@@ -10,13 +10,13 @@ import typer
 from service.diagnosis import Diagnosis, DiagnosisDocument
 from service.diagnosis.extended_model import compensation_code, improved_robot, model_document, scenario_text
 from service.diagnosis.next_experiment import PlannedExperiment
-from service.excitation import trajectory_json
-from service.excitation.trajectory_csv import trajectory_csv
-from service.excitation.trajectory_files import DEFAULT_RATE_HZ
 from service.identification.compensation import RecordingSource
 from service.jobs.version import tauscope_version
 from service.recording import EffortKind
 from service.report.provenance import Provenance, record_provenance
+from service.trajectory import trajectory_json
+from service.trajectory.csv_format import trajectory_csv
+from service.trajectory.files import DEFAULT_RATE_HZ
 
 CODE = (".py", ".h")
 TRAJECTORIES = (".json", ".csv")

@@ -15,10 +15,10 @@ from service.excitation import (
     design_excitation,
     excitation_document,
 )
-from service.excitation.trajectory_csv import trajectory_csv
 from service.report.quantities import significant
 from service.robot import Severity, read_robot
 from service.robot.messages import one_line
+from service.trajectory.csv_format import trajectory_csv
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,9 +17,10 @@ from service.cli.output_files import keep_file, require_new
 from service.cli.run_summary import show_run
 from service.cli.terminal import Told, output, plain, shown_percent
 from service.errors import AcquisitionError
-from service.excitation import ExcitationOptions, OptimiserProgress, design_excitation, write_trajectory
+from service.excitation import ExcitationOptions, OptimiserProgress, design_excitation
 from service.robot import Robot, read_robot
 from service.robot.messages import one_line
+from service.trajectory import write_trajectory
 
 SUFFIXES = (".csv", ".parquet", ".mcap")
 """Formats of a recording, by suffix."""

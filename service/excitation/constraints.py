@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from service.excitation.fourier_series import MotionSamples, between_samples
 from service.excitation.information import ExcitationRegressor, MotionGradient
-from service.excitation.limits import MotionLimits
 from service.excitation.series_space import SeriesSpace
 from service.excitation.torque_prediction import TorquePrediction
 from service.excitation.workspace import WorkspaceUsage
+from service.trajectory.fourier_series import MotionSamples, between_samples
+from service.trajectory.limits import MotionLimits
 
 Array = NDArray[np.float64]
 

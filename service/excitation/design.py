@@ -6,15 +6,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from service.excitation.criteria import Criterion, reported_value
-from service.excitation.fourier_series import FourierSeries
 from service.excitation.margins import Margins, trajectory_margins
 from service.excitation.optimiser import OptimiserProgress, optimise
 from service.excitation.options import ExcitationOptions
-from service.excitation.segments import FourierSegment, Segment
 from service.excitation.setting import Setting
 from service.excitation.slow_reversals import SlowPart, slow_part
-from service.excitation.trajectory import DesignRecord, Trajectory
 from service.robot import Robot
+from service.trajectory.fourier_series import FourierSeries
+from service.trajectory.segments import FourierSegment, Segment
+from service.trajectory.trajectory import DesignRecord, Trajectory
 
 ACTIVE = 0.01
 """Part of a limit: a limit that leaves no more than this above what is spared by wish is one that limits the design."""

@@ -6,9 +6,8 @@ import numpy as np
 from pydantic import Field
 
 from service.excitation.design import ExcitationDesign
-from service.excitation.trajectory_document import TrajectoryDocument, TrajectoryPart, trajectory_document
-
-EXCITATION_SCHEMA = "tauscope.excitation/1"
+from service.trajectory.document import TrajectoryDocument, TrajectoryPart, trajectory_document
+from service.trajectory.files import EXCITATION_SCHEMA
 
 
 class HistoryPart(TrajectoryPart):

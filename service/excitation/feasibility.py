@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from service.errors import ExcitationError
 from service.excitation.constraints import KinematicUsage, StateUsage
-from service.excitation.fourier_series import MotionSamples
-from service.excitation.limits import MotionLimits
 from service.excitation.series_space import SeriesGrid, SeriesSpace
 from service.robot import JointType, Robot
+from service.trajectory.fourier_series import MotionSamples
+from service.trajectory.limits import MotionLimits
 
 Array = NDArray[np.float64]
 

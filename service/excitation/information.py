@@ -15,8 +15,8 @@ from service.dynamics import BaseParameters
 from service.dynamics.friction import smooth_sign
 from service.dynamics.regressor import TorqueRegressor
 from service.dynamics.regressor_gradient import RegressorGradient
-from service.excitation.fourier_series import MotionSamples
 from service.robot import STANDARD_PARAMETERS, Robot
+from service.trajectory.fourier_series import MotionSamples
 
 Array = NDArray[np.float64]
 Columns = NDArray[np.intp]

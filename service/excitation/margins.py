@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from service.errors import ExcitationError
 from service.excitation.constraints import StateUsage
-from service.excitation.fourier_series import MotionSamples, between_samples
-from service.excitation.limits import MotionLimits
-from service.excitation.segments import FourierSegment, Segment
-from service.excitation.trajectory import Trajectory
 from service.robot import JointType, Robot
+from service.trajectory.fourier_series import MotionSamples, between_samples
+from service.trajectory.limits import MotionLimits
+from service.trajectory.segments import FourierSegment, Segment
+from service.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from service.excitation.constraints import KinematicUsage, StateUsage
 from service.excitation.criteria import Criterion, CriterionValue, criterion_value
-from service.excitation.fourier_series import MotionSamples
 from service.excitation.information import ExcitationRegressor
 from service.excitation.series_space import SeriesGrid, SeriesSpace
+from service.trajectory.fourier_series import MotionSamples
 
 Array = NDArray[np.float64]
 

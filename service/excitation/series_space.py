@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from scipy.linalg import null_space
 
 from service.errors import ExcitationError
-from service.excitation.fourier_series import LEAST_HARMONICS, FourierSeries, MotionSamples
 from service.excitation.information import MotionGradient
-from service.excitation.limits import MotionLimits
+from service.trajectory.fourier_series import LEAST_HARMONICS, FourierSeries, MotionSamples
+from service.trajectory.limits import MotionLimits
 
 Array = NDArray[np.float64]
 

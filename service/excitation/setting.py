@@ -10,9 +10,7 @@ from service.errors import ExcitationError
 from service.excitation.constraints import KinematicUsage, StateUsage
 from service.excitation.criteria import Criterion, CriterionValue, criterion_value, reported_value
 from service.excitation.feasibility import Feasibility, require_room
-from service.excitation.fourier_series import FourierSeries, MotionSamples
 from service.excitation.information import ColumnScaling, ExcitationRegressor
-from service.excitation.limits import MotionLimits, motion_limits
 from service.excitation.optimiser import Stages
 from service.excitation.options import ExcitationOptions
 from service.excitation.problem import ExcitationProblem, Objective
@@ -20,6 +18,8 @@ from service.excitation.series_space import SeriesSpace
 from service.excitation.torque_prediction import TorquePrediction
 from service.excitation.workspace import WorkspaceUsage
 from service.robot import Robot
+from service.trajectory.fourier_series import FourierSeries, MotionSamples
+from service.trajectory.limits import MotionLimits, motion_limits
 
 Array = NDArray[np.float64]
 

@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.excitation.constraints import StateUsage
-from service.excitation.fourier_series import FourierSeries, MotionSamples
-from service.excitation.limits import MotionLimits
-from service.excitation.segments import FourierSegment, MoveSegment, PathSegment, Segment
-from service.excitation.trajectory import ramp, whole_steps
 from service.robot import JointType, Robot
+from service.trajectory.fourier_series import FourierSeries, MotionSamples
+from service.trajectory.limits import MotionLimits
+from service.trajectory.segments import FourierSegment, MoveSegment, PathSegment, Segment
+from service.trajectory.trajectory import ramp, whole_steps
 
 Array = NDArray[np.float64]
 

@@ -4,9 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.dynamics import BaseParameters
-from service.excitation.fourier_series import MotionSamples
 from service.excitation.information import ExcitationRegressor, MotionGradient
 from service.robot import FrictionCoefficients, Robot
+from service.trajectory.fourier_series import MotionSamples
 
 Array = NDArray[np.float64]
 

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.errors import ExcitationError
-from service.excitation.fourier_series import MotionSamples
 from service.excitation.information import MotionGradient
 from service.robot import JointType, Robot
 from service.robot.kinematics import homogeneous, link_placements
+from service.trajectory.fourier_series import MotionSamples
 
 Array = NDArray[np.float64]
 

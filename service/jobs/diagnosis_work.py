@@ -10,7 +10,6 @@ from service.diagnosis.documents.plots import diagnosis_plots
 from service.diagnosis.extended_model import model_document
 from service.diagnosis.next_experiment import PlannedExperiment, planned_experiment
 from service.errors import ExcitationError, RecordingError, TauscopeError
-from service.excitation import trajectory_json
 from service.jobs.diagnosis_order import DiagnosisOrder
 from service.jobs.diagnosis_workspace import ROLES, DiagnosisWorkspace
 from service.jobs.identification_order import OrderedRecording
@@ -20,6 +19,7 @@ from service.jobs.work import begin_step, do_work
 from service.recording import Recording, read_recording
 from service.robot import Robot, read_robot
 from service.store import hash_file, write_atomically
+from service.trajectory import trajectory_json
 
 
 def run_diagnosis(folder: Path, server_recordings: Path) -> JobProblem | None:

@@ -5,21 +5,15 @@ from functools import partial
 from pathlib import Path
 
 from service.errors import LimitExceededError, TauscopeError
-from service.excitation import (
-    OptimiserProgress,
-    design_excitation,
-    excitation_document,
-    parse_trajectory_json,
-    read_trajectory,
-    trajectory_json,
-)
-from service.excitation.trajectory_csv import trajectory_csv
+from service.excitation import OptimiserProgress, design_excitation, excitation_document
 from service.jobs.excitation_workspace import ExcitationWorkspace
 from service.jobs.messages import without_folders
 from service.jobs.record import JobProblem
 from service.jobs.work import begin_step, do_work, require_wanted
 from service.robot import read_robot
 from service.store import write_atomically
+from service.trajectory import parse_trajectory_json, read_trajectory, trajectory_json
+from service.trajectory.csv_format import trajectory_csv
 
 MOST_ROWS = 2_000_000
 """Rows of the longest CSV that is made on request."""

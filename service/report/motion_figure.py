@@ -3,8 +3,8 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from service.excitation import Trajectory
 from service.report.svg import PREDICTED, draw_svg
+from service.trajectory import Trajectory
 
 MOST_SAMPLES = 700
 ROW_INCHES = 0.55

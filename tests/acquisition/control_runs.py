@@ -10,8 +10,8 @@ from acquisition.doubles import point_robot, short_motion
 from service.acquisition.order import BackendOrder, RunOrder
 from service.acquisition.record import RunRecord, read_record
 from service.acquisition.run_process import RunProcess
-from service.excitation import write_trajectory
 from service.robot import read_robot
+from service.trajectory import write_trajectory
 from shared_data import REPOSITORY
 
 ROBOT = """\

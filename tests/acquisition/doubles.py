@@ -10,8 +10,8 @@ from arms import dh_segment
 from drivers import ArmState, Capabilities, ControlMode, DriveLimits, DriverError, Fault, Setpoint, StopPolicy
 from drivers.errors import DriverErrorKind
 from service.acquisition.backends import Connection
-from service.excitation import FourierSegment, FourierSeries, Trajectory
 from service.robot import Joint, JointLimits, LinkInertia, Robot
+from service.trajectory import FourierSegment, FourierSeries, Trajectory
 
 Array = NDArray[np.float64]
 

@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -12,6 +14,13 @@ from service.acquisition.run_process import RunProcess
 from service.acquisition.states import RunState
 from service.recording import read_recording
 from service.recording.journal_reading import read_journal
+
+
+def test_it_begins_without_what_only_analysis_needs() -> None:
+    listed = "import sys, service.acquisition.control; print(*{name.partition('.')[0] for name in sys.modules})"
+    loaded = subprocess.run([sys.executable, "-c", listed], capture_output=True, text=True, check=True).stdout.split()
+    assert "numpy" in loaded
+    assert not {"scipy", "matplotlib", "sqlalchemy", "fastapi", "mujoco"} & set(loaded)
 
 
 def test_a_run_in_real_time(tmp_path: Path) -> None:

@@ -22,10 +22,10 @@ from acquisition.doubles import point_robot, short_motion
 from kills import KILLS, killed_often
 from service.acquisition import BackendOrder, RunOptions, RunOrder, RunRecord, RunState, read_record, recover_runs
 from service.acquisition.spawning import child_environment
-from service.excitation import write_trajectory
 from service.recording import read_recording
 from service.recording.journal_reading import read_journal
 from service.robot import read_robot
+from service.trajectory import write_trajectory
 from shared_data import REPOSITORY
 from sim_backend.device.activity import COMMANDED
 from sim_backend.device.trace import DeviceTrace, read_trace

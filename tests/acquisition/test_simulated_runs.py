@@ -8,9 +8,9 @@ import pytest
 from service.acquisition import BACKENDS, RunOptions, RunState, make_backend, run_trajectory
 from service.dynamics import friction_torque, inverse_dynamics
 from service.errors import AcquisitionError, ScenarioError
-from service.excitation import FourierSegment, FourierSeries, Trajectory
 from service.recording import read_recording
 from service.robot import Robot, read_robot
+from service.trajectory import FourierSegment, FourierSeries, Trajectory
 from sim_backend.examples import example_robot
 
 SCENARIO = "torque_noise_std: [0.5, 0.3, 0.7]\nseed: 5\n"

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from service.api.robots.models import EXAMPLE_ROBOT
-from service.excitation import MoveSegment, Trajectory, trajectory_json
+from service.trajectory import MoveSegment, Trajectory, trajectory_json
 
 ROBOT: dict[str, Any] = EXAMPLE_ROBOT
 ROBOT_FILE = json.dumps(ROBOT).encode()

@@ -13,7 +13,7 @@ from api.event_stream import read_events
 from api.serving import served
 from jobs.paper_files import PAPER_ROBOT
 from jobs.waiting import wait_until
-from service.excitation import MoveSegment, Trajectory, trajectory_json
+from service.trajectory import MoveSegment, Trajectory, trajectory_json
 from shared_data import REPOSITORY
 
 pytestmark = [pytest.mark.slow, pytest.mark.realtime]

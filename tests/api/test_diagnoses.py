@@ -11,8 +11,8 @@ from api.problem_check import assert_problem
 from service.diagnosis import DiagnosisDocument
 from service.diagnosis.documents.plots import DiagnosisPlots
 from service.diagnosis.extended_model import ModelDocument
-from service.excitation import parse_trajectory_json
 from service.robot import read_robot
+from service.trajectory import parse_trajectory_json
 from sim_backend.examples import example_robot
 
 DIAGNOSES = "/api/v1/diagnoses"

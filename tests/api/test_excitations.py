@@ -11,9 +11,9 @@ from api.motions import ROBOT, ROBOT_FILE, move_document
 from api.problem_check import assert_problem
 from jobs.executors import ManualExecutor
 from service.api import Settings
-from service.excitation import parse_trajectory_json
 from service.jobs import ExcitationWorkspace
 from service.robot import read_robot
+from service.trajectory import parse_trajectory_json
 
 EXCITATIONS = "/api/v1/excitations"
 QUICK = {"duration_s": 4.0, "harmonics": 2, "periods": 2, "starts": 1, "slow_postures": 0, "closing_period": False}

@@ -17,8 +17,8 @@ from api.event_stream import Event, read_events
 from api.serving import Served, served
 from jobs.paper_files import PAPER_ROBOT
 from jobs.waiting import wait_until
-from service.excitation import MoveSegment, Trajectory, trajectory_json
 from service.recording import read_recording
+from service.trajectory import MoveSegment, Trajectory, trajectory_json
 
 RUNS = "/api/v1/runs"
 LONG_S = 600.0

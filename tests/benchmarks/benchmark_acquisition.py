@@ -19,8 +19,8 @@ sys.path[:0] = [str(TESTS.parent), str(TESTS)]
 from acquisition.control_double import RealClock  # noqa: E402
 from acquisition.doubles import PointArm, point_robot, short_motion  # noqa: E402
 from service.acquisition import Connection, RunOptions, RunRecord, make_backend, run_trajectory  # noqa: E402
-from service.excitation import FourierSegment, FourierSeries, Trajectory  # noqa: E402
 from service.robot import Robot, read_robot  # noqa: E402
+from service.trajectory import FourierSegment, FourierSeries, Trajectory  # noqa: E402
 from sim_backend.examples import example_robot  # noqa: E402
 
 REAL_S = 10.0

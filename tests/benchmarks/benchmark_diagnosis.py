@@ -24,9 +24,9 @@ sys.path[:0] = [str(TESTS.parent), str(TESTS)]
 from concealed.arms import NOISE_STD, arm_named, without_truth  # noqa: E402
 from service.acquisition import RunOptions, make_backend, run_trajectory  # noqa: E402
 from service.diagnosis import diagnose, document  # noqa: E402
-from service.excitation import FourierSegment, FourierSeries, Trajectory  # noqa: E402
 from service.recording import read_recording  # noqa: E402
 from service.robot import Robot  # noqa: E402
+from service.trajectory import FourierSegment, FourierSeries, Trajectory  # noqa: E402
 
 ARM = "six"
 RATE_HZ = 500.0

@@ -32,9 +32,9 @@ sys.path[:0] = [str(TESTS.parent), str(TESTS)]
 from arms import panda_like, ur5_like  # noqa: E402
 from service.dynamics import base_parameters, inverse_dynamics  # noqa: E402
 from service.excitation import ExcitationOptions, design_excitation  # noqa: E402
-from service.excitation.fourier_series import MotionSamples  # noqa: E402
 from service.excitation.information import ExcitationRegressor  # noqa: E402
 from service.robot import Joint, JointLimits, LinkInertia, Model, Placement, Robot, read_robot  # noqa: E402
+from service.trajectory.fourier_series import MotionSamples  # noqa: E402
 from sim_backend.examples import example_robot  # noqa: E402
 from sim_backend.motion import random_fourier_motion  # noqa: E402
 

@@ -27,7 +27,7 @@ import numpy as np  # noqa: E402
 
 from api.serving import served  # noqa: E402
 from jobs.paper_files import PAPER_ROBOT  # noqa: E402
-from service.excitation import MoveSegment, Trajectory, trajectory_json  # noqa: E402
+from service.trajectory import MoveSegment, Trajectory, trajectory_json  # noqa: E402
 
 RUNS = "/api/v1/runs"
 START = [0.0, 0.6, 0.6]

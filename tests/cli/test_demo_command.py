@@ -31,9 +31,9 @@ from service.cli.demo import (
 from service.cli.demo_folder import MARK, prepare_folder
 from service.cli.demo_page import DATA, PORT, PageShown, leave_page
 from service.errors import ExportError, StoreError
-from service.excitation import read_trajectory
 from service.recording import read_recording
 from service.robot import read_robot
+from service.trajectory import read_trajectory
 from sim_backend.examples import example_robot
 
 Run = Callable[..., Ended]

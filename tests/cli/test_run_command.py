@@ -14,8 +14,8 @@ import pytest
 from cli.conftest import Ended
 from jobs.paper_files import PAPER_ROBOT
 from jobs.waiting import wait_until
-from service.excitation import MoveSegment, Trajectory, write_trajectory
 from service.recording import read_recording
+from service.trajectory import MoveSegment, Trajectory, write_trajectory
 from shared_data import REPOSITORY
 
 Run = Callable[..., Ended]

@@ -6,8 +6,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from service.excitation import Trajectory
 from service.robot import Joint, JointLimits, Robot
+from service.trajectory import Trajectory
 from sim_backend.motion import FourierMotion, random_fourier_motion
 
 Array = NDArray[np.float64]

@@ -19,8 +19,8 @@ from concealed.motions import Planned
 from concealed.trial import Trial
 from concealed.truth import truth_of
 from service.diagnosis.documents.document import DiagnosisDocument
-from service.excitation import read_trajectory
 from service.recording import EffortKind, Recording, write_recording
+from service.trajectory import read_trajectory
 
 Array = NDArray[np.float64]
 

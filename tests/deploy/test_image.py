@@ -18,7 +18,7 @@ from ruamel.yaml import YAML
 from deploy.containers import Podman, absent, as_composed, podman
 from jobs.paper_files import PAPER_ROBOT, write_recording
 from patience import eventually
-from service.excitation import MoveSegment, Trajectory, trajectory_json
+from service.trajectory import MoveSegment, Trajectory, trajectory_json
 from shared_data import REPOSITORY
 
 DEPLOY = REPOSITORY / "deploy"

@@ -16,9 +16,10 @@ from service.cli.verbs import add_verb
 from service.diagnosis import DiagnosisDocument
 from service.diagnosis.extended_model import read_model
 from service.errors import ExcitationError
-from service.excitation import motion_limits, read_trajectory, require_within_limits
+from service.excitation import require_within_limits
 from service.recording import Recording
 from service.robot import read_robot
+from service.trajectory import motion_limits, read_trajectory
 from sim_backend.examples import example_robot
 from sim_backend.scenario_file import read_scenario
 

@@ -14,9 +14,10 @@ from service.diagnosis.next_experiment.bank import KINDS, Bank
 from service.diagnosis.next_experiment.plan import PlannedExperiment
 from service.diagnosis.next_experiment.separation import equations, log_variances, separations
 from service.diagnosis.next_experiment.sweeps import sweep
-from service.excitation import Trajectory, motion_limits, read_trajectory, require_within_limits, write_trajectory
+from service.excitation import require_within_limits
 from service.identification import Identification, identify
 from service.recording import Recording, read_recording
+from service.trajectory import Trajectory, motion_limits, read_trajectory, write_trajectory
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from arms import panda_like, paper_arm, paper_parameters, random_arm, random_link, ur5_like
 from service.dynamics import inverse_dynamics
-from service.excitation import ExcitationDesign, ExcitationOptions, FourierSeries, motion_limits
+from service.excitation import ExcitationDesign, ExcitationOptions
 from service.robot import (
     FrictionCoefficients,
     FrictionShape,
@@ -18,6 +18,7 @@ from service.robot import (
     Model,
     Robot,
 )
+from service.trajectory import FourierSeries, motion_limits
 
 Array = NDArray[np.float64]
 

@@ -22,12 +22,12 @@ from service.excitation import (
     Workspace,
     design_excitation,
     optimiser,
-    trajectory_json,
 )
 from service.excitation.information import ExcitationRegressor
 from service.excitation.workspace import WorkspaceUsage
 from service.robot import JointLimits, Model, Robot
 from service.robot.kinematics import link_placements
+from service.trajectory import trajectory_json
 
 QUICK = ExcitationOptions(starts=1, slow_postures=1)
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from service.cli.program import main
-from service.excitation import read_trajectory, trajectory_json
-from service.excitation.trajectory_document import TrajectoryDocument, trajectory_of
 from service.robot import read_robot
+from service.trajectory import read_trajectory, trajectory_json
+from service.trajectory.document import TrajectoryDocument, trajectory_of
 from sim_backend.examples import example_robot
 
 ROBOT = str(example_robot("paper_arm"))

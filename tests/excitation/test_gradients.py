@@ -15,7 +15,7 @@ from excitation.excited_arms import (
 )
 from pinocchio_arm import pinocchio_model
 from service.dynamics import base_parameters, friction_columns, torque_regressor
-from service.excitation import Box, Criterion, MotionSamples, Workspace, motion_limits
+from service.excitation import Box, Criterion, Workspace
 from service.excitation.constraints import KinematicUsage, StateUsage, smooth_maximum
 from service.excitation.criteria import criterion_value
 from service.excitation.information import ExcitationRegressor, MotionGradient
@@ -25,6 +25,7 @@ from service.excitation.torque_prediction import TorquePrediction
 from service.excitation.workspace import WorkspaceUsage
 from service.robot import Robot
 from service.robot.kinematics import link_placements
+from service.trajectory import MotionSamples, motion_limits
 
 ARMS = gradient_arms()
 IDS = ["paper", "ur5", "panda", "random3", "random4"]

@@ -8,17 +8,13 @@ from service.dynamics import base_parameters
 from service.excitation import (
     ExcitationDesign,
     ExcitationOptions,
-    FourierSegment,
-    MotionSamples,
     design_excitation,
     excitation_document,
-    motion_limits,
-    parse_trajectory_json,
     require_within_limits,
-    trajectory_json,
 )
 from service.excitation.information import ExcitationRegressor
 from service.robot import Robot
+from service.trajectory import FourierSegment, MotionSamples, motion_limits, parse_trajectory_json, trajectory_json
 from sim_backend.motion import random_fourier_motion
 
 TIME = np.arange(500.0) * 0.02

@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 from service.cli import main
-from service.excitation import ExcitationOptions, design_excitation, write_trajectory
+from service.excitation import ExcitationOptions, design_excitation
 from service.robot import read_robot
+from service.trajectory import write_trajectory
 
 Tauscope = Callable[..., tuple[int, str, str]]
 """From arguments to exit status, standard output and standard error."""

@@ -9,8 +9,9 @@ from drivers import ArmState, Backend, Capabilities, ControlMode, DriveLimits, S
 from drivers.clock import Clock
 from service.acquisition import RunOptions, RunRecord, run_trajectory
 from service.acquisition.backends import Connection
-from service.excitation import ExcitationOptions, Trajectory, design_excitation
+from service.excitation import ExcitationOptions, design_excitation
 from service.robot import Robot, read_robot
+from service.trajectory import Trajectory
 from sim_backend.emulation import EmulatorProcess
 from sim_backend.emulation.emulator import EmulatorOrder
 

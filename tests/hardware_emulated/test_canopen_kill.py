@@ -21,8 +21,8 @@ from hardware_emulated.canopen_robot import RATED_TORQUE_MNM, drive_joints, writ
 from kills import KILLS, killed_often
 from service.acquisition import BackendOrder, RunOptions, RunOrder, RunState, recover_runs
 from service.acquisition.run_process import RunProcess
-from service.excitation import write_trajectory
 from service.robot import read_robot
+from service.trajectory import write_trajectory
 from sim_backend.canopen_bus.order import CanOrder
 from sim_backend.emulation.process import EmulatorProcess
 

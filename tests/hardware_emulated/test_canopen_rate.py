@@ -15,10 +15,11 @@ from hardware_emulated.canopen_rig import ANSWER_PATIENCE_S
 from hardware_emulated.canopen_robot import GEAR, write_canopen_arm
 from hardware_emulated.counted import against_the_clock, require_all_counted
 from service.acquisition import BackendOrder, RunOptions, RunOrder, RunProcess, RunRecord
-from service.excitation import ExcitationOptions, Trajectory, design_excitation, write_trajectory
+from service.excitation import ExcitationOptions, design_excitation
 from service.identification import document, identify
 from service.recording import read_recording
 from service.robot import read_robot
+from service.trajectory import Trajectory, write_trajectory
 from sim_backend.canopen_bus.order import CanOrder
 from sim_backend.emulation import EmulatorProcess
 

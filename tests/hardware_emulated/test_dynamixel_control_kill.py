@@ -17,8 +17,9 @@ from hardware_emulated.dynamixel_bench import SLACK_S, Bench
 from kills import KILLS, killed_often
 from service.acquisition import BackendOrder, RunOptions, RunOrder, RunProcess, RunState
 from service.acquisition.dynamixel_bus import dynamixel_joints
-from service.excitation import ExcitationOptions, design_excitation, write_trajectory
+from service.excitation import ExcitationOptions, design_excitation
 from service.robot import Robot, read_robot
+from service.trajectory import write_trajectory
 from sim_backend.dynamixel_bus import DynamixelOrder
 from sim_backend.dynamixel_bus.robot_servos import servos_of
 from sim_backend.emulation import EmulatorProcess

@@ -11,12 +11,13 @@ import pytest
 from acquisition.doubles import PointArm, connection, point_robot, short_motion
 from service.acquisition import make_backend, run_trajectory
 from service.errors import AcquisitionError, TauscopeError
-from service.excitation import ExcitationOptions, Workspace, design_excitation, read_trajectory
+from service.excitation import ExcitationOptions, Workspace, design_excitation
 from service.identification.compensation.drive_units import drive_units
 from service.recording import EffortKind, read_recording
 from service.robot import Joint, read_robot
 from service.store import site_identifier
 from service.store.database import Database
+from service.trajectory import read_trajectory
 from shared_data import REPOSITORY
 
 ROBOT = """\

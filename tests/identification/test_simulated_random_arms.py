@@ -12,11 +12,11 @@ import pytest
 
 from excitation.excited_arms import modelled_arm, resting_series, with_limits
 from service.acquisition import RunOptions, RunState, make_backend, run_trajectory
-from service.excitation import FourierSegment, Trajectory
 from service.identification import Identification, identify
 from service.recording import read_recording
 from service.robot import JointLimits, Model, Robot
 from service.robot.robot import STANDARD_PARAMETERS
+from service.trajectory import FourierSegment, Trajectory
 from sim_backend.model import build_model
 
 PERIODS = 3

@@ -20,8 +20,8 @@ from service.diagnosis import DiagnosisDocument
 from service.diagnosis.documents.plots import DiagnosisPlots
 from service.diagnosis.extended_model import ModelDocument
 from service.errors import NotFoundError
-from service.excitation.trajectory_document import TrajectoryDocument
 from service.jobs import DiagnosisWorkspace
+from service.trajectory.document import TrajectoryDocument
 
 router = APIRouter(prefix="/diagnoses", tags=["diagnoses"], responses=problem_responses("invalid-request"))
 

@@ -11,11 +11,12 @@ import numpy as np
 
 from service.diagnosis.next_experiment.sweeps import sweep
 from service.errors import ExcitationError
-from service.excitation import ExcitationOptions, FourierSegment, MotionSamples, Trajectory
+from service.excitation import ExcitationOptions
 from service.excitation.setting import Setting
 from service.excitation.slow_reversals import slow_part
 from service.identification import Identification
 from service.robot import FrictionCoefficients, Model, Robot
+from service.trajectory import FourierSegment, MotionSamples, Trajectory
 
 DURATION_S = 20.0
 """Of every Fourier series and sweep [s]."""

@@ -11,8 +11,8 @@ from service.diagnosis.model.extended import ExtendedModel
 from service.diagnosis.next_experiment.bank import KINDS, Bank, Primitive
 from service.diagnosis.next_experiment.separation import equations, log_variances, played, separations
 from service.errors import ExcitationError
-from service.excitation import Trajectory
 from service.recording.recording import Array
+from service.trajectory import Trajectory
 
 FIRST_LOOK = 4
 """Fourier series of every kind at the first look."""

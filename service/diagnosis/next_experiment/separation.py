@@ -16,11 +16,11 @@ from service.diagnosis.fitting.fit import Fitter
 from service.diagnosis.fitting.regressor_noise import weightings_of_motion
 from service.diagnosis.model.extended import ExtendedModel
 from service.diagnosis.observations.observations import Observations
-from service.excitation import Trajectory
 from service.recording import Recording
 from service.recording.conditioning import Conditioner
 from service.recording.conditioning.position_noise import PositionNoise
 from service.recording.recording import Array
+from service.trajectory import Trajectory
 
 UNKNOWN = 1e-9
 """Singular values of the scaled columns below this share of the largest tell nothing."""

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from service.excitation import MotionLimits, MotionSamples, SampledSegment
 from service.recording.recording import Array
+from service.trajectory import MotionLimits, MotionSamples, SampledSegment
 
 RATE_HZ = 100.0
 """Samples that define the motion; between them it is a quintic."""

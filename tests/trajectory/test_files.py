@@ -9,20 +9,20 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from excitation.excited_arms import limited_paper_arm, resting_series
-from excitation.test_trajectory import whole_trajectory
 from service.errors import ExcitationError
-from service.excitation import (
+from service.excitation import require_within_limits
+from service.trajectory import (
     DesignRecord,
     FourierSegment,
     Trajectory,
     motion_limits,
     parse_trajectory_json,
     read_trajectory,
-    require_within_limits,
     trajectory_json,
     write_trajectory,
 )
-from service.excitation.trajectory_csv import parse_trajectory_csv, trajectory_csv
+from service.trajectory.csv_format import parse_trajectory_csv, trajectory_csv
+from trajectory.test_trajectory import whole_trajectory
 
 ROBOT = limited_paper_arm()
 NAMES = ("joint1", "joint2", "joint3")

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.errors import ExcitationError
-from service.excitation.fourier_series import FourierSeries, MotionSamples
+from service.trajectory.fourier_series import FourierSeries, MotionSamples
 
 Array = NDArray[np.float64]
 

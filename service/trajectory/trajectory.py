@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.errors import ExcitationError
-from service.excitation.fourier_series import MotionSamples
-from service.excitation.limits import MotionLimits
-from service.excitation.segments import (
+from service.trajectory.fourier_series import MotionSamples
+from service.trajectory.limits import MotionLimits
+from service.trajectory.segments import (
     PEAK_ACCELERATION,
     PEAK_SPEED,
     FourierSegment,

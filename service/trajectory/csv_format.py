@@ -7,13 +7,12 @@ import re
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import make_interp_spline
 
 from service.errors import ExcitationError
-from service.excitation.fourier_series import MotionSamples
-from service.excitation.segments import SampledSegment
-from service.excitation.trajectory import Trajectory
 from service.robot.messages import nearest, shown
+from service.trajectory.fourier_series import MotionSamples
+from service.trajectory.segments import SampledSegment
+from service.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
@@ -175,6 +174,9 @@ def _group(columns: list[str], group: str, count: int, name: str) -> list[int]:
 
 def _spline(time: Array, position: Array, name: str) -> MotionSamples:
     """Samples of the quintic spline through the positions, at rest at both ends."""
+    # Not above: the process that plays a run needs SciPy for nothing else, and begins without it in half the time.
+    from scipy.interpolate import make_interp_spline
+
     if len(time) <= SPLINE_DEGREE:
         raise ExcitationError(f"{name}: has {len(time)} rows; velocities from positions need {SPLINE_DEGREE + 1}")
     zero = np.zeros(position.shape[1])

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from service.errors import ExcitationError
-from service.excitation.fourier_series import FourierSeries, MotionSamples
-from service.excitation.limits import MotionLimits
-from service.excitation.segments import FourierSegment, MoveSegment, PathSegment, SampledSegment, Segment
-from service.excitation.trajectory import DesignRecord, Trajectory
+from service.trajectory.fourier_series import FourierSeries, MotionSamples
+from service.trajectory.limits import MotionLimits
+from service.trajectory.segments import FourierSegment, MoveSegment, PathSegment, SampledSegment, Segment
+from service.trajectory.trajectory import DesignRecord, Trajectory
 
 Array = NDArray[np.float64]
 Vector = list[float]

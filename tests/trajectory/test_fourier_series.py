@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from excitation.excited_arms import resting_series
 from service.errors import ExcitationError
-from service.excitation import FourierSeries
-from service.excitation.fourier_series import between_samples
+from service.trajectory import FourierSeries
+from service.trajectory.fourier_series import between_samples
 
 
 def test_the_paper_s_formulas_term_by_term() -> None:

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from excitation.excited_arms import limited_paper_arm, resting_series
 from service.errors import ExcitationError
-from service.excitation import (
+from service.trajectory import (
     FourierSegment,
     MotionLimits,
     MotionSamples,
@@ -18,7 +18,7 @@ from service.excitation import (
     motion_limits,
     ramp,
 )
-from service.excitation.segments import minimum_jerk
+from service.trajectory.segments import minimum_jerk
 
 LIMITS = motion_limits(limited_paper_arm())
 NAMES = ("joint1", "joint2", "joint3")
