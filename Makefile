@@ -11,6 +11,9 @@ INSTALLED := .venv/.installed
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
+# Bytecode is kept, whatever the host's environment says: to compile our tests takes a test process 20 s.
+unexport PYTHONDONTWRITEBYTECODE
+
 .DEFAULT_GOAL := help
 .PHONY: help venv demo page prove test test-slow bench lint format lock clean
 
