@@ -48,6 +48,7 @@ def test_emps_is_predicted_better_than_by_the_readme() -> None:
     assert after / before < 3.93 / 4.78
 
 
+@pytest.mark.slow
 def test_the_cogging_of_a_bare_motor_is_named_with_its_orders_and_nothing_else() -> None:
     found = told("odrive-cogging")
     assert [finding.effect for finding in found.findings] == ["cogging"]

@@ -118,6 +118,8 @@ CASES: dict[str, tuple[EffectTorque, str, str, dict[str, float]]] = {
     "wrist": (wrist, "friction_coupling", "joint3", {"f": 0.6}),
 }
 
+QUICK = {"spring", "load", "teeth"}
+EVERY_CASE = [pytest.param(case, marks=() if case in QUICK else pytest.mark.slow) for case in CASES]
 
 OTHERS: dict[str, EffectTorque] = {"unknown": unknown, "bent": bent, "hardening": hardening, "balanced": balanced}
 
@@ -134,7 +136,7 @@ def told(case: str | None) -> DiagnosisDocument:
     return document(diagnosed(case))
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", EVERY_CASE)
 def test_a_concealed_effect_is_named_at_its_joint_and_explains_everything(case: str) -> None:
     _, effect, joint, _ = CASES[case]
     found = told(case)
@@ -144,7 +146,7 @@ def test_a_concealed_effect_is_named_at_its_joint_and_explains_everything(case: 
     assert found.findings[0].confirmed
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", EVERY_CASE)
 def test_its_parameters_are_within_four_standard_errors_of_the_truth(case: str) -> None:
     values = {entry.name: entry for entry in told(case).findings[0].parameters}
     for name, truth in CASES[case][3].items():
@@ -152,7 +154,7 @@ def test_its_parameters_are_within_four_standard_errors_of_the_truth(case: str) 
         assert values[name].std < 0.2 * abs(truth)
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", EVERY_CASE)
 def test_held_out_motion_is_predicted_as_if_nothing_were_missing(case: str) -> None:
     found, plain = told(case).fit.held_out, told(None).fit.held_out
     assert found is not None
@@ -162,7 +164,7 @@ def test_held_out_motion_is_predicted_as_if_nothing_were_missing(case: str) -> N
     assert found.rms_before[joint] > 1.03 * found.rms_after[joint]
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", EVERY_CASE)
 def test_the_mismatch_is_located_before_it_is_named(case: str) -> None:
     excess = [entry.excess_rms / noise for entry, noise in zip(told(case).mismatch, (0.5, 0.3, 0.7), strict=True)]
     strongest = {told(case).joints[int(np.argmax(excess))]}
@@ -170,7 +172,7 @@ def test_the_mismatch_is_located_before_it_is_named(case: str) -> None:
     assert {entry.joint for entry in told(case).mismatch if entry.significant} >= strongest
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
 def test_nothing_is_named_where_nothing_is_missing(seed: int) -> None:
     found = diagnosed(None, seed)
     assert found.verdict is Verdict.CONSISTENT
@@ -189,6 +191,7 @@ def test_what_could_have_been_seen_is_told_and_what_could_not() -> None:
     assert sizes["rotor_inertia", "joint1"].minimum is None
 
 
+@pytest.mark.slow
 def test_an_effect_outside_the_catalogue_is_never_explained_away() -> None:
     found = told("unknown")
     assert found.verdict in {"unexplained", "partly_explained"}
@@ -197,12 +200,14 @@ def test_an_effect_outside_the_catalogue_is_never_explained_away() -> None:
         assert ("unknown", "joint2") in [(finding.effect, finding.joint) for finding in found.findings]
 
 
+@pytest.mark.slow
 def test_what_a_formula_leaves_of_its_effect_is_no_second_effect() -> None:
     found = told("bent")
     assert [(finding.effect, finding.joint) for finding in found.findings] == [("load_dependent_friction", "joint2")]
     assert found.verdict == "partly_explained"
 
 
+@pytest.mark.slow
 def test_where_it_leaves_much_the_second_effect_is_doubted() -> None:
     first, *others = told("hardening").findings
     assert first.effect in {"joint_spring", "cable_force"}

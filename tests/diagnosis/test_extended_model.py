@@ -81,6 +81,7 @@ def test_every_form_of_every_effect_is_the_same_after_a_file() -> None:
             np.testing.assert_array_equal(torques[0], torques[1], err_msg=effect.id)
 
 
+@pytest.mark.slow
 def test_a_saved_model_predicts_the_same_and_finds_nothing_missing_again(tmp_path: Path) -> None:
     names = {(finding.effect, finding.joint) for finding in document(found()).findings}
     assert names == {("cable_force", "joint1"), ("cogging", "joint3")}

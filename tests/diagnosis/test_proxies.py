@@ -16,6 +16,8 @@ from service.diagnosis.selection.proxies import proxies
 from service.diagnosis.selection.pruning import without_proxies
 from service.diagnosis.selection.table import fitted_option
 
+pytestmark = pytest.mark.slow
+
 
 def crossed(arm: SimulatedArm, rigid: Array) -> Array:
     """Nothing of the catalogue, at the second joint alone."""

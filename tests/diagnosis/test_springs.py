@@ -1,6 +1,7 @@
 """A spring that pushes away: a counterbalance over its dead centre, whose stiffness is negative."""
 
 import numpy as np
+import pytest
 
 from diagnosis.diagnosed_arm import at_joint, recordings
 from identification.simulated import Array, SimulatedArm, paper_robot
@@ -14,6 +15,7 @@ def counterbalance(arm: SimulatedArm, rigid: Array) -> Array:
     return at_joint(2, STIFFNESS * (arm.exact.exact.position[:, 2] - REST))
 
 
+@pytest.mark.slow
 def test_a_spring_that_pushes_away_is_named_with_its_stiffness() -> None:
     rng = np.random.default_rng(5)
     found = diagnose(paper_robot(), recordings((1, 2), counterbalance, rng), recordings((11,), counterbalance, rng))

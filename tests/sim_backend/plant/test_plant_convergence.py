@@ -52,7 +52,7 @@ def end(robot: Robot, effects: Sequence[Any], step_s: float) -> Array:
     return np.array(rows)
 
 
-QUICK = ("friction", "bristles", "much at once")
+QUICK = ("friction", "bristles")
 
 
 @pytest.mark.parametrize(
