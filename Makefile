@@ -39,13 +39,15 @@ page: $(INSTALLED) ## the page at http://127.0.0.1:8000 with what `make demo` ha
 	@test -d demo-output/service || { echo "nothing to show yet: run make demo first" >&2; exit 1; }
 	$(BIN)/tauscope serve --data demo-output/service
 
-test: $(INSTALLED) ## the quick tests
-	$(BIN)/pytest -n 2 $(PYTEST_FLAGS)
+# A file is one process's: its tests share what they have built.
+IN_TWO_PROCESSES := -n 2 --dist loadfile --no-loadscope-reorder
 
-# A file is one process's: its tests share what they have built. The limit ends what hangs, and no test that a busy
-# machine makes slow: one diagnosis of half a minute has taken five.
+test: $(INSTALLED) ## the quick tests
+	$(BIN)/pytest $(IN_TWO_PROCESSES) $(PYTEST_FLAGS)
+
+# The limit ends what hangs, and no test that a busy machine makes slow: one diagnosis of half a minute has taken five.
 test-slow: $(INSTALLED) ## the tests that take long or need something of the host
-	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder --timeout 900 -m "(slow or system) and not realtime" $(PYTEST_FLAGS)
+	$(BIN)/pytest $(IN_TWO_PROCESSES) --timeout 900 -m "(slow or system) and not realtime" $(PYTEST_FLAGS)
 	$(BIN)/pytest -m realtime --reruns 4 --only-rerun MachineStoodStill $(PYTEST_FLAGS)
 
 bench: $(INSTALLED) ## time and memory; leave the machine alone meanwhile

@@ -86,7 +86,6 @@ class Plant:
         self._tolerance = TOLERANCE * (step_s / STEP) ** 2
         self._shortest = SHORTEST_PART * step_s
         self._part = step_s
-        self._parts = [self._coordinates.size, 2 * self._coordinates.size]
         self.place(np.zeros(robot.joint_count))
 
     @property
@@ -103,8 +102,8 @@ class Plant:
     @property
     def state(self) -> PlantState:
         """Where the plant is."""
-        count = self.joint_count
-        position, velocity, states = np.split(self._vector, self._parts)
+        count, size = self.joint_count, self._coordinates.size
+        position, velocity, states = self._vector[:size], self._vector[size : 2 * size], self._vector[2 * size :]
         return PlantState(
             time=self._time,
             motor_position=position[self._motors],
