@@ -40,7 +40,7 @@ Run = Callable[..., Ended]
 
 
 def in_whole_demo(test: Callable[..., None]) -> Callable[..., None]:
-    return pytest.mark.slow(pytest.mark.timeout(400)(test))
+    return pytest.mark.slow(pytest.mark.timeout(900)(test))
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """The demo's folder and what it printed, run as a program of its own."""
     folder = tmp_path_factory.mktemp("demo") / "out"
     command = [sys.executable, "-m", "service.cli", "demo", "--no-page", "--out", str(folder)]
-    ended = subprocess.run(command, check=False, capture_output=True, text=True, timeout=300)
+    ended = subprocess.run(command, check=False, capture_output=True, text=True, timeout=800)
     assert (ended.returncode, ended.stderr) == (0, "")
     return folder, ended.stdout
 
