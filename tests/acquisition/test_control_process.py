@@ -16,11 +16,24 @@ from service.recording import read_recording
 from service.recording.journal_reading import read_journal
 
 
+def packages_of(module: str) -> set[str]:
+    """Every package that a new interpreter has loaded once it has imported a module."""
+    listed = f"import sys, {module}; print(*{{name.partition('.')[0] for name in sys.modules}})"
+    return set(
+        subprocess.run([sys.executable, "-c", listed], capture_output=True, text=True, check=True).stdout.split()
+    )
+
+
 def test_it_begins_without_what_only_analysis_needs() -> None:
-    listed = "import sys, service.acquisition.control; print(*{name.partition('.')[0] for name in sys.modules})"
-    loaded = subprocess.run([sys.executable, "-c", listed], capture_output=True, text=True, check=True).stdout.split()
+    loaded = packages_of("service.acquisition.control")
     assert "numpy" in loaded
-    assert not {"scipy", "matplotlib", "sqlalchemy", "fastapi", "mujoco"} & set(loaded)
+    assert not {"scipy", "matplotlib", "sqlalchemy", "fastapi", "mujoco"} & loaded
+
+
+def test_a_simulated_arm_begins_without_a_window_system() -> None:
+    loaded = packages_of("sim_backend.driver")
+    assert "mujoco" in loaded
+    assert not {"glfw", "OpenGL"} & loaded
 
 
 def test_a_run_in_real_time(tmp_path: Path) -> None:
