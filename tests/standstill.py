@@ -2,7 +2,8 @@
 
 Machines are shared: the whole of one may be taken away for a tenth of a second, which no program can make good. A test
 of mark `realtime` that fails while that was seen to happen raises `MachineStoodStillError`, and is run again
-(``make test-slow``). A test that fails without it has failed.
+(``make test-slow``). A test that fails without it has failed; but on a machine too slow for emulated devices, which is
+measured, a failure was to be expected, and is told as one.
 """
 
 import os
@@ -13,6 +14,8 @@ from types import TracebackType
 from typing import Any, Self
 
 import pytest
+
+import machine_speed
 
 PERIOD_S = 0.005
 STANDSTILL_S = 0.025
@@ -65,6 +68,9 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
         try:
             return (yield)
         except (Exception, pytest.fail.Exception) as error:
+            if machine_speed.physics_step_s() > machine_speed.QUICK_ENOUGH_S:
+                took, why = 1e3 * machine_speed.physics_step_s(), str(error).partition("\n")[0]
+                pytest.xfail(f"too slow a machine ({took:.2f} ms for a step of the physics): {why}")
             if onlooker.longest_s < STANDSTILL_S:
                 raise
             raise MachineStoodStillError(f"for {1e3 * onlooker.longest_s:.0f} ms; the test failed: {error}") from error
