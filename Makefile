@@ -48,7 +48,7 @@ test: $(INSTALLED) ## the quick tests
 # The limit ends what hangs, and no test that a busy machine makes slow: one diagnosis of half a minute has taken five.
 test-slow: $(INSTALLED) ## the tests that take long or need something of the host
 	$(BIN)/pytest -m realtime --reruns 4 --only-rerun MachineStoodStill $(PYTEST_FLAGS)
-	$(BIN)/pytest $(IN_TWO_PROCESSES) --timeout 900 -m "(slow or system) and not realtime" $(PYTEST_FLAGS)
+	$(BIN)/pytest $(IN_TWO_PROCESSES) --timeout 1800 -m "(slow or system) and not realtime" $(PYTEST_FLAGS)
 
 bench: $(INSTALLED) ## time and memory; leave the machine alone meanwhile
 	@set -e; for script in tests/benchmarks/benchmark_*.py; do echo "== $$script"; $(BIN)/python $$script; done

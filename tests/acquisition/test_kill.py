@@ -238,7 +238,7 @@ def _assert_shown_as_interrupted(run: Path, record: RunRecord, *, was_moving: bo
 CASES = [("control", signal.SIGKILL), ("control", signal.SIGSTOP), ("owner", signal.SIGKILL), ("owner", signal.SIGSTOP)]
 
 
-@pytest.mark.timeout(120)
+@pytest.mark.timeout(1200)
 @pytest.mark.parametrize(("victim", "how"), CASES[1:3])
 def test_the_arm_stops_and_the_run_is_interrupted(site: Site, victim: str, how: signal.Signals) -> None:
     rng = np.random.default_rng([1, CASES.index((victim, how))])

@@ -18,7 +18,7 @@ from service.robot.robot import STANDARD_PARAMETERS
 NOISE_STD = [0.5, 0.3, 0.7]
 CAMPAIGNS, RUNS = "/api/v1/campaigns", "/api/v1/runs"
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(1200)]
 
 
 def until_it_ends(client: httpx2.Client, events: str) -> dict[str, Any]:

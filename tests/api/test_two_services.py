@@ -20,7 +20,7 @@ from snapshots import SNAPSHOTS, unpacked
 
 __all__ = ["postgres"]
 
-pytestmark = [pytest.mark.slow, pytest.mark.system, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.slow, pytest.mark.system, pytest.mark.timeout(1200)]
 
 SCHEDULES = 30
 LEAST_ROUNDS, MOST_ROUNDS = 3, 30

@@ -11,7 +11,7 @@ from api.serving import Served
 from browser.campaign import ROBOT, make_campaign, views_of
 from browser.conftest import Visit
 
-pytestmark = [pytest.mark.system, pytest.mark.slow, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.system, pytest.mark.slow, pytest.mark.timeout(1200)]
 
 NO_JUMP = 0.01
 """Most that a view may shift while it fills; up to 0.1 counts as good (Cumulative Layout Shift, Web Vitals)."""

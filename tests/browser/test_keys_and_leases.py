@@ -18,7 +18,7 @@ from service.api.access.keys import KeyFile
 from service.api.access.scopes import Scope
 from service.client import Client, HeldLease
 
-pytestmark = [pytest.mark.system, pytest.mark.slow, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.system, pytest.mark.slow, pytest.mark.timeout(1200)]
 
 KEYS: dict[str, str] = {}
 

@@ -13,7 +13,7 @@ from api.serving import Served
 from browser.conftest import Visit
 from jobs.paper_files import PAPER_ROBOT
 
-pytestmark = [pytest.mark.system, pytest.mark.slow, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.system, pytest.mark.slow, pytest.mark.timeout(1200)]
 
 MOTION_S = 1500
 """Far longer than a test, however fast the simulated arm computes: it is not bound to the clock."""

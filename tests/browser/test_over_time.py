@@ -10,7 +10,7 @@ from api.serving import Served, served
 from browser.conftest import Visit
 from browser.wear import NIGHTLY, ROBOT, make_history, set_up_schedule
 
-pytestmark = [pytest.mark.system, pytest.mark.slow, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.system, pytest.mark.slow, pytest.mark.timeout(1200)]
 
 MOVED = "viscous joint1"
 

@@ -40,7 +40,7 @@ Run = Callable[..., Ended]
 
 
 def in_whole_demo(test: Callable[..., None]) -> Callable[..., None]:
-    return pytest.mark.slow(pytest.mark.timeout(900)(test))
+    return pytest.mark.slow(pytest.mark.timeout(1800)(test))
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ import pytest
 from concealed.score import Score, diagnosed, scored
 from concealed.trial import effect_trial, null_trial, several_trial, unknown_trial
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(1800)]
 
 AT_40 = {
     "asymmetric_viscous": 1,

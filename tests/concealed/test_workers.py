@@ -34,7 +34,7 @@ def cluster(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(600)
+@pytest.mark.timeout(1200)
 @pytest.mark.filterwarnings("ignore")
 def test_a_dask_cluster_makes_the_same_trials(cluster: None, tmp_path: Path) -> None:
     tasks = [Task("sound", seed, "paper") for seed in (2, 3)]

@@ -9,7 +9,7 @@ from service.recording import read_recording
 from service.robot import read_robot
 from shared_data import SHARED_DATA, needs_shared_data
 
-pytestmark = [needs_shared_data, pytest.mark.timeout(600)]  # the LWR4+ takes 80 s on a quiet core
+pytestmark = [needs_shared_data, pytest.mark.timeout(1200)]  # the LWR4+ takes 80 s on a quiet core
 
 
 @cache

@@ -173,7 +173,7 @@ def worn(identification: Identification, tmp_path_factory: pytest.TempPathFactor
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(900)
+@pytest.mark.timeout(1800)
 def test_what_the_recordings_leave_open_is_said_and_a_motion_planned_that_separates_it(worn: Worn) -> None:
     """Beside the friction curve's flanks, asymmetric friction is all but a constant."""
     found = document(worn.diagnosis).findings
@@ -184,7 +184,7 @@ def test_what_the_recordings_leave_open_is_said_and_a_motion_planned_that_separa
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(900)
+@pytest.mark.timeout(1800)
 def test_a_run_of_what_is_planned_settles_what_the_recordings_left_open(worn: Worn, tmp_path: Path) -> None:
     new = recorded(worn.planned.trajectory, worn.scenario, tmp_path / "new", 9)
     after = document(diagnose(paper_robot(), [*worn.recordings, new]))

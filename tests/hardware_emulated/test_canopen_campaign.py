@@ -60,7 +60,7 @@ def play(arm: dict[str, Any], folder: Path, faults: list[InjectedFault], design:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(600)
+@pytest.mark.timeout(1200)
 @pytest.mark.parametrize("name", list(ARMS))
 def test_parameters_are_found_within_their_errors(name: str, tmp_path: Path) -> None:
     arm = ARMS[name]()

@@ -13,7 +13,7 @@ from drivers import ControlMode, DriverError, StopPolicy
 from hardware_emulated.canopen_rig import CanopenRig, canopen_rigs
 from sim_backend.emulation.fault_kit import FaultKind, InjectedFault
 
-pytestmark = [pytest.mark.realtime, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.realtime, pytest.mark.timeout(1200)]
 
 WATCHDOG_S = 0.4
 FAULTS: dict[FaultKind, dict[str, Any]] = {

@@ -58,7 +58,7 @@ def play(arm: dict[str, Any], folder: Path) -> RunRecord:
 
 @pytest.mark.realtime
 @pytest.mark.slow
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(1200)
 @pytest.mark.parametrize("name", list(ARMS))
 def test_a_campaign_at_200_hz(name: str, tmp_path: Path) -> None:
     arm = ARMS[name]()

@@ -94,7 +94,7 @@ def play(
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(600)
+@pytest.mark.timeout(1200)
 @pytest.mark.parametrize("name", list(ARMS))
 def test_parameters_are_found_within_their_errors(name: str, tmp_path: Path) -> None:
     arm = ARMS[name]()
@@ -116,7 +116,7 @@ def test_parameters_are_found_within_their_errors(name: str, tmp_path: Path) -> 
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(1200)
 @pytest.mark.parametrize("lateness_ns", [LITTLE_LATE_NS, LATE_NS])
 def test_a_host_that_is_late_shifts_no_parameter(lateness_ns: float, tmp_path: Path) -> None:
     arm = three_joints()
@@ -132,7 +132,7 @@ def test_a_host_that_is_late_shifts_no_parameter(lateness_ns: float, tmp_path: P
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(1200)
 def test_the_hosts_own_loop_tracks_a_motion_by_current(tmp_path: Path) -> None:
     options = RunOptions(rate_hz=RATE_HZ, mode=ControlMode.TORQUE, stop_policy=StopPolicy.TORQUE_OFF)
     design = ExcitationOptions(period_s=4.0, periods=1, starts=1, slow_postures=0, closing_period=False)

@@ -61,7 +61,7 @@ TABLE = FaultTable(
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(900)
+@pytest.mark.timeout(1800)
 def test_every_fault_in_every_phase(site: Site) -> None:
     TABLE.require_documented(site)
 

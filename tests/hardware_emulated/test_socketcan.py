@@ -89,7 +89,7 @@ def machine(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 
 @pytest.mark.system
 @pytest.mark.slow
-@pytest.mark.timeout(1000)
+@pytest.mark.timeout(1800)
 @pytest.mark.parametrize("name", list(DISTURBANCES))
 def test_the_conformance_suite_passes(machine: dict[str, str], name: str) -> None:
     disturbance = DISTURBANCES[name]

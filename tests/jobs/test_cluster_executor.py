@@ -36,7 +36,7 @@ from service.store import ItemStore, hash_file
 if TYPE_CHECKING:
     from distributed import LocalCluster
 
-CLUSTER = [pytest.mark.slow, pytest.mark.timeout(180), pytest.mark.filterwarnings("ignore")]
+CLUSTER = [pytest.mark.slow, pytest.mark.timeout(1200), pytest.mark.filterwarnings("ignore")]
 
 
 def die(_: int) -> None:

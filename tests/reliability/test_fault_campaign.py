@@ -13,7 +13,7 @@ SEED = os.environ.get("TAUSCOPE_SEED", "1")
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(0 if INJECTIONS > 100 else 300)
+@pytest.mark.timeout(0 if INJECTIONS > 100 else 1200)
 def test_no_lost_recording_no_stuck_job_no_wrong_status() -> None:
     """In a process of its own, which forks, and has as little in it as possible."""
     words = [sys.executable, "-m", "reliability.campaign", "--injections", str(INJECTIONS), "--seed", SEED]

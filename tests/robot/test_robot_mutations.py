@@ -167,7 +167,7 @@ def test_damaged_urdf_is_refused_or_sound(folder: Path, data: bytes) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(600)
+@pytest.mark.timeout(1200)
 @THOROUGH
 @given(data=mutated(ROBOT_YAML, YAML_PIECES))
 def test_damaged_robot_file_is_refused_or_sound_thoroughly(folder: Path, data: bytes) -> None:
@@ -175,7 +175,7 @@ def test_damaged_robot_file_is_refused_or_sound_thoroughly(folder: Path, data: b
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(600)
+@pytest.mark.timeout(1200)
 @THOROUGH
 @given(data=mutated(URDF, URDF_PIECES))
 def test_damaged_urdf_is_refused_or_sound_thoroughly(folder: Path, data: bytes) -> None:

@@ -119,7 +119,7 @@ def test_nothing_is_lost_or_changed(address: Path | str, old: dict[str, list[dic
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(600)
+@pytest.mark.timeout(1200)
 def test_a_program_that_is_killed_in_the_middle_leaves_the_form_of_before(
     address: Path | str, old: dict[str, list[dict[str, Any]]]
 ) -> None:

@@ -35,7 +35,7 @@ ENABLED, HOLDING = 0x1227, 0x0207
 COUNT = 2.0 * np.pi / (COUNTS * GEAR)
 LIMITS = DriveLimits(*(np.full(2, value) for value in (-5.0, 5.0, 4.0, 8.0)))
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(180)]
+pytestmark = [pytest.mark.system, pytest.mark.timeout(1200)]
 
 
 class NpmDrives:
