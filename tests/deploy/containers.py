@@ -56,7 +56,7 @@ class Podman:
         }
 
     def start(
-        self, *words: str, given: str | None = None, within_s: float = 120, environment: Mapping[str, str] | None = None
+        self, *words: str, given: str | None = None, within_s: float = 400, environment: Mapping[str, str] | None = None
     ) -> "subprocess.CompletedProcess[str]":
         """Call it, whatever comes of it; `environment` is what a compose file passes on by name."""
         return subprocess.run(
@@ -65,7 +65,7 @@ class Podman:
         )  # fmt: skip
 
     def call(
-        self, *words: str, given: str | None = None, within_s: float = 120, environment: Mapping[str, str] | None = None
+        self, *words: str, given: str | None = None, within_s: float = 400, environment: Mapping[str, str] | None = None
     ) -> str:
         """What it prints; it has to succeed."""
         done = self.start(*words, given=given, within_s=within_s, environment=environment)
@@ -77,7 +77,7 @@ class Podman:
         done = self.start("logs", name)
         return done.stdout + done.stderr
 
-    def healthy(self, name: str, within_s: float = 60) -> bool:
+    def healthy(self, name: str, within_s: float = 300) -> bool:
         """Whether the command by which the image says that it is well does so in time."""
         deadline = time.monotonic() + within_s
         while (done := self.start("healthcheck", "run", name)).returncode != 0 and time.monotonic() < deadline:
