@@ -70,7 +70,7 @@ class ForeignDrive:
 
 @pytest.fixture
 def channel() -> str:
-    return uuid4().hex
+    return f"{uuid4().hex}-1"  # BLF takes the digits at its end for its number, of 16 bits
 
 
 @pytest.fixture
