@@ -106,4 +106,5 @@ class _Contact(Term):
         if self._force is None:
             forces.link[self._joint] += share * self._torque
         else:
-            forces.link += share * (self._force @ moment.bodies.tool_jacobian(self._offset))
+            torque = share * (self._force @ moment.bodies.tool_jacobian(self._offset))
+            forces.link = [carried + pushed for carried, pushed in zip(forces.link, torque.tolist(), strict=True)]

@@ -108,7 +108,7 @@ class _WarmingFriction(Term):
         level = self._stiction * smooth_sign(v, self._k_v) + self._stribeck * smooth_sign(v, self._delta)
         forces.friction[self._joint] += coulomb * level + viscous * self._viscous * v
 
-    def rates(self, moment: Moment, rates: Array) -> None:
+    def rates(self, moment: Moment, rates: list[float]) -> None:
         """Write ϑ̇."""
         heat = moment.friction[self._joint] * moment.velocity[self._place]
         rise = moment.states[self.first_state]
@@ -122,7 +122,7 @@ class _WarmingFriction(Term):
         slopes.by_velocity[place, place] += coulomb * level + viscous * self._viscous
         slopes.rate_by_state[self.first_state, self.first_state] -= 1.0 / self._time_constant
 
-    def report_temperature(self, states: Array, temperature: Array) -> None:
+    def report_temperature(self, states: list[float], temperature: Array) -> None:
         """Write the joint's temperature."""
         temperature[self._joint] = AMBIENT + states[self.first_state]
 

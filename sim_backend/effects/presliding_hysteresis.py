@@ -107,7 +107,7 @@ class _Bristles(Term):
         replaced = self._stiction * smooth_sign(v, self._k_v) + self._stribeck * smooth_sign(v, self._delta)
         forces.friction[self._joint] += self._stiction * z + self._damping * self._rate(v, z) - replaced
 
-    def rates(self, moment: Moment, rates: Array) -> None:
+    def rates(self, moment: Moment, rates: list[float]) -> None:
         """Write ż."""
         rates[self.first_state] = self._rate(moment.velocity[self._place], moment.states[self.first_state])
 

@@ -93,13 +93,13 @@ class Compliance:
                 matrix[motor, motor] += felt * slope
                 matrix[motor, joint] -= felt * slope
 
-    def twist_at_rest(self, load: Array) -> list[float]:
+    def twist_at_rest(self, load: list[float]) -> list[float]:
         """Twist of each compliant joint at rest [rad or m].
 
         Parameters
         ----------
-        load : (n,) float64
-            torque that the links need [Nm or N]
+        load : list of float
+            torque that the links need, one a joint [Nm or N]
         """
         return [part.twist_at_rest(load[joint]) for joint, _, part in self._parts]
 

@@ -56,6 +56,7 @@ class EquationsOfMotion:
         self._evolving = _overriding(self._terms, "rates")
         self._heating = _overriding(self._terms, "report_temperature")
         self._loaded = any(term.depends_on_load for term in self._terms)
+        self._plain = not (self._loaded or self._evolving or self.coordinates.compliant)
         self.event_times = sorted({time for term in self._terms for time in term.event_times})
         self._moment = Moment(self.coordinates, self.bodies)
         self._forces = Forces(count)
@@ -63,9 +64,9 @@ class EquationsOfMotion:
         self._matrix = np.diag(np.concatenate([np.ones(count), self.compliance.rotor_inertia]))
         self._last_load = np.ones(count)
 
-    def initial_states(self) -> Array:
-        """Internal states of an arm that rests, (m,)."""
-        return np.array([state for term in self._terms for state in term.initial_states()])
+    def initial_states(self) -> list[float]:
+        """Internal states of an arm that rests, m numbers."""
+        return [state for term in self._terms for state in term.initial_states()]
 
     def begin(self, time: float) -> None:
         """Let the terms take note that an interval without events begins.
@@ -78,13 +79,13 @@ class EquationsOfMotion:
         for term in self._terms:
             term.begin(time, self.bodies)
 
-    def temperature(self, states: Array, ambient: float) -> Array:
+    def temperature(self, states: list[float], ambient: float) -> Array:
         """Temperature of the joints, (n,) [°C].
 
         Parameters
         ----------
-        states : (m,) float64
-            internal states
+        states : list of float
+            internal states, m numbers
         ambient : float
             temperature of joints that no term heats [°C]
         """
@@ -93,33 +94,36 @@ class EquationsOfMotion:
             term.report_temperature(states, temperature)
         return temperature
 
-    def evaluate(self, time: float, vector: Array, drive: Array) -> Array:
-        """Rate of change of y = [p, v, z], shape (2N + m,).
+    def evaluate(self, time: float, vector: list[float], drive: list[float]) -> list[float]:
+        """Rate of change of y = [p, v, z], 2N + m numbers.
 
         Parameters
         ----------
         time : float
             t [s]
-        vector : (2N + m,) float64
-            y: positions (N,), velocities (N,), internal states (m,)
-        drive : (n,) float64
-            u, torque of the drives on the joint's side [Nm or N]
+        vector : list of float
+            y: N positions, N velocities, m internal states
+        drive : list of float
+            u, torque of the drives on the joint's side, one a joint [Nm or N]
         """
         size = self._size
         link_side = self._sum_forces(time, vector)
         forces, moment = self._forces, self._moment
-        motor_side = drive - forces.friction - forces.motor
-        rate = np.empty_like(vector)
-        rate[:size] = vector[size : 2 * size]
-        if not (self._loaded or self._evolving or self.coordinates.compliant):
-            rate[size:] = self.bodies.accelerations(motor_side - link_side)
-            return rate
-        rate[size : 2 * size], load = self._accelerations(motor_side, link_side)
+        motor_side = [u - f - m for u, f, m in zip(drive, forces.friction, forces.motor, strict=True)]
+        velocity = vector[size : 2 * size]
+        if self._plain:
+            torque = [u - b for u, b in zip(motor_side, link_side, strict=True)]
+            return velocity + self.bodies.accelerations(torque).tolist()
+        acceleration, load = self._accelerations(np.array(motor_side), np.array(link_side))
         moment.load = load.tolist()
-        moment.friction = (forces.friction + np.abs(load) * forces.load_friction).tolist()
+        moment.friction = [
+            friction + abs(carried) * share
+            for friction, carried, share in zip(forces.friction, moment.load, forces.load_friction, strict=True)
+        ]
+        rates = [0.0] * self.state_count
         for term in self._evolving:
-            term.rates(moment, rate[2 * size :])
-        return rate
+            term.rates(moment, rates)
+        return velocity + acceleration.tolist() + rates
 
     def linearise(self) -> tuple[Array, Slopes]:
         """Mass matrix (N, N) and slopes at the state that was evaluated last; overwritten by the next call."""
@@ -134,36 +138,35 @@ class EquationsOfMotion:
             self._matrix[:count, :count] = self.bodies.mass_matrix()
         return self._matrix, slopes
 
-    def load_at(self, time: float, vector: Array) -> Array:
-        """Torque h + c + link that links need from their transmissions when they do not accelerate, (n,) [Nm or N].
+    def load_at(self, time: float, vector: list[float]) -> list[float]:
+        """Torque h + c + link that links need from their transmissions when they do not accelerate [Nm or N].
 
         Parameters
         ----------
         time : float
             t [s]
-        vector : (2N + m,) float64
+        vector : list of float
             y
         """
         return self._sum_forces(time, vector)
 
-    def _sum_forces(self, time: float, vector: Array) -> Array:
-        """Move the links and sum the terms' torque into `Forces`; returns h + c + link, (n,)."""
+    def _sum_forces(self, time: float, vector: list[float]) -> list[float]:
+        """Move the links and sum the terms' torque into `Forces`; returns h + c + link, one a joint."""
         count, size = self._count, self._size
         moment, forces = self._moment, self._forces
         self.bodies.update(vector[:count], vector[size : size + count])
         moment.time = time
-        moment.velocities = vector[size : 2 * size]
-        numbers = vector.tolist()
-        moment.position, moment.velocity, moment.states = numbers[:size], numbers[size : 2 * size], numbers[2 * size :]
-        forces.all[:] = 0.0
+        moment.position, moment.velocity, moment.states = vector[:size], vector[size : 2 * size], vector[2 * size :]
+        forces.clear()
         for term in self._acting:
             term.act(moment, forces)
-        return self.bodies.bias + forces.link
+        return [bias + link for bias, link in zip(self.bodies.bias.tolist(), forces.link, strict=True)]
 
     def _accelerations(self, motor_side: Array, link_side: Array) -> tuple[Array, Array]:
         """Solve for v̇ (N,) and the load (n,), given u - friction - motor and h + c + link."""
-        forces = self._forces
-        drive, gain, friction = motor_side.copy(), forces.load_gain.copy(), forces.load_friction.copy()
+        drive = motor_side.copy()
+        own_gain, own_friction = np.array(self._forces.load_gain), np.array(self._forces.load_friction)
+        gain, friction = own_gain.copy(), own_friction.copy()
         compliant = list(self.coordinates.compliant)
         if compliant:
             torque = self.compliance.torque(self._moment)
@@ -180,7 +183,7 @@ class EquationsOfMotion:
             load = drive - self._rotors * links
         if not compliant:
             return links, load
-        lost = load * (1.0 + forces.load_gain) + np.abs(load) * forces.load_friction
+        lost = load * (1.0 + own_gain) + np.abs(load) * own_friction
         motors = (motor_side - lost)[compliant] / self.compliance.rotor_inertia
         return np.concatenate([links, motors]), load
 

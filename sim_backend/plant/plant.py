@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import ceil, isfinite
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -76,7 +77,7 @@ class Plant:
     """
 
     def __init__(self, robot: Robot, effects: Sequence[PhysicalEffect] = (), *, step_s: float = STEP) -> None:
-        if not (np.isfinite(step_s) and step_s > 0.0):
+        if not (isfinite(step_s) and step_s > 0.0):
             raise ScenarioError(f"step_s is {step_s}; give a positive duration")
         self._equations = EquationsOfMotion(robot, effects)
         self._coordinates = self._equations.coordinates
@@ -96,21 +97,19 @@ class Plant:
     @property
     def motor_motion(self) -> tuple[Array, Array]:
         """Position and velocity of the motors, in joint units, each (n,) [rad or m, rad/s or m/s]."""
-        size, motors = self._coordinates.size, self._motors
-        return self._vector[:size][motors], self._vector[size : 2 * size][motors]
+        return self._of_motors(0), self._of_motors(self._coordinates.size)
 
     @property
     def state(self) -> PlantState:
         """Where the plant is."""
         count, size = self.joint_count, self._coordinates.size
-        position, velocity, states = self._vector[:size], self._vector[size : 2 * size], self._vector[2 * size :]
         return PlantState(
             time=self._time,
-            motor_position=position[self._motors],
-            motor_velocity=velocity[self._motors],
-            link_position=position[:count].copy(),
-            link_velocity=velocity[:count].copy(),
-            temperature=self._equations.temperature(states, AMBIENT),
+            motor_position=self._of_motors(0),
+            motor_velocity=self._of_motors(size),
+            link_position=np.array(self._vector[:count]),
+            link_velocity=np.array(self._vector[size : size + count]),
+            temperature=self._equations.temperature(self._vector[2 * size :], AMBIENT),
         )
 
     def place(self, position: ArrayLike) -> None:
@@ -133,7 +132,7 @@ class Plant:
         self._events = [time for time in self._equations.event_times if time > 0.0]
         self._equations.bodies.drop_everything()
         self._equations.begin(0.0)
-        self._vector = settled(self._equations, motors)
+        self._vector = settled(self._equations, motors).tolist()
         self._part = self._longest
 
     def advance(self, motor_torque: ArrayLike, duration_s: float) -> None:
@@ -153,7 +152,7 @@ class Plant:
         """
         if not duration_s >= 0.0:
             raise ScenarioError(f"duration_s is {duration_s}; time passes forwards only")
-        drive = np.asarray(motor_torque, dtype=np.float64)
+        drive = np.asarray(motor_torque, dtype=np.float64).tolist()
         end = self._time + duration_s
         while self._events and self._events[0] <= end:
             event = self._events.pop(0)
@@ -161,18 +160,18 @@ class Plant:
             self._equations.begin(event)
         self._advance_to(end, drive)
 
-    def _advance_to(self, end: float, drive: Array) -> None:
+    def _advance_to(self, end: float, drive: list[float]) -> None:
         """Integrate over an interval without events, in equal steps unless the error asks for shorter ones."""
         duration = end - self._time
         if duration <= 0.0:
             return
-        steps = max(1, int(np.ceil(duration / self._longest - 1e-9)))
+        steps = max(1, ceil(duration / self._longest - 1e-9))
         nominal = duration / steps
         begin = self._time
         for number in range(1, steps + 1):
             self._step_to(begin + nominal * number if number < steps else end, drive)
 
-    def _step_to(self, end: float, drive: Array) -> None:
+    def _step_to(self, end: float, drive: list[float]) -> None:
         """Integrate over one step, or over as many parts of it as its error asks for."""
         while self._time < end:
             remaining = end - self._time
@@ -183,7 +182,7 @@ class Plant:
             while not attempt.error <= 1.0 and part > self._shortest:
                 part = max(part * _change(attempt.error), self._shortest)
                 attempt = self._step.attempt(part, self._tolerance)
-            if not np.isfinite(attempt.error):
+            if not isfinite(attempt.error):
                 raise ScenarioError(
                     f"the simulated arm's motion grows beyond all bounds at {self._time:g} s; drive it with less torque"
                 )
@@ -192,9 +191,13 @@ class Plant:
             self._time = end if part == remaining else self._time + part
             self._part = min(max(part * _change(attempt.error), self._shortest), self._longest)
 
+    def _of_motors(self, first: int) -> Array:
+        """Numbers of the motors among the coordinates that begin at a place of the vector, (n,)."""
+        return np.array([self._vector[first + place] for place in self._motors])
+
 
 def _change(error: float) -> float:
     """Factor on the step's length by its error: the difference between the orders grows with the square of the step."""
-    if not np.isfinite(error):
+    if not isfinite(error):
         return 0.1
     return min(max(0.9 * error**-0.5, 0.1), 4.0) if error > 0.0 else 4.0

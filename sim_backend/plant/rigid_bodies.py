@@ -37,9 +37,10 @@ class RigidBodies:
         self._bias = self._data.qfrc_bias
         self._matrix = np.zeros((count, count))
         self._solution = np.empty((1, count))
+        self._accelerations = self._solution[0]
         self._right_side = np.empty((1, count))
 
-    def update(self, position: Array, velocity: Array) -> None:
+    def update(self, position: Array | list[float], velocity: Array | list[float]) -> None:
         """Move the links.
 
         Parameters
@@ -64,8 +65,8 @@ class RigidBodies:
         mujoco.mj_fullM(self._model, self._data, self._matrix)
         return self._matrix
 
-    def accelerations(self, torque: Array) -> Array:
-        """Solve H(q) q̈ = τ, shape (n,) [rad/s² or m/s²].
+    def accelerations(self, torque: Array | list[float]) -> Array:
+        """Solve H(q) q̈ = τ, shape (n,): a view that the next call overwrites [rad/s² or m/s²].
 
         Parameters
         ----------
@@ -74,7 +75,7 @@ class RigidBodies:
         """
         self._right_side[0] = torque
         mujoco.mj_solveM(self._model, self._data, self._solution, self._right_side)
-        return self._solution[0].copy()
+        return self._accelerations
 
     def tool_jacobian(self, offset: Array) -> Array:
         """Jacobian of a point that moves with the last link, in base axes, shape (3, n) [m/rad or 1].

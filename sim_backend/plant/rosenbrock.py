@@ -8,16 +8,16 @@ of order two whatever matrix J is (so J holds only what is stiff: friction, stif
 γ = 1 - 1/√2 where J is exact. y + h k₁ is of order one: the difference tells the error of a step.
 """
 
+from math import isfinite, nan
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dgetrf, dgetrs
+from scipy.linalg.lapack import dgesv
 
 from sim_backend.plant.equations import EquationsOfMotion
 
 Array = NDArray[np.float64]
-Factors = tuple[Array, NDArray[np.int32]]
 
 GAMMA = 1.0 - float(np.sqrt(0.5))
 """γ: L-stable, with the smaller of the two error constants."""
@@ -27,25 +27,32 @@ UNIT = 0.1
 
 
 class Attempt(NamedTuple):
-    """A step that may be taken.
+    """A step that may be taken; states as lists, 2N + m numbers each.
 
-    second_order : (2N + m,) float64
+    second_order : list of float
         y⁺
-    first_order : (2N + m,) float64
+    first_order : list of float
         y + h k₁, the linearly implicit Euler step: it has no fixed points but the true ones, however long the step
     error : float
-        largest difference of the two in a velocity or internal state, by what may pass; NaN where there is one
+        largest difference of the two in a velocity or internal state, by what may pass; NaN where one is not finite
     """
 
-    second_order: Array
-    first_order: Array
+    second_order: list[float]
+    first_order: list[float]
     error: float
 
 
 class RosenbrockStep:
     """One step of ROS2 on y = [p, v, z]: positions (N,), velocities (N,) and internal states (m,).
 
-    W is never formed: k_p = r_p + γ h k_v leaves N + m equations, the first N of them multiplied by the mass matrix.
+    k_p = r_p + s k_v with s = γ h leaves N + m equations for κ = [k_v, k_z], the first N of them multiplied by the mass
+    matrix M. With the slopes P, V, Z of torque and P', V', Z' of the states' rates by position, velocity and state:
+
+        [M + s V + s² P,        s Z]  κ  =  [-s P,  M,  0]  r.
+        [-s V' - s² P',   1 - s Z' ]        [ s P', 0,  1]
+
+    It is solved once an attempt, for the matrix K with κ = K r. States are lists: a call into NumPy takes longer than
+    the few numbers of an arm.
 
     Parameters
     ----------
@@ -55,29 +62,34 @@ class RosenbrockStep:
 
     def __init__(self, equations: EquationsOfMotion) -> None:
         self._equations = equations
-        self._size = equations.coordinates.size
-        total = self._size + equations.state_count
-        self._left = np.eye(total)
-        self._right = np.empty(total)
-        self._stateful = equations.state_count > 0
-        self._mass = np.zeros((self._size, self._size))
+        size, states = equations.coordinates.size, equations.state_count
+        self._size, self._stateful = size, states > 0
+        self._sign = np.concatenate([np.ones(size), -np.ones(states)])[:, None]
+        self._left = np.eye(size + states)
+        self._right = np.eye(size + states, 2 * size + states, size)
 
-    def begin(self, time: float, vector: Array, drive: Array) -> None:
+    def begin(self, time: float, vector: list[float], drive: list[float]) -> None:
         """Evaluate and linearise where steps shall start; a step may then be tried with several lengths.
 
         Parameters
         ----------
         time : float
             t [s]
-        vector : (2N + m,) float64
+        vector : list of float
             y
-        drive : (n,) float64
-            torque of the drives, constant during the step [Nm or N]
+        drive : list of float
+            torque of the drives, one a joint, constant during the step [Nm or N]
         """
+        size = self._size
         self._time, self._vector, self._drive = time, vector, drive
         self._rate = self._equations.evaluate(time, vector, drive)
-        mass, self._slopes = self._equations.linearise()
-        self._mass[:] = mass
+        mass, slopes = self._equations.linearise()
+        self._left[:size, :size] = mass
+        self._right[:size, size : 2 * size] = mass
+        self._slopes = self._sign * (slopes.all[1] + slopes.all[2]) if self._stateful else slopes.by_velocity
+        by_position = slopes.all[0]
+        self._by_position = self._sign * by_position if np.count_nonzero(by_position) else None
+        self._passing = [1.0 + abs(value) / UNIT for value in vector[size:]]
 
     def attempt(self, step: float, tolerance: float) -> Attempt:
         """Take the step and estimate its error.
@@ -90,37 +102,36 @@ class RosenbrockStep:
             error of a velocity or internal state of size zero that may pass; it grows with its size
         """
         scale = GAMMA * step
-        factors = self._factors(scale)
-        first = self._solve(factors, scale, self._rate)
-        predicted = self._vector + step * first
+        solution = self._solution(scale)
+        first = self._solve(solution, scale, self._rate)
+        predicted = [y + step * k for y, k in zip(self._vector, first, strict=True)]
         rate = self._equations.evaluate(self._time + step, predicted, self._drive)
-        rate -= 2.0 * first
-        second = self._solve(factors, scale, rate)
-        difference = (0.5 * step) * (first + second)
-        allowed = tolerance + (tolerance / UNIT) * np.abs(self._vector[self._size :])
-        error = float((np.abs(difference[self._size :]) / allowed).max())
-        return Attempt(predicted + difference, predicted, error)
+        second = self._solve(solution, scale, [r - 2.0 * k for r, k in zip(rate, first, strict=True)])
+        half = 0.5 * step
+        difference = [half * (k + other) for k, other in zip(first, second, strict=True)]
+        error = _largest(difference[self._size :], self._passing) / tolerance
+        return Attempt([y + d for y, d in zip(predicted, difference, strict=True)], predicted, error)
 
-    def _factors(self, scale: float) -> Factors:
-        """LU factors of W with the rates of the positions eliminated."""
-        size, slopes, left = self._size, self._slopes, self._left
-        left[:size, :size] = self._mass + scale * (slopes.by_velocity + scale * slopes.by_position)
-        if self._stateful:
-            left[:size, size:] = scale * slopes.by_state
-            left[size:, :size] = -scale * (slopes.rate_by_velocity + scale * slopes.rate_by_position)
-            left[size:, size:] = np.eye(len(left) - size) - scale * slopes.rate_by_state
-        factors, pivots, _ = dgetrf(left)
-        return factors, pivots
+    def _solution(self, scale: float) -> Array:
+        """K, (N + m, 2N + m)."""
+        left = self._left + scale * self._slopes
+        if self._by_position is not None:
+            left += (scale * scale) * self._by_position
+            self._right[:, : self._size] = -scale * self._by_position[:, : self._size]
+        return dgesv(left, self._right)[2]
 
-    def _solve(self, factors: Factors, scale: float, right_side: Array) -> Array:
+    def _solve(self, solution: Array, scale: float, right_side: list[float]) -> list[float]:
         """Solve W k = r."""
-        size, slopes, right = self._size, self._slopes, self._right
-        position = right_side[:size]
-        right[:size] = self._mass.dot(right_side[size : 2 * size])
-        right[:size] -= scale * slopes.by_position.dot(position)
-        if self._stateful:
-            right[size:] = right_side[2 * size :] + scale * slopes.rate_by_position.dot(position)
-        solution = np.empty_like(right_side)
-        solution[size:] = dgetrs(*factors, right)[0]
-        solution[:size] = position + scale * solution[size : 2 * size]
-        return solution
+        rates = solution.dot(right_side).tolist()
+        return [r + scale * k for r, k in zip(right_side[: self._size], rates, strict=False)] + rates
+
+
+def _largest(differences: list[float], passing: list[float]) -> float:
+    """Largest difference by what may pass; NaN where one is not finite."""
+    largest = 0.0
+    for difference, passes in zip(differences, passing, strict=True):
+        error = abs(difference) / passes
+        if not isfinite(error):
+            return nan
+        largest = max(largest, error)
+    return largest

@@ -40,7 +40,7 @@ def settled(equations: EquationsOfMotion, motor_position: Array) -> Array:
     vector = np.concatenate([position, np.zeros_like(position), equations.initial_states()])
     share, change = np.ones(len(compliant)), np.zeros(len(compliant))
     for _ in range(MOST_ITERATIONS if compliant else 0):
-        load = equations.load_at(0.0, vector)
+        load = equations.load_at(0.0, vector.tolist())
         hanging = motor_position[compliant] - equations.compliance.twist_at_rest(load)
         wish = hanging - vector[compliant]
         # a link that balances inside its backlash makes the wish jump from tooth to tooth: approach by halves

@@ -1,16 +1,27 @@
 """The robot file's static friction as a term of the equations of motion."""
 
 from collections.abc import Sequence
-
-import numpy as np
-from numpy.typing import NDArray
+from math import atan, pi
+from typing import NamedTuple
 
 from service.robot.robot import FrictionCoefficients, FrictionShape
 from sim_backend.friction import shape_constants
 from sim_backend.plant.coordinates import Coordinates
 from sim_backend.plant.term import Forces, Moment, Slopes, Term
 
-Array = NDArray[np.float64]
+_SCALE = 2.0 / pi
+
+
+class _Law(NamedTuple):
+    """Friction of one joint: its number from 0, the place of its motor, levels times 2/π, steepnesses, τ_v."""
+
+    joint: int
+    place: int
+    stiction: float
+    k_v: float
+    stribeck: float
+    delta: float
+    viscous: float
 
 
 class StaticFriction(Term):
@@ -38,12 +49,10 @@ class StaticFriction(Term):
         coordinates: Coordinates,
     ) -> None:
         constants = shape_constants(friction, friction_shape)
-        self._viscous = np.array([coefficients.viscous for coefficients in friction])
-        levels = [(coefficients.stiction, coefficients.stribeck) for coefficients in friction]
-        self._level = np.array(levels).T / (0.5 * np.pi)
-        self._steepness = np.array(constants).T
-        # a slice is a view: quicker than picking columns
-        self._motors = coordinates.motors if coordinates.compliant else slice(None)
+        self._laws = [
+            _Law(joint, coordinates.motor(joint), one.stiction * _SCALE, k_v, one.stribeck * _SCALE, delta, one.viscous)
+            for joint, (one, (k_v, delta)) in enumerate(zip(friction, constants, strict=True))
+        ]
 
     def act(self, moment: Moment, forces: Forces) -> None:
         """Add τ_f.
@@ -55,12 +64,10 @@ class StaticFriction(Term):
         forces : Forces
             what is added to
         """
-        velocity = moment.velocities[self._motors]
-        curve = np.arctan(self._steepness * velocity)
-        curve *= self._level
-        forces.friction += curve[0]
-        forces.friction += curve[1]
-        forces.friction += self._viscous * velocity
+        velocity, friction = moment.velocity, forces.friction
+        for joint, place, stiction, k_v, stribeck, delta, viscous in self._laws:
+            v = velocity[place]
+            friction[joint] += stiction * atan(k_v * v) + stribeck * atan(delta * v) + viscous * v
 
     def linearise(self, moment: Moment, slopes: Slopes) -> None:
         """Add dτ_f/dv.
@@ -72,6 +79,7 @@ class StaticFriction(Term):
         slopes : Slopes
             what is added to
         """
-        scaled = self._steepness * moment.velocities[self._motors]
-        slope = self._level * self._steepness / (1.0 + scaled * scaled)
-        slopes.velocity_diagonal[self._motors] += slope[0] + slope[1] + self._viscous
+        for _, place, stiction, k_v, stribeck, delta, viscous in self._laws:
+            x, y = k_v * moment.velocity[place], delta * moment.velocity[place]
+            slope = stiction * k_v / (1.0 + x * x) + stribeck * delta / (1.0 + y * y) + viscous
+            slopes.by_velocity[place, place] += slope

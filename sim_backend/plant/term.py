@@ -36,8 +36,6 @@ class Moment:
 
     def __init__(self, coordinates: Coordinates, bodies: RigidBodies) -> None:
         self.bodies = bodies
-        self.velocities: Array = np.zeros(coordinates.size)
-        """v as an array, (N,) [rad/s or m/s]"""
         self.time = 0.0
         """instant since the arm was placed [s]"""
         self.position = [0.0] * coordinates.size
@@ -53,7 +51,7 @@ class Moment:
 
 
 class Forces:
-    """Torque that the drives have to overcome, summed over the terms, each (n,) by joint.
+    """Torque that the drives have to overcome, summed over the terms; lists by joint, as in `Moment`.
 
     Parameters
     ----------
@@ -62,16 +60,20 @@ class Forces:
     """
 
     def __init__(self, joint_count: int) -> None:
-        self.all = np.zeros((5, joint_count))
-        self.friction: Array = self.all[0]
+        self._none = [0.0] * joint_count
+        self.clear()
+
+    def clear(self) -> None:
+        """Begin a sum."""
+        self.friction = self._none.copy()
         """friction on the motor's side [Nm or N]"""
-        self.motor: Array = self.all[1]
+        self.motor = self._none.copy()
         """anything else on the motor's side [Nm or N]"""
-        self.link: Array = self.all[2]
+        self.link = self._none.copy()
         """on the link's side: part of the load [Nm or N]"""
-        self.load_gain: Array = self.all[3]
+        self.load_gain = self._none.copy()
         """g, torque a unit of load"""
-        self.load_friction: Array = self.all[4]
+        self.load_friction = self._none.copy()
         """f, torque a unit of the load's magnitude; counts as friction"""
 
 
@@ -93,8 +95,6 @@ class Slopes:
         """derivative of each coordinate's torque with respect to p, (N, N)"""
         self.by_velocity: Array = self.all[1, :size, :size]
         """with respect to v, (N, N)"""
-        self.velocity_diagonal: Array = np.einsum("ii->i", self.by_velocity)
-        """its diagonal, a view, (N,)"""
         self.by_state: Array = self.all[2, :size, size:]
         """with respect to the internal states, (N, m)"""
         self.rate_by_position: Array = self.all[0, size:, :size]
@@ -154,23 +154,23 @@ class Term:
             what is added to
         """
 
-    def rates(self, moment: Moment, rates: Array) -> None:
+    def rates(self, moment: Moment, rates: list[float]) -> None:
         """Write the rates of the term's own internal states.
 
         Parameters
         ----------
         moment : Moment
             where
-        rates : (m,) float64
+        rates : list of float
             of all terms' states; the term's own begin at `first_state` [1/s times the state's unit]
         """
 
-    def report_temperature(self, states: Array, temperature: Array) -> None:
+    def report_temperature(self, states: list[float], temperature: Array) -> None:
         """Write the temperature of the joints that the term heats.
 
         Parameters
         ----------
-        states : (m,) float64
+        states : list of float
             internal states of all terms
         temperature : (n,) float64
             of all joints [°C]
