@@ -76,6 +76,7 @@ class DrivenArm:
         self._period_s = period_s
         self._kinds: list[Kind] = [(AxisMode.RELEASED, 0.0)] * count
         self._targets: dict[Kind, tuple[list[int], Target]] = {}
+        self._tracks = np.zeros(count, dtype=np.bool_)
         self._goal, self._goal_rate = (values.copy() for values in self.motion)
         self._seen = self._seen_before = np.array([*self.motion, self.torque])
         self.measure()
@@ -154,6 +155,7 @@ class DrivenArm:
         if [mode in TRACKING for mode, _ in kinds] != [mode in TRACKING for mode, _ in self._kinds]:
             self._servo.begin()
         self._kinds, self._targets = kinds, {}
+        self._tracks = np.array([mode in TRACKING for mode, _ in kinds])
         for kind in dict.fromkeys(kinds):
             if kind[0] in TRACKING:
                 joints = [joint for joint, other in enumerate(kinds) if other == kind]
@@ -172,8 +174,8 @@ class DrivenArm:
         """Torque of the position loops where a target is tracked, else what is demanded."""
         cap = np.array([demand.torque_cap for demand in demands])
         wanted = np.array([demand.torque for demand in demands])
-        tracks = np.array([mode in TRACKING for mode, _ in self._kinds])
-        if tracks.any():
+        if self._targets:
+            tracks = self._tracks
             position, velocity = self.motion
             error = np.where(tracks, self._goal - position, 0.0)
             error_rate = np.where(tracks, self._goal_rate - velocity, 0.0)

@@ -91,9 +91,10 @@ class CanEmulator:
             if frame[0] == _SYNC:
                 self.advance_to(now_s)
                 self.driven.measure(min(1.0, max(0.0, (now_s - self.now_s) / STEP_S)))
+            come_s = self.now_s
             for drive in self.drives:
-                if self._is_there(drive, self.now_s):
-                    self._wire.carry(drive.receive(frame, self.now_s), now_s)
+                if self._is_there(drive, come_s):
+                    self._wire.carry(drive.receive(frame, come_s), now_s)
             if frame[0] == _SYNC:
                 self.driven.take_targets(now_s - self._clock.lost_s)
         self.advance_to(now_s)
@@ -162,20 +163,22 @@ class CanEmulator:
 
     def _step(self) -> None:
         """One period of the drives' loops."""
-        self.schedule.run(self.now_s, self._carry_out)
+        now_s = self.now_s
+        self.schedule.run(now_s, self._carry_out)
         self.driven.step(self._clock.tick)
         if self._clock.tick % _TICKS_PER_MEASUREMENT == 0:
             self.driven.measure()
         for place, drive in enumerate(self.drives):
             was_enabled = drive.power.state is PowerState.OPERATION_ENABLED
             self._let_ail(drive)
-            if self._is_there(drive, self.now_s):
+            is_there = self._is_there(drive, now_s)
+            if is_there:
                 drive.return_to_bus()
-            frames = drive.tick(self.now_s)
+            frames = drive.tick(now_s)
             if was_enabled and drive.power.state is not PowerState.OPERATION_ENABLED:
-                self._stopped_s[place] = self.now_s
-            if self._is_there(drive, self.now_s):
-                self._wire.carry(frames, self.now_s)
+                self._stopped_s[place] = now_s
+            if is_there:
+                self._wire.carry(frames, now_s)
 
     def _carry_out(self, fault: InjectedFault) -> None:
         """Do what a fault does."""

@@ -81,7 +81,7 @@ class ObjectDictionary:
         signed: bool = False,
         writable: bool = True,
         hook: WriteHook | None = None,
-    ) -> None:
+    ) -> Entry:
         """Add an entry.
 
         Parameters
@@ -99,7 +99,8 @@ class ObjectDictionary:
         hook : callable or None
             called before a master's value is kept
         """
-        self.entries[index, subindex] = Entry(size, value, signed, writable, hook)
+        entry = self.entries[index, subindex] = Entry(size, value, signed, writable, hook)
+        return entry
 
     def get(self, index: int, subindex: int = 0) -> int:
         """Value of an entry.
@@ -109,7 +110,10 @@ class ObjectDictionary:
         index, subindex : int
             its place
         """
-        return self._entry(index, subindex).value
+        try:
+            return self.entries[index, subindex].value
+        except KeyError:
+            raise self._missing(index, subindex) from None
 
     def put(self, index: int, value: int, subindex: int = 0) -> None:
         """Set an entry from within the drive, whoever may write it.
@@ -173,5 +177,9 @@ class ObjectDictionary:
         try:
             return self.entries[index, subindex]
         except KeyError:
-            known = any(place[0] == index for place in self.entries)
-            raise AbortError(Abort.NO_SUBINDEX if known else Abort.NO_OBJECT) from None
+            raise self._missing(index, subindex) from None
+
+    def _missing(self, index: int, subindex: int) -> AbortError:
+        """What a master is told that asks for an entry that does not exist."""
+        known = any(place[0] == index for place in self.entries)
+        return AbortError(Abort.NO_SUBINDEX if known else Abort.NO_OBJECT)

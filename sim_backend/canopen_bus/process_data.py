@@ -1,23 +1,44 @@
 """Process data of an emulated drive: frames laid out as the mapping parameters say, exchanged at SYNC."""
 
+from dataclasses import dataclass
 from functools import partial
 
-from sim_backend.canopen_bus.object_dictionary import Abort, AbortError, ObjectDictionary
+from sim_backend.canopen_bus.object_dictionary import Abort, AbortError, Entry, ObjectDictionary
 
-RECEIVED = (0x1400, 0x1600)
-SENT = (0x1800, 0x1A00)
 PDOS = 4
 ENTRIES = 8
 _FRAME_BYTES = 8
+_TO_MAPPING = 0x200
 _OFF = 1 << 31
 _HIGHEST_SYNCHRONOUS = 240
+
+
+@dataclass(frozen=True)
+class _Pdo:
+    """Where a PDO's identifier, its transmission type and what it holds are written.
+
+    cob_id, transmission : Entry
+        subindices 1 and 2 of its communication parameter
+    mapping : int
+        index of the mapping parameter
+    """
+
+    cob_id: Entry
+    transmission: Entry
+    mapping: int
+
+    @property
+    def identifier(self) -> int | None:
+        """Of its frames; None where it is off."""
+        word = self.cob_id.value
+        return None if word & _OFF else word & 0x7FF
 
 
 class ProcessData:
     """The PDOs of one node; RPDOs wait for SYNC, TPDOs are sampled at it."""
 
     def __init__(self, dictionary: ObjectDictionary, node_id: int) -> None:
-        """Add the communication and mapping parameters; all PDOs are off at power-up.
+        """Add the parameters of all PDOs, which are off at power-up.
 
         Parameters
         ----------
@@ -29,15 +50,19 @@ class ProcessData:
         self._dictionary = dictionary
         self._waiting: dict[int, bytes] = {}
         self._syncs = 0
-        for (communication, mapping), first_id in ((RECEIVED, 0x200), (SENT, 0x180)):
-            for number in range(PDOS):
-                dictionary.add(communication + number, 0, 1, 2, writable=False)
-                dictionary.add(communication + number, 1, 4, _OFF | first_id + 0x100 * number + node_id)
-                dictionary.add(communication + number, 2, 1, 255)
-                dictionary.add(mapping + number, 0, 1, hook=partial(self._require_fit, mapping + number))
-                require_mappable = partial(self._require_mappable, mapping + number)
-                for subindex in range(1, ENTRIES + 1):
-                    dictionary.add(mapping + number, subindex, 4, hook=require_mappable)
+        self._received = [self._add(0x1400 + number, 0x200 + 0x100 * number + node_id) for number in range(PDOS)]
+        self._sent = [self._add(0x1800 + number, 0x180 + 0x100 * number + node_id) for number in range(PDOS)]
+
+    def _add(self, communication: int, identifier: int) -> _Pdo:
+        """Communication and mapping parameters of a PDO that is off."""
+        add, mapping = self._dictionary.add, communication + _TO_MAPPING
+        add(communication, 0, 1, 2, writable=False)
+        cob_id = add(communication, 1, 4, _OFF | identifier)
+        transmission = add(communication, 2, 1, 255)
+        add(mapping, 0, 1, hook=partial(self._require_fit, mapping))
+        for subindex in range(1, ENTRIES + 1):
+            add(mapping, subindex, 4, hook=partial(self._require_mappable, mapping))
+        return _Pdo(cob_id, transmission, mapping)
 
     def take(self, identifier: int, payload: bytes) -> bool:
         """Keep a frame for the next SYNC; False where it is no RPDO of this node.
@@ -49,33 +74,27 @@ class ProcessData:
         payload : bytes
             of the frame
         """
-        for number in range(PDOS):
-            if self._identifier(RECEIVED[0] + number) == identifier:
-                if self._dictionary.get(RECEIVED[0] + number, 2) <= _HIGHEST_SYNCHRONOUS:
+        for number, pdo in enumerate(self._received):
+            if pdo.identifier == identifier:
+                if pdo.transmission.value <= _HIGHEST_SYNCHRONOUS:
                     self._waiting[number] = payload
                 else:
-                    self._apply(number, payload)
+                    self._apply(pdo, payload)
                 return True
         return False
 
     def synchronise(self) -> list[tuple[int, bytes]]:
         """Apply what waited, and sample the frames that this SYNC asks for: identifiers and payloads."""
         for number, payload in sorted(self._waiting.items()):
-            self._apply(number, payload)
+            self._apply(self._received[number], payload)
         self._waiting.clear()
         self._syncs += 1
-        frames = []
-        for number in range(PDOS):
-            identifier = self._identifier(SENT[0] + number)
-            every = self._dictionary.get(SENT[0] + number, 2)
+        frames: list[tuple[int, bytes]] = []
+        for pdo in self._sent:
+            identifier, every = pdo.identifier, pdo.transmission.value
             if identifier is not None and 1 <= every <= _HIGHEST_SYNCHRONOUS and self._syncs % every == 0:
-                frames.append((identifier, self._sample(number)))
+                frames.append((identifier, self._sample(pdo)))
         return frames
-
-    def _identifier(self, communication: int) -> int | None:
-        """Identifier of a PDO; None where it is off."""
-        identifier = self._dictionary.get(communication, 1)
-        return None if identifier & _OFF else identifier & 0x7FF
 
     def _entries(self, mapping: int) -> list[tuple[int, int, int]]:
         """Index, subindex and bytes of what a PDO holds."""
@@ -104,9 +123,9 @@ class ProcessData:
         if sum(word & 0xFF for word in words) > 8 * _FRAME_BYTES:
             raise AbortError(Abort.TOO_MUCH_MAPPED)
 
-    def _apply(self, number: int, payload: bytes) -> None:
+    def _apply(self, pdo: _Pdo, payload: bytes) -> None:
         """Write what a frame holds, as a master would; one of the wrong length is dropped."""
-        entries = self._entries(RECEIVED[1] + number)
+        entries = self._entries(pdo.mapping)
         if len(payload) != sum(size for _, _, size in entries):
             return
         start = 0
@@ -117,8 +136,6 @@ class ProcessData:
                 return
             start += size
 
-    def _sample(self, number: int) -> bytes:
+    def _sample(self, pdo: _Pdo) -> bytes:
         """Payload of a TPDO."""
-        return b"".join(
-            self._dictionary.read(index, subindex) for index, subindex, _ in self._entries(SENT[1] + number)
-        )
+        return b"".join(self._dictionary.read(index, subindex) for index, subindex, _ in self._entries(pdo.mapping))
