@@ -12,13 +12,11 @@ from service.robot.bounded_file import decode_utf8, read_bounded
 from service.robot.messages import one_line, shown
 from service.trajectory.csv_format import parse_trajectory_csv, trajectory_csv
 from service.trajectory.document import TrajectoryDocument, trajectory_document, trajectory_of
+from service.trajectory.excitation_document import EXCITATION_SCHEMA, ExcitationDocument
 from service.trajectory.trajectory import Trajectory
 
 LARGEST_FILE = 256 * 2**20
 """Bytes of the largest trajectory file that is read."""
-
-EXCITATION_SCHEMA = "tauscope.excitation/1"
-"""A designed excitation's document, which holds its trajectory's."""
 
 DEFAULT_RATE_HZ = 500.0
 """Rate of CSV samples where none is asked for [Hz]."""
@@ -135,7 +133,7 @@ def write_trajectory(trajectory: Trajectory, path: str | Path, *, rate_hz: float
 def _document(text: str | bytes) -> TrajectoryDocument:
     """The trajectory's document, by itself or within an excitation's."""
     if _Schema.model_validate_json(text).schema_ == EXCITATION_SCHEMA:
-        return _Holder.model_validate_json(text).trajectory
+        return ExcitationDocument.model_validate_json(text).trajectory
     return TrajectoryDocument.model_validate_json(text)
 
 
@@ -143,12 +141,6 @@ class _Schema(BaseModel):
     """Which kind of document it is; a trajectory's where it says nothing that we know."""
 
     schema_: Any = Field(default=None, alias="schema")
-
-
-class _Holder(BaseModel):
-    """Of an excitation's document, what is played."""
-
-    trajectory: TrajectoryDocument
 
 
 def _one_line_errors(build: Callable[[], Trajectory], prefix: str = "") -> Trajectory:

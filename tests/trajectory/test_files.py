@@ -171,6 +171,57 @@ JSON_TEXT = trajectory_json(described_trajectory())
 CSV_TEXT = trajectory_csv(whole_trajectory(), 5.0)
 
 
+def designed(**changes: object) -> str:
+    """An excitation's document, as ``excite --json`` writes it, with some of its members replaced."""
+    document = {
+        "schema": "tauscope.excitation/1",
+        "robot": "paper",
+        "joints": NAMES,
+        "criterion": "cond-f",
+        "value": 12.5,
+        "condition_number": 3.5,
+        "random_value": 80.0,
+        "period_s": 10.0,
+        "harmonics": 5,
+        "periods": 2,
+        "duration_s": 25.0,
+        "margins": {"position": [0.1, None, 0.3]},
+        "clearance_m": None,
+        "active": ["joint1: velocity"],
+        "notes": [],
+        "evaluations": 100,
+        "seconds": 1.5,
+        "history": [{"start": 1, "iteration": 1, "value": 2.5, "violation": 0.0}],
+        "trajectory": json.loads(JSON_TEXT),
+    }
+    return json.dumps(document | changes)
+
+
+def test_an_excitation_holds_the_trajectory_that_is_played(tmp_path: Path) -> None:
+    path = tmp_path / "design.json"
+    path.write_text(designed())
+    assert trajectory_json(read_trajectory(path, ROBOT)) == JSON_TEXT
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"speed": 1.0}, "speed: extra inputs are not permitted (it is 1.0)"),
+        ({"periods": "2"}, "periods: input should be a valid integer (it is '2')"),
+        ({"criterion": "cond-3"}, "criterion: input should be 'cond-f', 'log-det' or 'cond-2' (it is 'cond-3')"),
+        ({"margins": {"position": [0.1, "a"]}}, "margins.position[1]: input should be a valid number (it is 'a')"),
+        ({"history": [{"start": 1, "iteration": 1, "value": 2.5}]}, "history[0].violation: field required"),
+        ({"trajectory": {}}, "trajectory.robot: field required"),
+    ],
+)
+def test_faults_of_an_excitation_are_named(tmp_path: Path, changes: dict[str, object], message: str) -> None:
+    path = tmp_path / "design.json"
+    path.write_text(designed(**changes))
+    with pytest.raises(ExcitationError) as raised:
+        read_trajectory(path, ROBOT)
+    assert str(raised.value) == f"{path}: {message}"
+
+
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(data=st.data())
 def test_mutated_files_never_make_a_traceback(data: st.DataObject) -> None:
