@@ -67,6 +67,7 @@ class RosenbrockStep:
         self._sign = np.concatenate([np.ones(size), -np.ones(states)])[:, None]
         self._left = np.eye(size + states)
         self._right = np.eye(size + states, 2 * size + states, size)
+        self._by_position: Array | None = None
 
     def begin(self, time: float, vector: list[float], drive: list[float]) -> None:
         """Evaluate and linearise where steps shall start; a step may then be tried with several lengths.
@@ -87,8 +88,11 @@ class RosenbrockStep:
         self._left[:size, :size] = mass
         self._right[:size, size : 2 * size] = mass
         self._slopes = self._sign * (slopes.all[1] + slopes.all[2]) if self._stateful else slopes.by_velocity
-        by_position = slopes.all[0]
-        self._by_position = self._sign * by_position if np.count_nonzero(by_position) else None
+        if np.count_nonzero(slopes.all[0]):
+            self._by_position = self._sign * slopes.all[0]
+        elif self._by_position is not None:
+            self._by_position = None
+            self._right[:, :size] = 0.0
         self._passing = [1.0 + abs(value) / UNIT for value in vector[size:]]
 
     def attempt(self, step: float, tolerance: float) -> Attempt:
