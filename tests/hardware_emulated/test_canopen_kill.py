@@ -120,6 +120,9 @@ def kill_once(site: Site, how: signal.Signals, rng: np.random.Generator) -> str 
 
 def refuse_until_acknowledged(site: Site) -> None:
     """The next start neither moves the arm nor lets go of it; once the fault is acknowledged, there is none."""
+    stopped_s = site.emulator.state["time"]
+    # the position loop's integral is still at work when the ramp has ended: half a milliradian, gone a second later
+    wait_for(lambda: site.emulator.state["time"] > stopped_s + 1.0, "the arm to settle")
     before = np.array(site.emulator.state["position"])
     recover_runs(site.folder / "runs")
     run, _ = site.start(acknowledge=False)
