@@ -157,11 +157,10 @@ class DriveNode:
         measured = self.measured()
         if not self.leaps.believes_place(measured.position, time_ns):
             self._forget(STATE_PDO)
+        elif not math.isnan(measured.position):
+            self.last_position = measured.position
         if not self.leaps.believes_speed(measured.velocity):
             self._forget(MOTION_PDO)
-        position = self.measured().position
-        if not math.isnan(position):
-            self.last_position = position
         self.last_state = self.state or self.last_state
 
     def read_now(self) -> None:

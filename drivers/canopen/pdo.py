@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from drivers.canopen.objects import DriveObject
 
@@ -22,7 +23,7 @@ class PdoLayout:
         if bits > 64 or any(entry.bits % 8 for entry in self.objects):
             raise ValueError(f"a PDO of {bits} bits does not fit into a frame of whole bytes up to 64 bits")
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Payload of the frame [bytes]."""
         return sum(entry.bits for entry in self.objects) // 8

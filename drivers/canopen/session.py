@@ -1,6 +1,7 @@
 """The drives of an arm on an open bus, and the ways to ask them: in a cycle of process data, or by service data."""
 
 import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
@@ -122,8 +123,11 @@ class Session:
         self.bus.send(SYNC_ID, b"")
         stamp, deadline = self.clock.now_ns(), time.monotonic_ns() + answer_ns
         answered = stamp
-        while not all(node.has_answered for node in self.nodes):
-            if self.bus.receive(deadline):
+        waiting = deque(self.nodes)
+        while waiting:
+            if waiting[0].has_answered:
+                waiting.popleft()
+            elif self.bus.receive(deadline):
                 answered = self.clock.now_ns()
             elif time.monotonic_ns() >= deadline:
                 break
