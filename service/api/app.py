@@ -42,6 +42,7 @@ from service.api.runs.router import router as runs
 from service.api.schedules.models import ScheduleRequest
 from service.api.schedules.router import router as schedules
 from service.api.settings import Settings
+from service.api.turns import TakingTurns
 from service.identification.history import ModelPolicy
 from service.jobs import StartControl
 
@@ -124,6 +125,7 @@ def create_app(settings: Settings, executor: Executor | None = None, start: Star
     app.add_middleware(Gate)
     app.add_middleware(BodyLimit, limit=settings.max_upload_bytes)
     app.add_middleware(KnownCallers, answers_for=settings.answers_for)
+    app.add_middleware(TakingTurns)
     app.add_middleware(Observed)
     app.add_middleware(SafeAnswers)
     return app

@@ -1,8 +1,8 @@
-"""How long a stop takes, from its request until the control process begins to stop the arm: alone and with 200 readers.
+"""How long a stop takes, from its request on, alone and with 200 readers: answered, last command, arm stopped.
 
 Service, control process and simulated arm as in `benchmark_readers.py`, whose readers these are. Every stop is of a
-run of its own, which moves; the moments are those of one clock, the machine's: when the request is sent, when it is
-answered, and when the control process writes down that it stops.
+run of its own, which moves; the moments are of the machine's clocks: when the request is sent, when it is answered,
+when the loop has last told the arm to go on, and when the arm has braked and the control process let go of it.
 """
 
 import argparse
@@ -23,48 +23,52 @@ from api.serving import served  # noqa: E402
 from benchmarks.benchmark_readers import begin, followed, readers  # noqa: E402
 from service.acquisition import RunState  # noqa: E402
 from service.jobs import RunWorkspace  # noqa: E402
+from service.recording.journal_reading import read_journal  # noqa: E402
 
 MOTION_S = 60.0
 """Longer than any run is left to move."""
 
 RATE_HZ = 200.0
+MOMENTS = ("answered", "the last command of the motion", "the arm has stopped")
 
 
-def stopped(client: httpx2.Client, runs: Path, number: int, count: int) -> tuple[float, float]:
-    """Seconds until the answer to a stop, and until the control process stops the arm."""
+def stopped(client: httpx2.Client, runs: Path, number: int, count: int) -> tuple[float, float, float]:
+    """Seconds from the request for a stop until each of the `MOMENTS`."""
     run = begin(client, MOTION_S, RATE_HZ)
     with readers(str(client.base_url), run["links"]["self"], count):
         while client.get(run["links"]["self"]).json()["state"] != RunState.RUNNING:
             time.sleep(0.05)
         time.sleep(0.5 + 0.013 * (number % 10))  # at another place of a cycle each time
-        sent, begun = datetime.now(UTC), time.perf_counter()
+        sent, sent_ns = datetime.now(UTC), time.monotonic_ns()
         answer = client.post(run["links"]["stop"])
-        answered = time.perf_counter() - begun
+        answered_ns = time.monotonic_ns()
         if answer.status_code != 202:
             raise SystemExit(answer.text)
         ended = followed(client, run)
-    record = RunWorkspace(runs / run["id"]).read_run()
+    workspace = RunWorkspace(runs / run["id"])
+    record = workspace.read_run()
     if record is None or ended["state"] != RunState.STOPPED:
         raise SystemExit(f"{run['id']}: is {ended['state']}")
+    last_ns = int(read_journal(workspace.recording("mcap")).rows["time_ns"][-1])
     (at,) = (each.at for each in record.history if each.state is RunState.STOPPING)
-    return answered, (at - sent).total_seconds()
+    return 1e-9 * (answered_ns - sent_ns), max(0.0, 1e-9 * (last_ns - sent_ns)), (at - sent).total_seconds()
 
 
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--readers", type=int, default=200)
-    parser.add_argument("--stops", type=int, default=50)
+    parser.add_argument("--stops", type=int, default=100)
     words = parser.parse_args()
     print(f"{os.cpu_count()} processors, load {os.getloadavg()[0]:.1f} before\n")
-    print("| readers | stops | until | p50 [ms] | p90 [ms] | longest [ms] |")
-    print("|---|---|---|---|---|---|")
+    print("| readers | stops | until | p50 [ms] | p90 [ms] | p99 [ms] | longest [ms] |")
+    print("|---|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory(prefix="bench-") as folder, served(Path(folder) / "data") as service:
         for count in (0, words.readers):
             runs = Path(folder) / "data" / "runs"
             times = np.array([stopped(service.client, runs, number, count) for number in range(words.stops)])
-            for what, column in (("answered", times[:, 0]), ("the arm is being stopped", times[:, 1])):
-                figures = [f"{1e3 * value:.1f}" for value in (*np.percentile(column, [50, 90]), column.max())]
+            for what, column in zip(MOMENTS, times.T, strict=True):
+                figures = [f"{1e3 * value:.1f}" for value in (*np.percentile(column, [50, 90, 99]), column.max())]
                 print(f"| {count} | {words.stops} | {what} | {' | '.join(figures)} |", flush=True)
 
 
