@@ -4,15 +4,15 @@ import asyncio
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-AT_A_TIME = 4
+AT_A_TIME = 2
 """Reading requests that are worked on at once: threads that share an interpreter do not read faster for being more."""
 
 LONGEST_TURN_S = 0.5
 """A reader that is stuck, with a disk or a lock, keeps its turn no longer [s]."""
 
 _READING = ("GET", "HEAD")
-_NEVER_WAIT = ("/healthz", "/readyz")
-"""Whoever restarts a service that does not answer stops its arms."""
+_PROBES = ("/healthz", "/readyz")
+"""They take turns among themselves: whoever restarts a service that does not answer stops its arms."""
 
 
 class TakingTurns:
@@ -34,15 +34,16 @@ class TakingTurns:
             after which the next one is let in although the answer has not begun [s]
         """
         self.app = app
-        self._turns = asyncio.Semaphore(at_a_time)
+        self._turns, self._probes = asyncio.Semaphore(at_a_time), asyncio.Semaphore(1)
         self._longest_turn_s = longest_turn_s
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request when its turn has come."""
-        if scope["type"] != "http" or scope["method"] not in _READING or scope["path"] in _NEVER_WAIT:
+        if scope["type"] != "http" or scope["method"] not in _READING:
             return await self.app(scope, receive, send)
-        await self._turns.acquire()
-        turn = _Turn(self._turns, self._longest_turn_s)
+        turns = self._probes if scope["path"] in _PROBES else self._turns
+        await turns.acquire()
+        turn = _Turn(turns, self._longest_turn_s)
 
         async def send_and_make_room(message: Message) -> None:
             turn.end()
