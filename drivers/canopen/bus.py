@@ -5,7 +5,8 @@ and the master's heartbeat are sent from the loop itself.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from contextlib import nullcontext
 
 import can
 import canopen
@@ -13,6 +14,7 @@ import canopen
 from drivers.canopen.claim import BusClaim, ClaimedError
 from drivers.canopen.configuration import BusConfiguration
 from drivers.canopen.interfaces import ONE_PROCESS, open_interface
+from drivers.canopen.serial_adapter import SerialAdapterBus
 from drivers.canopen.service_data import NodeDictionary, PumpedSdoClient
 from drivers.clock import Clock, MonotonicClock
 from drivers.errors import DriverError, DriverErrorKind
@@ -125,6 +127,27 @@ class CanBus:
             self._bus.send(
                 can.Message(arbitration_id=identifier, data=data, is_extended_id=False), timeout=SEND_TIMEOUT_S
             )
+        except (can.CanError, OSError, ValueError) as error:
+            raise self._lost(error) from error
+
+    def send_together(self, frames: Iterable[tuple[int, bytes]]) -> None:
+        """Send frames one after the other, with one write where the adapter takes that.
+
+        Parameters
+        ----------
+        frames : iterable of (int, bytes)
+            identifier and payload of each, in their order
+
+        Raises
+        ------
+        DriverError
+            ``lost``: the bus does not take them
+        """
+        gathering = self._bus.gathering() if isinstance(self._bus, SerialAdapterBus) else nullcontext()
+        try:
+            with gathering:
+                for identifier, data in frames:
+                    self.send(identifier, data)
         except (can.CanError, OSError, ValueError) as error:
             raise self._lost(error) from error
 

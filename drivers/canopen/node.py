@@ -59,6 +59,8 @@ class DriveNode:
         of its last emergency
     acknowledged_code : int
         error code that the operator has seen: a drive may go on showing it until it is enabled again
+    measurement : Measurement
+        of this cycle, as far as it is believed
     last_state : DriveState or None
         power state as it told when it last answered: what it is told next when an answer is lost
     last_position : float
@@ -76,6 +78,7 @@ class DriveNode:
     values: dict[DriveObject, int] = field(default_factory=dict)
     error_code: int = 0
     acknowledged_code: int = 0
+    measurement: Measurement = Measurement(math.nan, math.nan, math.nan)
     last_state: DriveState | None = None
     last_position: float = math.nan
     is_deaf: bool = False
@@ -134,18 +137,6 @@ class DriveNode:
         supported = self.dictionary.read(objects.SUPPORTED_MODES)
         return frozenset(mode for mode, number in MODES.items() if supported >> (number - 1) & 1)
 
-    def measured(self) -> Measurement:
-        """What it measured of the joint in this cycle."""
-
-        def converted(entry: DriveObject, to_joint: Callable[[int], float]) -> float:
-            return to_joint(self.values[entry]) if entry in self.values else math.nan
-
-        return Measurement(
-            position=converted(objects.POSITION_ACTUAL, self.units.position),
-            velocity=converted(objects.VELOCITY_ACTUAL, self.units.velocity),
-            effort=converted(objects.TORQUE_ACTUAL, self.units.torque),
-        )
-
     def remember(self, time_ns: int) -> None:
         """Keep state and place of this cycle for cycles whose answer is lost; a frame that cannot be true is lost too.
 
@@ -154,7 +145,7 @@ class DriveNode:
         time_ns : int
             when the drive was asked [ns]
         """
-        measured = self.measured()
+        self.measurement = measured = self._measured()
         if not self.leaps.believes_place(measured.position, time_ns):
             self._forget(STATE_PDO)
         elif not math.isnan(measured.position):
@@ -221,6 +212,18 @@ class DriveNode:
         """Joint and node, for messages."""
         return f"joint {self.joint} (node {self.configuration.node_id})"
 
+    def _measured(self) -> Measurement:
+        """What this cycle's values say of the joint."""
+
+        def converted(entry: DriveObject, to_joint: Callable[[int], float]) -> float:
+            return to_joint(self.values[entry]) if entry in self.values else math.nan
+
+        return Measurement(
+            position=converted(objects.POSITION_ACTUAL, self.units.position),
+            velocity=converted(objects.VELOCITY_ACTUAL, self.units.velocity),
+            effort=converted(objects.TORQUE_ACTUAL, self.units.torque),
+        )
+
     def _learn_units(self) -> DriveUnits:
         configuration = self.configuration
         rated = configuration.rated_torque_nm or self.dictionary.read_surely(objects.RATED_TORQUE) / 1000.0
@@ -239,6 +242,7 @@ class DriveNode:
 
     def _forget(self, layout: PdoLayout) -> None:
         self.values = {entry: value for entry, value in self.values.items() if entry not in layout.objects}
+        self.measurement = self._measured()
 
     def _take_heartbeat(self, data: bytes) -> None:
         self.is_deaf = len(data) == 1 and data[0] & 0x7F != NMT_OPERATIONAL_STATE

@@ -27,7 +27,7 @@ def arm_state(nodes: Sequence[DriveNode], time_ns: int, caught: Fault | None) ->
     caught : Fault or None
         what the driver itself has found
     """
-    measured = [node.measured() for node in nodes]
+    measured = [node.measurement for node in nodes]
     return ArmState(
         time_ns=time_ns,
         position=np.array([one.position for one in measured]),

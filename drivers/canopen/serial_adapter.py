@@ -1,13 +1,17 @@
 """A serial CAN adapter (slcan), read as its text comes: python-can's own reader asks the system for byte after byte.
 
-At a byte a call the answers of six drives take longer than a control cycle; read at once they take none of it.
+At a byte a call the answers of six drives take longer than a control cycle; read at once they take none of it. Nor does
+python-can's own writer fit a cycle: it waits after each frame until the port has sent it.
 """
 
 import contextlib
 import re
+import select
 import time
+from collections.abc import Iterator
 
 from can import CanInitializationError, CanOperationError
+from can.exceptions import error_check
 from can.interfaces.slcan import slcanBus
 
 from drivers.port_holder import find_holder
@@ -24,7 +28,9 @@ _STAMP_DIGITS = 4
 
 
 class SerialAdapterBus(slcanBus):
-    """`can.interfaces.slcan.slcanBus` that takes all bytes that came with one call and shares its port with nobody."""
+    """`can.interfaces.slcan.slcanBus` that takes many frames with one call, and shares its port with nobody."""
+
+    _gathered: bytearray | None = None
 
     def __init__(self, path: str, bit_rate: int) -> None:
         """Open the adapter, and the channel on it.
@@ -53,6 +59,23 @@ class SerialAdapterBus(slcanBus):
         self._await_adapter()
         self.set_bitrate(bit_rate)
 
+    @contextlib.contextmanager
+    def gathering(self) -> Iterator[None]:
+        """Send what is sent within the context with one write, on leaving it; nothing of it where that fails.
+
+        Raises
+        ------
+        CanOperationError
+            the port does not take it
+        """
+        self._gathered = bytearray()
+        try:
+            yield
+            text = bytes(self._gathered)
+        finally:
+            self._gathered = None
+        self._put(text)
+
     def shutdown(self) -> None:
         """Close the channel and the port; of an adapter that is gone only the port is left to close."""
         with contextlib.suppress(CanOperationError):
@@ -67,6 +90,18 @@ class SerialAdapterBus(slcanBus):
                 if self.get_version(_VERSION_S)[0] is not None:
                     return
 
+    def _write(self, string: str) -> None:
+        """One line for the adapter, at once or when the context of `gathering` is left."""
+        line = string.encode() + self.LINE_TERMINATOR
+        if self._gathered is None:
+            self._put(line)
+        else:
+            self._gathered += line
+
+    def _put(self, text: bytes) -> None:
+        with error_check("Could not write to serial device"):
+            self.serialPortOrig.write(text)
+
     def _read(self, timeout: float | None) -> str | None:
         """One line of the adapter, without waiting where one is there already."""
         line = self._next_line()
@@ -74,9 +109,10 @@ class SerialAdapterBus(slcanBus):
             port = self.serialPortOrig
             waiting = port.in_waiting
             if not waiting:
-                port.timeout = timeout
-                self._buffer.extend(port.read(1))
-                waiting = port.in_waiting
+                # the port's own timeout is a setting of the terminal, which takes longer to change than to read
+                if not select.select([port], [], [], timeout)[0]:
+                    return None
+                waiting = max(1, port.in_waiting)  # of a port that is gone the read fails
             self._buffer.extend(port.read(waiting))
             line = self._next_line()
         return line

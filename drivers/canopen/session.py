@@ -115,12 +115,14 @@ class Session:
             longest wait for the answers [ns]
         """
         pairs = zip(self.nodes, setpoint.position, setpoint.torque, strict=True)
-        frames = [node.target(mode, node.controlword(goal), float(q), float(tau)) for node, q, tau in pairs]
+        frames = [
+            (RECEIVED_ID + node.configuration.node_id, node.target(mode, node.controlword(goal), float(q), float(tau)))
+            for node, q, tau in pairs
+        ]
         self.bus.drain()
-        for node, frame in zip(self.nodes, frames, strict=True):
+        for node in self.nodes:
             node.values = {}
-            self.bus.send(RECEIVED_ID + node.configuration.node_id, frame)
-        self.bus.send(SYNC_ID, b"")
+        self.bus.send_together([*frames, (SYNC_ID, b"")])
         stamp, deadline = self.clock.now_ns(), time.monotonic_ns() + answer_ns
         answered = stamp
         waiting = deque(self.nodes)

@@ -16,13 +16,14 @@ class Work:
 
     def __init__(self) -> None:
         self.entered: list[str] = []
+        self.probes_wait = False
         self.may_begin, self.may_end = asyncio.Event(), asyncio.Event()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         self.entered.append(scope["path"])
         if scope["path"] == "/broken":
             raise ValueError(scope["path"])
-        if scope["path"].startswith("/slow"):
+        if scope["path"].startswith("/slow") or self.probes_wait:
             await self.may_begin.wait()
         await send({"type": "http.response.start", "status": 200, "headers": []})
         if scope["path"].startswith("/slow"):
@@ -79,6 +80,21 @@ def test_it_passes_readers_that_wait(method: str, path: str) -> None:
         work.may_end.set()
         await asyncio.gather(*readers)
         assert work.entered == ["/slow/0", "/slow/1", path, "/slow/2", "/slow/3", "/slow/4"]
+
+    play(scene)
+
+
+def test_probes_take_turns_among_themselves() -> None:
+    """Two hundred of them hold up a stop as readers do."""
+
+    async def scene(work: Work, ask: Callable[[str, str], asyncio.Task[None]]) -> None:
+        probes = [ask("GET", "/healthz") for _ in range(3)]
+        work.probes_wait = True
+        await settle()
+        assert work.entered == ["/healthz"]
+        work.may_begin.set()
+        await asyncio.gather(*probes)
+        assert work.entered == 3 * ["/healthz"]
 
     play(scene)
 

@@ -4,6 +4,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import can
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -68,6 +69,55 @@ def test_a_frame_that_lacks_a_character_is_lost_and_the_next_is_not(adapter, los
 @settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_no_text_crashes_the_reader(adapter, noise: bytes) -> None:
     assert all(identifier <= 0x1FFFFFFF for identifier, _ in received(adapter, noise))
+
+
+def frame(identifier: int) -> can.Message:
+    """A frame of two bytes."""
+    return can.Message(arbitration_id=identifier, data=bytes([identifier, 0xAB]), is_extended_id=False)
+
+
+def send_all(bus: SerialAdapterBus, *frames: can.Message) -> None:
+    """Send frames in their order."""
+    for each in frames:
+        bus.send(each)
+
+
+def test_frames_that_are_gathered_go_out_together_and_in_their_order(adapter) -> None:
+    terminal, bus = adapter
+    terminal.read()
+    with bus.gathering():
+        send_all(bus, frame(1), frame(2), frame(3))
+        assert terminal.read() == b""
+    assert terminal.read() == b"t001201AB\rt002202AB\rt003203AB\r"
+    bus.send(frame(4))
+    assert terminal.read() == b"t004204AB\r"
+
+
+def test_of_gathered_frames_none_goes_out_where_one_cannot(adapter) -> None:
+    """Half of the joints must not move without the others."""
+    terminal, bus = adapter
+    terminal.read()
+
+    def send_one_and_fail() -> None:
+        bus.send(frame(1))
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError), bus.gathering():
+        send_one_and_fail()
+    bus.send(frame(2))
+    assert terminal.read() == b"t002202AB\r"
+
+
+def test_an_adapter_that_is_gone_is_an_error_for_who_reads_and_who_writes(tmp_path: Path) -> None:
+    terminal = PseudoTerminal(str(tmp_path / "port"))
+    bus = SerialAdapterBus(str(tmp_path / "port"), 1_000_000)
+    terminal.close()
+    for use in (lambda: bus.recv(PATIENCE_S), lambda: bus.send(frame(1))):
+        with pytest.raises((can.CanError, OSError)):
+            use()
+    with pytest.raises(can.CanError), bus.gathering():
+        bus.send(frame(1))
+    bus.shutdown()
 
 
 def test_an_adapter_that_is_gone_can_be_let_go_of(tmp_path: Path) -> None:
