@@ -7,6 +7,8 @@ from collections.abc import Callable
 def eventually(is_so: Callable[[], bool], within_s: float = 5.0) -> bool:
     """Whether something comes true in time."""
     deadline = time.monotonic() + within_s
-    while not is_so() and time.monotonic() < deadline:
+    while not is_so():
+        if time.monotonic() > deadline:
+            return False
         time.sleep(0.002)
-    return is_so()
+    return True

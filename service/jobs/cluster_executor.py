@@ -7,6 +7,7 @@ from concurrent.futures import BrokenExecutor, Executor, Future
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from service.errors import StoreError
+from service.jobs.loop_thread import LoopThread
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -53,19 +54,17 @@ class ClusterExecutor(Executor):
             if it does not answer, or Dask is not installed
         """
         self._address, self._wait_s = address, wait_s
-        try:
-            self._client = self._open_client()
-        except ImportError:
-            hint = "install tauscope[fleet], or leave the variable out"
-            raise StoreError(f"{SCHEDULER}: Dask is not installed; {hint}") from None
-        except (OSError, ValueError) as error:
-            hint = "start the scheduler, or leave the variable out"
-            raise StoreError(f"{SCHEDULER}={address}: does not answer ({type(error).__name__}); {hint}") from None
-        self._executor = _executor_of(self._client)
         self._width = 1
         self._closing = threading.Event()
         self._there = threading.Event()
-        self._look()
+        self._loop = LoopThread("cluster loop")
+        try:
+            self._client = self._open_client()
+            self._executor = _executor_of(self._client)
+            self._look()
+        except (ImportError, OSError, ValueError) as error:
+            self._loop.stop(PATIENCE_S)
+            raise _not_reached(address, error) from None
         self._watcher = threading.Thread(target=self._watch, name="cluster", daemon=True)
         self._watcher.start()
 
@@ -137,12 +136,14 @@ class ClusterExecutor(Executor):
         except Exception:  # a scheduler that is away holds up nobody who leaves
             if self.is_there():
                 raise
+        finally:
+            self._loop.stop(PATIENCE_S)
 
     def _open_client(self) -> "Client":
         """A connection of its own; raises what Dask raises."""
         from distributed import Client
 
-        return Client(self._address, timeout=PATIENCE_S, set_as_default=False)
+        return Client(self._address, self._loop.open(), timeout=PATIENCE_S, set_as_default=False)
 
     def _watch(self) -> None:
         """Look at the scheduler until it is left."""
@@ -160,7 +161,9 @@ class ClusterExecutor(Executor):
             self._executor = _executor_of(self._client)
             _log.warning("the Dask scheduler at %s is back", self._address)
         if self.is_there():
-            threads: Any = self._client.nthreads()  # a mapping: this client is not an asynchronous one
+            # `Client.nthreads` asks the same, and waits for ever where the scheduler is lost meanwhile.
+            scheduler: Any = self._client.scheduler
+            threads: Any = self._client.sync(scheduler.ncores, callback_timeout=PATIENCE_S)
             self._width = max(1, sum(threads.values()))
             self._there.set()
         else:
@@ -185,6 +188,13 @@ class ClusterExecutor(Executor):
             outer.set_exception(error)
         else:
             outer.set_result(inner.result())
+
+
+def _not_reached(address: str, error: Exception) -> StoreError:
+    if isinstance(error, ImportError):
+        return StoreError(f"{SCHEDULER}: Dask is not installed; install tauscope[fleet], or leave the variable out")
+    hint = "start the scheduler, or leave the variable out"
+    return StoreError(f"{SCHEDULER}={address}: does not answer ({type(error).__name__}); {hint}")
 
 
 def _executor_of(client: "Client") -> Executor:

@@ -5,6 +5,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import BrokenExecutor, Future, wait
@@ -34,7 +35,7 @@ from service.jobs.worker_pool import WorkerPool
 from service.store import ItemStore, hash_file
 
 if TYPE_CHECKING:
-    from distributed import LocalCluster
+    from distributed import Client, LocalCluster
 
 CLUSTER = [pytest.mark.slow, pytest.mark.timeout(1200), pytest.mark.filterwarnings("ignore")]
 
@@ -192,6 +193,30 @@ class TestASchedulerThatDies:
         with pytest.raises(RuntimeError, match="was left"):
             executor.submit(divide, 1)
 
+    def test_reaching_for_it_again_and_again_leaves_nothing_behind(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        pytest.importorskip("distributed", reason="needs tauscope[fleet]")
+        monkeypatch.setattr("service.jobs.cluster_executor.PATIENCE_S", 1)
+        monkeypatch.setattr("service.jobs.cluster_executor.LOOK_S", 0.01)
+        before = set(threading.enumerate())
+        failures: list[OSError] = []
+        open_client = ClusterExecutor._open_client
+
+        def counted(executor: ClusterExecutor) -> "Client":
+            try:
+                return open_client(executor)
+            except OSError as error:
+                failures.append(error)
+                raise
+
+        port = str(free_port())
+        with dask("scheduler", "--host", "127.0.0.1", "--port", port):
+            executor = opened_when_there(f"tcp://127.0.0.1:{port}")
+            monkeypatch.setattr(ClusterExecutor, "_open_client", counted)
+        assert eventually(lambda: len(failures) == 3, 60)
+        assert names_of_threads_but(before) == {"cluster", "cluster loop"}
+        executor.shutdown(cancel_futures=True)
+        assert names_of_threads_but(before) == set()
+
     def test_workers_that_come_later_are_counted(self) -> None:
         pytest.importorskip("distributed", reason="needs tauscope[fleet]")
         port = str(free_port())
@@ -202,6 +227,11 @@ class TestASchedulerThatDies:
             with dask("worker", address, "--nworkers", "1", "--nthreads", "3", "--no-nanny"):
                 wait_until(lambda: executor.width == 3)
             executor.shutdown(cancel_futures=True)
+
+
+def names_of_threads_but(before: set[threading.Thread]) -> set[str]:
+    """Those that came meanwhile, less the one that serves all of Dask in a process."""
+    return {each.name for each in set(threading.enumerate()) - before if not each.name.startswith("Dask-Offload")}
 
 
 def opened_when_there(address: str) -> ClusterExecutor:
