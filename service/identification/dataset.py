@@ -77,6 +77,25 @@ class PreparedMotion:
         own = structure.joint_term_columns(joint, motion.velocity[:, joint], motion.acceleration[:, joint])
         return self.reduced_rigid[joint], motion.band.reduce(own)
 
+    def predicted_rows(self, structure: ModelStructure, parameters: Array) -> Array:
+        """Model torque in the common band, (n, M).
+
+        Parameters
+        ----------
+        structure : ModelStructure
+            the model's columns
+        parameters : (p,) float64
+            one parameter set
+        """
+        motion = self.motion
+        outward, others = [], []
+        for joint, rigid in enumerate(self.reduced_rigid):
+            links, own = np.split(parameters[structure.joint_columns(joint)], [len(rigid)])
+            terms = structure.joint_term_columns(joint, motion.velocity[:, joint], motion.acceleration[:, joint])
+            outward.append(links @ rigid)
+            others.append(own @ terms)
+        return np.stack(outward) + motion.band.reduce(np.stack(others))
+
     def predicted_torque(self, structure: ModelStructure, candidates: Array) -> Array:
         """Model torque at the recorded rate, before any filter, of several parameter sets at once.
 

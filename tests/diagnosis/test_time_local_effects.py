@@ -14,7 +14,7 @@ from service.diagnosis.catalogue.kinematic_error import KinematicError
 from service.diagnosis.catalogue.payload import Payload
 from service.diagnosis.catalogue.payload_change import PayloadChange, carried
 from service.diagnosis.catalogue.plain_terms import CoulombFriction, TorqueOffset, ViscousFriction
-from service.diagnosis.catalogue.time_local import EVERY, HALF_SINE, open_share, since
+from service.diagnosis.catalogue.time_local import EVERY, HALF_SINE, OUTSIDE, open_samples, open_share, since
 from service.robot import LinkInertia
 
 PICKED = slice(None, None, 200)
@@ -99,6 +99,25 @@ def test_windows_belong_to_one_recording_to_all_or_to_all_from_one_on() -> None:
     assert [round(seconds(later, number), 2) for number in (0, 1, 2, -1)] == [0.0, 6.0, 10.0, 0.0]
     # An edge between two samples counts the part of the interval that it leaves open.
     assert seconds([0.0, 2.003, 3.003, 0.0], 0) == pytest.approx(1.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("recording", [-1, 0, 1, 2])
+def test_a_window_is_shut_outside_its_samples(recording: int) -> None:
+    rng = np.random.default_rng(4)
+    count, interval = 300, 0.05
+    time = np.sort(rng.uniform(0.0, 4.0, 50))
+    scopes = rng.choice([EVERY, 0.0, 1.0, 2.0, since(0), since(1), since(2)], count)
+    start = rng.uniform(-1.0, 4.0, count)
+    profile = rng.choice([0.0, HALF_SINE, OUTSIDE], count)
+    shapes = np.stack([scopes, start, start + rng.exponential(1.0, count), profile], axis=1)
+    first, last = open_samples(shapes, recording, time, interval)
+    opened = np.stack([open_share(shape, recording, time, interval) for shape in shapes])
+    place = np.arange(len(time))
+    assert not opened[(place < first[:, None]) | (place >= last[:, None])].any()
+    assert (opened > 0.0).any() == (recording >= 0 or EVERY in scopes)
+    # All at once, one window a sample.
+    each = open_share(np.repeat(shapes, len(time), axis=0), recording, np.tile(time, count), interval)
+    assert np.array_equal(each.reshape(opened.shape), opened)
 
 
 def test_a_displaced_frame_is_the_difference_of_two_arms() -> None:

@@ -10,10 +10,13 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from service.diagnosis.catalogue.effect import Effect
 from service.diagnosis.catalogue.signals import Signals
 from service.recording.recording import Array
+
+IndexArray = NDArray[np.intp]
 
 EVERY = -1.0
 """Scope of a window that lies at the same instants of every recording, held-out ones included."""
@@ -126,13 +129,13 @@ class TimeLocalEffect(Effect):
         return names[int(-2 - scope) if scope < EVERY else int(scope)]
 
 
-def open_share(shape: Array, recording: int, time: Array, interval_s: float) -> Array:
-    """w(t) of one window: 1 where it is open, the part of an interval at the samples that its edges cut.
+def open_share(shapes: Array, recording: int, time: Array, interval_s: float) -> Array:
+    """w(t) of windows: 1 where one is open, the part of an interval at the samples that its edges cut.
 
     Parameters
     ----------
-    shape : (k,) float64
-        scope, start [s], end [s], profile
+    shapes : (..., k) float64
+        scope, start [s], end [s], profile: of one window, or of one a sample
     recording : int
         index of the recording, negative for held-out ones
     time : (...) float64
@@ -140,19 +143,41 @@ def open_share(shape: Array, recording: int, time: Array, interval_s: float) -> 
     interval_s : float
         what one instant stands for [s]
     """
-    scope, start, end, profile = shape[:4]
-    if profile == OUTSIDE:
-        inside = open_share(np.array([scope, start, end, 0.0]), recording, time, interval_s)
-        return 1.0 - inside if recording >= 0 else np.zeros_like(time)
-    opened = recording >= 0 and scope < EVERY and recording > -2.0 - scope
-    if opened:
-        return np.ones_like(time)
-    if not (scope in (EVERY, float(recording)) or (scope < EVERY and recording == -2.0 - scope)):
-        return np.zeros_like(time)
-    after = (time - start) / interval_s + 0.5
-    if scope < EVERY:
-        return np.clip(after, 0.0, 1.0)
-    if profile == HALF_SINE:
-        length = max(end - start, interval_s)
-        return np.where((time > start) & (time < end), np.sin(np.pi * (time - start) / length), 0.0)
-    return np.clip(after, 0.0, 1.0) * np.clip((end - time) / interval_s + 0.5, 0.0, 1.0)
+    scope, start, end, profile = np.moveaxis(shapes[..., :4], -1, 0)
+    first = np.where(scope < EVERY, -2.0 - scope, np.inf)  # the recording in which it opens for good
+    share = np.clip((time - start) / interval_s + 0.5, 0.0, 1.0)
+    share = share * np.where(scope < EVERY, 1.0, np.clip((end - time) / interval_s + 0.5, 0.0, 1.0))
+    length = np.maximum(end - start, interval_s)
+    inside = (time > start) & (time < end)
+    sine = np.sin(np.pi * np.where(inside, time - start, 0.0) / length)
+    share = np.where((profile == HALF_SINE) & (scope >= EVERY), sine, share)
+    share = np.where((scope == EVERY) | (scope == recording) | (first == recording), share, 0.0)
+    if recording < 0:
+        return np.where(profile == OUTSIDE, 0.0, share)
+    share = np.where(first < recording, 1.0, share)
+    return np.where(profile == OUTSIDE, 1.0 - share, share)
+
+
+def open_samples(
+    shapes: Array, recording: int, time: Array, interval_s: float
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """First sample of every window, and the one after its last, (g,) each: all others are shut.
+
+    Parameters
+    ----------
+    shapes : (g, k) float64
+        scope, start [s], end [s], profile
+    recording : int
+        index of the recording, negative for held-out ones
+    time : (N,) float64
+        instants in rising order, from the beginning of the recording [s]
+    interval_s : float
+        what one instant stands for [s]
+    """
+    scope, start, end, profile = shapes[:, :4].T
+    opened = np.where(scope < EVERY, -2.0 - scope, np.inf)
+    first = np.searchsorted(time, start - interval_s)
+    last = np.searchsorted(time, np.where(scope < EVERY, np.inf, end + interval_s))
+    whole = (opened < recording) | (profile == OUTSIDE)
+    shut = ~whole & (scope != EVERY) & (scope != recording) & (opened != recording)
+    return np.where(whole, 0, first), np.where(shut, 0, np.where(whole, len(time), last))

@@ -225,9 +225,8 @@ def _moving_columns(model: ExtendedModel, piece: Piece) -> list[JointColumns]:
         of_constants, slopes = model.sensitivity_columns(piece, joint)
         rows[joint].append(_with_steps_of_terms(piece.repeated(factor * slopes), of_constants, joint, model, piece))
         places[joint] += of_constants
-    signals = model.signals(piece)
     for term, place in zip(model.terms, model.term_places(), strict=True):
-        derivatives = model.term_derivatives(term, signals)
+        derivatives = model.term_derivatives(term, model.signals(piece))
         for slot, joint in enumerate(term.effect.touched(len(joints))):
             rows[joint].append(piece.reduced(derivatives[:, slot]))
             places[joint] += list(range(place.start, place.stop))

@@ -168,7 +168,7 @@ class ExtendedModel:
         motion = prepared.motion
         bodies = np.where(np.arange(structure.size) < structure.base_count, self.parameters, 0.0)
         whole, rigid = prepared.predicted_torque(structure, np.stack([self.parameters, bodies]))
-        load, acceleration = (piece.without_noise_of_inertia(rows) for rows in (rigid, motion.acceleration.T))
+        load = piece.without_noise_of_inertia(rigid)
         steepness = self.steepness
         velocity = np.ascontiguousarray(motion.velocity.T)
         return Signals(
@@ -178,7 +178,7 @@ class ExtendedModel:
             recording=prepared.recording,
             position=np.ascontiguousarray(motion.position.T),
             velocity=velocity,
-            acceleration=acceleration,
+            acceleration=piece.quiet_acceleration(),
             load=load,
             torque=whole - rigid + load,
             step=smooth_sign(velocity, steepness[:, None]),

@@ -23,14 +23,10 @@ def predicted_rows(model: ExtendedModel, piece: Piece) -> Array:
     piece : Piece
         from the observations
     """
-    signals, prepared = model.signals(piece), piece.prepared
-    nominal = prepared.motion.band.reduce(signals.torque - signals.load)
-    for joint, columns in enumerate(prepared.reduced_rigid):
-        nominal[joint] += model.parameters[model.structure.joint_columns(joint)[: len(columns)]] @ columns
-    total = np.array(piece.repeated(nominal))
+    total = np.array(piece.repeated(piece.prepared.predicted_rows(model.structure, model.parameters)))
     for term in model.terms:
         touched = list(term.effect.touched(len(total)))
-        total[touched] += piece.reduced(model.term_torque(term, signals))
+        total[touched] += piece.reduced(model.term_torque(term, model.signals(piece)))
     return total
 
 

@@ -129,6 +129,12 @@ class Piece:
             return np.ascontiguousarray(values)
         return np.ascontiguousarray(smooth(values.T, self.prepared.motion.rate_hz, self.rigid_hz).T)
 
+    def quiet_acceleration(self) -> Array:
+        """The motion's acceleration `without_noise_of_inertia`, (n, N): made once."""
+        if "quiet_acceleration" not in self.memory:
+            self.memory["quiet_acceleration"] = self.without_noise_of_inertia(self.prepared.motion.acceleration.T)
+        return self.memory["quiet_acceleration"]
+
     def row_times(self) -> Array:
         """Instant of every row, (P M,) [s]."""
         motion = self.prepared.motion

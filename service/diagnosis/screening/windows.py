@@ -11,7 +11,7 @@ import numpy as np
 from scipy import sparse, stats
 
 from service.diagnosis.catalogue.signals import Signals
-from service.diagnosis.catalogue.time_local import TimeLocalEffect, open_share
+from service.diagnosis.catalogue.time_local import IndexArray, TimeLocalEffect, open_samples, open_share
 from service.diagnosis.fitting.fit import Fit
 from service.diagnosis.fitting.projection import INVISIBLE, Moments
 from service.diagnosis.observations.observations import Observations
@@ -35,21 +35,28 @@ def windows_on_rows(effect: TimeLocalEffect, observations: Observations) -> Wind
     observations : Observations
         the data, noise known
     """
-    found: dict[int, sparse.csr_array] = {}
     interval = 1.0 / observations.pieces[0].prepared.motion.band.rate_hz
-    for joint in effect.touched(observations.robot.joint_count):
-        recording, instants = observations.row_labels(joint)
-        rows = {int(each): np.flatnonzero(recording == each) for each in np.unique(recording)}
-        values, columns, counts = [], [], []
-        for shape in effect.grid:
-            own = [(open_share(shape, each, instants[at], interval), at) for each, at in rows.items()]
-            kept = [(share[share > 0.0], at[share > 0.0]) for share, at in own]
-            values += [share for share, _ in kept]
-            columns += [at for _, at in kept]
-            counts.append(sum(len(at) for _, at in kept))
-        starts = np.concatenate([[0], np.cumsum(counts)])
-        content = (np.concatenate(values), np.concatenate(columns), starts)
-        found[joint] = sparse.csr_array(content, shape=(len(effect.grid), len(recording)))
+    return {
+        joint: _on_rows(effect.grid, *observations.row_labels(joint), interval)
+        for joint in effect.touched(observations.robot.joint_count)
+    }
+
+
+def _on_rows(shapes: Array, recording: IndexArray, instants: Array, interval_s: float) -> sparse.csr_array:
+    """The share (g, R) to which every window is open at every row; where it is shut costs nothing."""
+    shares, windows, rows = [], [], []
+    for each in np.unique(recording):
+        at = np.flatnonzero(recording == each)
+        first, last = open_samples(shapes, int(each), instants[at], interval_s)
+        counts = np.maximum(last - first, 0)
+        window = np.repeat(np.arange(len(shapes)), counts)
+        sample = np.arange(len(window)) + np.repeat(first - np.cumsum(counts) + counts, counts)
+        shares.append(open_share(shapes[window], int(each), instants[at[sample]], interval_s))
+        windows.append(window)
+        rows.append(at[sample])
+    content = (np.concatenate(shares), (np.concatenate(windows), np.concatenate(rows)))
+    found = sparse.csr_array(content, shape=(len(shapes), len(recording)))
+    found.eliminate_zeros()
     return found
 
 
