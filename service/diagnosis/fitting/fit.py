@@ -9,7 +9,6 @@ from service.diagnosis.model.extended import ExtendedModel, with_terms
 from service.diagnosis.model.residual import residual_rows
 from service.diagnosis.model.term import Term
 from service.diagnosis.observations.observations import Observations, Piece
-from service.diagnosis.threads import side_by_side
 from service.recording.recording import Array
 
 STEPS = 8
@@ -192,7 +191,7 @@ class Fitter:
 
     def _columns(self, model: ExtendedModel) -> list[JointColumns]:
         observations = self.observations
-        pieces = side_by_side(lambda piece: _moving_columns(model, piece), observations)
+        pieces = [_moving_columns(model, piece) for piece in observations]
         result = []
         for joint in range(observations.robot.joint_count):
             rigid = model.factor(joint) * self._white_rigid(model, joint)

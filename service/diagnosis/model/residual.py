@@ -7,7 +7,6 @@ import numpy as np
 from service.diagnosis.catalogue import Signals
 from service.diagnosis.model.extended import ExtendedModel
 from service.diagnosis.observations.observations import Observations, Piece
-from service.diagnosis.threads import side_by_side
 from service.dynamics import smooth_sign
 from service.recording.conditioning.filters import smooth_each
 from service.recording.recording import Array
@@ -40,7 +39,7 @@ def residual_rows(model: ExtendedModel, observations: Observations) -> list[list
     observations : Observations
         the data
     """
-    predicted = side_by_side(lambda piece: predicted_rows(model, piece), observations)
+    predicted = [predicted_rows(model, piece) for piece in observations]
     joints = range(observations.robot.joint_count)
     return [
         [measured - rows[joint] for measured, rows in zip(observations.torque(joint), predicted, strict=True)]
