@@ -40,14 +40,13 @@ def effective_number(found: Moments, columns: Sequence[Mapping[int, Array]], rng
     values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
     known = values > 1e-9 * values[-1]
     draws = (vectors[:, known] * np.sqrt(values[known])) @ rng.standard_normal((int(known.sum()), DRAWS))
+    visible = np.flatnonzero((found.shares > INVISIBLE).all(axis=1))
+    sizes = scale.reshape(shapes, count)[visible]
+    own = found.gram[visible] / (sizes[:, :, None] * sizes[:, None, :])
     largest = np.zeros(DRAWS)
-    for place in range(shapes):
-        if (found.shares[place] <= INVISIBLE).any():
-            continue
-        part = slice(place * count, (place + 1) * count)
-        own = found.gram[place] / np.outer(scale[part], scale[part])
-        drawn = draws[part]
-        largest = np.maximum(largest, np.einsum("cd,cd->d", drawn, np.linalg.lstsq(own, drawn, rcond=1e-9)[0]))
+    for place, inverse in zip(visible, np.linalg.pinv(own, rcond=1e-9, hermitian=True), strict=True):
+        drawn = draws[place * count : (place + 1) * count]
+        largest = np.maximum(largest, np.einsum("cd,cd->d", drawn, inverse @ drawn))
     threshold = float(np.quantile(largest, 1.0 - TAIL))
     single = float(stats.chi2.sf(threshold, count))
     return float(np.clip(-np.log1p(-TAIL) / max(single, 1e-12), 1.0, shapes))
