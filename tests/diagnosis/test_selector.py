@@ -7,17 +7,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service.diagnosis.catalogue.elastic_forces import JointSpring
+from service.diagnosis.catalogue.elastic_forces import CableForce, JointSpring
 from service.diagnosis.catalogue.periodic_torque import Cogging
 from service.diagnosis.screening.screen import Candidate
 from service.diagnosis.selection.choice import Choice, Option, Place, place_of
 from service.diagnosis.selection.confirmation import Confirmation
 from service.diagnosis.selection.selector import Selector
+from service.diagnosis.selection.table import Table
 
 JOINTS = tuple(SimpleNamespace(name=f"joint{number}") for number in (1, 2, 3))
 FIT: Any = SimpleNamespace(model=SimpleNamespace(structure=SimpleNamespace(robot=SimpleNamespace(joints=JOINTS))))
 SCREEN: Any = SimpleNamespace(effects=(), observations=SimpleNamespace(robot=SimpleNamespace(joint_count=3)))
 FITTER: Any = None
+PLAIN: Any = SimpleNamespace(inflation=lambda fit: 1.0)
 
 SEEN = Confirmation(gain=100.0, gain_z=5.0, expected_z=10.0, seen_z=10.0, favour=50.0)
 REFUTED = Confirmation(gain=-100.0, gain_z=-5.0, expected_z=10.0, seen_z=0.0, favour=-50.0)
@@ -31,10 +33,12 @@ def choice(effect: Any, confirmation: Confirmation) -> Choice:
 class AnyTable:
     """Knows only what is refused."""
 
+    candidates = ()
+
     def __init__(self, refused: set[Place]) -> None:
         self.refused = set(refused)
 
-    def refuse(self, place: Place) -> None:
+    def refuse(self, place: Place, but: Sequence[Candidate] = ()) -> None:
         self.refused.add(place)
 
 
@@ -52,6 +56,7 @@ def grown(monkeypatch: pytest.MonkeyPatch, waves_at: int) -> tuple[list[Place], 
     monkeypatch.setattr(Selector, "_table", lambda self, fit, choices, refused: AnyTable(refused))
     monkeypatch.setattr(Selector, "_best", best)
     selector = Selector(SCREEN, FITTER, None, pure_error=True)
+    selector.admission = PLAIN
     _, choices, rejected = selector._grown(FIT, [], lambda step: None)
     return tuple([place_of(each.options[0].candidate) for each in found] for found in (choices, rejected))  # type: ignore[return-value]
 
@@ -68,3 +73,33 @@ def test_what_was_refused_elsewhere_is_not(monkeypatch: pytest.MonkeyPatch) -> N
     chosen, refused = grown(monkeypatch, waves_at=2)
     assert chosen == [("joint_spring", 0)]
     assert refused == [("cogging", 2)]
+
+
+@pytest.mark.parametrize(("explained", "chosen"), [(95.0, ["cable_force"]), (85.0, [])])
+def test_another_form_of_what_was_refused_is_asked_where_training_hardly_tells_the_two(
+    monkeypatch: pytest.MonkeyPatch, explained: float, chosen: list[str]
+) -> None:
+    """Of a cable, the form of the other side may explain a little more and predict nothing."""
+    forms = {side: CableForce(1, np.ones((1, 2)), np.zeros(2), np.ones(2), side=side) for side in (1, -1)}
+    gains = {1: explained, -1: 100.0}
+    made = [
+        Candidate(form, np.ones(2), np.ones(1), gains[side], np.eye(1), True, 1.0, 1.0) for side, form in forms.items()
+    ]
+    table = object.__new__(Table)
+    table.candidates, table.fit = made, FIT
+    monkeypatch.setattr(Table, "refined", lambda self, candidate: candidate)
+    monkeypatch.setattr(Table, "fitted", lambda self, candidate: Option(candidate, FIT, candidate.gain))
+
+    def best(self: Selector, table: Table, choices: Sequence[Choice]) -> Choice | None:
+        left = sorted(table.candidates, key=lambda each: -each.gain)
+        asked = None if choices or not left else left[0]
+        is_true = asked is not None and asked.effect is forms[1]
+        return asked and Choice((table.fitted(asked),), SEEN if is_true else REFUTED, 0.0)
+
+    monkeypatch.setattr(Selector, "_table", lambda self, fit, choices, refused: table)
+    monkeypatch.setattr(Selector, "_best", best)
+    selector = Selector(SCREEN, FITTER, None, pure_error=True)
+    selector.admission = PLAIN
+    _, found, rejected = selector._grown(FIT, [], lambda step: None)
+    assert [each.options[0].candidate.effect.id for each in found] == chosen
+    assert [each.options[0].candidate.effect for each in rejected] == [forms[-1]]

@@ -168,8 +168,17 @@ class Selector:
             if choice.confirmation.confirmed(cautious=not self.pure_error):
                 return with_rivals(choice, rejected[before:])
             rejected.append(choice)
-            table.refuse(_chosen(choice))
+            table.refuse(_chosen(choice), but=self._other_forms(table, choice.options[0]))
         return None
+
+    def _other_forms(self, table: Table, refused: Option) -> list[Candidate]:
+        """Forms of a refused effect that training hardly tells from it: the other side of a cable, another exponent."""
+        own, doubt = refused.candidate, EQUIVALENT * self.admission.inflation(refused.fit)
+        others = [each for each in table.candidates if place_of(each) == place_of(own) and each.effect != own.effect]
+        refined = [table.refined(each) for each in others]
+        near = [each for each in refined if each.score > refused.score - CLOSE]
+        alike = [each.effect for each in near if table.fitted(each).score > refused.score - doubt]
+        return [each for each in others if each.effect in alike]
 
     def _best(self, table: Table, choices: Sequence[Choice]) -> Choice | None:
         """The best significant option, with those that explain nearly as much."""

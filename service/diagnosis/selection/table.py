@@ -1,6 +1,6 @@
 """All candidates beside one fitted model, refined and fitted where somebody asks."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -36,15 +36,17 @@ class Table:
         self._refined: dict[int, Candidate] = {}
         self._fitted: dict[int, Option] = {}
 
-    def refuse(self, place: Place) -> None:
+    def refuse(self, place: Place, but: Sequence[Candidate] = ()) -> None:
         """Leave an effect at a place out from now on.
 
         Parameters
         ----------
         place : (str, int or None)
             effect and joint
+        but : sequence of Candidate
+            forms of it that stay in
         """
-        self.candidates = [each for each in self.candidates if place_of(each) != place]
+        self.candidates = [each for each in self.candidates if place_of(each) != place or each in but]
 
     def refined(self, candidate: Candidate) -> Candidate:
         """The candidate at its best shape.
