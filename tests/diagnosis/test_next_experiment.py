@@ -30,7 +30,8 @@ def test_every_motion_of_the_bank_keeps_all_limits_and_can_be_written(
     identification: Identification, tmp_path: Path
 ) -> None:
     robot = identification.robot
-    seen = list(Bank(identification, np.random.default_rng(0)).first_look(2))
+    bank = Bank(identification, np.random.default_rng(0))
+    seen = [*bank.first_look(2), *bank.everywhere(2)]
     assert {primitive.kind for primitive in seen} > set(KINDS)
     assert any("sweeps" in primitive.kind for primitive in seen)
     assert any("slow reversals" in primitive.kind for primitive in seen)
@@ -39,6 +40,18 @@ def test_every_motion_of_the_bank_keeps_all_limits_and_can_be_written(
         write_trajectory(primitive.trajectory, tmp_path / f"{number}.json")
         again = read_trajectory(tmp_path / f"{number}.json", robot)
         assert again.duration_s == pytest.approx(primitive.trajectory.duration_s)
+
+
+def test_a_motion_for_what_nobody_can_explain_goes_everywhere(identification: Identification) -> None:
+    """Through half the range of every joint and at a third of its speed at least, and slowly through zero."""
+    limits = motion_limits(identification.robot)
+    for primitive in Bank(identification, np.random.default_rng(0)).everywhere(3):
+        motion = primitive.trajectory.samples(100.0)
+        assert (np.ptp(motion.position, axis=0) > 0.5 * 2.0 * limits.half_range).all()
+        assert (np.abs(motion.velocity).max(axis=0) > limits.velocity / 3.0).all()
+        fastest = np.abs(motion.velocity).max(axis=1)
+        assert np.count_nonzero(fastest < 0.1) > 1600  # two postures of eight seconds at least
+        assert primitive.kind == "a wide motion and slow reversals in several postures"
 
 
 def test_motions_ask_for_no_more_torque_than_there_is(identification: Identification) -> None:

@@ -16,15 +16,17 @@ from service.excitation.setting import Setting
 from service.excitation.slow_reversals import slow_part
 from service.identification import Identification
 from service.robot import FrictionCoefficients, Model, Robot
-from service.trajectory import FourierSegment, MotionSamples, Trajectory
+from service.trajectory import FourierSegment, FourierSeries, MotionSamples, Trajectory
 
 DURATION_S = 20.0
 """Of every Fourier series and sweep [s]."""
 
+WIDE = "a wide motion"
+
 KINDS = {
     "a random motion": (10.0, 5),
     "a fast motion": (4.0, 4),
-    "a wide motion": (10.0, 2),
+    WIDE: (10.0, 2),
 }
 """Period [s] and harmonics of the Fourier series."""
 
@@ -32,6 +34,9 @@ SWEEP_SHARES = (0.08, 0.3, 0.8)
 """Speeds of sweeps, as part of the limit."""
 
 SLOW_POSTURES = 3
+
+WIDEST_OF = 8
+"""Wide motions of which the one that crosses most of the position ranges is taken."""
 
 CHECKED = 2000
 """Instants at which a sweep's torque is looked at."""
@@ -99,6 +104,31 @@ class Bank:
         for share in SWEEP_SHARES:
             yield from self._sweep(share)
         yield from self._slow_reversals()
+
+    def everywhere(self, count: int) -> Iterator[Primitive]:
+        """Motions through as much of the ranges of positions and speeds as one takes in, slow reversals included.
+
+        Parameters
+        ----------
+        count : int
+            how many are tried
+        """
+        kind, setting = WIDE, self._settings[WIDE]
+        for _ in range(count):
+            drawn = (setting.feasibility.random_start(self._postures, self._rng) for _ in range(WIDEST_OF))
+            found = [setting.space.series(x) for x in drawn if x is not None]
+            if not found:
+                continue
+            series = max(found, key=self._crossed)
+            slow = slow_part(self._robot, series, self._limits, self._states, SLOW_POSTURES).segments
+            repeats = max(1, round(DURATION_S / series.period_s))
+            words = f"{kind} and slow reversals in several postures" if slow else kind
+            yield Primitive(words, self._trajectory(FourierSegment(series, repeats, 0), *slow))
+
+    def _crossed(self, series: FourierSeries) -> float:
+        """Part of its position range that the joint with the least of it crosses."""
+        position = series.evaluate(np.linspace(0.0, series.period_s, CHECKED)).position
+        return float((np.ptp(position, axis=0) / (2.0 * self._limits.half_range)).min())
 
     def fourier(self, kind: str, count: int) -> Iterator[Primitive]:
         """Random Fourier series about random postures.

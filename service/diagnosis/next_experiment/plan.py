@@ -102,9 +102,13 @@ def plan_experiment(
         added = tuple(equations(model, motion.fitter, others) for model, others in judge.tasks)
         return _Judged(primitive, added, judge.value(added))
 
-    seen = [judged(primitive) for primitive in bank.first_look(FIRST_LOOK)]
+    # What no explanation is known of may be anywhere that the recordings have not been.
+    offered = bank.first_look(FIRST_LOOK) if judge.separates else bank.everywhere(FIRST_LOOK)
+    seen = [judged(primitive) for primitive in offered]
+    if not seen:
+        raise ExcitationError("no motion keeps the arm's limits; widen them in the robot file")
     best = max(seen, key=lambda each: each.value)
-    if best.primitive.kind in KINDS:
+    if judge.separates and best.primitive.kind in KINDS:
         seen += [judged(primitive) for primitive in bank.fourier(best.primitive.kind, SECOND_LOOK)]
     best = max(seen, key=lambda each: each.value)
     chosen = best.primitive.trajectory
