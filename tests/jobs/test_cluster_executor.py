@@ -212,10 +212,10 @@ class TestASchedulerThatDies:
         with dask("scheduler", "--host", "127.0.0.1", "--port", port):
             executor = opened_when_there(f"tcp://127.0.0.1:{port}")
             monkeypatch.setattr(ClusterExecutor, "_open_client", counted)
-        assert eventually(lambda: len(failures) == 3, 60)
+        assert eventually(lambda: len(failures) >= 3, 60)
         assert names_of_threads_but(before) == {"cluster", "cluster loop"}
         executor.shutdown(cancel_futures=True)
-        assert names_of_threads_but(before) == set()
+        assert eventually(lambda: not names_of_threads_but(before), 30)
 
     def test_workers_that_come_later_are_counted(self) -> None:
         pytest.importorskip("distributed", reason="needs tauscope[fleet]")

@@ -158,9 +158,7 @@ def open_share(shapes: Array, recording: int, time: Array, interval_s: float) ->
     return np.where(profile == OUTSIDE, 1.0 - share, share)
 
 
-def open_samples(
-    shapes: Array, recording: int, time: Array, interval_s: float
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def open_samples(shapes: Array, recording: int, time: Array, interval_s: float) -> tuple[IndexArray, IndexArray]:
     """First sample of every window, and the one after its last, (g,) each: all others are shut.
 
     Parameters

@@ -39,7 +39,7 @@ WIDEST_OF = 8
 """Wide motions of which the one that crosses most of the position ranges is taken."""
 
 CHECKED = 2000
-"""Instants at which a sweep's torque is looked at."""
+"""Instants at which a motion's torque and range are looked at."""
 
 TAKEN_BACK = 0.75
 """Factor by which a sweep that needs too much torque is slowed down."""
@@ -113,7 +113,7 @@ class Bank:
         count : int
             how many are tried
         """
-        kind, setting = WIDE, self._settings[WIDE]
+        setting = self._settings[WIDE]
         for _ in range(count):
             drawn = (setting.feasibility.random_start(self._postures, self._rng) for _ in range(WIDEST_OF))
             found = [setting.space.series(x) for x in drawn if x is not None]
@@ -121,9 +121,8 @@ class Bank:
                 continue
             series = max(found, key=self._crossed)
             slow = slow_part(self._robot, series, self._limits, self._states, SLOW_POSTURES).segments
-            repeats = max(1, round(DURATION_S / series.period_s))
-            words = f"{kind} and slow reversals in several postures" if slow else kind
-            yield Primitive(words, self._trajectory(FourierSegment(series, repeats, 0), *slow))
+            kind = f"{WIDE} and slow reversals in several postures" if slow else WIDE
+            yield Primitive(kind, self._trajectory(_repeated(series), *slow))
 
     def _crossed(self, series: FourierSeries) -> float:
         """Part of its position range that the joint with the least of it crosses."""
@@ -144,9 +143,7 @@ class Bank:
         for _ in range(count):
             x = setting.feasibility.random_start(self._postures, self._rng)
             if x is not None:
-                series = setting.space.series(x)
-                repeats = max(1, round(DURATION_S / series.period_s))
-                yield Primitive(kind, self._trajectory(FourierSegment(series, repeats, 0)))
+                yield Primitive(kind, self._trajectory(_repeated(setting.space.series(x))))
 
     def _sweep(self, share: float) -> Iterator[Primitive]:
         """Constant speed to and fro, slowed down until its torque is there."""
@@ -174,6 +171,11 @@ class Bank:
     def _trajectory(self, *segments: object) -> Trajectory:
         names = tuple(joint.name for joint in self._robot.joints)
         return Trajectory(self._robot.name, names, segments, self._limits)  # pyright: ignore[reportArgumentType]
+
+
+def _repeated(series: FourierSeries) -> FourierSegment:
+    """As many periods as come closest to `DURATION_S`."""
+    return FourierSegment(series, max(1, round(DURATION_S / series.period_s)), 0)
 
 
 def _as_identified(identification: Identification) -> Robot:
