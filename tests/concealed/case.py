@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from concealed.arms import arm_named
+from concealed.concealment import Concealed, concealed_effects, concealed_form, concealed_unknown
 from concealed.effects import CATALOGUE, EVENTS
 from concealed.forms import FORMS
-from concealed.trial import Trial, effect_trial, form_trial, null_trial, several_trial, unknown_trial
+from concealed.trial import Trial, recorded_trial
 from concealed.unknown import UNKNOWN
 
 Place = tuple[str, int]
@@ -85,20 +86,22 @@ class Case:
         """Plain data."""
         return asdict(self)
 
-    def made(self) -> Trial:
-        """The trial itself."""
+    def concealed(self) -> Concealed:
+        """What the arm conceals, as strong as it could be made."""
         drawn = {"motion_seed": self.motion_seed, "seed": self.seed}
         if not self.places:
-            return null_trial(self.arm, **drawn, **self.sensors)
-        (what, joint), *others = self.places
-        where = self.arm
-        if others:
-            return several_trial(where, self.places, self.wanted, **drawn, **self.sensors)
+            return Concealed()
+        (what, joint), *_ = self.places
         if what in UNKNOWN:
-            return unknown_trial(where, what, joint, self.wanted, **drawn, **self.sensors)
+            return concealed_unknown(self.arm, what, joint, self.wanted, **drawn)
         if what in FORMS:
-            return form_trial(where, what, joint, self.wanted, **drawn, **self.sensors)
-        return effect_trial(where, what, joint, self.wanted, motion=self.kind, **drawn, **self.sensors)
+            return concealed_form(self.arm, what, joint, self.wanted, **drawn)
+        return concealed_effects(self.arm, self.places, self.wanted, **drawn)
+
+    def recorded(self, concealed: Concealed) -> Trial:
+        """The trial itself."""
+        drawn = {"motion_seed": self.motion_seed, "seed": self.seed}
+        return recorded_trial(self.arm, concealed, motion=self.kind, **drawn, **self.sensors)
 
 
 @dataclass(frozen=True)

@@ -63,9 +63,9 @@ def made(series: str, seed: int, arm: str | None = None) -> tuple[Case, Trial]:
     """The trial of a series and a seed: drawn anew where the effect could not be made as strong as wanted."""
     for attempt in range(MOST_ATTEMPTS):
         case = drawn(series, seed, arm, attempt)
-        trial = case.made()
-        if abs(trial.strength - case.wanted) <= REACHED * case.wanted:
-            return case, trial
+        concealed = case.concealed()
+        if abs(concealed.strength - case.wanted) <= REACHED * case.wanted:
+            return case, case.recorded(concealed)
     raise ValueError(f"{series} {seed}: no effect of {MOST_ATTEMPTS} drawn reaches the strength asked for")
 
 

@@ -10,10 +10,11 @@ import pytest
 
 from concealed.arms import NOISE_STD, arm_named, without_truth
 from concealed.case import SERIES, drawn
+from concealed.concealment import Concealed
 from concealed.effects import CATALOGUE
 from concealed.sealed import Sealed, apart, nominal_constants, sealed
 from concealed.sensing import Noise
-from concealed.trial import Concealed, Trial
+from concealed.trial import Trial
 from concealed.truth import opened
 from service.recording import Recording, read_recording
 from service.robot import read_robot
