@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from concealed.trial import effect_trial
+from concealed.concealment import Concealed
+from concealed.trial import recorded_trial
 from service.diagnosis import diagnose, document
 from service.diagnosis.catalogue.backlash import DAMPING, SpringyTeeth, place_between_springs, place_between_teeth
 
@@ -113,7 +114,8 @@ def test_springy_teeth_hold_it_whatever_it_weighs_on_its_way(seed: int, gap: flo
 @pytest.mark.slow
 def test_play_between_springy_teeth_is_named() -> None:
     """0.88 mrad, teeth of 1e4 Nm/rad: on which the link swings at 15 Hz: stiff teeth explain less than half."""
-    trial = effect_trial("paper", "backlash", 1, 40.0, motion_seed=811, seed=811)
+    play = {"effect": "backlash", "joint": 2, "gap": 0.88e-3, "contact_stiffness": 1e4, "rotor_inertia": 0.004}
+    trial = recorded_trial("paper", Concealed((), (play,)), motion_seed=811, seed=811)
     found = document(diagnose(trial.robot, trial.train, trial.held_out)).findings
     assert [(each.effect, each.joint) for each in found] == [("backlash", "joint2")]
     assert found[0].parameters[0].value == pytest.approx(0.88e-3, rel=0.2)

@@ -342,6 +342,14 @@ def test_bristles_shorter_than_the_encoder_s_noise_are_not_looked_for() -> None:
     assert set(coarse.grid[:, 0]) == {length for length in fine.grid[:, 0] if length > 4.0 * noise[2]}
 
 
+def test_a_swinging_link_tells_its_compliance_twice() -> None:
+    elastic, covariance = form("joint_elasticity", 2), np.diag([1e-12, 0.0, 0.0])
+    (twice,) = elastic.quantities(setting(), np.array([1.6e-4]), np.array([10.0, 1.0e-4]), covariance)
+    assert (twice.name, twice.value, twice.std) == ("c", pytest.approx(1.3e-4), pytest.approx(0.3e-4, rel=0.01))
+    (once,) = elastic.quantities(setting(), np.array([1.6e-4]), np.array([10.0, 0.0]), covariance)
+    assert (once.value, once.std) == (pytest.approx(1.6e-4), pytest.approx(1e-6))
+
+
 def test_what_gives_way_is_what_the_link_swings_on() -> None:
     """A resonance far from that of the compliance found is some other wave."""
     elastic, swinging = form("joint_elasticity", 2), 1e-4

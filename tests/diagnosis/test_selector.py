@@ -10,6 +10,7 @@ import pytest
 from service.diagnosis.catalogue.elastic_forces import CableForce, JointSpring
 from service.diagnosis.catalogue.periodic_torque import Cogging
 from service.diagnosis.screening.screen import Candidate
+from service.diagnosis.selection import selector
 from service.diagnosis.selection.choice import Choice, Option, Place, place_of
 from service.diagnosis.selection.confirmation import Confirmation
 from service.diagnosis.selection.selector import Selector
@@ -75,13 +76,15 @@ def test_what_was_refused_elsewhere_is_not(monkeypatch: pytest.MonkeyPatch) -> N
     assert refused == [("cogging", 2)]
 
 
-@pytest.mark.parametrize(("explained", "chosen"), [(95.0, ["cable_force"]), (85.0, [])])
-def test_another_form_of_what_was_refused_is_asked_where_training_hardly_tells_the_two(
-    monkeypatch: pytest.MonkeyPatch, explained: float, chosen: list[str]
-) -> None:
-    """Of a cable, the form of the other side may explain a little more and predict nothing."""
-    forms = {side: CableForce(1, np.ones((1, 2)), np.zeros(2), np.ones(2), side=side) for side in (1, -1)}
-    gains = {1: explained, -1: 100.0}
+def side(candidate: Candidate) -> int:
+    """On which side of its angle a cable pulls."""
+    assert isinstance(candidate.effect, CableForce)
+    return candidate.effect.side
+
+
+def cable_table(gains: dict[int, float], monkeypatch: pytest.MonkeyPatch) -> Table:
+    """A cable at the second joint, its forms by side, with what each explains."""
+    forms = {side: CableForce(1, np.ones((1, 2)), np.zeros(2), np.ones(2), side=side) for side in gains}
     made = [
         Candidate(form, np.ones(2), np.ones(1), gains[side], np.eye(1), True, 1.0, 1.0) for side, form in forms.items()
     ]
@@ -89,6 +92,16 @@ def test_another_form_of_what_was_refused_is_asked_where_training_hardly_tells_t
     table.candidates, table.fit = made, FIT
     monkeypatch.setattr(Table, "refined", lambda self, candidate: candidate)
     monkeypatch.setattr(Table, "fitted", lambda self, candidate: Option(candidate, FIT, candidate.gain))
+    return table
+
+
+@pytest.mark.parametrize(("explained", "chosen"), [(95.0, ["cable_force"]), (85.0, [])])
+def test_another_form_of_what_was_refused_is_asked_where_training_hardly_tells_the_two(
+    monkeypatch: pytest.MonkeyPatch, explained: float, chosen: list[str]
+) -> None:
+    """Of a cable, the form of the other side may explain a little more and predict nothing."""
+    table = cable_table({1: explained, -1: 100.0}, monkeypatch)
+    forms = {side(each): each.effect for each in table.candidates}
 
     def best(self: Selector, table: Table, choices: Sequence[Choice]) -> Choice | None:
         left = sorted(table.candidates, key=lambda each: -each.gain)
@@ -103,3 +116,23 @@ def test_another_form_of_what_was_refused_is_asked_where_training_hardly_tells_t
     _, found, rejected = selector._grown(FIT, [], lambda step: None)
     assert [each.options[0].candidate.effect.id for each in found] == chosen
     assert [each.options[0].candidate.effect for each in rejected] == [forms[-1]]
+
+
+@pytest.mark.parametrize(("possible", "chosen"), [({1}, [1]), (set(), [])])
+def test_a_form_that_cannot_be_takes_no_other_form_of_its_effect_with_it(
+    monkeypatch: pytest.MonkeyPatch, possible: set[int], chosen: list[int]
+) -> None:
+    """It may explain far more where its coefficient is free: late torque shifted by too much, and weakened for it."""
+    table = cable_table({1: 30.0, -1: 100.0}, monkeypatch)
+    monkeypatch.setattr(selector, "is_physical", lambda option, fit: side(option.candidate) in possible)
+    monkeypatch.setattr(selector, "outsized", lambda option, observations: False)
+    monkeypatch.setattr(selector, "is_position_noise", lambda option, fit, screen: False)
+    monkeypatch.setattr(selector, "where_held_out_shows", lambda option, fit, fitter, held_out: option)
+    monkeypatch.setattr(selector, "equivalents", lambda *_: [])
+    monkeypatch.setattr(Selector, "_confirmation", lambda self, fit, option: SEEN)
+    asked = Selector(SCREEN, FITTER, None, pure_error=True)
+    asked.admission = SimpleNamespace(
+        level=1e-3, inflation=lambda fit: 1.0, p_value=lambda *_, blocks: 0.0, large_enough=lambda *_, known: True
+    )  # type: ignore[assignment]
+    best = asked._best(table, [])
+    assert ([] if best is None else [side(each.candidate) for each in best.options]) == chosen

@@ -1,6 +1,7 @@
 """A transmission that gives way under load, quasi-statically or with the resonance of link and spring."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -8,12 +9,15 @@ from scipy.linalg import solve_banded
 
 from service.diagnosis.catalogue.deflection import BAND, Deflection
 from service.diagnosis.catalogue.effect import Effect
-from service.diagnosis.catalogue.parameters import Coefficient, Shape
+from service.diagnosis.catalogue.parameters import Coefficient, Quantity, Shape
 from service.diagnosis.catalogue.setting import Setting
 from service.recording.recording import Array
 
-BANDS = np.array([1.0, 0.35, 0.12])
-"""Bands to which the load is smoothed, relative to the common one."""
+BANDS = np.array([1.41, 1.0, 0.35, 0.12])
+"""Bands to which the load is smoothed, relative to the common one; the widest passes all that is compared there."""
+
+SWINGING_BANDS = BANDS[:2]
+"""The same where the link swings: near a resonance, what a narrower one takes from the load passes for compliance."""
 
 RESONANCES = np.array([0.6, 0.75, 0.9, 1.1, 1.35, 1.7, 2.2, 3.0])
 """Resonances of the link at its mean inertia, the motor held, relative to the common band; beyond, nothing is seen."""
@@ -91,7 +95,8 @@ class JointElasticity(Deflection):
             grid = stiff
             if setting.inertia[joint] > 0.0:
                 swinging = 1.0 / ((2.0 * np.pi * RESONANCES * setting.cutoff_hz) ** 2 * setting.inertia[joint])
-                grid = np.concatenate([stiff, np.stack([np.full(len(swinging), bands[0]), swinging], axis=1)])
+                swings = [[band, each] for band in SWINGING_BANDS * setting.cutoff_hz for each in swinging]
+                grid = np.concatenate([stiff, np.array(swings)])
             made.append(cls(joint, grid, grid.min(axis=0), grid.max(axis=0)))
         return made
 
@@ -116,6 +121,32 @@ class JointElasticity(Deflection):
             band of the load [Hz], compliance on which the link swings, 0 where it does not [rad/Nm or m/N]
         """
         return bool(shape[1] == 0.0 or 1.0 / SAME < coefficients[0] / shape[1] < SAME)
+
+    def quantities(
+        self, setting: Setting, coefficients: Array, shape: Array, covariance: Array
+    ) -> tuple[Quantity, ...]:
+        """c; where the link swings, the mean of what gives way and what it swings on: both estimate one compliance.
+
+        The load of a resonance is known only within a band, which errs the one way in the amplitude and the other way
+        in the frequency: half the difference is an error of their mean that the covariance does not know.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        coefficients : (1,) float64
+            c [rad/Nm or m/N]
+        shape : (2,) float64
+            band of the load [Hz], compliance on which the link swings, 0 where it does not [rad/Nm or m/N]
+        covariance : (3, 3) float64
+            of both
+        """
+        (found,) = super().quantities(setting, coefficients, shape, covariance)
+        swinging = float(shape[1])
+        if swinging == 0.0:
+            return (found,)
+        apart = 0.5 * (found.value - swinging)
+        return (replace(found, value=found.value - apart, std=float(np.hypot(found.std, apart))),)
 
     def deflection(self, load: Array, inertia: Array, shape: Array, rate_hz: float) -> Array:
         """What the spring transmits.

@@ -173,8 +173,7 @@ class Selector:
 
     def _other_forms(self, table: Table, refused: Option) -> list[Candidate]:
         """Forms of a refused effect that training hardly tells from it: the other side of a cable, another exponent."""
-        own, doubt = refused.candidate, EQUIVALENT * self.admission.inflation(refused.fit)
-        others = [each for each in table.candidates if place_of(each) == place_of(own) and each.effect != own.effect]
+        others, doubt = _siblings(table, refused.candidate), EQUIVALENT * self.admission.inflation(refused.fit)
         refined = [table.refined(each) for each in others]
         near = [each for each in refined if each.score > refused.score - CLOSE]
         alike = [each.effect for each in near if table.fitted(each).score > refused.score - doubt]
@@ -194,7 +193,9 @@ class Selector:
         near = CLOSE * self.admission.inflation(fit) + EQUIVALENT * FORMULA_ERROR * closest[0].gain
         tried = [each for each in closest[:MOST_FITTED] if each.score > closest[0].score - near]
         fitted = [table.fitted(each) for each in tried]
-        fitted = [each for each in fitted if is_physical(each, fit) and not outsized(each, self.screen.observations)]
+        impossible = [each.candidate for each in fitted if not is_physical(each, fit)]
+        fitted = [each for each in fitted if each.candidate not in impossible]
+        fitted = [each for each in fitted if not outsized(each, self.screen.observations)]
         fitted = [each for each in fitted if not is_position_noise(each, fit, self.screen)]
         fitted.sort(key=lambda each: -each.score)
         for option in fitted:
@@ -215,7 +216,7 @@ class Selector:
                 alike = equivalents(chosen, below, fit, self.screen, self.admission.inflation(chosen.fit))
                 return Choice(distinct([chosen, *alike]), confirmation, p_value / level)
         for each in tried:  # none of the largest is significant by the stricter measure: look below
-            table.refuse(place_of(each))
+            table.refuse(place_of(each), but=_siblings(table, each) if each in impossible else ())
         return self._best(table, choices)
 
     def _table(self, fit: Fit, choices: Sequence[Choice], refused: set[Place]) -> Table:
@@ -327,6 +328,12 @@ class Selector:
 def _chosen(choice: Choice) -> Place:
     """The effect that is in the model, and where."""
     return place_of(choice.options[0].candidate)
+
+
+def _siblings(table: Table, candidate: Candidate) -> list[Candidate]:
+    """Other forms of the same effect at the same place."""
+    place = place_of(candidate)
+    return [each for each in table.candidates if place_of(each) == place and each.effect != candidate.effect]
 
 
 def _at_one_joint(refused: Choice, found: Choice) -> bool:
