@@ -22,6 +22,10 @@ SCREEN: Any = SimpleNamespace(effects=(), observations=SimpleNamespace(robot=Sim
 FITTER: Any = None
 PLAIN: Any = SimpleNamespace(inflation=lambda fit: 1.0)
 
+SIGNIFICANT: Any = SimpleNamespace(
+    level=1e-3, inflation=lambda fit: 1.0, p_value=lambda *_, blocks: 0.0, large_enough=lambda *_, known: True
+)
+
 SEEN = Confirmation(gain=100.0, gain_z=5.0, expected_z=10.0, seen_z=10.0, favour=50.0)
 REFUTED = Confirmation(gain=-100.0, gain_z=-5.0, expected_z=10.0, seen_z=0.0, favour=-50.0)
 
@@ -131,8 +135,6 @@ def test_a_form_that_cannot_be_takes_no_other_form_of_its_effect_with_it(
     monkeypatch.setattr(selector, "equivalents", lambda *_: [])
     monkeypatch.setattr(Selector, "_confirmation", lambda self, fit, option: SEEN)
     asked = Selector(SCREEN, FITTER, None, pure_error=True)
-    asked.admission = SimpleNamespace(
-        level=1e-3, inflation=lambda fit: 1.0, p_value=lambda *_, blocks: 0.0, large_enough=lambda *_, known: True
-    )  # type: ignore[assignment]
+    asked.admission = SIGNIFICANT
     best = asked._best(table, [])
     assert ([] if best is None else [side(each.candidate) for each in best.options]) == chosen
