@@ -41,6 +41,13 @@ def bumped(arm: SimulatedArm, seed: int) -> Array | float:
     return at_joint(1, 4.0 * np.where(within, np.sin(np.pi * phase), 0.0)) if seed == 2 else 0.0
 
 
+def nudged(arm: SimulatedArm, seed: int) -> Array | float:
+    """Half a sine of 3 Nm and 0.7 s at joint 2 in every recording."""
+    phase = (seconds(arm) - 6.47) / 0.7
+    within = (phase > 0.0) & (phase < 1.0)
+    return at_joint(1, 3.0 * np.where(within, np.sin(np.pi * phase), 0.0))
+
+
 def offset(arm: SimulatedArm, seed: int) -> Array | float:
     return at_joint(2, np.full(len(arm.exact.time), 0.6))
 
@@ -108,6 +115,17 @@ def test_a_contact_is_named_with_joint_size_and_window() -> None:
     assert within(values["c"], 4.0)
     assert within(values["t_0"], 6.3)
     assert within(values["t_1"], 7.9)
+
+
+@pytest.mark.slow
+def test_a_short_push_that_rises_and_falls_is_told_from_one_that_is_there_at_once() -> None:
+    """On a grid of windows either may come nearer to it."""
+    found = told(nudged)
+    assert [(finding.effect, finding.joint) for finding in found.findings] == [("external_contact", "joint2")]
+    values = sizes(found)
+    assert within(values["c"], 3.0)
+    assert within(values["t_0"], 6.47)
+    assert within(values["t_1"], 7.17)
 
 
 @pytest.mark.slow

@@ -148,6 +148,16 @@ class Effect(ABC):
         """
         return np.zeros(len(shapes))
 
+    def alike(self, shape: Array) -> Sequence[Array]:
+        """Shapes of each other kind that look nearly as this one does, (g, k): only their optima tell which is better.
+
+        Parameters
+        ----------
+        shape : (k,) float64
+            values of the shape parameters
+        """
+        return ()
+
     def is_possible(self, shape: Array, k_v: float | None) -> bool:
         """Whether this shape is still what the effect means, beside the joint's friction as it was fitted with it.
 

@@ -114,6 +114,16 @@ class CableForce(Effect):
         """
         return np.where(shapes[:, 1] == USUAL_EXPONENT, 0.0, CLEARLY_BETTER)
 
+    def alike(self, shape: Array) -> Sequence[Array]:
+        """The other exponents: on a grid of onsets any of them may come nearest.
+
+        Parameters
+        ----------
+        shape : (2,) float64
+            q_t [rad or m], p
+        """
+        return [self.grid[self.grid[:, 1] == exponent] for exponent in EXPONENTS if exponent != shape[1]]
+
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """±max(±(q - q_t), 0)^p.
 

@@ -1,6 +1,6 @@
 """Shape parameters between the grid's points: no two forms are compared before each is at its own best."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +16,7 @@ ZOOMS = 3
 
 
 def refined(candidate: Candidate, fit: Fit, screen: Screen, signals: Sequence[Signals]) -> Candidate:
-    """The candidate at the best shape near its grid point.
+    """The candidate at the best shape near its grid point, or near the same in another form.
 
     Parameters
     ----------
@@ -30,24 +30,37 @@ def refined(candidate: Candidate, fit: Fit, screen: Screen, signals: Sequence[Si
         of every piece under that model
     """
     effect = candidate.effect
+
+    def best_of(shapes: Array) -> tuple[int, Candidate]:
+        found = screen.at_shapes(effect, shapes, fit, signals)
+        gains, coefficients = statistics(found, [each.positive for each in effect.coefficients])
+        best = int(np.argmax(gains))
+        return best, replace(
+            candidate,
+            shape=shapes[best],
+            coefficients=coefficients[best],
+            gain=float(gains[best]),
+            gram=found.gram[best],
+        )
+
+    nearby = _zoomed(candidate, best_of)
+    alike = [_zoomed(best_of(shapes)[1], best_of) for shapes in effect.alike(nearby.shape)]
+    return max([nearby, *alike], key=lambda each: each.gain - effect.reluctance(each.shape[None])[0])
+
+
+def _zoomed(candidate: Candidate, best_of: Callable[[Array], tuple[int, Candidate]]) -> Candidate:
+    """One shape parameter after the other between its neighbours on the grid."""
+    effect = candidate.effect
     for place in filter(effect.is_free, range(len(effect.shapes))):
         low, high = _neighbours(effect, candidate.shape, place)
         for _ in range(ZOOMS):
             values = _spread(low, high, effect.shapes[place].logarithmic)
             shapes = np.tile(candidate.shape, (POINTS, 1))
             shapes[:, place] = values
-            found = screen.at_shapes(effect, shapes, fit, signals)
-            gains, coefficients = statistics(found, [each.positive for each in effect.coefficients])
-            best = int(np.argmax(gains))
+            best, found = best_of(shapes)
             low, high = float(values[max(best - 1, 0)]), float(values[min(best + 1, POINTS - 1)])
-            if gains[best] > candidate.gain:
-                candidate = replace(
-                    candidate,
-                    shape=shapes[best],
-                    coefficients=coefficients[best],
-                    gain=float(gains[best]),
-                    gram=found.gram[best],
-                )
+            if found.gain > candidate.gain:
+                candidate = found
     return candidate
 
 
