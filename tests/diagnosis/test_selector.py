@@ -138,3 +138,11 @@ def test_a_form_that_cannot_be_takes_no_other_form_of_its_effect_with_it(
     asked.admission = SIGNIFICANT
     best = asked._best(table, [])
     assert ([] if best is None else [side(each.candidate) for each in best.options]) == chosen
+
+
+def test_a_fit_goes_on_until_it_has_converged() -> None:
+    """Eight steps led a Stribeck curve away from where it belongs, and ended before they led it back."""
+    left = [100.0, 40.0, 39.98, 10.0]
+    fitter: Any = SimpleNamespace(fit=lambda step: SimpleNamespace(model=step + 1, energy=left[step + 1]))
+    asked = Selector(SCREEN, fitter, None, pure_error=True)
+    assert asked._converged(SimpleNamespace(model=0, energy=left[0])).energy == 39.98  # type: ignore[arg-type]
