@@ -7,8 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from service.diagnosis.catalogue import Effect
 from service.diagnosis.catalogue.elastic_forces import CableForce, JointSpring
+from service.diagnosis.catalogue.late_torque import Shift
 from service.diagnosis.catalogue.periodic_torque import Cogging
+from service.diagnosis.catalogue.time_delay import TimeDelay
 from service.diagnosis.screening.screen import Candidate
 from service.diagnosis.selection import selector
 from service.diagnosis.selection.choice import Choice, Option, Place, place_of
@@ -25,6 +28,8 @@ PLAIN: Any = SimpleNamespace(inflation=lambda fit: 1.0)
 SIGNIFICANT: Any = SimpleNamespace(
     level=1e-3, inflation=lambda fit: 1.0, p_value=lambda *_, blocks: 0.0, large_enough=lambda *_, known: True
 )
+
+LATER = Shift(1, np.full((1, 1), 2.0), np.zeros(1), np.ones(1))
 
 SEEN = Confirmation(gain=100.0, gain_z=5.0, expected_z=10.0, seen_z=10.0, favour=50.0)
 REFUTED = Confirmation(gain=-100.0, gain_z=-5.0, expected_z=10.0, seen_z=0.0, favour=-50.0)
@@ -80,20 +85,18 @@ def test_what_was_refused_elsewhere_is_not(monkeypatch: pytest.MonkeyPatch) -> N
     assert refused == [("cogging", 2)]
 
 
-def side(candidate: Candidate) -> int:
-    """On which side of its angle a cable pulls."""
-    assert isinstance(candidate.effect, CableForce)
-    return candidate.effect.side
+def cable(side: int) -> CableForce:
+    """At the second joint."""
+    return CableForce(1, np.ones((1, 2)), np.zeros(2), np.ones(2), side=side)
 
 
-def cable_table(gains: dict[int, float], monkeypatch: pytest.MonkeyPatch) -> Table:
-    """A cable at the second joint, its forms by side, with what each explains."""
-    forms = {side: CableForce(1, np.ones((1, 2)), np.zeros(2), np.ones(2), side=side) for side in gains}
-    made = [
-        Candidate(form, np.ones(2), np.ones(1), gains[side], np.eye(1), True, 1.0, 1.0) for side, form in forms.items()
-    ]
+def table_of(gains: Sequence[tuple[Effect, float]], monkeypatch: pytest.MonkeyPatch) -> Table:
+    """Forms with what each explains."""
     table = object.__new__(Table)
-    table.candidates, table.fit = made, FIT
+    table.candidates = [
+        Candidate(form, np.ones(2), np.ones(1), gain, np.eye(1), True, 1.0, 1.0) for form, gain in gains
+    ]
+    table.fit = FIT
     monkeypatch.setattr(Table, "refined", lambda self, candidate: candidate)
     monkeypatch.setattr(Table, "fitted", lambda self, candidate: Option(candidate, FIT, candidate.gain))
     return table
@@ -104,8 +107,8 @@ def test_another_form_of_what_was_refused_is_asked_where_training_hardly_tells_t
     monkeypatch: pytest.MonkeyPatch, explained: float, chosen: list[str]
 ) -> None:
     """Of a cable, the form of the other side may explain a little more and predict nothing."""
-    table = cable_table({1: explained, -1: 100.0}, monkeypatch)
-    forms = {side(each): each.effect for each in table.candidates}
+    forms = {side: cable(side) for side in (1, -1)}
+    table = table_of([(forms[1], explained), (forms[-1], 100.0)], monkeypatch)
 
     def best(self: Selector, table: Table, choices: Sequence[Choice]) -> Choice | None:
         left = sorted(table.candidates, key=lambda each: -each.gain)
@@ -122,13 +125,14 @@ def test_another_form_of_what_was_refused_is_asked_where_training_hardly_tells_t
     assert [each.options[0].candidate.effect for each in rejected] == [forms[-1]]
 
 
-@pytest.mark.parametrize(("possible", "chosen"), [({1}, [1]), (set(), [])])
-def test_a_form_that_cannot_be_takes_no_other_form_of_its_effect_with_it(
-    monkeypatch: pytest.MonkeyPatch, possible: set[int], chosen: list[int]
+@pytest.mark.parametrize(("sibling", "stays"), [(TimeDelay(1), True), (LATER, False)])
+def test_a_form_that_cannot_be_leaves_the_plain_form_of_its_effect_in(
+    monkeypatch: pytest.MonkeyPatch, sibling: Effect, stays: bool
 ) -> None:
-    """It may explain far more where its coefficient is free: late torque shifted by too much, and weakened for it."""
-    table = cable_table({1: 30.0, -1: 100.0}, monkeypatch)
-    monkeypatch.setattr(selector, "is_physical", lambda option, fit: side(option.candidate) in possible)
+    """A delay, whose torque shifted by too much and weakened for it explains far more; another shift is as doubtful."""
+    impossible = Shift(1, np.ones((1, 1)), np.zeros(1), np.ones(1))
+    table = table_of([(sibling, 30.0), (impossible, 100.0)], monkeypatch)
+    monkeypatch.setattr(selector, "is_physical", lambda option, fit: option.candidate.effect is not impossible)
     monkeypatch.setattr(selector, "outsized", lambda option, observations: False)
     monkeypatch.setattr(selector, "is_position_noise", lambda option, fit, screen: False)
     monkeypatch.setattr(selector, "where_held_out_shows", lambda option, fit, fitter, held_out: option)
@@ -137,7 +141,7 @@ def test_a_form_that_cannot_be_takes_no_other_form_of_its_effect_with_it(
     asked = Selector(SCREEN, FITTER, None, pure_error=True)
     asked.admission = SIGNIFICANT
     best = asked._best(table, [])
-    assert ([] if best is None else [side(each.candidate) for each in best.options]) == chosen
+    assert ([] if best is None else [each.candidate.effect for each in best.options]) == [sibling] * stays
 
 
 def test_a_fit_goes_on_until_it_has_converged() -> None:

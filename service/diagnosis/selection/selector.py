@@ -220,7 +220,7 @@ class Selector:
                 alike = equivalents(chosen, below, fit, self.screen, self.admission.inflation(chosen.fit))
                 return Choice(distinct([chosen, *alike]), confirmation, p_value / level)
         for each in tried:  # none of the largest is significant by the stricter measure: look below
-            table.refuse(place_of(each), but=_siblings(table, each) if each in impossible else ())
+            table.refuse(place_of(each), but=_without_shape(table, each) if each in impossible else ())
         return self._best(table, choices)
 
     def _table(self, fit: Fit, choices: Sequence[Choice], refused: set[Place]) -> Table:
@@ -349,6 +349,11 @@ def _siblings(table: Table, candidate: Candidate) -> list[Candidate]:
     """Other forms of the same effect at the same place."""
     place = place_of(candidate)
     return [each for each in table.candidates if place_of(each) == place and each.effect != candidate.effect]
+
+
+def _without_shape(table: Table, candidate: Candidate) -> list[Candidate]:
+    """The plain form of an effect, beside one whose shape and size cannot belong together: it has no shape."""
+    return [each for each in _siblings(table, candidate) if not each.effect.shapes]
 
 
 def _at_one_joint(refused: Choice, found: Choice) -> bool:
