@@ -148,12 +148,7 @@ def headline(outcomes: Sequence[Outcome]) -> list[Figure]:
         share("aliased", "motion that hides the effect: within a set", _each(of("aliased"), _key("named"))),
         share("aliased-again", "… with the recommended motion recorded too", _each(of("aliased"), _again), 0.90),
         _calibration(outcomes),
-        share(
-            "coverage",
-            "95 % intervals that hold the parameter (90 to 98 % asked)",
-            (p.inside for p in parameters(outcomes)),
-            0.90,
-        ),
+        share("coverage", "95 % intervals that hold the parameter", (p.inside for p in parameters(outcomes)), 0.95),
         share(
             "oracle",
             f"held-out rms ≤ {AS_ORACLE} of a diagnosis that knows the form",
