@@ -3,7 +3,9 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from service.diagnosis.fitting.bounded_step import bounded_step
 from service.diagnosis.fitting.projection import JointColumns, Projection, project
 from service.diagnosis.model.extended import ExtendedModel, with_terms
 from service.diagnosis.model.residual import residual_rows
@@ -11,9 +13,9 @@ from service.diagnosis.model.term import Term
 from service.diagnosis.observations.observations import Observations, Piece
 from service.recording.recording import Array
 
-STEPS = 8
-SETTLED = 1e-4
-"""Change of the residual's energy, in noise variances a step, relative to all rows, that is the end."""
+STEPS = 25
+SETTLED = 0.05
+"""Energy that a step takes or promises to take off, below which there is none to follow [noise variances]."""
 
 LARGEST_LOG_STEP = 0.4
 """Change of a constant's logarithm in one step."""
@@ -21,10 +23,14 @@ LARGEST_LOG_STEP = 0.4
 SHAPE_STEP = 0.15
 """Change of a linear shape parameter in one step, relative to its bounds."""
 
-HALVINGS = 4
+TRUSTED = (1.0, 0.25, 0.06, 0.015)
+"""Parts of those changes that are tried, one after the other, until less is left than before."""
 
 FARTHEST = 3.0
 """Factor beyond which a constant of the friction curve does not move from where the identification found it."""
+
+AT_LIMIT = 1e-6
+"""Difference of logarithms within which a constant is at its limit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,16 +40,19 @@ class Fit:
     model : ExtendedModel
         with fitted parameters
     projection : Projection
-        of its columns at the optimum; the residual is what is left after the last linear step
+        of its columns there; its residual is what one more linear step would leave
+    energy : float
+        Σ r² that the model leaves, the prior's included [noise variances]
     """
 
     model: ExtendedModel
     projection: Projection
+    energy: float
 
     @property
-    def energy(self) -> float:
-        """Whitened residual's Σ r²."""
-        return self.projection.energy
+    def joint_energies(self) -> Array:
+        """Σ r² by joint, (n,) [noise variances]."""
+        return np.array([float(rows @ rows) for rows in self.projection.residual])
 
     @property
     def covariance(self) -> Array:
@@ -84,34 +93,41 @@ class Fitter:
         steps : int
             most Gauss–Newton steps
         """
-        start = [model.constant(place) for place in range(len(model.constants))]
-        model, residual, columns = self._linear_optimum(model)
-        rows = sum(len(row) for row in residual)
+        limits = _constants_limits(model)
+        model, residual = self._linear_optimum(model)
         energy = _energy(model, residual)
-        projection = self._project(columns, residual, model)
+        projection = self._project(self._columns(model), residual, model)
         for _ in range(steps):
-            tried = self._descended(model, projection.step, energy, start)
+            if energy - projection.energy < SETTLED:
+                break
+            tried = self._descended(model, projection, energy, limits)
             if tried is None:
                 break
-            model, residual, columns = tried
+            model, residual = tried
             gained, energy = energy - _energy(model, residual), _energy(model, residual)
-            projection = self._project(columns, residual, model)
-            if gained < SETTLED * rows and not _moves(model, projection.step):
+            projection = self._project(self._columns(model), residual, model)
+            if gained < SETTLED:
                 break
-        return Fit(model, projection)
+        at_limit = _stopped_constants(model, projection.step, limits)
+        if at_limit:  # what they would do beyond is nothing that the model can do
+            projection = self._project(_without(self._columns(model), at_limit), residual, model)
+        return Fit(model, projection, energy)
 
     def _descended(
-        self, model: ExtendedModel, step: Array, energy: float, start: list[float]
-    ) -> tuple[ExtendedModel, list[Array], list[JointColumns]] | None:
-        """The first part of a step after which no more is left than before, as `_linear_optimum` gives it."""
-        for halving in range(HALVINGS):
-            tried = self._linear_optimum(_stepped(model, step, 0.5**halving, start))
-            if _energy(tried[0], tried[1]) <= energy * (1.0 + 1e-12):
+        self, model: ExtendedModel, projection: Projection, energy: float, limits: Array
+    ) -> tuple[ExtendedModel, list[Array]] | None:
+        """The longest step after which no more is left than before, as `_linear_optimum` gives it."""
+        curved, lower, upper, reach = _room(model, limits)
+        for trusted in TRUSTED:
+            low, high = np.maximum(lower, -trusted * reach), np.minimum(upper, trusted * reach)
+            step = bounded_step(projection.step, projection.spread, curved, low, high, reach)
+            tried = self._linear_optimum(_stepped(model, step))
+            if _energy(*tried) <= energy * (1.0 + 1e-12):
                 return tried
         return None
 
-    def _linear_optimum(self, model: ExtendedModel) -> tuple[ExtendedModel, list[Array], list[JointColumns]]:
-        """The model with the best Θ and coefficients for its shapes, its residual, and columns of all parameters.
+    def _linear_optimum(self, model: ExtendedModel) -> tuple[ExtendedModel, list[Array]]:
+        """The model with the best Θ and coefficients for its shapes, and its residual.
 
         A step in a shape that is cut short would else leave coefficients that belong to another shape.
         """
@@ -129,10 +145,10 @@ class Fitter:
         found = project(own, residual, int(linear.sum()))
         step = np.zeros(model.size)
         step[linear] = found.step
-        moved = _stepped(model, step, 1.0, [])
+        moved = _stepped(model, step)
         if model.terms:  # their columns may depend on Θ
-            return moved, self._residual(moved), columns
-        return moved, list(found.residual), columns
+            return moved, self._residual(moved)
+        return moved, list(found.residual)
 
     def projected(self, model: ExtendedModel) -> Fit:
         """The linear step at a model as it is, without moving it.
@@ -143,7 +159,8 @@ class Fitter:
             the model
         """
         residual, columns = self._linearised(model)
-        return Fit(model, self._project(columns, residual, model))
+        projection = self._project(columns, residual, model)
+        return Fit(model, projection, projection.energy)
 
     def covariance(self, fit: Fit) -> Array:
         """Covariance of all parameters, those that a term displaced as uncertain as they would be without that, (p, p).
@@ -248,52 +265,67 @@ def _energy(model: ExtendedModel, residual: list[Array]) -> float:
     return sum(float(row @ row) for row in residual) + float(left @ left)
 
 
-def _moves(model: ExtendedModel, step: Array) -> bool:
-    """Whether the next step would still move a shape."""
+def _constants_limits(model: ExtendedModel) -> Array:
+    """Logarithms of the lowest and highest value of every constant of the friction curve, (c, 2)."""
+    start = np.log([model.constant(place) for place in range(len(model.constants))])
+    return np.stack([start - np.log(FARTHEST), start + np.log(FARTHEST)], axis=-1)
+
+
+def _stopped_constants(model: ExtendedModel, step: Array, limits: Array) -> list[int]:
+    """Places of the constants that would move on beyond their limits."""
     first = model.structure.size
-    constants = step[first : first + len(model.constants)]
-    if len(constants) and np.abs(constants).max() > 0.02:
-        return True
+    found = []
+    for place, (low, high) in enumerate(limits):
+        value, wanted = np.log(model.constant(place)), step[first + place]
+        if (wanted < 0.0 and value < low + AT_LIMIT) or (wanted > 0.0 and value > high - AT_LIMIT):
+            found.append(first + place)
+    return found
+
+
+def _without(columns: list[JointColumns], places: list[int]) -> list[JointColumns]:
+    """The same with nothing in the columns of some parameters."""
+    return [JointColumns(own.index, np.where(np.isin(own.index, places)[:, None], 0.0, own.rows)) for own in columns]
+
+
+def _room(model: ExtendedModel, limits: Array) -> tuple[NDArray[np.intp], Array, Array, Array]:
+    """Places of constants and shapes, how far each may go down and up, and how far in one step, (k,) each."""
+    first = model.structure.size
+    rows = [
+        (first + place, *(limits[place] - np.log(model.constant(place))), LARGEST_LOG_STEP)
+        for place in range(len(model.constants))
+    ]
     for term, place in zip(model.terms, model.term_places(), strict=True):
-        of_shapes = step[place][len(term.coefficients) :]
-        span = (term.effect.upper - term.effect.lower)[term.free_shapes]
-        if len(of_shapes) and (np.abs(of_shapes) > 2e-3 * span).any():
-            return True
-    return False
+        effect, count = term.effect, len(term.coefficients)
+        for number, free in enumerate(term.free_shapes):
+            value = float(term.shape[free])
+            low, high = float(effect.lower[free]) - value, float(effect.upper[free]) - value
+            rows.append((place.start + count + number, low, high, _largest_move(term, free)))
+    told = np.array(rows, dtype=np.float64).reshape(-1, 4)
+    return told[:, 0].astype(np.intp), np.minimum(told[:, 1], 0.0), np.maximum(told[:, 2], 0.0), told[:, 3]
 
 
-def _stepped(model: ExtendedModel, step: Array, share: float, start: list[float]) -> ExtendedModel:
-    """The model moved by part of a Gauss–Newton step, shapes within their bounds."""
+def _stepped(model: ExtendedModel, step: Array) -> ExtendedModel:
+    """The model moved by a step; rounding leads no shape out of its bounds."""
     size = model.structure.size
     terms = list(model.structure.terms)
     for place, (joint, name) in enumerate(model.constants):
-        if not step[size + place]:
-            continue
-        change = float(np.clip(share * step[size + place], -LARGEST_LOG_STEP, LARGEST_LOG_STEP))
-        value = float(np.clip(model.constant(place) * np.exp(change), start[place] / FARTHEST, start[place] * FARTHEST))
-        terms[joint] = replace(terms[joint], **{name: value})
+        if step[size + place]:
+            terms[joint] = replace(terms[joint], **{name: model.constant(place) * float(np.exp(step[size + place]))})
     moved = []
     for term, place in zip(model.terms, model.term_places(), strict=True):
-        own = share * step[place]
         count = len(term.coefficients)
         shape = term.shape.copy()
-        for free, change in zip(term.free_shapes, own[count:], strict=True):
-            shape[free] = _moved_shape(term, free, float(change))
-        moved.append(replace(term, shape=shape, coefficients=term.coefficients + own[:count]))
+        free = list(term.free_shapes)
+        shape[free] = np.clip(shape[free] + step[place][count:], term.effect.lower[free], term.effect.upper[free])
+        moved.append(replace(term, shape=shape, coefficients=term.coefficients + step[place][:count]))
     stepped = replace(
-        model, structure=model.structure.with_terms(tuple(terms)), parameters=model.parameters + share * step[:size]
+        model, structure=model.structure.with_terms(tuple(terms)), parameters=model.parameters + step[:size]
     )
     return with_terms(stepped, moved)
-
-
-def _moved_shape(term: Term, place: int, change: float) -> float:
-    """A shape parameter after a step that is neither too long nor leaves its bounds."""
-    effect, value, bound = term.effect, float(term.shape[place]), _largest_move(term, place)
-    return float(np.clip(value + np.clip(change, -bound, bound), effect.lower[place], effect.upper[place]))
 
 
 def _largest_move(term: Term, place: int) -> float:
     """How far one step may move a shape parameter."""
     if term.effect.shapes[place].logarithmic:
         return max(LARGEST_LOG_STEP * abs(float(term.shape[place])), np.finfo(float).tiny)
-    return SHAPE_STEP * float(term.effect.upper[place] - term.effect.lower[place])
+    return max(SHAPE_STEP * float(term.effect.upper[place] - term.effect.lower[place]), np.finfo(float).tiny)

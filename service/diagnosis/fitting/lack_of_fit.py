@@ -35,17 +35,20 @@ class LackOfFit:
         Σ r² beyond the noise's, in noise variances, never negative
     measurable : (n,) float64
         the excess from which it exceeds what the noise's own power is uncertain by [noise variances]
+    structured : (n,) float64
+        the part of it that smooth functions of state and time hold, where the omnibus test tells that from chance
     """
 
     omnibus: Array
     pure_error: Array
     excess: Array
     measurable: Array
+    structured: Array
 
     @property
     def significant(self) -> list[bool]:
         """Per joint, whether more than noise is left."""
-        level = LEVEL / (2 * len(self.omnibus))
+        level = _level(len(self.omnibus))
         return [bool(min(a, b) < level) for a, b in zip(self.omnibus, self.pure_error, strict=True)]
 
     @property
@@ -70,7 +73,8 @@ def lack_of_fit(fit: Fit, observations: Observations, *, pure_error: bool, seed:
         of the random features
     """
     joints = observations.robot.joint_count
-    omnibus, pure, excess, measurable = np.ones(joints), np.ones(joints), np.zeros(joints), np.zeros(joints)
+    omnibus, pure = np.ones(joints), np.ones(joints)
+    excess, measurable, structured = np.zeros(joints), np.zeros(joints), np.zeros(joints)
     rows = sum(own.share * len(row) for own, row in zip(observations.noise, fit.projection.residual, strict=True))
     share = fit.projection.spread.shape[1] / max(rows, 1.0)
     repeated = pure_error_rows(observations)
@@ -80,7 +84,9 @@ def lack_of_fit(fit: Fit, observations: Observations, *, pure_error: bool, seed:
         basis = fit.projection.basis[joint]
         outside = white - (white @ basis.T) @ basis
         freedom = observations.noise[joint].share * len(residual) * (1.0 - share)
-        omnibus[joint] = _f_test(outside, residual, freedom)
+        omnibus[joint], beyond_chance = _f_test(outside, residual, freedom)
+        if omnibus[joint] < _level(joints):
+            structured[joint] = max(beyond_chance, 0.0)
         over = observations.noise[joint].over_repetitions
         energy = float(residual @ residual) * over  # in what repetitions differ by
         excess[joint] = max(energy - freedom, 0.0) / over
@@ -90,7 +96,7 @@ def lack_of_fit(fit: Fit, observations: Observations, *, pure_error: bool, seed:
         if (pure_error or over > 1.0) and repeated[joint] > 0 and means > 1.0:
             ratio = max(energy - repeated[joint], 0.0) / means
             pure[joint] = float(stats.f.sf(ratio, means, repeated[joint]))
-    return LackOfFit(omnibus, pure, excess, measurable)
+    return LackOfFit(omnibus, pure, excess, measurable, structured)
 
 
 def pure_error_rows(observations: Observations) -> Array:
@@ -113,20 +119,26 @@ def pure_error_rows(observations: Observations) -> Array:
     return found * np.array([noise.share for noise in observations.noise])
 
 
-def _f_test(columns: Array, residual: Array, freedom: float) -> float:
-    """p-value of the residual's energy in the columns' span against the rest."""
+def _level(joints: int) -> float:
+    """Chance at which one test at one joint is called significant."""
+    return LEVEL / (2 * joints)
+
+
+def _f_test(columns: Array, residual: Array, freedom: float) -> tuple[float, float]:
+    """p-value of the residual's energy in the columns' span against the rest, and what it has there beyond chance."""
     scale = np.linalg.norm(columns, axis=1)
     columns = columns[scale > 1e-9 * max(float(scale.max(initial=0.0)), 1e-300)]
     if not len(columns):
-        return 1.0
+        return 1.0, 0.0
     _, singular, right = np.linalg.svd(columns / np.linalg.norm(columns, axis=1)[:, None], full_matrices=False)
     span = right[singular > 1e-3 * singular[0]]
     inside = float(np.sum((span @ residual) ** 2))
     rest = float(residual @ residual) - inside
     freedom -= len(span)
     if freedom < len(span) or rest <= 0.0:
-        return 1.0
-    return float(stats.f.sf((inside / len(span)) / (rest / freedom), len(span), freedom))
+        return 1.0, 0.0
+    by_chance = len(span) * rest / freedom
+    return float(stats.f.sf(inside / by_chance, len(span), freedom)), inside - by_chance
 
 
 def _features(piece: Piece, joint: int, observations: Observations, seed: int) -> Array:

@@ -112,8 +112,8 @@ def standings(nominal: Fit, fit: Fit, without: Sequence[Fit], fitter: Fitter, in
     meeting = [sum(joint in own for own in touched) > 1 for joint in range(joints)]
     if not any(meeting):
         return [LEADING] * len(touched)
-    after = _energies(fit)
-    explained = _energies(nominal) - after
+    after = fit.joint_energies
+    explained = nominal.joint_energies - after
     counts = np.array(meeting) & (explained > WORTH_SHARING * inflation)
     leads = np.argmax([_alone(places, nominal, fit, fitter) for places in groups.values()], axis=0)
     found = []
@@ -122,7 +122,7 @@ def standings(nominal: Fit, fit: Fit, without: Sequence[Fit], fitter: Fitter, in
         if effect.id in EXPECTED or not counts[own].all() or (leads[own] == number).any():
             found.append(LEADING)
             continue
-        shares = (_energies(without[number])[own] - after[own]) / explained[own]
+        shares = (without[number].joint_energies[own] - after[own]) / explained[own]
         share, joint = max(float(shares.max()), 0.0), own[int(shares.argmax())]
         leading = effects[int(leads[joint])]
         error = SHAPE_ERROR if _is_of_the_same(effect, leading) else LIKENESS
@@ -141,9 +141,4 @@ def _is_of_the_same(effect: Effect, leading: Effect) -> bool:
 def _alone(places: Sequence[int], nominal: Fit, fit: Fit, fitter: Fitter) -> Array:
     """Energy that one finding alone takes off each joint's residual, (n,)."""
     only = fitter.fit(with_terms(fit.model, [fit.model.terms[place] for place in places]))
-    return _energies(nominal) - _energies(only)
-
-
-def _energies(fit: Fit) -> Array:
-    """Energy of each joint's residual, (n,) [noise variances]."""
-    return np.array([float(rows @ rows) for rows in fit.projection.residual])
+    return nominal.joint_energies - only.joint_energies
