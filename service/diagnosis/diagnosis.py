@@ -122,13 +122,14 @@ def _unless_plainer_is_better(selection: Selection, delivered: ExtendedModel, he
     """Nothing selected, where the plain model of a possible body predicts held-out motion better than all of it.
 
     Motion that excites an arm too poorly leaves free parameters that no body has; findings then explain their errors.
-    Joints are counted, not their energy: the one with the least noise would else speak for all.
+    They stand where they predict some joint clearly better and none clearly worse, each joint by itself: the one with
+    the least noise would else speak for all.
     """
     if not selection.choices:
         return selection
     gains = held_out.joint_gains_z(delivered, selection.fit.model)
-    better, worse = (int((sign * gains > CLEARLY).sum()) for sign in (1.0, -1.0))
-    if better > worse or (better == worse and held_out.block_gains(delivered, selection.fit.model).sum() > 0.0):
+    whole = held_out.block_gains(delivered, selection.fit.model).sum()
+    if gains.min() > -CLEARLY and (gains.max() > CLEARLY or whole > 0.0):
         return selection
     return Selection(selection.nominal, selection.nominal, (), (*selection.rejected, *selection.choices))
 
@@ -186,7 +187,7 @@ def _concluded(
         identification=identification,
         setting=setting,
         selection=selection,
-        findings=selected_findings(selection, screen, fitter, held_out, inflation),
+        findings=selected_findings(selection, screen, fitter, held_out, misfit_after, inflation),
         mismatch=locate(selection, observations, misfit_after.significant),
         misfit_before=lack_of_fit(selection.nominal, observations, pure_error=pure_error),
         misfit_after=misfit_after,

@@ -12,13 +12,16 @@ from diagnosis.test_repetitions import observed
 from service.diagnosis.findings.diagnosed import Diagnosis
 from service.diagnosis.fitting.fit import Fitter
 from service.diagnosis.fitting.lack_of_fit import LackOfFit, lack_of_fit
+from service.diagnosis.noise.floor import with_noise
 from service.diagnosis.observations.whitening import JointNoise
 from service.identification.autocorrelation import Autoregression
 
 
 def test_a_test_that_fires_without_any_excess_is_no_mismatch() -> None:
     unlikely, likely = np.array([1e-9, 1e-9, 1e-9, 0.5]), np.ones(4)
-    found = LackOfFit(unlikely, likely, np.array([0.0, 40.0, 90.0, 90.0]), np.array([0.0, 60.0, 60.0, 60.0]))
+    found = LackOfFit(
+        unlikely, likely, np.array([0.0, 40.0, 90.0, 90.0]), np.array([0.0, 60.0, 60.0, 60.0]), np.zeros(4)
+    )
     assert found.significant == [True, True, True, False]
     assert found.mismatch == [False, False, True, False]
 
@@ -26,13 +29,15 @@ def test_a_test_that_fires_without_any_excess_is_no_mismatch() -> None:
 @pytest.mark.parametrize(("holds", "predicts"), [(True, True), (False, True), (True, False)])
 def test_what_cannot_be_measured_counts_where_parameters_move_or_predictions_fail(holds: bool, predicts: bool) -> None:
     """Joint by joint: a significant excess below and above what can be measured, and one that is not significant."""
-    before = LackOfFit(np.array([1e-9, 1e-9, 0.5]), np.ones(3), np.array([40.0, 90.0, 90.0]), np.full(3, 60.0))
+    before = LackOfFit(
+        np.array([1e-9, 1e-9, 0.5]), np.ones(3), np.array([40.0, 90.0, 90.0]), np.full(3, 60.0), np.zeros(3)
+    )
     found = Diagnosis.mismatched.__get__(stand_in(before, [0.0, 0.0, 0.0], holds=holds, predicts=predicts))
     assert found == [not (holds and predicts), True, False]
 
 
 def test_what_findings_explain_was_there_though_no_test_had_told() -> None:
-    nothing = LackOfFit(np.full(3, 0.5), np.ones(3), np.zeros(3), np.full(3, 60.0))
+    nothing = LackOfFit(np.full(3, 0.5), np.ones(3), np.zeros(3), np.full(3, 60.0), np.zeros(3))
     energy = [200.0, 8.0, 200.0]
     assert Diagnosis.mismatched.__get__(stand_in(nothing, energy, found=[1, 2])) == [False, False, True]
     assert Diagnosis.mismatched.__get__(stand_in(nothing, energy, found=[])) == [False, False, False]
@@ -68,3 +73,15 @@ def test_noise_far_above_what_repetitions_differ_by_is_a_mismatch() -> None:
     assert (told[9.0].pure_error < 1e-9).all()
     assert told[9.0].mismatch == [True] * 3
     assert (told[9.0].excess > told[1.0].excess).all()
+
+
+def test_what_smooth_functions_hold_is_measured_where_it_is_not_chance() -> None:
+    """A wave in time is one of them; alone it is all that is left beyond noise."""
+    waving, quiet = (observed(wave) for wave in (0.6, 0.0))
+    known, _ = with_noise(*quiet, ())
+    for (unweighted, model), is_there in ((waving, True), (quiet, False)):
+        rows = unweighted.with_noise(known.noise)
+        left = lack_of_fit(Fitter(rows).fit(model), rows, pure_error=True)
+        assert ((left.structured > 0.0) == is_there).all()
+        if is_there:
+            assert (left.structured < 1.2 * left.excess).all()

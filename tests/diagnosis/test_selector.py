@@ -65,6 +65,7 @@ def grown(monkeypatch: pytest.MonkeyPatch, waves_at: int) -> tuple[list[Place], 
 
     monkeypatch.setattr(Selector, "_table", lambda self, fit, choices, refused: AnyTable(refused))
     monkeypatch.setattr(Selector, "_best", best)
+    monkeypatch.setattr(Selector, "_settled", lambda self, fit, choices: (fit, choices))
     selector = Selector(SCREEN, FITTER, None, pure_error=True)
     selector.admission = PLAIN
     _, choices, rejected = selector._grown(FIT, [], lambda step: None)
@@ -142,11 +143,3 @@ def test_a_form_that_cannot_be_leaves_the_plain_form_of_its_effect_in(
     asked.admission = SIGNIFICANT
     best = asked._best(table, [])
     assert ([] if best is None else [each.candidate.effect for each in best.options]) == [sibling] * stays
-
-
-def test_a_fit_goes_on_until_it_has_converged() -> None:
-    """Eight steps led a Stribeck curve away from where it belongs, and ended before they led it back."""
-    left = [100.0, 40.0, 39.98, 10.0]
-    fitter: Any = SimpleNamespace(fit=lambda step: SimpleNamespace(model=step + 1, energy=left[step + 1]))
-    asked = Selector(SCREEN, fitter, None, pure_error=True)
-    assert asked._converged(SimpleNamespace(model=0, energy=left[0])).energy == 39.98  # type: ignore[arg-type]

@@ -45,7 +45,8 @@ class FindingEntry(Document):
     effect: str = Field(description="id of the effect")
     joint: str | None = Field(description="name of the joint; null where it belongs to the whole arm")
     probability: float = Field(
-        description="that it is this effect, neither one of its equivalents nor an error of a larger one's curve"
+        description="that it is this effect: neither one of its equivalents, nor an error of a larger one's curve,"
+        " nor a stand-in for a law that the catalogue does not have"
     )
     equivalent: list[str] = Field(description="other effect@joint that these data cannot tell from it")
     equation: str = Field(description="its torque")

@@ -6,7 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from service.diagnosis.catalogue import Effect, TimeLocalEffect
+from service.diagnosis.findings.stand_in import certainty_as_law
 from service.diagnosis.fitting.fit import Fit, Fitter
+from service.diagnosis.fitting.lack_of_fit import LackOfFit
 from service.diagnosis.model.extended import ExtendedModel
 from service.diagnosis.model.residual import raw_squares
 from service.diagnosis.model.term import Term
@@ -45,7 +47,8 @@ class Finding:
     gain : float
         what they take off the residual's energy beside all other findings [noise variances]
     probability : float
-        that it is this effect, and neither one of its equivalents nor an error of a larger effect's curve
+        that it is this effect: neither one of its equivalents, nor an error of a larger effect's curve, nor what stands
+        in for a law that the catalogue does not have
     before, after : FitSizes
         residuals of the model without it, and with all findings
     alternatives : tuple of Option
@@ -98,7 +101,12 @@ def _rms(model: ExtendedModel, observations: Observations) -> Array:
 
 
 def selected_findings(
-    selection: Selection, screen: Screen, fitter: Fitter, held_out: HeldOut | None, inflation: float
+    selection: Selection,
+    screen: Screen,
+    fitter: Fitter,
+    held_out: HeldOut | None,
+    left: LackOfFit,
+    inflation: float,
 ) -> tuple[Finding, ...]:
     """Terms of one effect at one place together, each compared with the model without it.
 
@@ -112,6 +120,8 @@ def selected_findings(
         of the same
     held_out : HeldOut or None
         the others
+    left : LackOfFit
+        what the final model leaves
     inflation : float
         factor by which the residual exceeds the modelled noise
     """
@@ -136,6 +146,7 @@ def selected_findings(
                 ),
                 gain=without.energy - fit.energy,
                 probability=standing.certainty
+                * certainty_as_law(terms[0].effect, selection.nominal, fit, without, left)
                 * probability_among(
                     chosen.score,
                     [each.score for each in alternatives],

@@ -54,10 +54,6 @@ LIKELY = 0.02
 
 CLEARLY_PREDICTED = 2.5
 
-MOST_REFITS = 4
-SETTLED = 0.1
-"""Gain of another fit from which the last one is taken for converged [noise variances]."""
-
 MOST_TERMS = 24
 MOST_REJECTED = 12
 
@@ -123,7 +119,7 @@ class Selector:
         fit, choices = without_proxies(nominal, fit, choices, self.fitter, self.admission)
         fit, choices = self._settled_without_superfluous(fit, choices)
         fit, choices = without_errors_of_larger_ones(nominal, fit, choices, self.fitter, self.admission)
-        return Selection(nominal, self._converged(fit), tuple(choices), tuple(rejected))
+        return Selection(nominal, fit, tuple(choices), tuple(rejected))
 
     def continued(self, selection: Selection, progress: Callable[[str], None]) -> Selection:
         """Add effects of this screen to what was selected with another.
@@ -141,7 +137,7 @@ class Selector:
         fit, choices = without_superfluous(fit, choices, self.fitter, self.admission)
         fit, choices = without_proxies(selection.nominal, fit, choices, self.fitter, self.admission)
         fit, choices = without_errors_of_larger_ones(selection.nominal, fit, choices, self.fitter, self.admission)
-        return Selection(selection.nominal, self._converged(fit), tuple(choices), (*selection.rejected, *rejected))
+        return Selection(selection.nominal, fit, tuple(choices), (*selection.rejected, *rejected))
 
     def _grown(
         self, fit: Fit, choices: list[Choice], progress: Callable[[str], None]
@@ -155,8 +151,11 @@ class Selector:
             rejected += [each for each in refused if each not in rejected]
             if choice is None:
                 break
+            is_open = any(len(each.options) > 1 for each in choices)
             choices = [*choices, choice]
             fit = choice.options[0].fit
+            if is_open:  # what has come may decide between them; else others come to explain what the wrong one leaves
+                fit, choices = self._settled(fit, choices)
             refused = [each for each in refused if not _at_one_joint(each, choice)]
             progress(f"found {choice.options[0].candidate.effect.name(names)}")
         return fit, choices, rejected
@@ -247,17 +246,6 @@ class Selector:
             return candidate.effect.repeats and chosen.count(place) < MOST_REPEATS
         others = {each for each in chosen if each[0] not in UNCOUNTED}
         return place[0] in UNCOUNTED or len(others) < MOST_EFFECTS
-
-    def _converged(self, fit: Fit) -> Fit:
-        """The model fitted on where its steps had not reached the optimum.
-
-        A name does not suffer from that, but a parameter may be many standard errors off.
-        """
-        for _ in range(MOST_REFITS):
-            before, fit = fit, self.fitter.fit(fit.model)
-            if before.energy - fit.energy < SETTLED:
-                break
-        return fit
 
     def _option(self, fit: Fit, term: Term) -> Option:
         """A term that was not screened for, fitted."""
