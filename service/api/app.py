@@ -46,7 +46,7 @@ from service.api.turns import TakingTurns
 from service.identification.history import ModelPolicy
 from service.jobs import StartControl
 
-API_VERSION = "1.9.0"
+API_VERSION = "1.9.1"
 """Of the interface, not of the package; a change of tests/api/openapi.json goes with a change here."""
 
 PREFIX = "/api/v1"

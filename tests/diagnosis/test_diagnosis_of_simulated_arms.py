@@ -198,6 +198,10 @@ def test_an_effect_outside_the_catalogue_is_never_explained_away() -> None:
     found = told("unknown")
     assert found.verdict in {"unexplained", "partly_explained"}
     assert found.mismatch[1].significant
+    for each in found.findings:
+        assert (
+            each.effect == "unknown" or "may stand in for something that the catalogue does not have" in each.statement
+        )
     if found.verdict == "unexplained":
         assert ("unknown", "joint2") in [(finding.effect, finding.joint) for finding in found.findings]
 
@@ -215,10 +219,10 @@ def test_where_it_leaves_much_the_second_effect_is_doubted() -> None:
     assert first.effect in {"joint_spring", "cable_force"}
     assert first.joint == "joint3"
     assert first.probability > 0.9
-    waves = [finding for finding in others if finding.effect == "cogging"]
-    assert waves, "what the curve leaves of the cube is significant, and a wave takes it up"
-    assert waves[0].probability < 0.9
-    assert f"beside {first.effect}@joint3 it is so small that it may be an error" in waves[0].statement
+    assert others, "what the curve leaves of the cube is significant, and something takes it up"
+    for each in others:
+        assert 0.1 < each.probability < 0.9
+        assert f"beside {first.effect}@joint3 it is so small that it may be an error" in each.statement
 
 
 @pytest.mark.slow

@@ -25,6 +25,7 @@ from service.diagnosis.findings.finding import Finding
 from service.diagnosis.findings.location import JointMismatch, Place
 from service.diagnosis.findings.verdict import Verdict
 from service.diagnosis.next_experiment import PlannedExperiment
+from service.diagnosis.selection.shape_error import PLAIN
 
 SHIFTS_FROM = 3.0
 """Standard errors from which a parameter's shift is told."""
@@ -207,6 +208,8 @@ def _statement(finding: Finding, quantities: Sequence[Quantity], others: Sequenc
         doubt += (
             f"; beside {finding.behind.name(names)} it is so small that it may be an error of that effect's formula"
         )
+    if finding.as_law < PLAIN:
+        doubt += "; so much is left beside it that it may stand in for something that the catalogue does not have"
     return f"{term.effect.where(names)}: {term.effect.meaning}{when} ({sizes}){doubt}; {term.effect.remedy}"
 
 

@@ -17,6 +17,7 @@ from service.diagnosis.selection.admission import Admission
 from service.diagnosis.selection.choice import Choice, Option, Selection, distinct, is_physical
 from service.diagnosis.selection.confirmation import HeldOut
 from service.diagnosis.selection.equivalence import EQUIVALENT
+from service.diagnosis.selection.pruning import without_errors_of_larger_ones
 from service.diagnosis.selection.selector import MOST_FITTED
 from service.diagnosis.selection.table import fitted_option
 
@@ -107,7 +108,9 @@ def _exchanged(
     near = [each for each in (*options, constant) if each.score > best.score - EQUIVALENT * inflation]
     near.sort(key=lambda each: -each.score)
     choice = Choice(distinct(near), confirmation, admission.p_value(best, without, blocks=True) / admission.level)
-    return Selection(selection.nominal, best.fit, (*selection.choices, choice), selection.rejected)
+    choices = [*selection.choices, choice]
+    fit, choices = without_errors_of_larger_ones(selection.nominal, best.fit, choices, fitter, admission)
+    return Selection(selection.nominal, fit, tuple(choices), selection.rejected)
 
 
 def _constant(effect: TorqueOffset, fit: Fit, place: int, gain: float) -> Option:

@@ -59,6 +59,8 @@ class Finding:
         whether the terms stand in the final model beside its nominal part, and not within that
     behind : Effect or None
         the effect that leads at its joint, of whose curve it may be an error
+    as_law : float
+        chance that it is a law of the catalogue, and does not stand in for another one
     """
 
     terms: tuple[Term, ...]
@@ -71,6 +73,7 @@ class Finding:
     confirmed: bool | None = None
     in_model: bool = True
     behind: Effect | None = None
+    as_law: float = 1.0
 
     @property
     def place(self) -> tuple[str, int | None]:
@@ -138,6 +141,7 @@ def selected_findings(
         choices = [selection.choices[place] for place in places]
         chosen, *rivals = choices[0].options
         alternatives = _likely(rivals, without, screen, held_out)
+        as_law = certainty_as_law(terms[0].effect, selection.nominal, fit, without, left)
         found.append(
             Finding(
                 terms=terms,
@@ -146,7 +150,7 @@ def selected_findings(
                 ),
                 gain=without.energy - fit.energy,
                 probability=standing.certainty
-                * certainty_as_law(terms[0].effect, selection.nominal, fit, without, left)
+                * as_law
                 * probability_among(
                     chosen.score,
                     [each.score for each in alternatives],
@@ -157,6 +161,7 @@ def selected_findings(
                 alternatives=alternatives,
                 confirmed=any(choice.confirmation is not None for choice in choices) or None,
                 behind=standing.behind,
+                as_law=as_law,
             )
         )
     return in_order(found)
