@@ -86,67 +86,43 @@ def interval(hits: int, count: int) -> tuple[float, float]:
     return float(found.low), float(found.high)
 
 
+@dataclass(frozen=True)
+class Asked:
+    """A share of the trials of some series.
+
+    id, words, target, at_least
+        of its figure
+    series : tuple of str
+        whose trials count
+    counts : callable
+        whether a trial does
+    among : callable
+        which trials are asked at all
+    fault : bool
+        whether what counts is a fault: a trial that failed shows none, and does nothing well either
+    """
+
+    id: str
+    words: str
+    series: tuple[str, ...]
+    counts: Callable[[Outcome], bool]
+    target: float | None = None
+    at_least: bool = True
+    among: Callable[[Outcome], bool] = lambda each: True
+    fault: bool = False
+
+    def measured(self, outcomes: Sequence[Outcome]) -> Figure:
+        """The figure on some trials."""
+        own = [each for each in outcomes if each["series"] in self.series and self.among(each)]
+        hits = [self.counts(each) for each in done(own)] if self.fault else _each(own, self.counts)
+        return share(self.id, self.words, hits, self.target, at_least=self.at_least)
+
+
 def headline(outcomes: Sequence[Outcome]) -> list[Figure]:
     """All figures of a set; failed trials count as misses of their series."""
-
-    def of(*series: str) -> list[Outcome]:
-        return [each for each in outcomes if each["series"] in series]
-
-    good, poor, forms = of(*NAMED_SINGLE), of(*POOR_SINGLE), of("form")
     hidden = [each for each in outcomes if not each["series"].startswith("sound")]
     return [
-        share("sound", "sound arms: an effect is named", _faults(of("sound"), _claimed), 0.01, at_least=False),
-        share(
-            "sound-poor",
-            "sound arms, poor recordings: an effect is named",
-            _faults(of("sound-sensing", "sound-coarse"), _claimed),
-            0.01,
-            at_least=False,
-        ),
-        share("weak", "one effect, s = 8: detected", _each(of("weak"), _key("detected")), 0.90),
-        share("detected", "one effect, s ≥ 15: detected", _each(good, _key("detected"))),
-        share("located", "one effect, s ≥ 15: the largest mismatch is at its joint", _each(good, _key("located"))),
-        share("named", "one effect, s ≥ 15: truth within a finding's set", _each(good, _key("named")), 0.95),
-        share("joint", "one effect, s ≥ 15: its joint is right", _each(good, _key("placed")), 0.99),
-        share("first", "one effect, s ≥ 15: truth is the first choice", _each(good, _key("first"))),
-        share("extra", "one effect, s ≥ 15: something else is named beside", _faults(good, _extra)),
-        share("named-poor", "the same, poor recordings: truth within a set", _each(poor, _key("named")), 0.95),
-        share("joint-poor", "the same, poor recordings: its joint is right", _each(poor, _key("placed")), 0.99),
-        share("event", "something that happens for a while: truth within a set", _each(of("event"), _key("named"))),
-        share("pair", "two effects: both within sets", _each(of("pair"), _key("named")), 0.90),
-        share("triple", "three effects: all within sets", _each(of("triple"), _key("named"))),
-        share("form", "another formula than the catalogue's: right family", _each(forms, _key("named")), 0.85),
-        share(
-            "form-partly",
-            "another formula, not named: told as partly explained or unexplained",
-            _each([each for each in done(forms) if not each["score"]["named"]], _admitted),
-            1.0,
-        ),
-        share(
-            "form-wrong",
-            f"another formula: a wrong name with p > {CONFIDENT}",
-            _faults(forms, _confident_and_wrong),
-            0.03,
-            at_least=False,
-        ),
-        share(
-            "form-instead",
-            "… and the right family is not among the findings",
-            _faults(forms, lambda each: _confident_and_wrong(each) and not each["score"]["named"]),
-        ),
-        share(
-            "unknown",
-            "nothing of the catalogue: told as partly explained or unexplained",
-            _each(of("unknown"), _admitted),
-            0.90,
-        ),
-        share(
-            "unknown-wrong",
-            f"nothing of the catalogue: a name with p > {CONFIDENT}",
-            _faults(of("unknown"), _confident_and_wrong),
-        ),
-        share("aliased", "motion that hides the effect: within a set", _each(of("aliased"), _key("named"))),
-        share("aliased-again", "… with the recommended motion recorded too", _each(of("aliased"), _again), 0.90),
+        *(asked.measured(outcomes) for asked in ASKED),
         _calibration(outcomes),
         share("coverage", "95 % intervals that hold the parameter", (p.inside for p in parameters(outcomes)), 0.95),
         share(
@@ -179,11 +155,6 @@ def sizes(outcomes: Sequence[Outcome]) -> list[float]:
 def _each(outcomes: Sequence[Outcome], counts: Callable[[Outcome], bool]) -> list[bool]:
     """Whether each trial does well; one that failed does not."""
     return ["score" in each and counts(each) for each in outcomes]
-
-
-def _faults(outcomes: Sequence[Outcome], counts: Callable[[Outcome], bool]) -> list[bool]:
-    """Whether each trial shows a fault; one that failed says nothing of it."""
-    return [counts(each) for each in done(outcomes)]
 
 
 def _key(name: str) -> Callable[[Outcome], bool]:
@@ -229,3 +200,59 @@ def _mean(id_: str, words: str, values: Sequence[float]) -> Figure:
         return Figure(id_, words, float(np.mean(values)) if count else float("nan"), 0.0, np.inf, count, None)
     mean, half = float(np.mean(values)), float(stats.t.ppf(0.5 + LEVEL / 2.0, count - 1) * stats.sem(values))
     return Figure(id_, words, mean, mean - half, mean + half, count, None)
+
+
+def _not_named(each: Outcome) -> bool:
+    return "score" in each and not each["score"]["named"]
+
+
+def _wrong_instead(each: Outcome) -> bool:
+    return _confident_and_wrong(each) and _not_named(each)
+
+
+GOOD, POOR = "one effect, s ≥ 15", "the same, poor recordings"
+NOTHING = "nothing of the catalogue"
+PARTLY = "told as partly explained or unexplained"
+WRONG = f"name with p > {CONFIDENT}"
+
+ASKED: tuple[Asked, ...] = (
+    Asked("sound", "sound arms: an effect is named", ("sound",), _claimed, 0.01, at_least=False, fault=True),
+    Asked(
+        "sound-poor",
+        "sound arms, poor recordings: an effect is named",
+        ("sound-sensing", "sound-coarse"),
+        _claimed,
+        0.01,
+        at_least=False,
+        fault=True,
+    ),
+    Asked("weak", "one effect, s = 8: detected", ("weak",), _key("detected"), 0.90),
+    Asked("detected", f"{GOOD}: detected", NAMED_SINGLE, _key("detected")),
+    Asked("located", f"{GOOD}: the largest mismatch is at its joint", NAMED_SINGLE, _key("located")),
+    Asked("named", f"{GOOD}: truth within a finding's set", NAMED_SINGLE, _key("named"), 0.95),
+    Asked("joint", f"{GOOD}: its joint is right", NAMED_SINGLE, _key("placed"), 0.99),
+    Asked("first", f"{GOOD}: truth is the first choice", NAMED_SINGLE, _key("first")),
+    Asked("extra", f"{GOOD}: something else is named beside", NAMED_SINGLE, _extra, fault=True),
+    Asked("named-poor", f"{POOR}: truth within a set", POOR_SINGLE, _key("named"), 0.95),
+    Asked("joint-poor", f"{POOR}: its joint is right", POOR_SINGLE, _key("placed"), 0.99),
+    Asked("event", "something that happens for a while: truth within a set", ("event",), _key("named")),
+    Asked("pair", "two effects: both within sets", ("pair",), _key("named"), 0.90),
+    Asked("triple", "three effects: all within sets", ("triple",), _key("named")),
+    Asked("form", "another formula than the catalogue's: right family", ("form",), _key("named"), 0.85),
+    Asked("form-partly", f"another formula, not named: {PARTLY}", ("form",), _admitted, 1.0, among=_not_named),
+    Asked(
+        "form-wrong",
+        f"another formula: a wrong {WRONG}",
+        ("form",),
+        _confident_and_wrong,
+        0.03,
+        at_least=False,
+        fault=True,
+    ),
+    Asked("form-instead", "… and the right family is not among the findings", ("form",), _wrong_instead, fault=True),
+    Asked("unknown", f"{NOTHING}: {PARTLY}", ("unknown",), _admitted, 0.90),
+    Asked("unknown-wrong", f"{NOTHING}: a {WRONG}", ("unknown",), _confident_and_wrong, fault=True),
+    Asked("aliased", "motion that hides the effect: within a set", ("aliased",), _key("named")),
+    Asked("aliased-again", "… with the recommended motion recorded too", ("aliased",), _again, 0.90),
+)
+"""What is asked of the diagnosis, in the order of the page."""
