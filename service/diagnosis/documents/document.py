@@ -23,9 +23,9 @@ from service.diagnosis.documents.result import (
 from service.diagnosis.findings.diagnosed import Diagnosis
 from service.diagnosis.findings.finding import Finding
 from service.diagnosis.findings.location import JointMismatch, Place
+from service.diagnosis.findings.stand_in import DOUBTED
 from service.diagnosis.findings.verdict import Verdict
 from service.diagnosis.next_experiment import PlannedExperiment
-from service.diagnosis.selection.shape_error import PLAIN
 
 SHIFTS_FROM = 3.0
 """Standard errors from which a parameter's shift is told."""
@@ -208,7 +208,7 @@ def _statement(finding: Finding, quantities: Sequence[Quantity], others: Sequenc
         doubt += (
             f"; beside {finding.behind.name(names)} it is so small that it may be an error of that effect's formula"
         )
-    if finding.as_law < PLAIN:
+    if finding.as_law < DOUBTED:
         doubt += "; so much is left beside it that it may stand in for something that the catalogue does not have"
     return f"{term.effect.where(names)}: {term.effect.meaning}{when} ({sizes}){doubt}; {term.effect.remedy}"
 

@@ -18,8 +18,11 @@ from service.diagnosis.fitting.lack_of_fit import LackOfFit
 from service.diagnosis.selection.shape_error import EXPECTED
 
 LEFT = 0.15
-"""Share that as well a right name leaves, where the arm's formula is not quite the catalogue's, as a wrong one: on
-simulated arms right names left up to 0.05, and one 0.17; names of what was not in the catalogue 0.10 to 0.7."""
+"""Share that is left from which a name is rather wrong than right. On simulated arms right names left up to 0.05, and
+one 0.17, where the arm's formula is not quite the catalogue's; names of what was in no catalogue 0.10 to 0.7."""
+
+DOUBTED = 0.5
+"""Certainty below which a finding's statement says why."""
 
 
 def certainty_as_law(effect: Effect, nominal: Fit, fit: Fit, without: Fit, left: LackOfFit) -> float:
