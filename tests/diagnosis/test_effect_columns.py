@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from arms import random_parameters, ur5_like
 from pinocchio_arm import pinocchio_model
 from service.diagnosis.catalogue import Effect, Setting, Signals, catalogue, possible_effects
+from service.diagnosis.catalogue.deflection import FIRST_ORDER
 from service.diagnosis.catalogue.joint_elasticity import DAMPING, transmitted
 from service.diagnosis.catalogue.late_torque import Lag, Shift
 from service.robot import JointType, Robot
@@ -345,9 +346,34 @@ def test_bristles_shorter_than_the_encoder_s_noise_are_not_looked_for() -> None:
 def test_a_swinging_link_tells_its_compliance_twice() -> None:
     elastic, covariance = form("joint_elasticity", 2), np.diag([1e-12, 0.0, 0.0])
     (twice,) = elastic.quantities(setting(), np.array([1.6e-4]), np.array([10.0, 1.0e-4]), covariance)
-    assert (twice.name, twice.value, twice.std) == ("c", pytest.approx(1.3e-4), pytest.approx(0.3e-4, rel=0.01))
+    formula = FIRST_ORDER * 1.6e-4
+    assert (twice.name, twice.value) == ("c", pytest.approx(1.3e-4))
+    assert twice.std == pytest.approx(np.hypot(0.3e-4, formula), rel=0.01)
     (once,) = elastic.quantities(setting(), np.array([1.6e-4]), np.array([10.0, 0.0]), covariance)
-    assert (once.value, once.std) == (pytest.approx(1.6e-4), pytest.approx(1e-6))
+    assert (once.value, once.std) == (pytest.approx(1.6e-4), pytest.approx(np.hypot(1e-6, formula)))
+
+
+def test_a_resonance_is_looked_for_between_the_grid_s() -> None:
+    elastic = form("joint_elasticity", 2)
+    (swinging,) = {each for each in elastic.grid[:, 1] if each > 0.0 and each == elastic.grid[-1, 1]}
+    finer = np.concatenate(elastic.alike(np.array([10.0, swinging])))
+    others = np.unique(elastic.grid[elastic.grid[:, 1] > 0.0, 1])
+    nearest = others[others != swinging][np.argmin(np.abs(np.log(others[others != swinging] / swinging)))]
+    step = np.abs(np.log(nearest / swinging))
+    assert np.abs(np.diff(np.log(np.sort(np.unique(finer[:, 1]))))).max() < 0.3 * step
+    assert np.log(finer[:, 1] / swinging).max() > 0.5 * step
+    assert set(finer[:, 0]) == set(elastic.grid[elastic.grid[:, 1] > 0.0, 0])
+    assert not len(elastic.alike(np.array([10.0, 0.0])))
+
+
+def test_a_soft_curve_that_is_only_bent_a_little_may_have_any_share_of_a_higher_level() -> None:
+    """tanh(τ/c) ≈ τ/c - (τ/c)³/3: a c and a/c² are one; its level is c/√a."""
+    soft = form("torque_saturation", 2)
+    lowest = float(soft.lower[0])
+    assert soft.is_consistent(np.array([11.7]), np.array([4.0 * lowest]))
+    assert not soft.is_consistent(np.array([17.0]), np.array([4.0 * lowest]))
+    (level,) = soft.quantities(setting(), np.array([11.7]), np.array([33.4]), np.zeros((2, 2)))
+    assert level.value == pytest.approx(33.4 / np.sqrt(11.7))
 
 
 def test_what_gives_way_is_what_the_link_swings_on() -> None:

@@ -5,13 +5,14 @@ stands the fourth derivative of the position: the load is smoothed before, to a 
 """
 
 from abc import abstractmethod
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from service.diagnosis.catalogue.effect import Effect
-from service.diagnosis.catalogue.parameters import Shape
+from service.diagnosis.catalogue.parameters import Quantity, Shape
 from service.diagnosis.catalogue.setting import Setting
 from service.diagnosis.catalogue.signals import Signals
 from service.dynamics import inverse_dynamics
@@ -25,6 +26,10 @@ SLOPES_HZ = 100.0
 
 LEAST_INERTIA = 0.05
 """Share of a joint's largest inertia below which a fitted one is an error of the fit."""
+
+FIRST_ORDER = 0.12
+"""What the first order in δ, with the load of the motor's own motion, errs by, relative to the size that is found: on
+simulated arms 0.02 to 0.25 beyond the standard error."""
 
 BAND = Shape("band", "Hz", fixed=True, reported=False)
 """Of the load that deflects the transmission."""
@@ -55,6 +60,25 @@ class Deflection(Effect):
             n
         """
         return tuple(range(joint_count))
+
+    def quantities(
+        self, setting: Setting, coefficients: Array, shape: Array, covariance: Array
+    ) -> tuple[Quantity, ...]:
+        """The size of the deflection, its standard error with that of the first order.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        coefficients : (1,) float64
+            of the effect
+        shape : (k,) float64
+            values of the shape parameters
+        covariance : (1 + k, 1 + k) float64
+            of both
+        """
+        found = super().quantities(setting, coefficients, shape, covariance)
+        return tuple(replace(each, std=float(np.hypot(each.std, FIRST_ORDER * each.value))) for each in found)
 
     @abstractmethod
     def deflection(self, load: Array, inertia: Array, shape: Array, rate_hz: float) -> Array:

@@ -41,7 +41,8 @@ class Effect(ABC):
     `has_step` change with K_v of its joint.
     Columns that are a linear filter of the load are `linear_in_load`: noise of the positions, which changes the
     predicted load, is in them as it is in the residual.
-    What a sensor does not pass on, or a spring carries for the motor, `may_exceed_measured`; nothing else can.
+    What a sensor does not pass on, a spring carries for the motor, or a displaced link for its neighbours,
+    `may_exceed_measured`; nothing else can.
     An effect that is `screened` is looked for beside the nominal model; any other becomes a finding by comparison with
     a given model.
     One that does not do the same whenever the motion does, that does not `repeats_with_motion`, passes for noise there.

@@ -22,6 +22,9 @@ SWINGING_BANDS = BANDS[:2]
 RESONANCES = np.array([0.6, 0.75, 0.9, 1.1, 1.35, 1.7, 2.2, 3.0])
 """Resonances of the link at its mean inertia, the motor held, relative to the common band; beyond, nothing is seen."""
 
+BETWEEN = np.geomspace(1.0 / 1.5, 1.5, 15)
+"""Compliances that swing, relative to the grid's best: a resonance within the band is far narrower than the grid."""
+
 SAME = 1.6
 """Factor between the compliance that swings and the one that is found, up to which they are the same."""
 
@@ -109,6 +112,19 @@ class JointElasticity(Deflection):
             band of the load [Hz], compliance on which the link swings, 0 where it does not [rad/Nm or m/N]
         """
         return np.where(shapes[:, 1] == 0.0, 0.0, CLEARLY_BETTER)
+
+    def alike(self, shape: Array) -> Sequence[Array]:
+        """What swings a little slower or faster, in either band.
+
+        Parameters
+        ----------
+        shape : (2,) float64
+            band of the load [Hz], compliance on which the link swings, 0 where it does not [rad/Nm or m/N]
+        """
+        if shape[1] == 0.0:
+            return ()
+        bands = np.unique(self.grid[self.grid[:, 1] > 0.0, 0])
+        return [np.stack([np.full(len(BETWEEN), band), shape[1] * BETWEEN], axis=1) for band in bands]
 
     def is_consistent(self, coefficients: Array, shape: Array) -> bool:
         """Whether what gives way is what the link swings on.

@@ -122,9 +122,9 @@ class Saturation(Effect):
 
 
 class TorqueSaturation(Saturation):
-    """r(τ) = c tanh(τ/c), a soft curve."""
+    """r(τ) = c tanh(τ/c), a soft curve; where it is only bent a little no data tell a and c apart, but c/√a."""
 
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("a", "1", positive=True, largest=2.0),)
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("a", "1", positive=True),)
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
@@ -149,10 +149,22 @@ class TorqueSaturation(Saturation):
         """
         return levels * np.tanh(torque / levels)
 
+    def is_consistent(self, coefficients: Array, shape: Array) -> bool:
+        """Whether a curve with a = 1 that is bent as much has a level that a sensor may have.
+
+        Parameters
+        ----------
+        coefficients : (1,) float64
+            a
+        shape : (1,) float64
+            c [Nm or N]
+        """
+        return bool(shape[0] >= self.lower[0] * np.sqrt(coefficients[0]))
+
     def quantities(
         self, setting: Setting, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
-        """The level alone where a soft curve is only bent a little: then no data tell a and c apart, but c/√a.
+        """The level c/√a.
 
         Parameters
         ----------

@@ -46,6 +46,10 @@ predictions err by is no uncertainty of parameters."""
 TELLS_NOTHING = 1.0
 """…and below which the held-out motion does not even do that."""
 
+LESS_LIKELY = -3.0
+"""Favour below which held-out recordings speak against a finding that they cannot show: what it changes of other
+parameters makes them twenty times less likely."""
+
 PREDICTED = 4.0
 """Energy of a joint's residual on held-out motion, noise variances a row, up to which that motion is predicted."""
 
@@ -87,7 +91,7 @@ class Confirmation:
         if self.gain > 0.0 and self.gain_z > BEYOND_DOUBT:
             return True
         if self.expected_z < TELLS_NOTHING:
-            return not cautious or self.gain_z > CLEARLY_BETTER
+            return self.gain_z > CLEARLY_BETTER if cautious else self.favour > LESS_LIKELY
         if self.seen_z > max(PLAINLY_SEEN, SAME_SIZE * self.expected_z):
             return True
         if not cautious:
