@@ -17,7 +17,7 @@ Written by `tests/diagnosis/write_verdicts.py` from the shared recordings (not i
 default: train on `train-*.csv`, confirm on `held-out-*.csv`. Residuals: rms at the recorded rate, unfiltered, relative
 to the rms of the torque, all joints together.
 
-| recordings | verdict | findings (joint; not told apart from) | held out before → after |
+| recordings | verdict | findings (joint, probability; not told apart from) | held out before → after |
 |---|---|---|---|
 """
 
@@ -47,7 +47,7 @@ def main() -> None:
         print(f"{folder.name}: {found.verdict}, {time.process_time() - begin:.0f} s", flush=True)
         findings = []
         for each in found.findings:
-            text = f"`{each.effect}` ({each.joint or 'arm'}"
+            text = f"`{each.effect}` ({each.joint or 'arm'}, {each.probability:.2f}"
             text += f"; {', '.join(f'`{other}`' for other in each.equivalent)})" if each.equivalent else ")"
             findings.append(text)
         change = ""
