@@ -11,6 +11,7 @@ from service.diagnosis.catalogue import Effect
 from service.diagnosis.catalogue.elastic_forces import CableForce, JointSpring
 from service.diagnosis.catalogue.late_torque import Shift
 from service.diagnosis.catalogue.periodic_torque import Cogging
+from service.diagnosis.catalogue.rotor_inertia import RotorInertia
 from service.diagnosis.catalogue.time_delay import TimeDelay
 from service.diagnosis.screening.screen import Candidate
 from service.diagnosis.selection import selector
@@ -143,3 +144,14 @@ def test_a_form_that_cannot_be_leaves_the_plain_form_of_its_effect_in(
     asked.admission = SIGNIFICANT
     best = asked._best(table, [])
     assert ([] if best is None else [each.candidate.effect for each in best.options]) == [sibling] * stays
+
+
+@pytest.mark.parametrize(("effect", "allowed"), [(JointSpring(3), True), (RotorInertia(0), True), (Cogging(0), False)])
+def test_what_is_counted_are_kinds_and_not_joints(effect: Effect, allowed: bool) -> None:
+    """Springs at three joints leave room for three other effects, and for a fourth spring beside those."""
+    asked = Selector(SCREEN, FITTER, None, pure_error=True)
+    chosen: list[Place] = [("joint_spring", joint) for joint in range(3)]
+    candidate = Candidate(effect, np.ones(0), np.ones(1), 50.0, np.eye(1), True, 1.0, 1.0)
+    assert asked.allowed(candidate, chosen, set())
+    chosen += [("time_delay", None), ("base_tilt", None), ("cable_force", 1)]
+    assert asked.allowed(candidate, chosen, set()) is allowed

@@ -28,7 +28,7 @@ from service.diagnosis.selection.pruning import without_errors_of_larger_ones, w
 from service.diagnosis.selection.table import Table, fitted_option
 
 MOST_EFFECTS = 4
-"""Different effects in one model."""
+"""Different effects in one model; what one joint does, the others may do as well."""
 
 UNCONFIRMED = 0.1
 """Share of the level that is left to effects that no other motion can confirm."""
@@ -244,8 +244,8 @@ class Selector:
             return False
         if place in chosen:
             return candidate.effect.repeats and chosen.count(place) < MOST_REPEATS
-        others = {each for each in chosen if each[0] not in UNCOUNTED}
-        return place[0] in UNCOUNTED or len(others) < MOST_EFFECTS
+        kinds = {effect for effect, _ in chosen if effect not in UNCOUNTED}
+        return place[0] in (*UNCOUNTED, *kinds) or len(kinds) < MOST_EFFECTS
 
     def _option(self, fit: Fit, term: Term) -> Option:
         """A term that was not screened for, fitted."""
