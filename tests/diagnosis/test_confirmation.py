@@ -19,14 +19,7 @@ from service.recording.recording import Array
         (5.0, 1.0, 6.0, 0.3, -12.0, False),  # should be there, and is not
         (-2.0, -0.5, 0.5, -0.2, -0.3, True),  # nothing to be seen: no objection
         (-9.0, -4.0, 0.5, -0.2, 1.0, False),  # nothing to be seen, and yet it spoils the prediction
-        (
-            -80.8,
-            -1.7,
-            0.5,
-            -0.5,
-            -7.5,
-            False,
-        ),  # nothing of it to be seen, and by way of others much less likely
+        (-80.8, -1.7, 0.5, -0.5, -7.5, False),  # nothing of it to be seen, and much else less likely
         (-4.0, -1.0, 20.0, 19.0, -2.0, True),  # there beyond doubt: its size is off
         (-39.5, -2.0, 3.8, 2.7, 2.2, True),  # the point predicts worse, and by no more than it is uncertain
         (-2.3, -0.1, 4.6, 3.4, 1.0, True),  # seen as large as it should be; that the point is no better is chance

@@ -35,9 +35,7 @@ class KinematicError(Effect):
     revealing_motion: ClassVar[str] = "none: measure the tool's place in several postures instead"
     coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("d", "m", largest=LARGEST_M),)
     shapes: ClassVar[tuple[Shape, ...]] = (Shape("link", "1", fixed=True), Shape("axis", "1", fixed=True))
-    may_exceed_measured: ClassVar[bool] = (
-        True  # links that balance their neighbours on shorter arms do not on longer ones
-    )
+    may_exceed_measured: ClassVar[bool] = True  # links that are balanced in one place are not in another
     of_motion_alone: ClassVar[bool] = True  # the consistent links, which no model of a diagnosis changes
 
     @classmethod
