@@ -16,7 +16,7 @@ from jobs.paper_files import PAPER_ROBOT
 from patience import eventually
 from service.api.access.keys import KeyFile
 from service.api.access.scopes import Scope
-from service.client import Client, HeldLease
+from service.client import ApiError, Client, HeldLease
 
 pytestmark = [pytest.mark.system, pytest.mark.slow, pytest.mark.timeout(1200)]
 
@@ -33,6 +33,23 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     with served(data) as running:
         running.client.headers["authorization"] = f"Bearer {KEYS['admin']}"
         yield running
+
+
+@pytest.fixture(autouse=True)
+def free_arm(service: Served) -> None:
+    """The arm is nobody's when a test begins: the run before says ``stopped`` while it still closes its bus."""
+    client = Client(str(service.client.base_url), KEYS["admin"])
+
+    def is_free() -> bool:
+        try:
+            with client.lease("paper-arm"):
+                return True
+        except ApiError as problem:
+            if problem.problem_code not in ("busy", "leased"):
+                raise
+            return False
+
+    assert eventually(is_free, within_s=60.0)
 
 
 @pytest.fixture
