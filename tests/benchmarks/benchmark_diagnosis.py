@@ -21,7 +21,7 @@ import numpy as np
 TESTS = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(TESTS.parent), str(TESTS)]
 
-from concealed.arms import NOISE_STD, arm_named, without_truth  # noqa: E402
+from concealed.generator.arms import NOISE_STD, arm_named, without_truth  # noqa: E402
 from service.acquisition import RunOptions, make_backend, run_trajectory  # noqa: E402
 from service.diagnosis import diagnose, document  # noqa: E402
 from service.recording import read_recording  # noqa: E402

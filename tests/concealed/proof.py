@@ -7,14 +7,14 @@ from concurrent.futures import BrokenExecutor
 from pathlib import Path
 
 from concealed import sets
-from concealed.kept import Kept, Outcome
-from concealed.page import write_page
 from concealed.prove import line
+from concealed.publishing.page import write_page
 from concealed.real.trials import QUICK, REAL
-from concealed.rescored import rescored
-from concealed.running import commit, run
-from concealed.tables import summary
-from concealed.workers import workers
+from concealed.running.kept import Kept, Outcome
+from concealed.running.run import commit, run
+from concealed.running.workers import workers
+from concealed.scoring.rescored import rescored
+from concealed.scoring.tables import summary
 
 
 def main() -> None:

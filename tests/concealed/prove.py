@@ -7,12 +7,12 @@ only then is it opened. Outcomes are kept line by line: what is there is not tri
 import argparse
 from pathlib import Path
 
-from concealed.case import SERIES
-from concealed.kept import Kept, Outcome
-from concealed.running import commit, run
-from concealed.tables import summary
+from concealed.generator.case import SERIES
+from concealed.running.kept import Kept, Outcome
+from concealed.running.run import commit, run
+from concealed.running.workers import workers
+from concealed.scoring.tables import summary
 from concealed.task import REAL, Task
-from concealed.workers import workers
 
 
 def main() -> None:

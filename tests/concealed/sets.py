@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from concealed.case import SERIES
+from concealed.generator.case import SERIES
 from concealed.real.trials import REAL, data
 from concealed.task import REAL as REAL_SERIES
 from concealed.task import Task

@@ -8,15 +8,15 @@ from typing import Any
 
 from concealed.baselines.columns import ground
 from concealed.baselines.ranking import rankings
-from concealed.case import Case
-from concealed.kept import Key, Outcome
-from concealed.oracle import against_oracle, oracle
-from concealed.plain import plain
+from concealed.generator.case import Case
+from concealed.generator.trial import Trial
 from concealed.real.outcome import real_outcome
-from concealed.score import compared
-from concealed.sealed import Sealed, diagnosis_apart, made, sealed, with_recommended
-from concealed.trial import Trial
-from concealed.truth import opened
+from concealed.running.kept import Key, Outcome
+from concealed.scoring.oracle import against_oracle, oracle
+from concealed.scoring.plain import plain
+from concealed.scoring.score import compared
+from concealed.sealing.sealed import Sealed, diagnosis_apart, made, sealed, with_recommended
+from concealed.sealing.truth import opened
 
 FOLLOWED = ("aliased",)
 """Series in which the recommended motion is played and the diagnosis repeated."""

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from concealed.score import Score, diagnosed, scored
-from concealed.trial import effect_trial, null_trial, several_trial, unknown_trial
+from concealed.generator.trial import effect_trial, null_trial, several_trial, unknown_trial
+from concealed.scoring.score import Score, diagnosed, scored
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1800)]
 

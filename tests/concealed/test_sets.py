@@ -5,7 +5,7 @@ from collections import Counter
 import pytest
 
 from concealed import sets
-from concealed.case import ARMS, SERIES, drawn
+from concealed.generator.case import ARMS, SERIES, drawn
 from service.cli import prove_command
 
 SOUND = [series for series, told in SERIES.items() if not told.count]

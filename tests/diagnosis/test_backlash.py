@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from concealed.concealment import Concealed
-from concealed.trial import recorded_trial
+from concealed.generator.concealment import Concealed
+from concealed.generator.trial import recorded_trial
 from service.diagnosis import diagnose, document
 from service.diagnosis.catalogue.backlash import DAMPING, SpringyTeeth, place_between_springs, place_between_teeth
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from ruamel.yaml import YAML
 
-from concealed.kept import Outcome
+from concealed.running.kept import Outcome
 
 TUNED = Path(__file__).with_name("thresholds.yaml")
 BASELINES = ("correlation", "sparse", "bic")

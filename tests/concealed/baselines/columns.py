@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from concealed.truth import label
+from concealed.sealing.truth import label
 from service.diagnosis.catalogue import Effect, TimeLocalEffect, possible_effects
 from service.diagnosis.fitting.fit import Fit, Fitter
 from service.diagnosis.model.nominal import nominal_model, setting_of

@@ -15,9 +15,9 @@ from concealed.baselines.claims import (
     right,
     thresholds,
 )
-from concealed.breakdown import Count, cell
-from concealed.figures import interval
-from concealed.kept import Outcome
+from concealed.running.kept import Outcome
+from concealed.scoring.breakdown import Count, cell
+from concealed.scoring.figures import interval
 
 GROUPS = {
     "sound: nothing claimed": ("sound",),

@@ -5,13 +5,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from concealed.arms import arm_named, without_truth
 from concealed.baselines.claims import best_threshold, claim, right, thresholds
 from concealed.baselines.columns import Columns, Ground, ground
 from concealed.baselines.comparison import shares, table
 from concealed.baselines.ranking import Best, rankings, sparse
 from concealed.baselines.tune import LOOKED_AT
-from concealed.motions import campaign
+from concealed.generator.arms import arm_named, without_truth
+from concealed.generator.motions import campaign
 from service.diagnosis.fitting.projection import JointColumns, project
 from service.dynamics import inverse_dynamics
 from service.recording import Recording

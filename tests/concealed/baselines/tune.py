@@ -7,9 +7,9 @@ from pathlib import Path
 from concealed.baselines.claims import BASELINES, TUNED, Rankings, best_threshold
 from concealed.baselines.columns import ground
 from concealed.baselines.ranking import rankings
-from concealed.case import SERIES
-from concealed.sealed import made
-from concealed.truth import truth_of
+from concealed.generator.case import SERIES
+from concealed.sealing.sealed import made
+from concealed.sealing.truth import truth_of
 
 LOOKED_AT = ("sound", "moderate", "strong")
 

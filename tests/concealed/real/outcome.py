@@ -6,13 +6,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from concealed.kept import Outcome
-from concealed.plain import plain
 from concealed.real.editing import Edit
 from concealed.real.trials import REAL, Real, data
-from concealed.score import compared
-from concealed.sealed import diagnosis_apart
-from concealed.truth import Hidden, Truth, opened
+from concealed.running.kept import Outcome
+from concealed.scoring.plain import plain
+from concealed.scoring.score import compared
+from concealed.sealing.sealed import diagnosis_apart
+from concealed.sealing.truth import Hidden, Truth, opened
 from service.recording import read_recording, write_recording
 from service.robot import read_robot
 

@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from concealed.kept import Outcome
 from concealed.real.trials import REAL
+from concealed.running.kept import Outcome
 
 SERIES = "real"
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from concealed.arms import arm_named
+from concealed.generator.arms import arm_named
 from concealed.real.editing import carried, cogging_of, later, motion, point_mass_torque, scaled
 from concealed.real.outcome import real_outcome
 from concealed.real.table import table

@@ -1,0 +1,74 @@
+"""The measure of an effect's strength: nothing where nothing is concealed, in proportion to what is."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from concealed.generator.arms import NOISE_STD, arm_named, without_truth
+from concealed.generator.forward import FINE, Passage, physical
+from concealed.generator.laws import law_torque, with_law
+from concealed.generator.motions import RATE_HZ, campaign
+from concealed.generator.strength import foreseen_strength, strength
+from service.dynamics import inverse_dynamics
+from sim_backend.friction import static_friction_torque
+
+COGGING = {"effect": "cogging", "joint": 1, "amplitude": 0.3, "order": 17.0, "phase": 0.4}
+
+
+@cache
+def passage(arm: str) -> Passage:
+    """A motion followed exactly, with the torque that it takes by our own inverse dynamics."""
+    robot = arm_named(arm)
+    train, _ = campaign(robot, 3)
+    time = np.arange(round(8.0 * FINE * RATE_HZ)) / (FINE * RATE_HZ)
+    exact = train[0].series.evaluate(time)
+    links = np.concatenate([link.to_vector() for link in robot.model.links or ()])
+    torque = inverse_dynamics(robot, links, exact.position, exact.velocity, exact.acceleration)
+    shapes = [joint.friction_shape for joint in robot.joints]
+    torque = torque + static_friction_torque(exact.velocity, robot.model.friction or (), shapes)
+    return Passage(exact.position, exact.velocity, torque)
+
+
+@pytest.mark.parametrize("arm", ["paper", "six", "seven"])
+def test_an_arm_that_conceals_nothing_shows_nothing(arm: str) -> None:
+    whole, _ = strength(arm_named(arm), [], [passage(arm)], NOISE_STD[arm])
+    assert whole < 0.2
+
+
+def test_it_grows_in_proportion_and_stays_at_its_joint() -> None:
+    robot, noise = arm_named("paper"), NOISE_STD["paper"]
+    made = [
+        with_law(robot, physical([{**COGGING, "amplitude": amplitude}]), passage("paper")) for amplitude in (0.3, 0.9)
+    ]
+    found = [strength(robot, [], [each], noise) for each in made if each is not None]
+    assert found[1][0] == pytest.approx(3.0 * found[0][0], rel=0.01)
+    assert found[0][1][0] > 0.98 * found[0][0]
+    # Far from what any nominal column can follow, s is the torque's own norm over the noise's.
+    torque = law_torque(robot, physical([COGGING])[0], passage("paper"))
+    assert torque is not None
+    plain = np.linalg.norm(torque[::FINE, 0]) / noise[0]
+    assert 0.8 * plain < found[0][0] <= plain
+
+
+def test_half_the_noise_is_twice_the_strength_and_what_is_foreseen_comes_true() -> None:
+    robot, noise = arm_named("paper"), np.array(NOISE_STD["paper"])
+    made = with_law(robot, physical([COGGING]), passage("paper"))
+    assert made is not None
+    whole, _ = strength(robot, [], [made], noise)
+    assert strength(robot, [], [made], 0.5 * noise)[0] == pytest.approx(2.0 * whole)
+    assert foreseen_strength(robot, COGGING, [passage("paper")], noise) == pytest.approx(whole, rel=1e-6)
+
+
+def test_what_the_nominal_model_has_itself_does_not_show() -> None:
+    entry = {"effect": "viscous_friction", "joint": 2, "coefficient": 0.4}
+    found = foreseen_strength(arm_named("paper"), entry, [passage("paper")], NOISE_STD["paper"])
+    assert found is not None
+    assert found < 0.2
+
+
+def test_the_robot_file_of_a_trial_says_nothing_of_the_truth() -> None:
+    robot = without_truth(arm_named("six"), states_friction=False)
+    assert robot.model.links is None
+    assert robot.model.friction is None
+    assert all(joint.friction_shape.k_v is None for joint in robot.joints)

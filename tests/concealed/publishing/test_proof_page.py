@@ -1,0 +1,155 @@
+"""Figures, pictures and page of the proof, from outcomes that are made up and whose figures are therefore known."""
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from concealed.generator.case import drawn
+from concealed.publishing import page as page_module
+from concealed.publishing.page import write_page
+from concealed.scoring.breakdown import confusion
+from concealed.scoring.calibration import calibration_error, calibration_interval
+from concealed.scoring.figures import Standing, headline, share
+
+RIGHT: dict[str, Any] = {
+    "strength": 15.0,
+    "verdict": "explained",
+    "detected": True,
+    "claimed": True,
+    "located": True,
+    "placed": True,
+    "named": True,
+    "first": True,
+    "size": 1.0,
+    "extra": [],
+    "probabilities": [(0.98, True)],
+    "parameters": [{"name": "a", "truth": 1.0, "value": 1.1, "std": 0.1}],
+    "held_out": 1.0,
+    "seconds": 3.0,
+    "told": ["cogging@joint1 0.98 {}"],
+}
+QUIET = {
+    **RIGHT,
+    "verdict": "consistent",
+    "detected": False,
+    "claimed": False,
+    "probabilities": [],
+    "parameters": [],
+    "told": [],
+    "size": float("nan"),
+}
+WRONG = {
+    **RIGHT,
+    "named": False,
+    "first": False,
+    "placed": False,
+    "extra": ["backlash@joint2"],
+    "probabilities": [(0.98, False)],
+    "parameters": [],
+    "told": ["backlash@joint2 0.98 {}"],
+}
+
+
+def trial(series: str, seed: int, score: dict[str, Any]) -> dict[str, Any]:
+    case = drawn(series, seed)
+    return {
+        "series": series,
+        "seed": seed,
+        "arm": None,
+        "name": case.name,
+        "case": case.as_dict(),
+        "commit": "0123456789",
+        "began": "2026-11-22T08:00:00Z",
+        "seconds": 3.0,
+        "score": score,
+    }
+
+
+@pytest.fixture
+def outcomes() -> list[dict[str, Any]]:
+    told = [trial("sound", seed, QUIET) for seed in range(98)] + [trial("sound", seed, WRONG) for seed in (98, 99)]
+    told += [trial("moderate", seed, RIGHT) for seed in range(19)] + [trial("moderate", 19, WRONG)]
+    told += [trial("form", seed, {**WRONG, "verdict": "partly_explained"} if seed < 5 else RIGHT) for seed in range(10)]
+    told.append({**trial("weak", 0, {}), "error": "RuntimeError('exit 1')"})
+    del told[-1]["score"], told[-1]["seconds"]
+    return told
+
+
+def test_figures_count_what_they_say(outcomes: list[dict[str, Any]]) -> None:
+    found = {each.id: each for each in headline(outcomes)}
+    assert (found["sound"].hits, found["sound"].count, found["sound"].value) == (2, 100, pytest.approx(0.02))
+    assert found["sound"].standing is Standing.SHORT
+    assert (found["named"].hits, found["named"].count) == (19, 20)
+    assert found["named"].standing is Standing.MET
+    assert (found["form"].hits, found["form-partly"].hits, found["form-partly"].count) == (5, 5, 5)
+    assert (found["form-wrong"].hits, found["form-wrong"].standing) == (5, Standing.MISSED)
+    assert (found["weak"].hits, found["weak"].count) == (0, 1)
+    assert (found["failed"].hits, found["failed"].count) == (1, 131)
+    assert found["coverage"].value == 1.0
+    # 24 right and 8 wrong findings, all at p = 0.98
+    assert found["calibration"].value == pytest.approx(0.98 - 24 / 32)
+
+
+def test_the_interval_of_a_share_is_the_binomial_one() -> None:
+    none = share("x", "x", [False] * 300, 0.01, at_least=False)
+    assert none.high == pytest.approx(1.0 - 0.025 ** (1 / 300))  # closed form where nothing was seen
+    assert none.standing is Standing.MET
+    assert share("x", "x", [False] * 400, 0.01, at_least=False).standing is Standing.SHOWN
+    assert share("x", "x", [], 0.01).standing is None
+
+
+def test_findings_that_mean_what_they_say_are_calibrated() -> None:
+    rng = np.random.default_rng(3)
+    probability = rng.uniform(0.0, 1.0, 40_000)
+    honest = [(float(p), bool(rng.random() < p)) for p in probability]
+    assert calibration_error(honest) < 0.02
+    boastful = [(float(0.5 + p / 2.0), right) for (p, right) in honest]
+    assert calibration_error(boastful) == pytest.approx(0.25, abs=0.02)
+    low, high = calibration_interval([[claim] for claim in honest[:400]])
+    assert 0.0 < low < high < 0.25
+    # Twenty that are right say no more than that fewer than one in six is wrong.
+    assert calibration_interval([[(1.0, True)]] * 20)[1] == pytest.approx(1.0 - 0.025 ** (1 / 20))
+
+
+def test_what_was_mistaken_stands_off_the_diagonal(outcomes: list[dict[str, Any]]) -> None:
+    truths, answers, table = confusion(outcomes)
+    assert table[truths.index("nothing"), answers.index("nothing")] == 98
+    assert table[truths.index("nothing"), answers.index("backlash")] == 2
+    assert table.sum() == 130
+
+
+def test_the_page_has_every_figure_every_failure_and_a_reason(
+    outcomes: list[dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    reasons = tmp_path / "reasons.yaml"
+    reasons.write_text("form-wrong: The curve is another one.\nnamed: never shown, for it is met\n")
+    monkeypatch.setattr(page_module, "REASONS", reasons)
+    written = write_page(outcomes, tmp_path / "docs" / "proof.md", "tauscope prove")
+    text = written[0].read_text()
+    for each in headline(outcomes):
+        assert (f"| {each.words} |" in text) == bool(each.count)
+    assert "The curve is another one." in text
+    assert "never shown" not in text
+    assert "nobody has looked into it yet" in text  # of the false alarms
+    below = text.split("## Below target")[1].split("## ")[0]
+    assert "sound arms: an effect is named" in below
+    for seed in (98, 99):
+        assert f"| sound-{drawn('sound', seed).arm}-{seed} | nothing |" in text
+    assert "weak 0 | | | error | RuntimeError" in text
+    assert len(written) > 5
+    for picture in written[1:]:
+        assert f"]({picture.relative_to(tmp_path / 'docs')})" in text
+        ET.parse(picture)
+
+
+def test_a_set_that_is_not_done_says_so(outcomes: list[dict[str, Any]], tmp_path: Path) -> None:
+    text = write_page(outcomes[-3:], tmp_path / "proof.md", "tauscope prove", 400)[0].read_text()
+    assert "the outcomes of 3 trials, **the first of a set of 400**" in text
+
+
+def test_the_same_outcomes_give_the_same_bytes(outcomes: list[dict[str, Any]], tmp_path: Path) -> None:
+    first, second = (write_page(outcomes, tmp_path / name / "proof.md", "x") for name in ("a", "b"))
+    assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]

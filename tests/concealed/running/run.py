@@ -1,0 +1,53 @@
+"""Many trials: those that are not there yet, by whatever workers there are, kept as they end."""
+
+import subprocess
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor, as_completed
+from pathlib import Path
+
+from concealed.running.kept import Kept, Outcome
+from concealed.task import Task, outcome
+
+REPOSITORY = Path(__file__).resolve().parents[3]
+JUDGED = ("service", "sim_backend", "drivers", "tests/concealed")
+"""What an outcome depends on."""
+
+
+def run(
+    tasks: Sequence[Task],
+    kept: Kept,
+    executor: Executor,
+    told: Callable[[Outcome], None],
+    *,
+    until: float | None = None,
+) -> int:
+    """Try what is not kept yet, in the order given; the number of trials left over after `until` [s].
+
+    With a time limit, trials that have not begun by then are not begun.
+    """
+    begin = time.monotonic()
+    there = {(each["series"], each["seed"], each["arm"]) for each in kept.outcomes}
+    futures = {executor.submit(outcome, task): task for task in tasks if task.key not in there}
+    left = len(futures)
+    for future in as_completed(futures):
+        if future.cancelled():
+            continue
+        kept.add(future.result())
+        told(kept.outcomes[-1])
+        left -= 1
+        if until is not None and time.monotonic() - begin > until:
+            for each in futures:
+                each.cancel()
+    return left
+
+
+def commit() -> str:
+    """The commit that is tried, with ``+`` where files have been changed since; empty where git says nothing."""
+
+    def git(*words: str) -> str:
+        told = subprocess.run(["git", *words], cwd=REPOSITORY, capture_output=True, text=True, check=False)
+        return told.stdout.strip() if told.returncode == 0 else ""
+
+    changed = git("status", "--porcelain", "--untracked-files=no", "--", *JUDGED)
+    return git("rev-parse", "--short=10", "HEAD") + ("+" if changed else "")

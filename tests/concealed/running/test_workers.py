@@ -1,0 +1,51 @@
+"""Trials by processes: of this machine, and of a Dask cluster."""
+
+import os
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from concealed.running.kept import Kept
+from concealed.running.run import run
+from concealed.running.workers import SCHEDULER, workers
+from concealed.sealing.sealed import made
+from concealed.sealing.truth import truth_of
+from concealed.task import Task
+
+
+def test_without_a_scheduler_they_are_processes_of_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(SCHEDULER, raising=False)
+    with workers(1) as executor:
+        assert executor.submit(os.getppid).result(timeout=60) == os.getpid()
+
+
+@pytest.fixture
+def cluster(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        from distributed import LocalCluster
+
+        local = LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address="")
+        monkeypatch.setenv(SCHEDULER, local.scheduler_address)
+        yield
+        local.close()
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+@pytest.mark.filterwarnings("ignore")
+def test_a_dask_cluster_makes_the_same_trials(cluster: None, tmp_path: Path) -> None:
+    tasks = [Task("sound", seed, "paper") for seed in (2, 3)]
+    kept = Kept(tmp_path / "outcomes.jsonl")
+    with workers() as executor:
+        processes = {each.result() for each in [executor.submit(os.getpid) for _ in range(40)]}
+        run(tasks, kept, executor, lambda each: None)
+    assert os.getpid() not in processes
+    assert len(kept.outcomes) == 2
+    for task, each in zip(tasks, kept.of({task.key for task in tasks}), strict=True):
+        assert "error" not in each
+        case, trial = made(task.series, task.seed, task.arm)
+        assert truth_of(trial, case).seal(tmp_path / "truth.json") == each["seal"]
+        assert not each["score"]["claimed"]
