@@ -86,6 +86,9 @@ LARGEST_VARIATION = 0.9
 LARGEST_GAIN_ERROR = 0.5
 """Of a torque channel: one that is wrong by more, somebody has seen long ago; at one it shows nothing."""
 
+LARGEST_OF_LOAD = 0.95
+"""Part of the load that a gear's ripple, or its friction, may take: at all of it the transmission locks itself."""
+
 
 def _law(effect: str, ground: Ground, key: str, size: float, **more: object) -> Drawn:
     """An effect of one joint with an amplitude."""
@@ -121,7 +124,8 @@ def stribeck_friction(g: Ground, rng: np.random.Generator) -> Drawn:
 
 
 def load_dependent_friction(g: Ground, rng: np.random.Generator) -> Drawn:
-    return _law("load_dependent_friction", g, "mu", min(0.8 * g.noise / g.load, 0.3))
+    drawn = _law("load_dependent_friction", g, "mu", min(0.8 * g.noise / g.load, 0.3))
+    return replace(drawn, largest=LARGEST_OF_LOAD)
 
 
 def position_dependent_friction(g: Ground, rng: np.random.Generator) -> Drawn:
@@ -181,7 +185,8 @@ def cogging(g: Ground, rng: np.random.Generator) -> Drawn:
 def torque_ripple(g: Ground, rng: np.random.Generator) -> Drawn:
     order = round(float(rng.uniform(6.0, 40.0)) / max(g.high - g.low, 0.5) * 2.0, 1)
     more = {"order": order, "phase": float(rng.uniform(-3.0, 3.0))}
-    return _law("torque_ripple", g, "amplitude", min(0.4 * g.noise / g.load, 0.3), **more)
+    drawn = _law("torque_ripple", g, "amplitude", min(0.4 * g.noise / g.load, 0.3), **more)
+    return replace(drawn, largest=LARGEST_OF_LOAD)
 
 
 def joint_elasticity(g: Ground, rng: np.random.Generator) -> Drawn:
