@@ -33,16 +33,10 @@ def values(found: DiagnosisDocument, effect: str) -> dict[str, float]:
 
 def test_the_worn_screw_of_emps_and_its_late_force_are_named() -> None:
     found = told("emps")
-    named = [finding.effect for finding in found.findings]
-    assert {"asymmetric_viscous", "time_delay"} <= set(named)
+    assert {finding.effect for finding in found.findings[:2]} == {"asymmetric_viscous", "time_delay"}
     assert -40.0 < values(found, "asymmetric_viscous")["b"] < -25.0
     # The force read one sample of 1 ms earlier fits better: the channel is early by about that.
     assert -1.2e-3 < values(found, "time_delay")["d"] < -0.6e-3
-
-
-@pytest.mark.xfail(reason="a power of speed at its lowest exponent explains 2 % more than the asymmetry", strict=True)
-def test_what_its_authors_found_on_emps_comes_before_all_else() -> None:
-    assert {each.effect for each in told("emps").findings[:2]} == {"asymmetric_viscous", "time_delay"}
 
 
 def test_emps_is_predicted_better_than_by_the_readme() -> None:
@@ -85,3 +79,11 @@ def test_nothing_is_named_where_the_plain_model_predicts_better() -> None:
     found = told("kuka-lwr4")
     assert {finding.effect for finding in found.findings} <= {"unknown"}
     assert found.verdict != "consistent"
+
+
+@pytest.mark.slow
+def test_the_load_dependent_friction_of_the_double_pendulum_is_named() -> None:
+    found = told("double-pendulum")
+    # By the README's own fits 0.13 and 0.10 at shoulder and elbow.
+    assert {each.joint for each in found.findings if each.effect == "load_dependent_friction"} & {"shoulder", "elbow"}
+    assert 0.05 < values(found, "load_dependent_friction")["mu"] < 0.15

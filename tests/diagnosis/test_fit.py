@@ -95,3 +95,17 @@ def test_a_constant_at_its_limit_promises_nothing(diagnosis: Diagnosis) -> None:
     assert found.model.constant(place) == pytest.approx(3.0 * flat.constant(place))
     assert found.projection.step[nominal.structure.size + place] == pytest.approx(0.0, abs=1e-9)
     assert found.energy == pytest.approx(found.projection.energy, abs=0.1)
+
+
+def test_a_shape_at_its_bound_promises_nothing_and_is_not_known(diagnosis: Diagnosis) -> None:
+    """A power of speed near one comes as near to a curve that falls with speed as its bound allows."""
+    nominal, fitter = diagnosis.selection.nominal.model, diagnosis.fitter
+    powers = [each for each in diagnosis.screen.effects if (each.id, each.joint) == ("nonlinear_viscous", JOINT)]
+    power = max(powers, key=lambda each: float(each.lower[0]))
+    found = fitter.fit(with_terms(nominal, [Term(power, np.array([1.3]), np.array([1.0]))]))
+    assert found.model.terms[0].shape == power.lower
+    place = found.model.term_places()[0].stop - 1
+    assert found.projection.step[place] == 0.0
+    assert found.energy == pytest.approx(found.projection.energy, abs=0.1)
+    assert found.covariance[place, place] > 0.0
+    assert found.joint_energies.sum() <= found.energy

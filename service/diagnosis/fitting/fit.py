@@ -1,5 +1,6 @@
 """The extended model fitted to whitened rows by Gauss–Newton steps: Θ, K_v, δ, effects and their shapes together."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,7 +31,7 @@ FARTHEST = 3.0
 """Factor beyond which a constant of the friction curve does not move from where the identification found it."""
 
 AT_LIMIT = 1e-6
-"""Difference of logarithms within which a constant is at its limit."""
+"""Part of its largest step within which a constant or a shape is at its limit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,24 +41,26 @@ class Fit:
     model : ExtendedModel
         with fitted parameters
     projection : Projection
-        of its columns there; its residual is what one more linear step would leave
+        of its columns there, without those that would lead out of their bounds; its residual is what one more linear
+        step would leave
     energy : float
         Σ r² that the model leaves, the prior's included [noise variances]
+    joint_energies : (n,) float64
+        the same by joint, without the prior's
+    spread : (p, r) float64
+        square root of the covariance; a shape at its bound is as uncertain as if there were none
     """
 
     model: ExtendedModel
     projection: Projection
     energy: float
-
-    @property
-    def joint_energies(self) -> Array:
-        """Σ r² by joint, (n,) [noise variances]."""
-        return np.array([float(rows @ rows) for rows in self.projection.residual])
+    joint_energies: Array
+    spread: Array
 
     @property
     def covariance(self) -> Array:
         """Covariance of all parameters for white noise of the modelled size, (p, p)."""
-        return self.projection.spread @ self.projection.spread.T
+        return self.spread @ self.spread.T
 
     def inflation(self, *, at_least: float = 1.0) -> float:
         """Residual energy per degree of freedom: what is left is more than the modelled noise by this factor.
@@ -108,10 +111,24 @@ class Fitter:
             projection = self._project(self._columns(model), residual, model)
             if gained < SETTLED:
                 break
-        at_limit = _stopped_constants(model, projection.step, limits)
-        if at_limit:  # what they would do beyond is nothing that the model can do
-            projection = self._project(_without(self._columns(model), at_limit), residual, model)
-        return Fit(model, projection, energy)
+        projection, spread = self._within_limits(model, residual, projection, limits)
+        return Fit(model, projection, energy, _energies(residual), spread)
+
+    def _within_limits(
+        self, model: ExtendedModel, residual: list[Array], projection: Projection, limits: Array
+    ) -> tuple[Projection, Array]:
+        """The projection without what would only lead beyond limits, and the spread of all parameters.
+
+        What they would do beyond is nothing that the model can do; but nor does a shape's bound make it known.
+        """
+        stopped = _stopped(model, projection.step, limits)
+        if not stopped:
+            return projection, projection.spread
+        columns, constants = self._columns(model), [place for place in stopped if _is_constant(model, place)]
+        within = self._project(_without(columns, stopped), residual, model)
+        if constants == stopped:
+            return within, within.spread
+        return within, self._project(_without(columns, constants), residual, model).spread
 
     def _descended(
         self, model: ExtendedModel, projection: Projection, energy: float, limits: Array
@@ -160,7 +177,7 @@ class Fitter:
         """
         residual, columns = self._linearised(model)
         projection = self._project(columns, residual, model)
-        return Fit(model, projection, projection.energy)
+        return Fit(model, projection, projection.energy, _energies(projection.residual), projection.spread)
 
     def covariance(self, fit: Fit) -> Array:
         """Covariance of all parameters, those that a term displaced as uncertain as they would be without that, (p, p).
@@ -259,10 +276,15 @@ def _with_steps_of_terms(slopes: Array, places: list[int], joint: int, model: Ex
     return slopes
 
 
+def _energies(residual: Sequence[Array]) -> Array:
+    """Σ r² by joint, (n,)."""
+    return np.array([float(row @ row) for row in residual])
+
+
 def _energy(model: ExtendedModel, residual: list[Array]) -> float:
     """Σ r² of the data's rows and of the prior's."""
     _, left = model.prior()
-    return sum(float(row @ row) for row in residual) + float(left @ left)
+    return float(_energies(residual).sum() + left @ left)
 
 
 def _constants_limits(model: ExtendedModel) -> Array:
@@ -271,15 +293,16 @@ def _constants_limits(model: ExtendedModel) -> Array:
     return np.stack([start - np.log(FARTHEST), start + np.log(FARTHEST)], axis=-1)
 
 
-def _stopped_constants(model: ExtendedModel, step: Array, limits: Array) -> list[int]:
-    """Places of the constants that would move on beyond their limits."""
-    first = model.structure.size
-    found = []
-    for place, (low, high) in enumerate(limits):
-        value, wanted = np.log(model.constant(place)), step[first + place]
-        if (wanted < 0.0 and value < low + AT_LIMIT) or (wanted > 0.0 and value > high - AT_LIMIT):
-            found.append(first + place)
-    return found
+def _stopped(model: ExtendedModel, step: Array, limits: Array) -> list[int]:
+    """Places of the constants and shapes that would move on beyond their limits."""
+    curved, lower, upper, reach = _room(model, limits)
+    wanted, near = step[curved], AT_LIMIT * reach
+    return [int(place) for place in curved[((wanted < 0.0) & (lower > -near)) | ((wanted > 0.0) & (upper < near))]]
+
+
+def _is_constant(model: ExtendedModel, place: int) -> bool:
+    """Whether a parameter is one of the friction curve's constants."""
+    return 0 <= place - model.structure.size < len(model.constants)
 
 
 def _without(columns: list[JointColumns], places: list[int]) -> list[JointColumns]:
