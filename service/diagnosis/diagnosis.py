@@ -36,7 +36,7 @@ from service.diagnosis.observations.observations import Observations
 from service.diagnosis.screening.screen import Screen
 from service.diagnosis.selection.admission import LEVEL
 from service.diagnosis.selection.choice import Selection
-from service.diagnosis.selection.confirmation import HeldOut
+from service.diagnosis.selection.confirmation import CLEARLY_WORSE, HeldOut
 from service.diagnosis.selection.farther import looked_farther
 from service.diagnosis.selection.selector import Selector
 from service.identification import Identification, Options, identify
@@ -48,8 +48,9 @@ __all__ = ["Diagnosis", "Finding", "FitSizes", "diagnose"]
 
 Progress = Callable[[str], None]
 
-CLEARLY = 2.0
-"""Standard errors by which one of two models predicts a joint better."""
+CLEARLY_BETTER = 2.0
+"""Standard errors by which one of two models predicts a joint better; worse, it is by `CLEARLY_WORSE`: of many joints
+one is so by chance, at a size that nobody would see."""
 
 DEFAULT = Options()
 """An identification as nobody asked otherwise."""
@@ -129,7 +130,7 @@ def _unless_plainer_is_better(selection: Selection, delivered: ExtendedModel, he
         return selection
     gains = held_out.joint_gains_z(delivered, selection.fit.model)
     whole = held_out.block_gains(delivered, selection.fit.model).sum()
-    if gains.min() > -CLEARLY and (gains.max() > CLEARLY or whole > 0.0):
+    if gains.min() > CLEARLY_WORSE and (gains.max() > CLEARLY_BETTER or whole > 0.0):
         return selection
     return Selection(selection.nominal, selection.nominal, (), (*selection.rejected, *selection.choices))
 
