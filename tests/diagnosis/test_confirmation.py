@@ -15,7 +15,8 @@ from service.recording.recording import Array
     [
         (60.0, 3.0, 8.0, 7.0, 25.0, True),  # predicts better, and is there again
         (200.0, 3.4, 3.6, 1.2, -1.0, True),  # predicts so well that too little to estimate it anew does not matter
-        (-6.0, -0.7, 2.9, 2.1, -1.0, False),  # expected there, and less likely with it
+        (-6.0, -0.7, 2.9, 2.1, -1.0, True),  # a little less likely with it: that is chance in one case of twelve
+        (-9.0, -1.2, 2.9, 0.2, -3.7, False),  # expected there, and much less likely with it
         (5.0, 1.0, 6.0, 0.3, -12.0, False),  # should be there, and is not
         (-2.0, -0.5, 0.5, -0.2, -0.3, True),  # nothing to be seen: no objection
         (-9.0, -4.0, 0.5, -0.2, 1.0, False),  # nothing to be seen, and yet it spoils the prediction

@@ -36,9 +36,6 @@ SHOULD_BE_SEEN = 3.0
 """Standard errors at which the finding, if true, is expected there: below, estimated anew it says little; what it
 predicts still has to be better than what is predicted without it."""
 
-UNLIKE = -1.0
-"""Likeness below which what held-out recordings show is something else, however well it is predicted."""
-
 RIGHT = 1.1
 """Residual energy per row of a fit to the held-out recordings, up to which the model may be right: beyond, what
 predictions err by is no uncertainty of parameters."""
@@ -47,8 +44,9 @@ TELLS_NOTHING = 1.0
 """…and below which the held-out motion does not even do that."""
 
 LESS_LIKELY = -3.0
-"""Favour below which held-out recordings speak against a finding that they cannot show: what it changes of other
-parameters makes them twenty times less likely."""
+"""Logarithm of a likelihood ratio below which held-out recordings speak against a finding: with it they, or what they
+show of it, are twenty times less likely. What is there and should show with E standard errors falls below in
+Φ(-E/2 - 3/E) of all cases, one in 140 at most; below zero it would in one of four where E is 1.4."""
 
 PREDICTED = 4.0
 """Energy of a joint's residual on held-out motion, noise variances a row, up to which that motion is predicted."""
@@ -95,7 +93,7 @@ class Confirmation:
         if self.seen_z > max(PLAINLY_SEEN, SAME_SIZE * self.expected_z):
             return True
         if not cautious:
-            return self.favour > 0.0 and likeness(self.expected_z, self.seen_z) > UNLIKE
+            return min(self.favour, likeness(self.expected_z, self.seen_z)) > LESS_LIKELY
         seen = self.expected_z < SHOULD_BE_SEEN or self.seen_z > SEEN_AGAIN
         return seen and self.gain > 0.0 and self.gain_z > CLEARLY_BETTER
 
