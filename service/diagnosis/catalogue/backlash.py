@@ -23,6 +23,10 @@ GAPS = np.array([1e-4, 3e-4, 1e-3, 3e-3, 1e-2])
 BANDS = np.array([2.0, 1.0, 0.35])
 """Bands to which the load is smoothed, relative to the common one."""
 
+FARTHEST_FLOWN = 1.3
+"""Gap that is flown over, relative to b, beyond which no teeth are as far apart: on simulated arms it is 0.75 to
+0.9 of b, and 2 or more where something else is taken for play."""
+
 RESONANCES = np.array([0.7, 1.0, 1.5, 2.2])
 """Resonances of the link on springy teeth at its mean inertia, relative to the common band."""
 
@@ -33,9 +37,8 @@ DAMPING = 0.35
 """Damping ratio of teeth that touch. Where less is lost a link bounces on, but when it comes back hangs on everything
 that a recording does not show: on simulated arms more is explained by 0.35 than by the damping that they have."""
 
-SAME = 1.8
-"""Factor between the gap that is crossed and the one that is found, up to which they are the same: on simulated arms
-with play the first is 0.75 to 1.7 of the second, and 2 or more where something else is taken for play."""
+SAME = 1.6
+"""Factor between the gap that is crossed and the one that is found, up to which they are the same."""
 
 
 def place_between_teeth(load: Array, inertia: Array, gap: float, rate_hz: float) -> Array:
@@ -176,7 +179,7 @@ class Backlash(Deflection):
         shape : (2,) float64
             gap that is flown over [rad or m], band of the load [Hz]
         """
-        return bool(shape[0] < SAME * coefficients[0])
+        return bool(shape[0] <= FARTHEST_FLOWN * coefficients[0])
 
     def deflection(self, load: Array, inertia: Array, shape: Array, rate_hz: float) -> Array:
         """Place between the teeth.
