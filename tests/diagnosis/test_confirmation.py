@@ -15,8 +15,7 @@ from service.recording.recording import Array
     [
         (60.0, 3.0, 8.0, 7.0, 25.0, True),  # predicts better, and is there again
         (200.0, 3.4, 3.6, 1.2, -1.0, True),  # predicts so well that too little to estimate it anew does not matter
-        (-6.0, -0.7, 2.9, 2.1, -1.0, True),  # a little less likely with it: that is chance in one case of twelve
-        (-9.0, -1.2, 2.9, 0.2, -3.7, False),  # expected there, and much less likely with it
+        (-6.0, -0.7, 2.9, 2.1, -1.0, False),  # expected there, and less likely with it
         (5.0, 1.0, 6.0, 0.3, -12.0, False),  # should be there, and is not
         (-2.0, -0.5, 0.5, -0.2, -0.3, True),  # nothing to be seen: no objection
         (-9.0, -4.0, 0.5, -0.2, 1.0, False),  # nothing to be seen, and yet it spoils the prediction
@@ -33,6 +32,20 @@ def test_what_is_confirmed(
     gain: float, gain_z: float, expected_z: float, seen_z: float, favour: float, confirmed: bool
 ) -> None:
     assert Confirmation(gain, gain_z, expected_z, seen_z, favour).confirmed(cautious=False) is confirmed
+
+
+@pytest.mark.parametrize(("chance", "favour", "confirmed"), [
+    (0.5, -1.0, False),  # training hardly asks for it
+    (1e-2, -1.0, True),  # training does: that held-out motion is a little less likely with it is chance
+    (1e-2, -3.5, False),  # much less likely
+    (0.0, -3.5, False),  # whatever training says
+    (0.0, -2.5, True),
+])  # fmt: skip
+def test_the_more_training_says_the_clearer_held_out_motion_has_to_speak(
+    chance: float, favour: float, confirmed: bool
+) -> None:
+    seen = Confirmation(gain=-6.0, gain_z=-0.7, expected_z=2.9, seen_z=1.0, favour=favour)
+    assert seen.confirmed(cautious=False, chance=chance) is confirmed
 
 
 def test_where_noise_is_a_guess_more_is_asked() -> None:

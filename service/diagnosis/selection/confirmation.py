@@ -1,5 +1,7 @@
 """Whether a finding holds on motion that was not used: what it predicts there, and what it would be there."""
 
+import math
+import sys
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -43,10 +45,13 @@ predictions err by is no uncertainty of parameters."""
 TELLS_NOTHING = 1.0
 """…and below which the held-out motion does not even do that."""
 
+UNLIKE = -1.0
+"""Likeness below which what held-out recordings show is something else, however well it is predicted."""
+
 LESS_LIKELY = -3.0
-"""Logarithm of a likelihood ratio below which held-out recordings speak against a finding: with it they, or what they
-show of it, are twenty times less likely. What is there and should show with E standard errors falls below in
-Φ(-E/2 - 3/E) of all cases, one in 140 at most; below zero it would in one of four where E is 1.4."""
+"""Logarithm of a likelihood ratio below which held-out recordings speak against a finding, whatever training says: with
+it they, or what they show of it, are twenty times less likely. What is there and should show with E standard errors
+falls below in Φ(-E/2 - 3/E) of all cases, one in 140 at most; below zero it would in one of four where E is 1.4."""
 
 PREDICTED = 4.0
 """Energy of a joint's residual on held-out motion, noise variances a row, up to which that motion is predicted."""
@@ -76,13 +81,16 @@ class Confirmation:
     seen_z: float
     favour: float
 
-    def confirmed(self, *, cautious: bool) -> bool:
+    def confirmed(self, *, cautious: bool, chance: float = 1.0) -> bool:
         """Whether the finding is there on motion that it was not made from, and does not spoil the prediction.
 
         Parameters
         ----------
         cautious : bool
             whether the noise is not known from repetitions
+        chance : float
+            of the finding in training, relative to the chance that is allowed: the farther below, the more clearly
+            held-out recordings have to speak against it
         """
         if self.gain_z <= CLEARLY_WORSE:
             return False
@@ -93,7 +101,8 @@ class Confirmation:
         if self.seen_z > max(PLAINLY_SEEN, SAME_SIZE * self.expected_z):
             return True
         if not cautious:
-            return min(self.favour, likeness(self.expected_z, self.seen_z)) > LESS_LIKELY
+            least = max(LESS_LIKELY, math.log(max(chance, sys.float_info.min)))
+            return self.favour > min(least, 0.0) and likeness(self.expected_z, self.seen_z) > min(least, UNLIKE)
         seen = self.expected_z < SHOULD_BE_SEEN or self.seen_z > SEEN_AGAIN
         return seen and self.gain > 0.0 and self.gain_z > CLEARLY_BETTER
 

@@ -168,7 +168,7 @@ class Selector:
             choice = self._best(table, choices)
             if choice is None or choice.confirmation is None:
                 return choice
-            if choice.confirmation.confirmed(cautious=not self.pure_error):
+            if choice.confirmation.confirmed(cautious=not self.pure_error, chance=choice.p_value):
                 return with_rivals(choice, rejected[before:])
             rejected.append(choice)
             table.refuse(_chosen(choice), but=self._other_forms(table, choice.options[0]))
