@@ -79,11 +79,3 @@ def test_nothing_is_named_where_the_plain_model_predicts_better() -> None:
     found = told("kuka-lwr4")
     assert {finding.effect for finding in found.findings} <= {"unknown"}
     assert found.verdict != "consistent"
-
-
-@pytest.mark.slow
-def test_the_load_dependent_friction_of_the_double_pendulum_is_named() -> None:
-    found = told("double-pendulum")
-    # By the README's own fits 0.13 and 0.10 at shoulder and elbow.
-    assert {each.joint for each in found.findings if each.effect == "load_dependent_friction"} & {"shoulder", "elbow"}
-    assert 0.05 < values(found, "load_dependent_friction")["mu"] < 0.15
