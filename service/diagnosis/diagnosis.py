@@ -48,7 +48,7 @@ __all__ = ["Diagnosis", "Finding", "FitSizes", "diagnose"]
 
 Progress = Callable[[str], None]
 
-CLEARLY_BETTER = 2.0
+PREDICTED_BETTER = 2.0
 """Standard errors by which one of two models predicts a joint better; worse, it is by `CLEARLY_WORSE`: of many joints
 one is so by chance, at a size that nobody would see."""
 
@@ -130,7 +130,7 @@ def _unless_plainer_is_better(selection: Selection, delivered: ExtendedModel, he
         return selection
     gains = held_out.joint_gains_z(delivered, selection.fit.model)
     whole = held_out.block_gains(delivered, selection.fit.model).sum()
-    if gains.min() > CLEARLY_WORSE and (gains.max() > CLEARLY_BETTER or whole > 0.0):
+    if gains.min() > CLEARLY_WORSE and (gains.max() > PREDICTED_BETTER or whole > 0.0):
         return selection
     return Selection(selection.nominal, selection.nominal, (), (*selection.rejected, *selection.choices))
 

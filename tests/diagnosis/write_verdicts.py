@@ -73,7 +73,7 @@ def main() -> None:
 
 
 def _in_band(diagnosis: "Diagnosis") -> tuple[str, str]:
-    """Change of the held-out residual in the common band: of all joints, and of that which it is largest at."""
+    """Change of the held-out residual in the common band: of all joints together, and of the one that gains most."""
     (before, torque), (after, _) = (
         _left(diagnosis, each.model) for each in (diagnosis.selection.nominal, diagnosis.selection.fit)
     )
