@@ -146,6 +146,16 @@ def test_python_code_gives_the_torque_of_the_effects() -> None:
         assert effect_torque(1, q, v, load) == 0.0
 
 
+def test_code_gives_the_arms_own_torque_where_the_recorded_one_is_scaled() -> None:
+    diagnosis, added = with_all({"cogging", "torque_gain_error"})
+    teeth, scale = sorted(added, key=lambda term: term.effect.id)
+    space: dict[str, Any] = {}
+    exec(code(diagnosis, ".py"), space)
+    effect_torque = next(value for name, value in space.items() if name.endswith("_effect_torque"))
+    for q, v, load, torque in zip(*expected(diagnosis, [teeth]), strict=True):
+        assert effect_torque(2, q, v, load) * (1.0 + scale.coefficients[0]) == pytest.approx(torque, rel=1e-9)
+
+
 @pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
 def test_c_code_compiles_without_warnings_and_gives_the_same(tmp_path: Path) -> None:
     diagnosis, added = with_all({*EXPRESSIONS, "time_delay"})

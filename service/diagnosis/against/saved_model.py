@@ -8,6 +8,7 @@ from service.diagnosis.against.given_model import CLEAR, Given, beside, compared
 from service.diagnosis.findings.diagnosed import Diagnosis, ParameterDifference
 from service.diagnosis.findings.finding import sizes
 from service.diagnosis.model.extended import ExtendedModel
+from service.diagnosis.model.torque_scale import on_the_arm
 
 TERMS = ("stiction", "stribeck", "viscous", "offset")
 
@@ -34,7 +35,7 @@ def against_saved(diagnosis: Diagnosis, saved: ExtendedModel) -> Diagnosis:
     for finding in diagnosis.findings:
         if finding.place not in had:
             continue
-        own, given = finding.terms[0], had[finding.place]
+        own, given = on_the_arm(diagnosis.selection.fit.model, finding.terms[0]), on_the_arm(saved, had[finding.place])
         std = np.sqrt(np.maximum(np.diag(finding.covariances[0]), 0.0))
         for place, coefficient in enumerate(own.effect.coefficients[: len(given.coefficients)]):
             differences.append(

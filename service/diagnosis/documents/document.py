@@ -25,6 +25,7 @@ from service.diagnosis.findings.finding import Finding
 from service.diagnosis.findings.location import JointMismatch, Place
 from service.diagnosis.findings.stand_in import DOUBTED
 from service.diagnosis.findings.verdict import Verdict
+from service.diagnosis.model.torque_scale import on_the_arm
 from service.diagnosis.next_experiment import PlannedExperiment
 
 SHIFTS_FROM = 3.0
@@ -189,7 +190,8 @@ def _quantities(finding: Finding, diagnosis: Diagnosis) -> list[Quantity]:
     """Parameters of all terms; those after the first are numbered."""
     found: list[Quantity] = []
     for number, (term, covariance) in enumerate(zip(finding.terms, finding.covariances, strict=True), start=1):
-        own = term.effect.quantities(diagnosis.setting, term.coefficients, term.shape, covariance)
+        sized = on_the_arm(diagnosis.selection.fit.model, term)
+        own = sized.effect.quantities(diagnosis.setting, sized.coefficients, sized.shape, covariance)
         suffix = "" if number == 1 else f"_{number}"
         found += [Quantity(f"{each.name}{suffix}", each.value, each.std, each.unit) for each in own]
     return found

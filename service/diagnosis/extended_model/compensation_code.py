@@ -9,6 +9,7 @@ from datetime import datetime
 
 from service.diagnosis.findings.diagnosed import Diagnosis
 from service.diagnosis.model.term import Term
+from service.diagnosis.model.torque_scale import on_the_arm
 from service.errors import ExportError
 from service.identification.compensation import (
     CompensationModel,
@@ -98,6 +99,8 @@ def _friction(diagnosis: Diagnosis, joint: int) -> JointFriction:
 
 
 def _expression(term: Term, diagnosis: Diagnosis) -> str:
+    """A term's torque, in the arm's own like the friction beside it."""
+    term = on_the_arm(diagnosis.selection.fit.model, term)
     joint = term.effect.joint or 0
     values = {f"c{place}": repr(float(value)) for place, value in enumerate(term.coefficients)}
     values |= {f"s{place}": repr(float(value)) for place, value in enumerate(term.shape)}

@@ -18,6 +18,7 @@ from service.diagnosis.catalogue.torque_sensing import Clipping
 from service.diagnosis.extended_model.consistent_links import consistent_links
 from service.diagnosis.findings.diagnosed import Diagnosis
 from service.diagnosis.model.term import Term
+from service.diagnosis.model.torque_scale import on_the_arm
 from service.robot import LinkInertia
 
 Entry = dict[str, Any]
@@ -99,7 +100,8 @@ def _link(link: LinkInertia) -> Mapping[str, Any]:
 
 
 def _entries(term: Term, diagnosis: Diagnosis) -> list[Entry]:
-    """A term as entries of a scenario; none where there is no such entry."""
+    """A term as entries of a scenario, in the arm's own torque; none where there is no such entry."""
+    term = on_the_arm(diagnosis.selection.fit.model, term)
     effect = term.effect
     make = ENTRIES.get(effect.id)
     shape = [float(value) for value in term.shape]

@@ -12,6 +12,7 @@ from service.diagnosis.fitting.lack_of_fit import LackOfFit
 from service.diagnosis.model.extended import ExtendedModel
 from service.diagnosis.model.residual import raw_squares
 from service.diagnosis.model.term import Term
+from service.diagnosis.model.torque_scale import covariance_on_the_arm
 from service.diagnosis.observations.observations import Observations
 from service.diagnosis.screening.screen import Screen
 from service.diagnosis.selection.choice import Option, Selection
@@ -43,7 +44,7 @@ class Finding:
     terms : tuple of Term
         as in the final model
     covariances : tuple of (k, k) float64
-        of each term's coefficients and shapes
+        of each term's coefficients and shapes, in the arm's own torque (`model.torque_scale`)
     gain : float
         what they take off the residual's energy beside all other findings [noise variances]
     probability : float
@@ -136,7 +137,6 @@ def selected_findings(
     own = standings(selection.nominal, fit, all_without, fitter, inflation)
     found = []
     for places, without, standing in zip(groups.values(), all_without, own, strict=True):
-        slices = fit.model.term_places()
         terms = tuple(fit.model.terms[place] for place in places)
         choices = [selection.choices[place] for place in places]
         chosen, *rivals = choices[0].options
@@ -146,7 +146,8 @@ def selected_findings(
             Finding(
                 terms=terms,
                 covariances=tuple(
-                    _spread_out(t, covariance[slices[p], slices[p]]) for t, p in zip(terms, places, strict=True)
+                    _spread_out(term, covariance_on_the_arm(fit.model, place, covariance))
+                    for term, place in zip(terms, places, strict=True)
                 ),
                 gain=without.energy - fit.energy,
                 probability=standing.certainty
