@@ -145,18 +145,9 @@ def selected_findings(
         found.append(
             Finding(
                 terms=terms,
-                covariances=tuple(
-                    _spread_out(term, covariance_on_the_arm(fit.model, place, covariance))
-                    for term, place in zip(terms, places, strict=True)
-                ),
+                covariances=tuple(_covariance_of(fit.model, place, covariance) for place in places),
                 gain=without.energy - fit.energy,
-                probability=standing.certainty
-                * as_law
-                * probability_among(
-                    chosen.score,
-                    [each.score for each in alternatives],
-                    [doubt(chosen, each, inflation) for each in alternatives],
-                ),
+                probability=standing.certainty * as_law * _share(chosen, alternatives, inflation),
                 before=sizes(without.model, fitter, held_out),
                 after=after,
                 alternatives=alternatives,
@@ -166,6 +157,12 @@ def selected_findings(
             )
         )
     return in_order(found)
+
+
+def _share(chosen: Option, alternatives: Sequence[Option], inflation: float) -> float:
+    """Chance that it is the chosen one among those that explain nearly as much."""
+    doubts = [doubt(chosen, each, inflation) for each in alternatives]
+    return probability_among(chosen.score, [each.score for each in alternatives], doubts)
 
 
 def _likely(options: Sequence[Option], without: Fit, screen: Screen, held_out: HeldOut | None) -> tuple[Option, ...]:
@@ -208,10 +205,11 @@ def without_nominal(fit: Fit, place: int, fitter: Fitter) -> Fit:
     return fitter.fit(replace(fit.model, parameters=parameters, held=(*fit.model.held, place)))
 
 
-def _spread_out(term: Term, covariance: Array) -> Array:
-    """Covariance of coefficients and all shapes; shapes that were only chosen have none."""
+def _covariance_of(model: ExtendedModel, place: int, covariance: Array) -> Array:
+    """Covariance of a term's coefficients and all its shapes; shapes that were only chosen have none."""
+    term = model.terms[place]
     count = len(term.coefficients)
     places = [*range(count), *(count + place for place in term.free_shapes)]
     whole = np.zeros((count + len(term.shape), count + len(term.shape)))
-    whole[np.ix_(places, places)] = covariance
+    whole[np.ix_(places, places)] = covariance_on_the_arm(model, place, covariance)
     return whole
