@@ -25,7 +25,6 @@ Array = NDArray[np.float64]
 
 BAND_HZ = 20.0
 EDGE_S = 0.3
-_FILTER = signal.butter(4, BAND_HZ, fs=FINE * RATE_HZ, output="sos")
 
 
 def strength(
@@ -47,7 +46,7 @@ def foreseen_strength(robot: Robot, entry: Entry, passages: Sequence[Passage], t
             return None
         columns, missing = _rows(robot, [], passage)
         edge = round(EDGE_S * RATE_HZ)
-        parts.append((columns, missing + _banded(torque)[::FINE][edge:-edge].T))
+        parts.append((columns, missing + _banded(torque, FINE * RATE_HZ)[::FINE][edge:-edge].T))
     return _shown(parts, torque_std)[0]
 
 
@@ -77,7 +76,7 @@ def _rows(robot: Robot, entries: Sequence[Entry], passage: Passage) -> tuple[Arr
         nominal += static_friction_torque(velocity, robot.model.friction, [j.friction_shape for j in robot.joints])
     # The sensors' effects exist at the recorded rate only: what they change is added to the true torque there.
     changed = recorded - passage.recorded[1]
-    missing = _banded(passage.torque - nominal)[::FINE] + changed
+    missing = _banded(passage.torque - nominal, rate)[::FINE] + _banded(changed, RATE_HZ)
     base = base_parameters(robot)
     regressor = torque_regressor(robot, position, velocity, acceleration, columns=np.asarray(base.independent_columns))
     count, n = regressor.shape[0], robot.joint_count
@@ -90,10 +89,12 @@ def _rows(robot: Robot, entries: Sequence[Entry], passage: Passage) -> tuple[Arr
             + [constant * smooth_sign_slope(v, constant) for constant in (k_v, delta)],
             axis=1,
         )
-    columns = _banded(np.concatenate([regressor, own], axis=2))[::FINE]
+    columns = _banded(np.concatenate([regressor, own], axis=2), rate)[::FINE]
     edge = round(EDGE_S * RATE_HZ)
     return columns[edge:-edge].transpose(1, 0, 2), missing[edge:-edge].T
 
 
-def _banded(values: Array) -> Array:
-    return np.asarray(signal.sosfiltfilt(_FILTER, values, axis=0), dtype=np.float64)
+def _banded(values: Array, rate_hz: float) -> Array:
+    """What lies within the band."""
+    band = signal.butter(4, BAND_HZ, fs=rate_hz, output="sos")
+    return np.asarray(signal.sosfiltfilt(band, values, axis=0), dtype=np.float64)

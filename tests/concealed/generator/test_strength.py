@@ -1,5 +1,6 @@
 """The measure of an effect's strength: nothing where nothing is concealed, in proportion to what is."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -65,6 +66,16 @@ def test_what_the_nominal_model_has_itself_does_not_show() -> None:
     found = foreseen_strength(arm_named("paper"), entry, [passage("paper")], NOISE_STD["paper"])
     assert found is not None
     assert found < 0.2
+
+
+def test_what_a_sensor_changes_counts_in_the_band_alone() -> None:
+    robot, noise, made = arm_named("paper"), NOISE_STD["paper"], passage("paper")
+    late = [{"effect": "time_delay", "joint": 2, "delay": 0.004}]
+    time = np.arange(len(made.torque)) / (FINE * RATE_HZ)
+    humming = replace(made, torque=made.torque + 10.0 * np.array(noise) * np.sin(2.0 * np.pi * 60.0 * time)[:, None])
+    whole, by_joint = strength(robot, late, [humming], noise)
+    assert whole == pytest.approx(strength(robot, late, [made], noise)[0], rel=0.02)
+    assert by_joint[1] > 0.9 * whole
 
 
 def test_the_robot_file_of_a_trial_says_nothing_of_the_truth() -> None:
