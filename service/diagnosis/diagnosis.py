@@ -103,27 +103,35 @@ def diagnose(
     rows, pure_error = _observed(observations, model, effects)
     confirming = _held_out(held_out, robot, rows, identification, cutoff)
     progress("compare effects")
-    rotors = [
-        Term(RotorInertia(j), np.zeros(0), np.array([value])) for j, value in identified_rotors(identification).items()
-    ]
     fitter = Fitter(rows)
     model = with_fitting_slopes(model, fitter, open_slopes(identification), setting.speed)
     model = with_fitting_stribeck(model, fitter, open_stribeck(identification), setting.speed)
     selector = Selector(Screen(rows, effects), fitter, confirming, pure_error=pure_error)
+    selection, selector = _selected(selector, model, identification, setting, progress)
+    progress("weigh the evidence")
+    found = _concluded(identification, setting, selector, selection, cutoff)
+    return with_plain_terms(found, undeclared_offsets(found))
+
+
+def _selected(
+    selector: Selector, model: ExtendedModel, identification: Identification, setting: Setting, progress: Progress
+) -> tuple[Selection, Selector]:
+    """All that is missing, and the selector whose rows count as much as they should beside it."""
+    rotors = [
+        Term(RotorInertia(j), np.zeros(0), np.array([value])) for j, value in identified_rotors(identification).items()
+    ]
     selection = selector.select(model, rotors, progress)
     guided = guided_by(selection.fit.model, selector)
     if guided is not None:
         selector = guided
         selection = selector.select(model, selection.fit.model.terms, progress)
     selection = looked_farther(selection, selector, setting, progress)
-    if states_friction(robot):
+    if states_friction(identification.robot):
         selection = with_better_than_constants(selection, selector)
     selection = without_errors_of_larger_ones(selection, selector.fitter, selector.admission)
     if selector.held_out is not None and identification.constrained:
         selection = _unless_plainer_is_better(selection, delivered_model(identification), selector.held_out)
-    progress("weigh the evidence")
-    found = _concluded(identification, setting, selector, selection, cutoff)
-    return with_plain_terms(found, undeclared_offsets(found))
+    return selection, selector
 
 
 def _unless_plainer_is_better(selection: Selection, delivered: ExtendedModel, held_out: HeldOut) -> Selection:
