@@ -5,7 +5,6 @@ Stiff teeth stop the link; on springy ones it swings, at frequencies that a diag
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -14,7 +13,7 @@ from scipy.interpolate import CubicSpline
 
 from service.diagnosis.catalogue.deflection import BAND, Deflection
 from service.diagnosis.catalogue.effect import Effect, mesh
-from service.diagnosis.catalogue.parameters import Coefficient, Quantity, Shape
+from service.diagnosis.catalogue.parameters import Coefficient, Shape
 from service.diagnosis.catalogue.setting import Setting
 from service.recording.recording import Array
 
@@ -24,9 +23,9 @@ GAPS = np.array([1e-4, 3e-4, 1e-3, 3e-3, 1e-2])
 BANDS = np.array([2.0, 1.0, 0.35])
 """Bands to which the load is smoothed, relative to the common one."""
 
-FARTHEST_FLOWN = 1.6
+FARTHEST_FLOWN = 1.3
 """Gap that is flown over, relative to b, beyond which no teeth are as far apart: on simulated arms it is 0.75 to
-1.3 of b, and 2 or more where something else is taken for play."""
+0.9 of b, and 2 or more where something else is taken for play."""
 
 RESONANCES = np.array([0.7, 1.0, 1.5, 2.2])
 """Resonances of the link on springy teeth at its mean inertia, relative to the common band."""
@@ -38,10 +37,8 @@ DAMPING = 0.35
 """Damping ratio of teeth that touch. Where less is lost a link bounces on, but when it comes back hangs on everything
 that a recording does not show: on simulated arms more is explained by 0.35 than by the damping that they have."""
 
-LEAST_MET, MOST_MET = 0.4, 1.6
-"""Gap by which the link is found to move, relative to the one that it crosses, as far as one gap may be both. No model
-knows each bounce: those that come at another instant than it says add nothing to what is found, on simulated arms up to
-six tenths of it."""
+SAME = 1.6
+"""Factor between the gap that is crossed and the one that is found, up to which they are the same."""
 
 
 def place_between_teeth(load: Array, inertia: Array, gap: float, rate_hz: float) -> Array:
@@ -172,29 +169,6 @@ class Backlash(Deflection):
         """
         return SpringyTeeth.forms(setting)
 
-    def quantities(
-        self, setting: Setting, coefficients: Array, shape: Array, covariance: Array
-    ) -> tuple[Quantity, ...]:
-        """b; where the link crosses more than it is found to move by, what it crosses.
-
-        A bounce at another instant than the model's adds nothing to how far the link moves; of how long it flies they
-        still tell. Half the difference counts as an error that the covariance does not know.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        coefficients : (1,) float64
-            b [rad or m]
-        shape : (k,) float64
-            gap that is crossed [rad or m], and what else shapes the column
-        covariance : (1 + k, 1 + k) float64
-            of both
-        """
-        (found,) = super().quantities(setting, coefficients, shape, covariance)
-        apart = max(float(shape[0]) - found.value, 0.0)
-        return (replace(found, value=found.value + apart, std=float(np.hypot(found.std, 0.5 * apart))),)
-
     def is_consistent(self, coefficients: Array, shape: Array) -> bool:
         """Whether the gap that the link flies over is the one by which it moves.
 
@@ -271,7 +245,7 @@ class SpringyTeeth(Backlash):
         shape : (3,) float64
             gap that is crossed [rad or m], band of the load [Hz], compliance of the teeth [rad/Nm or m/N]
         """
-        return bool(LEAST_MET < coefficients[0] / shape[0] < MOST_MET)
+        return bool(1.0 / SAME < coefficients[0] / shape[0] < SAME)
 
     def deflection(self, load: Array, inertia: Array, shape: Array, rate_hz: float) -> Array:
         """Place between and on the teeth; where no inertia is known that could swing, as on stiff ones.

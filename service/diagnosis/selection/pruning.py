@@ -8,7 +8,7 @@ import numpy as np
 from service.diagnosis.fitting.fit import Fit, Fitter
 from service.diagnosis.model.extended import with_terms
 from service.diagnosis.selection.admission import Admission
-from service.diagnosis.selection.choice import Choice, Selection
+from service.diagnosis.selection.choice import Choice
 from service.diagnosis.selection.proxies import proxies
 from service.diagnosis.selection.shape_error import HARDLY, groups_of, standings, without_group
 
@@ -64,30 +64,30 @@ def without_proxies(nominal: Fit, fit: Fit, choices: list[Choice], fitter: Fitte
     return without_superfluous(*_without(dropped, fit, choices, fitter), fitter, admission)
 
 
-def without_errors_of_larger_ones(selection: Selection, fitter: Fitter, admission: Admission) -> Selection:
+def without_errors_of_larger_ones(
+    nominal: Fit, fit: Fit, choices: list[Choice], fitter: Fitter, admission: Admission
+) -> Pruned:
     """Drop what is hardly more than an error of the formula of a larger effect at the same joint.
-
-    Last of all: as long as others are looked for, what such an error explains must not be there for them to explain.
 
     Parameters
     ----------
-    selection : Selection
-        all that was selected
+    nominal, fit : Fit
+        models without and with all choices
+    choices : list of Choice
+        one a term
     fitter : Fitter
         of the training recordings
     admission : Admission
         what was asked of each
     """
-    nominal, fit = selection.nominal, selection.fit
     groups = list(groups_of(fit.model).values())
     if len(groups) < 2:
-        return selection
+        return fit, choices
     without = [without_group(fit, places, fitter) for places in groups]
     found = standings(nominal, fit, without, fitter, admission.inflation(fit))
     pairs = zip(groups, found, strict=True)
     dropped = [place for places, standing in pairs if standing.certainty < HARDLY for place in places]
-    fit, choices = _without(dropped, fit, list(selection.choices), fitter)
-    return replace(selection, fit=fit, choices=tuple(choices))
+    return _without(dropped, fit, choices, fitter)
 
 
 def _without(dropped: Sequence[int], fit: Fit, choices: list[Choice], fitter: Fitter) -> Pruned:
