@@ -22,7 +22,9 @@ ATTEMPTS = 3
 PATIENCE_S = 0.02
 """How much longer a single servo is waited for there [s]."""
 
-_LATEST_ANSWER_NS = 100_000_000
+_LATEST_ANSWER_NS = 500_000_000
+"""Answers have come 133 ms late where a machine stood still; a control loop gives an arm up long before this."""
+
 _AFTERTHOUGHT_NS = 2_000_000
 _STATUS_BYTES = 11
 _PING_ANSWER_BYTES = 14

@@ -18,7 +18,7 @@ from sim_backend.dynamixel_bus.framing import status_frame
 BLOCK = find_model(1020).state_block
 SERVOS = (1, 2, 3)
 OLD, NEW = b"old state.", b"new state."
-LATEST_ANSWER_MS = 100
+LATEST_ANSWER_MS = 500
 
 
 class Line:
@@ -80,6 +80,18 @@ def test_late_answers_have_another_length() -> None:
     assert ask(bus) == dict.fromkeys(SERVOS, NEW)
 
 
+def test_an_answer_from_long_ago_is_not_believed_where_every_length_was_missed(monkeypatch: pytest.MonkeyPatch) -> None:
+    now_ms = 1000
+    monkeypatch.setattr("drivers.dynamixel.bus.time.monotonic_ns", lambda: now_ms * 1_000_000)
+    line = Line()
+    bus = ServoBus(line)  # pyright: ignore[reportArgumentType]
+    for _ in range(BYTES_BEFORE_STATE + 1):
+        assert ask(bus) == {}
+        now_ms += 35
+    line.coming.extend(status_frame(SERVOS[1], 0, bytes(surplus) + OLD) for surplus in range(BYTES_BEFORE_STATE + 1))
+    assert ask(bus) == {}, "one of them has the length that is asked for, and was asked for 105 ms ago or more"
+
+
 def test_servos_that_come_back_are_believed_once_nothing_can_be_late(monkeypatch: pytest.MonkeyPatch) -> None:
     now_ms = 1000
     monkeypatch.setattr("drivers.dynamixel.bus.time.monotonic_ns", lambda: now_ms * 1_000_000)
@@ -90,7 +102,7 @@ def test_servos_that_come_back_are_believed_once_nothing_can_be_late(monkeypatch
         now_ms += 5
     line.answers = NEW
     believed_ms = []
-    for _ in range(40):
+    for _ in range(2 * LATEST_ANSWER_MS // 5):
         if ask(bus):
             believed_ms.append(now_ms)
         now_ms += 5
