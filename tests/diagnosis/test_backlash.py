@@ -8,8 +8,16 @@ from scipy.integrate import solve_ivp
 
 from concealed.generator.concealment import Concealed
 from concealed.generator.trial import recorded_trial
+from diagnosis.test_effect_columns import setting
 from service.diagnosis import diagnose, document
-from service.diagnosis.catalogue.backlash import DAMPING, SpringyTeeth, place_between_springs, place_between_teeth
+from service.diagnosis.catalogue.backlash import (
+    DAMPING,
+    Backlash,
+    SpringyTeeth,
+    place_between_springs,
+    place_between_teeth,
+)
+from service.diagnosis.catalogue.deflection import FIRST_ORDER
 
 RATE = 1000.0
 TIME = np.arange(4000) / RATE
@@ -111,6 +119,32 @@ def test_springy_teeth_hold_it_whatever_it_weighs_on_its_way(seed: int, gap: flo
         np.testing.assert_allclose(place_between_springs(-load, inertia, gap, compliance, 100.0), -place, rtol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("form", "crossed", "moved", "is_play"),
+    [
+        (Backlash, [1.3e-3, 10.0], 1e-3, True),
+        (Backlash, [2.0e-3, 10.0], 1e-3, False),
+        (SpringyTeeth, [1e-3, 10.0, 1e-4], 0.7e-3, True),
+        (SpringyTeeth, [1e-3, 10.0, 1e-4], 0.5e-3, False),
+        (SpringyTeeth, [1e-3, 10.0, 1e-4], 1.7e-3, False),
+    ],
+)
+def test_bounces_that_come_at_other_instants_take_some_of_the_gap_and_not_most(
+    form: type[Backlash], crossed: list[float], moved: float, is_play: bool
+) -> None:
+    assert form(0).is_consistent(np.array([moved]), np.array(crossed)) is is_play
+
+
+@pytest.mark.parametrize(("crossed", "moved", "told"), [(1.2e-3, 0.8e-3, 1.2e-3), (0.8e-3, 1.0e-3, 1.0e-3)])
+def test_the_gap_is_what_the_link_crosses_where_it_seems_to_move_by_less(
+    crossed: float, moved: float, told: float
+) -> None:
+    covariance = np.diag([1e-10, 0.0, 0.0])
+    (gap,) = Backlash(0).quantities(setting(), np.array([moved]), np.array([crossed, 10.0]), covariance)
+    assert gap.value == pytest.approx(told)
+    assert gap.std == pytest.approx(np.hypot(np.hypot(1e-5, FIRST_ORDER * moved), 0.5 * (told - moved)))
+
+
 @pytest.mark.slow
 def test_play_between_springy_teeth_is_named() -> None:
     """0.88 mrad, teeth of 1e4 Nm/rad: on which the link swings at 15 Hz: stiff teeth explain less than half."""
@@ -119,3 +153,14 @@ def test_play_between_springy_teeth_is_named() -> None:
     found = document(diagnose(trial.robot, trial.train, trial.held_out)).findings
     assert [(each.effect, each.joint) for each in found] == [("backlash", "joint2")]
     assert found[0].parameters[0].value == pytest.approx(0.88e-3, rel=0.2)
+
+
+@pytest.mark.slow
+def test_play_whose_bounces_no_model_foresees_is_named_and_its_gap_told() -> None:
+    """36 mrad at the wrist of seven joints: by three quarters of it the link moves as foreseen."""
+    play = {"effect": "backlash", "joint": 5, "gap": 0.0356, "contact_stiffness": 1e4, "rotor_inertia": 0.004}
+    trial = recorded_trial("seven", Concealed((), (play,)), motion_seed=5602, seed=14000008)
+    found = document(diagnose(trial.robot, trial.train, trial.held_out)).findings
+    assert [(each.effect, each.joint) for each in found] == [("backlash", "joint5")]
+    (gap,) = found[0].parameters
+    assert abs(gap.value - 0.0356) < 2.0 * gap.std < 0.5 * gap.value

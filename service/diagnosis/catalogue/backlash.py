@@ -5,6 +5,7 @@ Stiff teeth stop the link; on springy ones it swings, at frequencies that a diag
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -13,7 +14,7 @@ from scipy.interpolate import CubicSpline
 
 from service.diagnosis.catalogue.deflection import BAND, Deflection
 from service.diagnosis.catalogue.effect import Effect, mesh
-from service.diagnosis.catalogue.parameters import Coefficient, Shape
+from service.diagnosis.catalogue.parameters import Coefficient, Quantity, Shape
 from service.diagnosis.catalogue.setting import Setting
 from service.recording.recording import Array
 
@@ -23,9 +24,9 @@ GAPS = np.array([1e-4, 3e-4, 1e-3, 3e-3, 1e-2])
 BANDS = np.array([2.0, 1.0, 0.35])
 """Bands to which the load is smoothed, relative to the common one."""
 
-FARTHEST_FLOWN = 1.3
+FARTHEST_FLOWN = 1.6
 """Gap that is flown over, relative to b, beyond which no teeth are as far apart: on simulated arms it is 0.75 to
-0.9 of b, and 2 or more where something else is taken for play."""
+1.3 of b, and 2 or more where something else is taken for play."""
 
 RESONANCES = np.array([0.7, 1.0, 1.5, 2.2])
 """Resonances of the link on springy teeth at its mean inertia, relative to the common band."""
@@ -168,6 +169,29 @@ class Backlash(Deflection):
             the arm
         """
         return SpringyTeeth.forms(setting)
+
+    def quantities(
+        self, setting: Setting, coefficients: Array, shape: Array, covariance: Array
+    ) -> tuple[Quantity, ...]:
+        """b; where the link crosses more than it is found to move by, what it crosses.
+
+        A bounce at another instant than the model's adds nothing to how far the link moves; of how long it flies they
+        still tell. Half the difference counts as an error that the covariance does not know.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        coefficients : (1,) float64
+            b [rad or m]
+        shape : (k,) float64
+            gap that is crossed [rad or m], and what else shapes the column
+        covariance : (1 + k, 1 + k) float64
+            of both
+        """
+        (found,) = super().quantities(setting, coefficients, shape, covariance)
+        apart = max(float(shape[0]) - found.value, 0.0)
+        return (replace(found, value=found.value + apart, std=float(np.hypot(found.std, 0.5 * apart))),)
 
     def is_consistent(self, coefficients: Array, shape: Array) -> bool:
         """Whether the gap that the link flies over is the one by which it moves.
