@@ -63,9 +63,12 @@ class Quantity:
         its standard error
     unit : str
         SI
+    period : float
+        after which it is the same again; infinite for most
     """
 
     name: str
     value: float
     std: float
     unit: str
+    period: float = np.inf

@@ -209,7 +209,13 @@ class _Periodic(Effect):
                 float(np.sqrt(of_amplitude @ own @ of_amplitude)),
                 self.unit(self.coefficients[0].unit, setting),
             ),
-            Quantity("phase", float(np.arctan2(cosine, sine)), float(np.sqrt(of_phase @ own @ of_phase)), "rad"),
+            Quantity(
+                "phase",
+                float(np.arctan2(cosine, sine)),
+                float(np.sqrt(of_phase @ own @ of_phase)),
+                "rad",
+                period=2.0 * np.pi,
+            ),
         )
 
     def _waves(self, signals: Signals, shapes: Array) -> Array:

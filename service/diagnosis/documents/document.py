@@ -23,10 +23,13 @@ from service.diagnosis.documents.result import (
 from service.diagnosis.findings.diagnosed import Diagnosis
 from service.diagnosis.findings.finding import Finding
 from service.diagnosis.findings.location import JointMismatch, Place
+from service.diagnosis.findings.order_spread import spread
 from service.diagnosis.findings.stand_in import DOUBTED
 from service.diagnosis.findings.verdict import Verdict
+from service.diagnosis.model.term import Term
 from service.diagnosis.model.torque_scale import on_the_arm
 from service.diagnosis.next_experiment import PlannedExperiment
+from service.recording.recording import Array
 
 SHIFTS_FROM = 3.0
 """Standard errors from which a parameter's shift is told."""
@@ -191,10 +194,16 @@ def _quantities(finding: Finding, diagnosis: Diagnosis) -> list[Quantity]:
     found: list[Quantity] = []
     for number, (term, covariance) in enumerate(zip(finding.terms, finding.covariances, strict=True), start=1):
         sized = on_the_arm(diagnosis.selection.fit.model, term)
-        own = sized.effect.quantities(diagnosis.setting, sized.coefficients, sized.shape, covariance)
+        own = _told(sized, diagnosis, covariance)
+        own = spread(own, [(each.chance, _told(each.term, diagnosis, covariance)) for each in finding.elsewhere])
         suffix = "" if number == 1 else f"_{number}"
         found += [Quantity(f"{each.name}{suffix}", each.value, each.std, each.unit) for each in own]
     return found
+
+
+def _told(term: Term, diagnosis: Diagnosis, covariance: Array) -> tuple[Quantity, ...]:
+    """The parameters of one term."""
+    return term.effect.quantities(diagnosis.setting, term.coefficients, term.shape, covariance)
 
 
 def _statement(finding: Finding, quantities: Sequence[Quantity], others: Sequence[str], diagnosis: Diagnosis) -> str:

@@ -6,13 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from service.diagnosis.catalogue import Effect, TimeLocalEffect
+from service.diagnosis.findings.order_spread import Elsewhere, orders_elsewhere
 from service.diagnosis.findings.stand_in import certainty_as_law
 from service.diagnosis.fitting.fit import Fit, Fitter
 from service.diagnosis.fitting.lack_of_fit import LackOfFit
 from service.diagnosis.model.extended import ExtendedModel
 from service.diagnosis.model.residual import raw_squares
 from service.diagnosis.model.term import Term
-from service.diagnosis.model.torque_scale import covariance_on_the_arm
+from service.diagnosis.model.torque_scale import covariance_on_the_arm, scaled_back
 from service.diagnosis.observations.observations import Observations
 from service.diagnosis.screening.screen import Screen
 from service.diagnosis.selection.choice import Option, Selection
@@ -62,6 +63,8 @@ class Finding:
         the effect that leads at its joint, of whose curve it may be an error
     as_law : float
         chance that it is a law of the catalogue, and does not stand in for another one
+    elsewhere : tuple of Elsewhere
+        other orders that explain nearly as much, in the arm's own torque; of a finding of one wave
     """
 
     terms: tuple[Term, ...]
@@ -75,6 +78,7 @@ class Finding:
     in_model: bool = True
     behind: Effect | None = None
     as_law: float = 1.0
+    elsewhere: tuple[Elsewhere, ...] = ()
 
     @property
     def place(self) -> tuple[str, int | None]:
@@ -142,10 +146,11 @@ def selected_findings(
         chosen, *rivals = choices[0].options
         alternatives = _likely(rivals, without, screen, held_out)
         as_law = certainty_as_law(terms[0].effect, selection.nominal, fit, without, left)
+        covariances = tuple(_covariance_of(fit.model, place, covariance) for place in places)
         found.append(
             Finding(
                 terms=terms,
-                covariances=tuple(_covariance_of(fit.model, place, covariance) for place in places),
+                covariances=covariances,
                 gain=without.energy - fit.energy,
                 probability=standing.certainty * as_law * _share(chosen, alternatives, inflation),
                 before=sizes(without.model, fitter, held_out),
@@ -154,9 +159,26 @@ def selected_findings(
                 confirmed=any(choice.confirmation is not None for choice in choices) or None,
                 behind=standing.behind,
                 as_law=as_law,
+                elsewhere=_elsewhere(terms, covariances, fit.model, without, screen, inflation),
             )
         )
     return in_order(found)
+
+
+def _elsewhere(
+    terms: Sequence[Term],
+    covariances: Sequence[Array],
+    model: ExtendedModel,
+    without: Fit,
+    screen: Screen,
+    inflation: float,
+) -> tuple[Elsewhere, ...]:
+    """Other orders of a finding of one wave, in the arm's own torque."""
+    if len(terms) > 1:
+        return ()
+    error = float(np.sqrt(max(covariances[0][-1, -1], 0.0)))
+    found = orders_elsewhere(terms[0], error, without, screen, inflation)
+    return tuple(replace(each, term=scaled_back(model, each.term)) for each in found)
 
 
 def _share(chosen: Option, alternatives: Sequence[Option], inflation: float) -> float:

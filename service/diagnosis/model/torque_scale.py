@@ -28,7 +28,20 @@ def on_the_arm(model: ExtendedModel, term: Term) -> Term:
     term : Term
         the effect
     """
-    if not any(term is each for each in model.terms) or not _is_scaled(model, term):
+    return scaled_back(model, term) if any(term is each for each in model.terms) else term
+
+
+def scaled_back(model: ExtendedModel, term: Term) -> Term:
+    """A term with the coefficients that it has in the arm's own torque, at whichever shape.
+
+    Parameters
+    ----------
+    model : ExtendedModel
+        the fitted model, which has the term's effect
+    term : Term
+        the effect, in the recorded torque
+    """
+    if not _is_scaled(model, term):
         return term
     return replace(term, coefficients=term.coefficients / model.factor(term.effect.joint or 0))
 
