@@ -11,7 +11,7 @@ from service.acquisition import RunOptions, RunState, make_backend, run_trajecto
 from service.diagnosis import Diagnosis, diagnose, document
 from service.diagnosis.next_experiment import is_wanted, plan_experiment
 from service.diagnosis.next_experiment.bank import KINDS, Bank
-from service.diagnosis.next_experiment.plan import PlannedExperiment
+from service.diagnosis.next_experiment.plan import SETTLING, PlannedExperiment
 from service.diagnosis.next_experiment.separation import equations, log_variances, separations
 from service.diagnosis.next_experiment.sweeps import sweep
 from service.excitation import require_within_limits
@@ -193,7 +193,7 @@ def test_what_the_recordings_leave_open_is_said_and_a_motion_planned_that_separa
     names = {f"{f.effect}@{f.joint}" for f in found} | {each for finding in found for each in finding.equivalent}
     assert names >= {"asymmetric_coulomb@joint1", "torque_offset@joint1"}
     assert is_wanted(worn.diagnosis)
-    assert worn.planned.after > 3.0 * worn.planned.before
+    assert worn.planned.before**2 < SETTLING <= worn.planned.after**2
 
 
 @pytest.mark.slow
