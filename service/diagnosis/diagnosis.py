@@ -38,6 +38,8 @@ from service.diagnosis.selection.admission import LEVEL
 from service.diagnosis.selection.choice import Selection
 from service.diagnosis.selection.confirmation import CLEARLY_WORSE, HeldOut
 from service.diagnosis.selection.farther import looked_farther
+from service.diagnosis.selection.guided import guided_by
+from service.diagnosis.selection.pruning import without_errors_of_larger_ones
 from service.diagnosis.selection.selector import Selector
 from service.identification import Identification, Options, identify
 from service.recording.conditioning import Conditioner
@@ -101,22 +103,35 @@ def diagnose(
     rows, pure_error = _observed(observations, model, effects)
     confirming = _held_out(held_out, robot, rows, identification, cutoff)
     progress("compare effects")
+    fitter = Fitter(rows)
+    model = with_fitting_slopes(model, fitter, open_slopes(identification), setting.speed)
+    model = with_fitting_stribeck(model, fitter, open_stribeck(identification), setting.speed)
+    selector = Selector(Screen(rows, effects), fitter, confirming, pure_error=pure_error)
+    selection, selector = _selected(selector, model, identification, setting, progress)
+    progress("weigh the evidence")
+    found = _concluded(identification, setting, selector, selection, cutoff)
+    return with_plain_terms(found, undeclared_offsets(found))
+
+
+def _selected(
+    selector: Selector, model: ExtendedModel, identification: Identification, setting: Setting, progress: Progress
+) -> tuple[Selection, Selector]:
+    """All that is missing, and the selector whose rows count as much as they should beside it."""
     rotors = [
         Term(RotorInertia(j), np.zeros(0), np.array([value])) for j, value in identified_rotors(identification).items()
     ]
-    screen, fitter = Screen(rows, effects), Fitter(rows)
-    model = with_fitting_slopes(model, fitter, open_slopes(identification), setting.speed)
-    model = with_fitting_stribeck(model, fitter, open_stribeck(identification), setting.speed)
-    selector = Selector(screen, fitter, confirming, pure_error=pure_error)
     selection = selector.select(model, rotors, progress)
+    guided = guided_by(selection.fit.model, selector)
+    if guided is not None:
+        selector = guided
+        selection = selector.select(model, selection.fit.model.terms, progress)
     selection = looked_farther(selection, selector, setting, progress)
-    if states_friction(robot):
-        selection = with_better_than_constants(selection, screen, fitter, confirming, selector.admission)
-    if confirming is not None and identification.constrained:
-        selection = _unless_plainer_is_better(selection, delivered_model(identification), confirming)
-    progress("weigh the evidence")
-    found = _concluded(identification, setting, screen, fitter, confirming, selection, pure_error, cutoff)
-    return with_plain_terms(found, undeclared_offsets(found))
+    if states_friction(identification.robot):
+        selection = with_better_than_constants(selection, selector)
+    selection = without_errors_of_larger_ones(selection, selector.fitter, selector.admission)
+    if selector.held_out is not None and identification.constrained:
+        selection = _unless_plainer_is_better(selection, delivered_model(identification), selector.held_out)
+    return selection, selector
 
 
 def _unless_plainer_is_better(selection: Selection, delivered: ExtendedModel, held_out: HeldOut) -> Selection:
@@ -170,16 +185,10 @@ def _observed(observations: Observations, model: ExtendedModel, effects: Sequenc
 
 
 def _concluded(
-    identification: Identification,
-    setting: Setting,
-    screen: Screen,
-    fitter: Fitter,
-    held_out: HeldOut | None,
-    selection: Selection,
-    pure_error: bool,
-    cutoff_hz: float,
+    identification: Identification, setting: Setting, selector: Selector, selection: Selection, cutoff_hz: float
 ) -> Diagnosis:
     """All tests on the selected model."""
+    screen, fitter, held_out, pure_error = selector.screen, selector.fitter, selector.held_out, selector.pure_error
     observations = fitter.observations
     inflation = 1.0 if pure_error else selection.fit.inflation()
     level = LEVEL / max(len(screen.effects), 1)

@@ -74,6 +74,13 @@ def test_a_model_that_leaves_nearly_everything_is_no_guide() -> None:
         assert not own.shrinkage.size
 
 
+def test_it_is_still_one_at_other_joints() -> None:
+    quiet, _ = with_noise(*observed(), ())
+    observations, model = observed(np.array([0.0, 0.0, 20.0]))
+    known = observations.with_noise(quiet.noise)
+    assert [own.is_guided for own in row_weightings(known, model)] == [True, True, False]
+
+
 def test_what_half_the_band_makes_of_friction_passes_for_no_more_than_noise() -> None:
     observations, model = observed()
     (piece,) = observations.pieces

@@ -15,8 +15,8 @@ from service.recording.conditioning import Conditioner
 BAND_HZ = 8.0
 
 
-def observed(wave: float = 0.0) -> tuple[Observations, ExtendedModel]:
-    """Two periods of a motion with a wave [Nm] in every torque that no model has, and that repeats."""
+def observed(wave: float | Array = 0.0) -> tuple[Observations, ExtendedModel]:
+    """Two periods of a motion with a wave [Nm] in every torque, or (3,), that no model has, and that repeats."""
     rng = np.random.default_rng(0)
     ((arm, _),) = motions((1,))
     extra = wave * np.sin(2.0 * np.pi * 1.7 * arm.exact.time[:, None])

@@ -71,6 +71,17 @@ def test_the_covariance_is_that_of_the_quotient(scaled: ExtendedModel) -> None:
     assert found[0, 0] == pytest.approx((slopes @ root @ root.T @ slopes.T)[0, 0], rel=1e-4)
 
 
+def test_nothing_is_named_that_is_not_there(diagnosis: Diagnosis) -> None:
+    """The cogging is a hundred times the noise: what it leaves at its joint is no delay, and no play.
+
+    Beside it the gain may be taken for an error of its formula; then nothing else is called what the gain explains.
+    """
+    found = {each.place for each in diagnosis.findings}
+    assert ("cogging", JOINT) in found
+    assert found <= {("cogging", JOINT), ("torque_gain_error", JOINT)}
+    assert all(own.is_guided for own in diagnosis.fitter.observations.weightings)
+
+
 def test_cogging_is_told_as_large_as_it_is(diagnosis: Diagnosis) -> None:
     teeth = term(diagnosis, "cogging", JOINT, 0.5, 0.5)
     at_nine = replace(teeth, shape=np.array([9.0]))

@@ -13,12 +13,9 @@ from service.diagnosis.findings.finding import without_nominal
 from service.diagnosis.fitting.fit import Fit, Fitter
 from service.diagnosis.screening.refinement import refined
 from service.diagnosis.screening.screen import Candidate, Screen, model_signals
-from service.diagnosis.selection.admission import Admission
 from service.diagnosis.selection.choice import Choice, Option, Selection, distinct, is_physical
-from service.diagnosis.selection.confirmation import HeldOut
 from service.diagnosis.selection.equivalence import EQUIVALENT
-from service.diagnosis.selection.pruning import without_errors_of_larger_ones
-from service.diagnosis.selection.selector import MOST_FITTED
+from service.diagnosis.selection.selector import MOST_FITTED, Selector
 from service.diagnosis.selection.table import fitted_option
 
 WITH_A_CONSTANT = ("joint_spring",)
@@ -56,61 +53,43 @@ def instead_of_a_constant(
     return distinct(sorted(near_enough, key=lambda each: -each.score))
 
 
-def with_better_than_constants(
-    selection: Selection, screen: Screen, fitter: Fitter, held_out: HeldOut | None, admission: Admission
-) -> Selection:
+def with_better_than_constants(selection: Selection, selector: Selector) -> Selection:
     """The selection with what explains a joint's torque better than its constant in the constant's place.
 
     Parameters
     ----------
     selection : Selection
         what was selected beside a model that has constants
-    screen : Screen
-        of the training recordings
-    fitter : Fitter
-        of the same
-    held_out : HeldOut or None
-        what findings are confirmed by
-    admission : Admission
-        what is asked of an effect
+    selector : Selector
+        that has selected it
     """
     constants = {term.effect.joint for term in selection.fit.model.terms if term.effect.id in WITH_A_CONSTANT}
-    for joint in range(screen.observations.robot.joint_count):
+    for joint in range(selector.screen.observations.robot.joint_count):
         place = selection.nominal.model.structure.coefficient(joint, TorqueOffset.term)
         if place is not None and joint not in constants:
-            selection = _exchanged(selection, TorqueOffset(joint), place, screen, fitter, held_out, admission)
+            selection = _exchanged(selection, TorqueOffset(joint), place, selector)
     return selection
 
 
-def _exchanged(
-    selection: Selection,
-    effect: TorqueOffset,
-    place: int,
-    screen: Screen,
-    fitter: Fitter,
-    held_out: HeldOut | None,
-    admission: Admission,
-) -> Selection:
+def _exchanged(selection: Selection, effect: TorqueOffset, place: int, selector: Selector) -> Selection:
     """The selection with the best effect in the place of one constant, where that explains more and is confirmed."""
-    fit = selection.fit
+    fit, fitter, admission = selection.fit, selector.fitter, selector.admission
     without = without_nominal(fit, place, fitter)
     constant = _constant(effect, fit, place, without.energy - fit.energy)
     inflation = admission.inflation(fit)
     if constant.candidate.p_value(inflation) >= admission.level:
         return selection
-    options = instead_of_a_constant(effect, without, constant.gain, screen, fitter)
+    options = instead_of_a_constant(effect, without, constant.gain, selector.screen, fitter)
     if not options or options[0].score <= constant.score:
         return selection
     best = options[0]
-    confirmation = None if held_out is None else held_out.confirm(without, best.fit, fitter)
+    confirmation = None if selector.held_out is None else selector.held_out.confirm(without, best.fit, fitter)
     if confirmation is not None and not confirmation.confirmed(cautious=not admission.pure_error):
         return selection
     near = [each for each in (*options, constant) if each.score > best.score - EQUIVALENT * inflation]
     near.sort(key=lambda each: -each.score)
     choice = Choice(distinct(near), confirmation, admission.p_value(best, without, blocks=True) / admission.level)
-    choices = [*selection.choices, choice]
-    fit, choices = without_errors_of_larger_ones(selection.nominal, best.fit, choices, fitter, admission)
-    return Selection(selection.nominal, fit, tuple(choices), selection.rejected)
+    return Selection(selection.nominal, best.fit, (*selection.choices, choice), selection.rejected)
 
 
 def _constant(effect: TorqueOffset, fit: Fit, place: int, gain: float) -> Option:

@@ -24,6 +24,7 @@ from service.diagnosis.findings.finding import Finding, sizes, without_nominal
 from service.diagnosis.model.term import Term
 from service.diagnosis.selection.admission import LEVEL, SMALLEST_SHARE
 from service.diagnosis.selection.equivalence import probability_among
+from service.diagnosis.selection.shape_error import HARDLY
 from service.robot import Robot
 
 PLAIN: tuple[type[PlainTerm], ...] = (CoulombFriction, StribeckTerm, ViscousFriction, TorqueOffset)
@@ -100,12 +101,14 @@ def _finding(effect: PlainTerm, diagnosis: Diagnosis) -> Finding | None:
     others = ()
     if isinstance(effect, TorqueOffset):
         others = instead_of_a_constant(effect, without, gain, diagnosis.screen, diagnosis.fitter)
-    score = gain - 1.0
+    probability = probability_among(gain - 1.0, [option.score for option in others], [inflation] * len(others))
+    if probability < HARDLY:  # something else explains it better, and has been refused elsewhere
+        return None
     return Finding(
         terms=(Term(effect, shape, np.array([value])),),
         covariances=(np.diag([variance, *np.zeros(len(shape))]),),
         gain=gain,
-        probability=probability_among(score, [option.score for option in others], [inflation] * len(others)),
+        probability=probability,
         before=sizes(without.model, diagnosis.fitter, diagnosis.held_out),
         after=diagnosis.after,
         alternatives=others,

@@ -36,7 +36,8 @@ from service.recording.conditioning.filters import smooth
 from service.recording.recording import Array
 
 FAR_OFF = 6.0
-"""Power that the nominal model leaves, in noise variances, beyond which its friction is no guide to anything."""
+"""Power that the nominal model leaves, in noise variances, beyond which its friction is no guide to anything at the
+joints where that much is left."""
 
 HALF_BAND = 0.5
 """What the motion's velocity is without the upper half of its band stands for how far the band itself may be off."""
@@ -63,11 +64,14 @@ def row_weightings(observations: Observations, model: ExtendedModel) -> tuple[Ro
         the nominal model
     """
     fit = Fitter(observations).fit(model)  # an identification leaves alone what it cannot tell, however large it is
-    if fit.inflation() > FAR_OFF:
-        return tuple(
-            RowWeighting.certain(int(observations.kept(joint).sum())) for joint in range(len(observations.noise))
-        )
-    return weightings_of_motion(observations, fit.model)
+    weightings = weightings_of_motion(observations, fit.model)
+    if fit.inflation() <= FAR_OFF:
+        return weightings
+    left = [energy / len(rows) for energy, rows in zip(fit.joint_energies, fit.projection.residual, strict=True)]
+    return tuple(
+        RowWeighting.certain(len(own.weights)) if power > FAR_OFF else own
+        for power, own in zip(left, weightings, strict=True)
+    )
 
 
 def weightings_of_motion(observations: Observations, model: ExtendedModel) -> tuple[RowWeighting, ...]:

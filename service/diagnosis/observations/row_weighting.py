@@ -45,9 +45,14 @@ class RowWeighting:
         _, sizes, directions = np.linalg.svd(shared, full_matrices=False)
         return RowWeighting(weights, directions, 1.0 - 1.0 / np.sqrt(1.0 + sizes**2))
 
+    @property
+    def is_guided(self) -> bool:
+        """Whether anything is said of the columns' errors."""
+        return bool(len(self.shrinkage))
+
     @staticmethod
     def certain(count: int) -> "RowWeighting":
-        """For columns that are certain everywhere.
+        """For columns of whose errors nothing is said.
 
         Parameters
         ----------

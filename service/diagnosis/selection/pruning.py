@@ -8,7 +8,7 @@ import numpy as np
 from service.diagnosis.fitting.fit import Fit, Fitter
 from service.diagnosis.model.extended import with_terms
 from service.diagnosis.selection.admission import Admission
-from service.diagnosis.selection.choice import Choice
+from service.diagnosis.selection.choice import Choice, Selection
 from service.diagnosis.selection.proxies import proxies
 from service.diagnosis.selection.shape_error import HARDLY, groups_of, standings, without_group
 
@@ -64,30 +64,31 @@ def without_proxies(nominal: Fit, fit: Fit, choices: list[Choice], fitter: Fitte
     return without_superfluous(*_without(dropped, fit, choices, fitter), fitter, admission)
 
 
-def without_errors_of_larger_ones(
-    nominal: Fit, fit: Fit, choices: list[Choice], fitter: Fitter, admission: Admission
-) -> Pruned:
+def without_errors_of_larger_ones(selection: Selection, fitter: Fitter, admission: Admission) -> Selection:
     """Drop what is hardly more than an error of the formula of a larger effect at the same joint.
+
+    Last of all: as long as others are looked for, what such an error explains must not be there for them to explain.
+    One at a time: of two that share what the larger one leaves, neither has to be an error where the other is none.
 
     Parameters
     ----------
-    nominal, fit : Fit
-        models without and with all choices
-    choices : list of Choice
-        one a term
+    selection : Selection
+        all that was selected
     fitter : Fitter
         of the training recordings
     admission : Admission
         what was asked of each
     """
-    groups = list(groups_of(fit.model).values())
-    if len(groups) < 2:
-        return fit, choices
-    without = [without_group(fit, places, fitter) for places in groups]
-    found = standings(nominal, fit, without, fitter, admission.inflation(fit))
-    pairs = zip(groups, found, strict=True)
-    dropped = [place for places, standing in pairs if standing.certainty < HARDLY for place in places]
-    return _without(dropped, fit, choices, fitter)
+    while len(groups := list(groups_of(selection.fit.model).values())) > 1:
+        fit = selection.fit
+        without = [without_group(fit, places, fitter) for places in groups]
+        found = standings(selection.nominal, fit, without, fitter, admission.inflation(fit))
+        least = min(range(len(groups)), key=lambda number: found[number].certainty)
+        if found[least].certainty >= HARDLY:
+            break
+        fit, choices = _without(groups[least], fit, list(selection.choices), fitter)
+        selection = replace(selection, fit=fit, choices=tuple(choices))
+    return selection
 
 
 def _without(dropped: Sequence[int], fit: Fit, choices: list[Choice], fitter: Fitter) -> Pruned:

@@ -24,7 +24,7 @@ from service.diagnosis.selection.equivalence import EQUIVALENT, FORMULA_ERROR, e
 from service.diagnosis.selection.interleaved import interleaved_confirmation
 from service.diagnosis.selection.outside import where_held_out_shows
 from service.diagnosis.selection.position_bias import is_position_noise
-from service.diagnosis.selection.pruning import without_errors_of_larger_ones, without_proxies, without_superfluous
+from service.diagnosis.selection.pruning import without_proxies, without_superfluous
 from service.diagnosis.selection.table import Table, fitted_option
 
 MOST_EFFECTS = 4
@@ -118,7 +118,6 @@ class Selector:
         choices = [with_rivals(each, dropped) for each in choices]
         fit, choices = without_proxies(nominal, fit, choices, self.fitter, self.admission)
         fit, choices = self._settled_without_superfluous(fit, choices)
-        fit, choices = without_errors_of_larger_ones(nominal, fit, choices, self.fitter, self.admission)
         return Selection(nominal, fit, tuple(choices), tuple(rejected))
 
     def continued(self, selection: Selection, progress: Callable[[str], None]) -> Selection:
@@ -136,7 +135,6 @@ class Selector:
             return selection
         fit, choices = without_superfluous(fit, choices, self.fitter, self.admission)
         fit, choices = without_proxies(selection.nominal, fit, choices, self.fitter, self.admission)
-        fit, choices = without_errors_of_larger_ones(selection.nominal, fit, choices, self.fitter, self.admission)
         return Selection(selection.nominal, fit, tuple(choices), (*selection.rejected, *rejected))
 
     def _grown(
