@@ -171,7 +171,7 @@ class Effect(ABC):
         """
         return True
 
-    def is_consistent(self, coefficients: Array, shape: Array) -> bool:
+    def is_consistent(self, coefficients: Array, shape: Array, *, alone: bool = False) -> bool:
         """Whether coefficients and shape, each fitted freely, can belong to one thing.
 
         Parameters
@@ -180,6 +180,8 @@ class Effect(ABC):
             values of the coefficients
         shape : (k,) float64
             values of the shape parameters
+        alone : bool
+            whether nothing else is known to be missing
         """
         return True
 

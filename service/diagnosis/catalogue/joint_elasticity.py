@@ -126,7 +126,7 @@ class JointElasticity(Deflection):
         bands = np.unique(self.grid[self.grid[:, 1] > 0.0, 0])
         return [np.stack([np.full(len(BETWEEN), band), shape[1] * BETWEEN], axis=1) for band in bands]
 
-    def is_consistent(self, coefficients: Array, shape: Array) -> bool:
+    def is_consistent(self, coefficients: Array, shape: Array, *, alone: bool = False) -> bool:
         """Whether what gives way is what the link swings on.
 
         Parameters
@@ -135,6 +135,8 @@ class JointElasticity(Deflection):
             c [rad/Nm or m/N]
         shape : (2,) float64
             band of the load [Hz], compliance on which the link swings, 0 where it does not [rad/Nm or m/N]
+        alone : bool
+            whether nothing else is known to be missing
         """
         return bool(shape[1] == 0.0 or 1.0 / SAME < coefficients[0] / shape[1] < SAME)
 

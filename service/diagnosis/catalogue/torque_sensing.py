@@ -149,7 +149,7 @@ class TorqueSaturation(Saturation):
         """
         return levels * np.tanh(torque / levels)
 
-    def is_consistent(self, coefficients: Array, shape: Array) -> bool:
+    def is_consistent(self, coefficients: Array, shape: Array, *, alone: bool = False) -> bool:
         """Whether a curve with a = 1 that is bent as much has a level that a sensor may have.
 
         Parameters
@@ -158,6 +158,8 @@ class TorqueSaturation(Saturation):
             a
         shape : (1,) float64
             c [Nm or N]
+        alone : bool
+            whether nothing else is known to be missing
         """
         return bool(shape[0] >= self.lower[0] * np.sqrt(coefficients[0]))
 

@@ -29,6 +29,7 @@ from service.diagnosis.findings.verdict import Verdict
 from service.diagnosis.model.term import Term
 from service.diagnosis.model.torque_scale import on_the_arm
 from service.diagnosis.next_experiment import PlannedExperiment
+from service.diagnosis.selection.shape_error import GAIN, LOAD_FRICTION
 from service.recording.recording import Array
 
 SHIFTS_FROM = 3.0
@@ -206,6 +207,13 @@ def _told(term: Term, diagnosis: Diagnosis, covariance: Array) -> tuple[Quantity
     return term.effect.quantities(diagnosis.setting, term.coefficients, term.shape, covariance)
 
 
+def _why_behind(finding: Finding) -> str:
+    """Why a finding may be none beside the one that it is behind."""
+    if finding.terms[0].effect.id == GAIN and finding.behind is not None and finding.behind.id == LOAD_FRICTION:
+        return "it may be none: a gear's efficiency, and load friction of another formula, show as both"
+    return "it is so small that it may be an error of that effect's formula"
+
+
 def _statement(finding: Finding, quantities: Sequence[Quantity], others: Sequence[str], diagnosis: Diagnosis) -> str:
     term = finding.terms[0]
     names = [joint.name for joint in diagnosis.robot.joints]
@@ -216,9 +224,7 @@ def _statement(finding: Finding, quantities: Sequence[Quantity], others: Sequenc
         when = f", {term.effect.when(term.coefficients, term.shape, names_of_recordings, diagnosis.setting.durations)}"
     doubt = f"; these data cannot tell it from {', '.join(others)}" if others else ""
     if finding.behind is not None:
-        doubt += (
-            f"; beside {finding.behind.name(names)} it is so small that it may be an error of that effect's formula"
-        )
+        doubt += f"; beside {finding.behind.name(names)} {_why_behind(finding)}"
     if finding.as_law < DOUBTED:
         doubt += "; so much is left beside it that it may stand in for something that the catalogue does not have"
     return f"{term.effect.where(names)}: {term.effect.meaning}{when} ({sizes}){doubt}; {term.effect.remedy}"

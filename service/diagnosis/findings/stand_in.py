@@ -15,7 +15,7 @@ import numpy as np
 from service.diagnosis.catalogue import Effect
 from service.diagnosis.fitting.fit import Fit
 from service.diagnosis.fitting.lack_of_fit import LackOfFit
-from service.diagnosis.selection.shape_error import EXPECTED
+from service.diagnosis.selection.choice import EXPECTED
 
 LEFT = 0.15
 """Share that is left from which a name is rather wrong than right. On simulated arms right names left up to 0.05, and

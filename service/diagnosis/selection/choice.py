@@ -13,6 +13,9 @@ from service.diagnosis.selection.confirmation import Confirmation
 CERTAIN = 3.0
 """Standard errors by which a friction coefficient must be negative to be impossible."""
 
+EXPECTED = ("rotor_inertia",)
+"""Effects that every geared joint may have: they need no share to be believed, and nothing is doubted beside them."""
+
 Place = tuple[str, int | None]
 """Effect id and joint index, from 0; None for the whole arm."""
 
@@ -108,7 +111,8 @@ def is_physical(option: Option, before: Fit) -> bool:
     joint = term.effect.joint
     k_v = None if joint is None else option.fit.model.structure.terms[joint].k_v
     possible = possible and term.effect.is_possible(term.shape, k_v)
-    possible = possible and term.effect.is_consistent(term.coefficients, term.shape)
+    alone = all(each.effect.id in EXPECTED for each in before.model.terms)
+    possible = possible and term.effect.is_consistent(term.coefficients, term.shape, alone=alone)
     return option.gain > 0.0 and possible and not driving(option.fit) - driving(before)
 
 

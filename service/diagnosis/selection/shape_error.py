@@ -7,6 +7,10 @@ functions of the same quantities; only for a very small part is it chance that m
 Where effects meet at a joint, the one that alone explains most there leads; each other one has a share s of all that is
 explained there, and is certain by s²/(s² + e²) with e = `SHAPE_ERROR`, or `LIKENESS` where it depends on something that
 the leading one does not depend on. Below `HARDLY` it is no finding at all.
+
+A gear of efficiency η takes τ/η where the motor drives and τ η where it is driven: (1/η + η)/2 of the load like a wrong
+gain, (1/η - η)/2 of it like load friction. Load friction of another formula shows as both as well. Beside it a wrong
+gain is doubted however large it is, with e = `EFFICIENCY`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,7 +21,7 @@ import numpy as np
 from service.diagnosis.catalogue import Effect
 from service.diagnosis.fitting.fit import Fit, Fitter
 from service.diagnosis.model.extended import ExtendedModel, with_terms
-from service.diagnosis.selection.choice import Place
+from service.diagnosis.selection.choice import EXPECTED, Place
 from service.recording.recording import Array
 
 SHAPE_ERROR = 0.1
@@ -27,14 +31,17 @@ other formulas than the catalogue's it is 0.03 to 0.16 where another law is take
 LIKENESS = 0.02
 """The same for an effect that depends on what the leading one does not: along a motion all quantities are related."""
 
+EFFICIENCY = 0.4
+"""The same for a wrong gain beside load friction: on arms whose load friction grows with the square of the load, and
+nothing else is missing, it is up to 0.6."""
+
+GAIN, LOAD_FRICTION = "torque_gain_error", "load_dependent_friction"
+
 PLAIN = 0.9
 """Certainty from which a finding is not doubted."""
 
 HARDLY = 0.1
 """Certainty below which a finding is none."""
-
-EXPECTED = ("rotor_inertia",)
-"""Effects that every geared joint may have: they need no share to be believed."""
 
 WORTH_SHARING = 20.0
 """Energy that findings take off a joint's residual from which it counts as explained at all [noise variances]."""
@@ -119,16 +126,25 @@ def standings(nominal: Fit, fit: Fit, without: Sequence[Fit], fitter: Fitter, in
     found = []
     for number, effect in enumerate(effects):
         own = list(touched[number])
-        if effect.id in EXPECTED or not counts[own].all() or (leads[own] == number).any():
+        gear = _gear_of(effect, effects)
+        leader = (leads[own] == number).any() and gear is None
+        if effect.id in EXPECTED or not counts[own].all() or leader:
             found.append(LEADING)
             continue
         shares = (without[number].joint_energies[own] - after[own]) / explained[own]
         share, joint = max(float(shares.max()), 0.0), own[int(shares.argmax())]
-        leading = effects[int(leads[joint])]
-        error = SHAPE_ERROR if _is_of_the_same(effect, leading) else LIKENESS
+        leading = gear or effects[int(leads[joint])]
+        error = EFFICIENCY if gear else SHAPE_ERROR if _is_of_the_same(effect, leading) else LIKENESS
         certainty = share**2 / (share**2 + error**2)
         found.append(Standing(certainty, leading if certainty < PLAIN else None))
     return found
+
+
+def _gear_of(effect: Effect, others: Sequence[Effect]) -> Effect | None:
+    """The load friction beside which a wrong gain may be a gear's efficiency; None for anything else."""
+    if effect.id != GAIN:
+        return None
+    return next((each for each in others if each.id == LOAD_FRICTION and each.joint == effect.joint), None)
 
 
 def _is_of_the_same(effect: Effect, leading: Effect) -> bool:
