@@ -1,4 +1,4 @@
-"""What a finding is beside a larger one at its joint: by its share, and a wrong gain beside load friction in any case."""
+"""What a finding is beside a larger one at its joint: by its share; a wrong gain beside load friction, in any case."""
 
 from types import SimpleNamespace
 from typing import Any
