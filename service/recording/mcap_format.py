@@ -32,6 +32,7 @@ MCAP_MAGIC = b"\x89MCAP0\r\n"
 
 _RECORD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
+_MESSAGE_INDEX = struct.Struct("<HI")
 _LARGEST_CHUNK_BYTES = 2**28
 _COPY_BYTES = 2**20
 _UNREADABLE = (
@@ -192,7 +193,7 @@ class _Scan:
 
     def __init__(self, file: BinaryIO, size: int, sink: MessageSink) -> None:
         self._file, self._size, self._sink = file, size, sink
-        self._checksum = self._unpacked_bytes = 0
+        self._checksum = self._unpacked_bytes = self._messages = 0
         self._schemas: dict[int, str] = {}
         self._handlers: dict[int, MessageHandler | None] = {}
 
@@ -214,6 +215,10 @@ class _Scan:
                     (expected,) = struct.unpack_from("<I", self._read(length))
                     if expected not in (0, checksum):
                         raise _DamageError("the file is damaged: its data fail their checksum")
+                elif opcode == Opcode.MESSAGE_INDEX:
+                    _require_filled(self._read(length))
+                elif opcode == Opcode.STATISTICS:
+                    self._require_all(*struct.unpack_from("<Q", self._read(length)))
                 else:
                     self._skip(length)
             except _UNREADABLE as error:
@@ -223,6 +228,11 @@ class _Scan:
                 break
         if self._file.read() != MCAP_MAGIC:
             raise _DamageError("the file does not end as an MCAP file does")
+
+    def _require_all(self, stated: int) -> None:
+        """A record whose kind was damaged is passed over as one that is not known: its messages are missed here."""
+        if stated != self._messages:
+            raise _DamageError(f"the file is damaged: it states {stated} messages and holds {self._messages}")
 
     def _walk_chunk(self, body: bytes) -> None:
         """Walk the records within a chunk."""
@@ -254,6 +264,7 @@ class _Scan:
             channel, _, log_time, _ = _MESSAGE.unpack_from(data, start)
             if stop - start < _MESSAGE.size or channel not in self._handlers:
                 raise ValueError("a message without a channel")
+            self._messages += 1
             handler = self._handlers[channel]
             if handler is not None:
                 handler(log_time, data[start + _MESSAGE.size : stop])
@@ -277,3 +288,10 @@ class _Scan:
         """Pass over a record of any size in small memory; the checksum wants its bytes."""
         while length > 0:
             length -= len(self._read(min(length, _COPY_BYTES)))
+
+
+def _require_filled(index: bytes) -> None:
+    """An index of messages is as long as it says; a chunk that is taken for one is not."""
+    _, entries_bytes = _MESSAGE_INDEX.unpack_from(index)
+    if entries_bytes != len(index) - _MESSAGE_INDEX.size:
+        raise ValueError("an index of messages that does not fill its record")

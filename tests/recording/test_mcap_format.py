@@ -4,6 +4,7 @@ import struct
 import numpy as np
 import pytest
 import zstandard
+from mcap.opcode import Opcode
 from mcap.writer import CompressionType, IndexType
 
 from recording.recording_files import (
@@ -293,6 +294,26 @@ def test_a_damaged_chunk_is_told_from_a_truncated_file(tmp_path):
     path.write_bytes(data)
     with pytest.raises(RecordingError, match="the file is damaged: the record at byte"):
         read_recording(path)
+
+
+def places_of_chunks(data):
+    """Byte at which each chunk begins."""
+    at, found = 8, []
+    while at < len(data) - 8:
+        opcode, length = struct.unpack_from("<BQ", data, at)
+        found += [at] if opcode == Opcode.CHUNK else []
+        at += 9 + length
+    return found
+
+
+@pytest.mark.parametrize("kind", [Opcode.MESSAGE_INDEX, 0x86])
+def test_a_chunk_whose_kind_was_damaged_is_not_passed_over_in_silence(tmp_path, kind):
+    """Neither as an index, which says how long it is, nor as a kind that nobody knows: messages are counted."""
+    path = write_log(tmp_path / "log.mcap", {"/joint_states": messages()}, chunk_size=1024)
+    data = bytearray(path.read_bytes())
+    data[places_of_chunks(data)[1]] = kind
+    path.write_bytes(data)
+    assert "the file is damaged" in message_of(lambda: read_recording(path))
 
 
 def test_a_log_without_chunks_is_held_to_the_checksum_of_its_data(tmp_path):
