@@ -177,7 +177,7 @@ def _parse_chunk(chunk: _Chunk, header: _Header, name: str, *, is_first: bool) -
     lines: list[int] = []
     text = chunk.text[:-1].split(b"\n")
     for number, raw_line in enumerate(text, chunk.first_line):
-        line = raw_line.removesuffix(b"\r")
+        line = raw_line.rstrip(b"\r")  # two of them: text mode has translated a translated line end
         if _is_empty(line):
             continue
         is_truncated = chunk.unterminated and number == chunk.first_line + len(text) - 1

@@ -38,6 +38,7 @@ SAME = {
     "no newline at the end": "\n".join(LINES),
     "blank lines at the end": "\n".join(LINES) + "\n\n  \n",
     "carriage returns": "\r\n".join(LINES) + "\r\n",
+    "line ends translated twice": "\r\r\n".join(LINES) + "\r\r\n",
     "byte order mark": "\ufeff" + "\n".join(LINES) + "\n",
     "comments everywhere": "# one\n\n#two, with, commas\n" + "\n# between\n".join(LINES) + "\n   # last\n",
     "semicolons": "\n".join(LINES).replace(",", ";") + "\n",

@@ -81,7 +81,7 @@ def expected_rows(data: bytes) -> np.ndarray | None:
         text = data.removeprefix(b"\xef\xbb\xbf").decode("utf-8")
     except UnicodeDecodeError:
         text = data.removeprefix(b"\xef\xbb\xbf").decode("latin-1")
-    lines = [line.removesuffix("\r") for line in text.split("\n")]
+    lines = [line.rstrip("\r") for line in text.split("\n")]
     lines = [line for line in lines if line.strip(" \t\r\v\f") and not line.strip(" \t\r\v\f").startswith("#")]
     if not lines:
         return None
