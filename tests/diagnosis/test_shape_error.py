@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from concealed.sealing.sealed import made
+from service.diagnosis import diagnose, document
 from service.diagnosis.catalogue import Effect
 from service.diagnosis.catalogue.asymmetric_friction import AsymmetricCoulomb
 from service.diagnosis.catalogue.load_dependent_friction import LoadDependentFriction
@@ -54,3 +56,14 @@ def test_a_wrong_gain_beside_load_friction_may_be_a_gears_efficiency(
 def test_beside_anything_else_it_is_what_it_explains(monkeypatch: pytest.MonkeyPatch) -> None:
     other, gain = AsymmetricCoulomb(0), TorqueGainError(0)
     assert beside(monkeypatch, [other, gain], [0.4, 0.4], [0.5, 0.6])[1].certainty == 1.0
+
+
+@pytest.mark.slow
+def test_load_friction_that_grows_with_the_square_of_the_load_is_no_certain_gain_error() -> None:
+    _, trial = made("form", 13000002)
+    found = {each.effect: each for each in document(diagnose(trial.robot, trial.train, trial.held_out)).findings}
+    assert found["load_dependent_friction"].probability > 0.9
+    assert found["torque_gain_error"].probability < 0.6
+    assert "a gear's efficiency, and load friction of another formula, show as both" in (
+        found["torque_gain_error"].statement
+    )
