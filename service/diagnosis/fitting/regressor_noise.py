@@ -50,7 +50,7 @@ OF_ITS_PERIOD = 0.1
 
 REALISED = 0.15
 """Part of u² that a row is held to be off by: on simulated arms that lack nothing, rows near reversals hold a twentieth
-to a fifth of it, as most of u is what a band does to all of them alike, which is looked at apart."""
+to a fifth of it; what a band does to all of them alike is looked at apart."""
 
 
 def row_weightings(observations: Observations, model: ExtendedModel) -> tuple[RowWeighting, ...]:
