@@ -101,13 +101,13 @@ def relative_error_by_recipe(result: Identification, parameters: Array, recordin
     return 100.0 * np.sqrt(squares / total)
 
 
-def free_held_out_error(result: Identification, name: str) -> float:
-    """Held-out relative error [%] of the LS or WLS estimate itself, whether it is delivered or not."""
+def held_out_error(result: Identification, name: str, parameters: Array, cutoff_hz: float | None) -> float:
+    """Held-out relative error [%] of an estimate in any band."""
     robot, _, held_out = real_set(name)
     conditioners = [Conditioner.survey(recording, robot) for recording in held_out]
-    motions = Dataset(conditioners, robot, result.structure.base, result.cutoff_hz)
-    (free,) = evaluate(motions, result.structure, [result.free_parameters])
-    return 100.0 * free.fit.relative_error
+    motions = Dataset(conditioners, robot, result.structure.base, cutoff_hz)
+    (residuals,) = evaluate(motions, result.structure, [parameters])
+    return 100.0 * residuals.fit.relative_error
 
 
 def links_of(found: IdentificationDocument) -> list[LinkInertia]:
@@ -158,7 +158,7 @@ def test_links_are_possible_and_nearly_as_good(name: str) -> None:
         assert entry.stiction + entry.stribeck >= 0.0
     assert found.fit.links_held_out is not None
     consistent = 100.0 * found.fit.links_held_out.relative_error
-    assert consistent <= min(free_held_out_error(result, name), consistent) + 1.0
+    assert consistent <= min(held_out_error(result, name, result.free_parameters, result.cutoff_hz), consistent) + 1.0
 
 
 @pytest.mark.parametrize("name", HELD_OUT_BOUNDS)
@@ -216,5 +216,6 @@ def test_the_automatic_band_suits_the_data(name: str) -> None:
     assert np.isfinite(result.covariance).all()
     assert result.held_out is not None
     if name in HELD_OUT_BOUNDS:
-        assert 100.0 * result.held_out.relative_error <= HELD_OUT_BOUNDS[name][1]
+        cutoff, bound = HELD_OUT_BOUNDS[name]
+        assert held_out_error(result, name, result.parameters, cutoff) <= bound, "in the README's own band"
     assert robot.joint_count == len(result.shapes)

@@ -26,6 +26,16 @@ STANDING_STILL = 10.0
 SEGMENT = 1024
 """Samples in one segment of the averaged spectra."""
 
+LOOK = 128
+"""Samples in one look at the plateau."""
+
+SHAKING = 3.0
+"""Looks that hold more than this many times their median are of a joint that shakes, as one that sticks and slips does:
+that is motion, and does not count."""
+
+BRIEF = 1.0 / 3.0
+"""Where more than this share of all looks is such, the rest is of a joint at rest, and all count."""
+
 SEGMENT_OVERLAP_LOSS = 0.9
 """Independent segments among half-overlapping ones under a Hann window, relative to their number."""
 
@@ -155,7 +165,7 @@ def acceleration_spectrum(
     Returns
     -------
     AccelerationSpectrum
-        the noise density is the median over `PLATEAU`, corrected for the skewness of few averages
+        the noise density is the median over `PLATEAU` while nothing shakes, corrected for the skewness of few averages
     """
     accelerations = [np.diff(values, n=order, axis=0) * rate_hz**order for values in signals]
     length = min(SEGMENT, max(len(values) for values in accelerations))
@@ -163,13 +173,32 @@ def acceleration_spectrum(
     segments = sum(len(each) for each in spectra)
     frequency = np.arange(length // 2 + 1, dtype=np.float64) * (rate_hz / length)
     power = np.sum([each.sum(axis=0) for each in spectra], axis=0) / segments
-    gain = (2.0 * rate_hz * np.sin(np.pi * frequency / rate_hz)) ** (2 * order)
+    gain = _gain(frequency, rate_hz, order)
+    return AccelerationSpectrum(frequency, power, gain, np.maximum(_plateau_density(accelerations, rate_hz, order), floor))
+
+
+def _plateau_density(accelerations: Sequence[Array], rate_hz: float, order: int) -> Array:
+    """Density of a signal's noise while nothing shakes, (n,)."""
+    length = min(LOOK, max(len(values) for values in accelerations))
+    frequency = np.arange(length // 2 + 1, dtype=np.float64) * (rate_hz / length)
     nyquist = rate_hz / 2.0
     plateau: NDArray[np.bool_] = (frequency >= PLATEAU[0] * nyquist) & (frequency <= PLATEAU[1] * nyquist)
-    freedom = 2.0 * max(1.0, SEGMENT_OVERLAP_LOSS * segments)
-    skewness = float(stats.chi2.median(freedom)) / freedom
-    density = np.median(power[plateau] / gain[plateau, None], axis=0) / skewness
-    return AccelerationSpectrum(frequency, power, gain, np.maximum(density, floor))
+    looks = np.concatenate(
+        [segment_spectra(values, rate_hz, length)[:, plateau] for values in accelerations if len(values) >= length]
+    )
+    looks /= _gain(frequency[plateau], rate_hz, order)[:, None]
+    whole = looks.mean(axis=1)
+    calm = whole <= SHAKING * np.median(whole, axis=0)
+    calm |= calm.mean(axis=0) < 1.0 - BRIEF
+    count = calm.sum(axis=0)
+    freedom = 2.0 * np.maximum(1.0, SEGMENT_OVERLAP_LOSS * count)
+    skewness = stats.chi2.median(freedom) / freedom
+    return np.median(np.sum(looks, axis=0, where=calm[:, None]) / count, axis=0) / skewness
+
+
+def _gain(frequency: Array, rate_hz: float, order: int) -> Array:
+    """Squared gain from a signal's noise to that of q̈, which is `order` differences away, (F,)."""
+    return (2.0 * rate_hz * np.sin(np.pi * frequency / rate_hz)) ** (2 * order)
 
 
 def segment_spectra(values: Array, rate_hz: float, length: int) -> Array:

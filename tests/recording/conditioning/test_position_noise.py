@@ -135,3 +135,24 @@ def test_a_single_lively_joint_alone() -> None:
     limit = position_noise(stretch_of(one.derivative(time, 0) + noise, 100.0)).limit_hz
     assert limit is not None
     assert 0.5 < limit < 10.0
+
+
+def test_a_joint_that_shakes_for_a_while_is_not_taken_to_be_noisy() -> None:
+    """Two seconds of shaking in twelve, thirty times the noise, as a joint has that sticks and slips."""
+    rate, std = 200.0, 2e-5
+    time = np.arange(2400) / rate
+    random = np.random.default_rng(3)
+    calm = MOTION.derivative(time, 0) + random.normal(0.0, std, (len(time), 2))
+    shaking = calm + (30.0 * random.normal(0.0, std, (len(time), 2))) * ((time > 5.0) & (time < 7.0))[:, None]
+    found = position_noise(stretch_of(shaking, rate))
+    np.testing.assert_allclose(found.density, std**2 * 2.0 / rate, rtol=0.2)
+
+
+def test_a_joint_that_rests_half_the_time_is_as_noisy_as_where_it_moves() -> None:
+    rate, std = 200.0, 2e-5
+    time = np.arange(2400) / rate
+    moving = (time < 6.0)[:, None]
+    position = np.where(moving, MOTION.derivative(time, 0), MOTION.derivative(np.array([6.0]), 0))
+    noise = np.random.default_rng(3).normal(0.0, std, (len(time), 2)) * np.where(moving, 1.0, 0.05)
+    found = position_noise(stretch_of(position + noise, rate))
+    assert (found.density > 0.3 * std**2 * 2.0 / rate).all()
