@@ -7,14 +7,17 @@ import pytest
 
 from diagnosis.test_repetitions import observed
 from service.diagnosis.fitting.regressor_noise import (
-    OF_ITS_PERIOD,
+    MOVED,
+    ROUNDED,
     _shared_errors,
     _step_error,
     _steps,
     row_weightings,
     weightings_of_motion,
 )
+from service.diagnosis.model.extended import ExtendedModel
 from service.diagnosis.noise.floor import with_noise
+from service.diagnosis.observations.observations import Observations
 from service.diagnosis.observations.whitening import JointNoise
 from service.identification.autocorrelation import Autoregression
 from service.recording.conditioning.filters import smooth
@@ -81,32 +84,39 @@ def test_it_is_still_one_at_other_joints() -> None:
     assert [own.is_guided for own in row_weightings(known, model)] == [True, True, False]
 
 
-def test_what_half_the_band_makes_of_friction_passes_for_no_more_than_noise() -> None:
+def observed_without_noise() -> tuple[Observations, ExtendedModel]:
+    """Observations whose noise is nearly nothing, and their model."""
     observations, model = observed()
-    (piece,) = observations.pieces
-    motion, still = piece.prepared.motion, JointNoise(Autoregression(np.empty(0), 1e-6, 1e-6))
-    known = observations.with_noise([still] * 3)
+    return observations.with_noise([JointNoise(Autoregression(np.empty(0), 1e-6, 1e-6))] * 3), model
+
+
+def test_what_a_band_may_have_made_of_all_reversals_passes_for_no_more_than_noise() -> None:
+    """A part of what half of it rounds them by, and a shift of all of them by a part of its period."""
+    known, model = observed_without_noise()
+    (piece,) = known.pieces
+    motion = piece.prepared.motion
     for joint, own in enumerate(weightings_of_motion(known, model)):
-        narrow = smooth(motion.velocity[:, [joint]], motion.rate_hz, 0.5 * float(piece.state_hz[joint]))[:, 0]
-        change = _steps(model, joint, narrow) - _steps(model, joint, motion.velocity[:, joint])
-        error = known.white(joint, [piece.reduced(change[None])])
-        assert np.sum((own.weights * error) ** 2) > 2.0
-        assert np.sum(own.applied(error) ** 2) < 1.0
+        band_hz = float(piece.state_hz[joint])
+        friction = _steps(model, joint, motion.velocity[:, joint])
+        narrow = smooth(motion.velocity[:, [joint]], motion.rate_hz, 0.5 * band_hz)[:, 0]
+        rates = np.stack([_steps(model, joint, narrow) - friction, np.gradient(friction) * motion.rate_hz])
+        change, slope = known.white(joint, [piece.reduced(rates)])
+        rounded = ROUNDED * (change - (change @ slope) / (slope @ slope) * slope)
+        for error in (rounded, MOVED[0] / band_hz * slope):
+            assert np.sum((own.weights * error) ** 2) > 2.0
+            assert np.sum(own.applied(error[None]) ** 2) < 1.0
 
 
-def test_a_band_moves_reversals_by_no_more_than_a_part_of_its_period(monkeypatch: pytest.MonkeyPatch) -> None:
-    observations, model = observed()
-    (piece,) = observations.pieces
-    motion, still = piece.prepared.motion, JointNoise(Autoregression(np.empty(0), 1e-6, 1e-6))
-    known = observations.with_noise([still] * 3)
+@pytest.mark.parametrize(("step", "part"), [(0.0, 0), (1.0, 1)])
+def test_a_band_moves_reversals_by_a_part_of_its_period_and_more_where_steps_are_followed(
+    step: float, part: int
+) -> None:
+    known, model = observed_without_noise()
+    (piece,) = known.pieces
+    coarse = replace(piece, position_noise=replace(piece.position_noise, step=np.full(3, step)))
+    known, motion = replace(known, pieces=(coarse,)), piece.prepared.motion
     for joint, band_hz in enumerate(piece.state_hz):
         slope = np.gradient(_steps(model, joint, motion.velocity[:, joint])) * motion.rate_hz
         white = known.white(joint, [piece.reduced(slope[None])])[0]
-        found_s = []
-        for part in (OF_ITS_PERIOD, 1e-4):
-            monkeypatch.setattr("service.diagnosis.fitting.regressor_noise.OF_ITS_PERIOD", part)
-            _, shift = _shared_errors(known, model, joint, np.ones(len(white)))
-            found_s.append(float(shift @ white) / float(white @ white))
-            np.testing.assert_allclose(shift, found_s[-1] * white, atol=1e-9 * np.abs(shift).max())
-        assert 1e-4 < found_s[0] * band_hz < OF_ITS_PERIOD, "this band moves them by less than that"
-        assert found_s[1] * band_hz == pytest.approx(1e-4)
+        _, moved = _shared_errors(known, model, joint, np.ones(len(white)))
+        np.testing.assert_allclose(moved, MOVED[part] / band_hz * white, atol=1e-9 * np.abs(moved).max())
