@@ -5,7 +5,8 @@ of B included. What is left of A, λ_A (1 - cos²), is all that could tell them 
 a small error of the columns decides between them, and no name is better than the other.
 
 Nor is a law's formula ever exact. Two laws of the same quantities at one joint, drag and Stribeck friction say, differ
-by less than what their formulas may be wrong by: there a share `FORMULA_ERROR` of what is explained counts as noise.
+by less than what their formulas may be wrong by: there a share `FORMULA_ERROR` of what is explained counts as noise,
+and of probabilities a share `FORMULA_DOUBT`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,6 +28,10 @@ EQUIVALENT = 10.0
 FORMULA_ERROR = 0.005
 """Share of what an effect explains that counts as noise between it and another law of the same quantities; on arms that
 conceal other formulas than the catalogue's, the wrong one of two explained up to a sixteenth more."""
+
+FORMULA_DOUBT = 0.025
+"""The same where the two are weighed against each other: one that leads by a ninth, as a wrong one did on an arm with
+drag of another formula, has a probability of 0.9."""
 
 
 def equivalents(option: Option, others: Sequence[Option], fit: Fit, screen: Screen, inflation: float) -> list[Option]:
@@ -50,7 +55,7 @@ def equivalents(option: Option, others: Sequence[Option], fit: Fit, screen: Scre
     for each in others:
         if each is option or each.gain <= 0.0:
             continue
-        margin = EQUIVALENT * doubt(option, each, inflation)
+        margin = EQUIVALENT * (inflation + (FORMULA_ERROR * option.gain if of_one_kind(option, each) else 0.0))
         if each.score > option.score - margin:
             found.append(each)
             continue
@@ -66,7 +71,7 @@ def equivalents(option: Option, others: Sequence[Option], fit: Fit, screen: Scre
 
 
 def doubt(option: Option, rival: Option, inflation: float) -> float:
-    """What the scores of two options may differ by, in place of one noise variance.
+    """What counts as one noise variance between the scores of two options.
 
     Parameters
     ----------
@@ -75,7 +80,7 @@ def doubt(option: Option, rival: Option, inflation: float) -> float:
     inflation : float
         factor by which the residual exceeds the modelled noise
     """
-    return inflation + (FORMULA_ERROR * option.gain if of_one_kind(option, rival) else 0.0)
+    return inflation + (FORMULA_DOUBT * option.gain if of_one_kind(option, rival) else 0.0)
 
 
 def of_one_kind(option: Option, rival: Option) -> bool:

@@ -174,7 +174,8 @@ def acceleration_spectrum(
     frequency = np.arange(length // 2 + 1, dtype=np.float64) * (rate_hz / length)
     power = np.sum([each.sum(axis=0) for each in spectra], axis=0) / segments
     gain = _gain(frequency, rate_hz, order)
-    return AccelerationSpectrum(frequency, power, gain, np.maximum(_plateau_density(accelerations, rate_hz, order), floor))
+    density = np.maximum(_plateau_density(accelerations, rate_hz, order), floor)
+    return AccelerationSpectrum(frequency, power, gain, density)
 
 
 def _plateau_density(accelerations: Sequence[Array], rate_hz: float, order: int) -> Array:
