@@ -30,8 +30,8 @@ FORMULA_ERROR = 0.005
 conceal other formulas than the catalogue's, the wrong one of two explained up to a sixteenth more."""
 
 FORMULA_DOUBT = 0.025
-"""The same where the two are weighed against each other: one that leads by a ninth, as a wrong one did on an arm with
-drag of another formula, has a probability of 0.9."""
+"""The same where the two are weighed against each other: of two that explain much, one that leads by a ninth has a
+probability of 0.9. On an arm with drag of another formula the wrong one led by an eighth, 27 of 219 noise variances."""
 
 
 def equivalents(option: Option, others: Sequence[Option], fit: Fit, screen: Screen, inflation: float) -> list[Option]:
@@ -55,7 +55,7 @@ def equivalents(option: Option, others: Sequence[Option], fit: Fit, screen: Scre
     for each in others:
         if each is option or each.gain <= 0.0:
             continue
-        margin = EQUIVALENT * (inflation + (FORMULA_ERROR * option.gain if of_one_kind(option, each) else 0.0))
+        margin = EQUIVALENT * doubt(option, each, inflation, FORMULA_ERROR)
         if each.score > option.score - margin:
             found.append(each)
             continue
@@ -70,7 +70,7 @@ def equivalents(option: Option, others: Sequence[Option], fit: Fit, screen: Scre
     return found
 
 
-def doubt(option: Option, rival: Option, inflation: float) -> float:
+def doubt(option: Option, rival: Option, inflation: float, formula_error: float = FORMULA_DOUBT) -> float:
     """What counts as one noise variance between the scores of two options.
 
     Parameters
@@ -79,8 +79,10 @@ def doubt(option: Option, rival: Option, inflation: float) -> float:
         the one that explains more, and another
     inflation : float
         factor by which the residual exceeds the modelled noise
+    formula_error : float
+        share of what the one explains that counts as noise where the two are laws of the same quantities
     """
-    return inflation + (FORMULA_DOUBT * option.gain if of_one_kind(option, rival) else 0.0)
+    return inflation + (formula_error * option.gain if of_one_kind(option, rival) else 0.0)
 
 
 def of_one_kind(option: Option, rival: Option) -> bool:

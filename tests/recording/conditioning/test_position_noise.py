@@ -148,7 +148,7 @@ def test_a_joint_that_shakes_for_a_while_is_not_taken_to_be_noisy() -> None:
     np.testing.assert_allclose(found.density, std**2 * 2.0 / rate, rtol=0.2)
 
 
-def test_a_joint_that_rests_half_the_time_is_as_noisy_as_where_it_moves() -> None:
+def test_a_joint_that_rests_half_the_time_is_not_taken_to_be_as_quiet_as_at_rest() -> None:
     rate, std = 200.0, 2e-5
     time = np.arange(2400) / rate
     moving = (time < 6.0)[:, None]
