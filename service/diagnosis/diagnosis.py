@@ -39,6 +39,7 @@ from service.diagnosis.selection.choice import Selection
 from service.diagnosis.selection.confirmation import CLEARLY_WORSE, HeldOut
 from service.diagnosis.selection.farther import looked_farther
 from service.diagnosis.selection.guided import guided_by
+from service.diagnosis.selection.kinds import with_best_kinds
 from service.diagnosis.selection.pruning import without_errors_of_larger_ones
 from service.diagnosis.selection.selector import Selector
 from service.identification import Identification, Options, identify
@@ -126,6 +127,7 @@ def _selected(
         selector = guided
         selection = selector.select(model, selection.fit.model.terms, progress)
     selection = looked_farther(selection, selector, setting, progress)
+    selection = with_best_kinds(selection, selector)
     if states_friction(identification.robot):
         selection = with_better_than_constants(selection, selector)
     selection = without_errors_of_larger_ones(selection, selector.fitter, selector.admission)

@@ -97,7 +97,7 @@ def test_an_alternative_that_held_out_recordings_refute_is_none(diagnosis: Diagn
     """However well it explains the recordings that were used; one that they confirm takes the finding's place."""
 
     class Deciding(Selector):
-        def _confirmation(self, fit: Fit, option: Option) -> Confirmation:
+        def confirmation(self, fit: Fit, option: Option) -> Confirmation:
             return Confirmation(0.0, 10.0 if confirmed else -10.0, 0.0, 0.0, 0.0)
 
     nominal = diagnosis.selection.nominal

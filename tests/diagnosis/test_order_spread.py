@@ -11,7 +11,8 @@ from service.diagnosis.catalogue import Effect, Quantity
 from service.diagnosis.catalogue.periodic_torque import Cogging
 from service.diagnosis.catalogue.torque_sensing import Clipping
 from service.diagnosis.findings import order_spread
-from service.diagnosis.findings.order_spread import Elsewhere, orders_elsewhere, spread
+from service.diagnosis.findings.elsewhere import Elsewhere, spread
+from service.diagnosis.findings.order_spread import orders_elsewhere
 from service.diagnosis.fitting.projection import Moments
 from service.diagnosis.model.term import Term
 

@@ -139,7 +139,7 @@ def test_a_form_that_cannot_be_leaves_the_plain_form_of_its_effect_in(
     monkeypatch.setattr(selector, "is_position_noise", lambda option, fit, screen: False)
     monkeypatch.setattr(selector, "where_held_out_shows", lambda option, fit, fitter, held_out: option)
     monkeypatch.setattr(selector, "equivalents", lambda *_: [])
-    monkeypatch.setattr(Selector, "_confirmation", lambda self, fit, option: SEEN)
+    monkeypatch.setattr(Selector, "confirmation", lambda self, fit, option: SEEN)
     asked = Selector(SCREEN, FITTER, None, pure_error=True)
     asked.admission = SIGNIFICANT
     best = asked._best(table, [])

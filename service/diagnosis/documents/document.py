@@ -21,9 +21,9 @@ from service.diagnosis.documents.result import (
     WhereEntry,
 )
 from service.diagnosis.findings.diagnosed import Diagnosis
+from service.diagnosis.findings.elsewhere import spread
 from service.diagnosis.findings.finding import Finding
 from service.diagnosis.findings.location import JointMismatch, Place
-from service.diagnosis.findings.order_spread import spread
 from service.diagnosis.findings.stand_in import DOUBTED
 from service.diagnosis.findings.verdict import Verdict
 from service.diagnosis.model.term import Term
@@ -196,14 +196,16 @@ def _quantities(finding: Finding, diagnosis: Diagnosis) -> list[Quantity]:
     for number, (term, covariance) in enumerate(zip(finding.terms, finding.covariances, strict=True), start=1):
         sized = on_the_arm(diagnosis.selection.fit.model, term)
         own = _told(sized, diagnosis, covariance)
-        own = spread(own, [(each.chance, _told(each.term, diagnosis, covariance)) for each in finding.elsewhere])
+        own = spread(own, [(each.chance, _told(each.term, diagnosis)) for each in finding.elsewhere])
         suffix = "" if number == 1 else f"_{number}"
         found += [Quantity(f"{each.name}{suffix}", each.value, each.std, each.unit) for each in own]
     return found
 
 
-def _told(term: Term, diagnosis: Diagnosis, covariance: Array) -> tuple[Quantity, ...]:
-    """The parameters of one term."""
+def _told(term: Term, diagnosis: Diagnosis, covariance: Array | None = None) -> tuple[Quantity, ...]:
+    """The parameters of one term; without standard errors where their covariance is not given."""
+    if covariance is None:
+        covariance = np.zeros((len(term.coefficients) + len(term.shape),) * 2)
     return term.effect.quantities(diagnosis.setting, term.coefficients, term.shape, covariance)
 
 

@@ -6,7 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from service.diagnosis.catalogue import Effect, TimeLocalEffect
-from service.diagnosis.findings.order_spread import Elsewhere, orders_elsewhere
+from service.diagnosis.findings.elsewhere import Elsewhere
+from service.diagnosis.findings.kind_spread import kinds_elsewhere
+from service.diagnosis.findings.order_spread import orders_elsewhere
 from service.diagnosis.findings.stand_in import certainty_as_law
 from service.diagnosis.fitting.fit import Fit, Fitter
 from service.diagnosis.fitting.lack_of_fit import LackOfFit
@@ -64,7 +66,7 @@ class Finding:
     as_law : float
         chance that it is a law of the catalogue, and does not stand in for another one
     elsewhere : tuple of Elsewhere
-        other orders that explain nearly as much, in the arm's own torque; of a finding of one wave
+        other orders and kinds that explain nearly as much, in the arm's own torque; of a finding of one term
     """
 
     terms: tuple[Term, ...]
@@ -159,7 +161,10 @@ def selected_findings(
                 confirmed=any(choice.confirmation is not None for choice in choices) or None,
                 behind=standing.behind,
                 as_law=as_law,
-                elsewhere=_elsewhere(terms, covariances, fit.model, without, screen, inflation),
+                elsewhere=(
+                    *_elsewhere(terms, covariances, fit.model, without, screen, inflation),
+                    *kinds_elsewhere(choices[0], inflation),
+                ),
             )
         )
     return in_order(found)

@@ -5,16 +5,13 @@ what a wave takes off the residual's energy at order k, σ the standard error of
 exceeds the modelled noise, and nothing known of k beforehand, the chance of an order more than three σ away is
 
     p(k) dk = L(k) dk / (√(2π) σ + ∫ L dk'),        L(k) = exp((T(k) - T(k̂)) / 2κ).
-
-A parameter's variance is then σ² + Σ p (x(k) - x̂)².
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from service.diagnosis.catalogue.parameters import Quantity
+from service.diagnosis.findings.elsewhere import Elsewhere
 from service.diagnosis.fitting.fit import Fit
 from service.diagnosis.fitting.projection import statistics
 from service.diagnosis.model.term import Term
@@ -32,20 +29,6 @@ NEGLIGIBLE = 20.0
 
 PARTS = 8
 """Orders between two of the grid's."""
-
-
-@dataclass(frozen=True, eq=False)
-class Elsewhere:
-    """An order far from the one that was found.
-
-    chance : float
-        of this order
-    term : Term
-        the wave of it
-    """
-
-    chance: float
-    term: Term
 
 
 def orders_elsewhere(term: Term, error: float, without: Fit, screen: Screen, inflation: float) -> tuple[Elsewhere, ...]:
@@ -107,25 +90,3 @@ def _chances(gains: Array, best: float, steps: Array, error: float, inflation: f
     fall = np.minimum(gains - best, 0.0) / inflation
     likelihood = np.where(fall > -NEGLIGIBLE, np.exp(0.5 * fall), 0.0) * steps
     return likelihood / (np.sqrt(2.0 * np.pi) * error + likelihood.sum())
-
-
-def spread(found: Sequence[Quantity], elsewhere: Sequence[tuple[float, Sequence[Quantity]]]) -> tuple[Quantity, ...]:
-    """Parameters with what they are elsewhere in their standard errors.
-
-    Parameters
-    ----------
-    found : sequence of Quantity
-        at the order that was found
-    elsewhere : sequence of (float, sequence of Quantity)
-        chance of another order, and the same parameters there
-    """
-    variances = np.array([each.std**2 for each in found])
-    for chance, others in elsewhere:
-        variances += chance * np.array([_distance(one, other) ** 2 for one, other in zip(found, others, strict=True)])
-    return tuple(replace(each, std=float(np.sqrt(v))) for each, v in zip(found, variances, strict=True))
-
-
-def _distance(one: Quantity, other: Quantity) -> float:
-    """Between two values, the shorter way where they lie on a circle."""
-    apart = abs(one.value - other.value)
-    return apart if np.isinf(one.period) else min(apart % one.period, -apart % one.period)

@@ -29,6 +29,24 @@ def refined(candidate: Candidate, fit: Fit, screen: Screen, signals: Sequence[Si
     signals : sequence of Signals
         of every piece under that model
     """
+    kinds = refined_kinds(candidate, fit, screen, signals)
+    return max(kinds, key=lambda each: each.gain - candidate.effect.reluctance(each.shape[None])[0])
+
+
+def refined_kinds(candidate: Candidate, fit: Fit, screen: Screen, signals: Sequence[Signals]) -> list[Candidate]:
+    """The candidate at the best shape near its grid point, then at the best near the same of each other kind.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        at a point of its grid
+    fit : Fit
+        the model so far
+    screen : Screen
+        of the observations
+    signals : sequence of Signals
+        of every piece under that model
+    """
     effect = candidate.effect
 
     def best_of(shapes: Array) -> tuple[int, Candidate]:
@@ -44,8 +62,7 @@ def refined(candidate: Candidate, fit: Fit, screen: Screen, signals: Sequence[Si
         )
 
     nearby = _zoomed(candidate, best_of)
-    alike = [_zoomed(best_of(shapes)[1], best_of) for shapes in effect.alike(nearby.shape)]
-    return max([nearby, *alike], key=lambda each: each.gain - effect.reluctance(each.shape[None])[0])
+    return [nearby, *(_zoomed(best_of(shapes)[1], best_of) for shapes in effect.alike(nearby.shape))]
 
 
 def _zoomed(candidate: Candidate, best_of: Callable[[Array], tuple[int, Candidate]]) -> Candidate:

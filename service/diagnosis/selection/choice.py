@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from service.diagnosis.fitting.fit import Fit
+from service.diagnosis.model.term import Term
 from service.diagnosis.observations.observations import Observations
 from service.diagnosis.screening.screen import Candidate
 from service.diagnosis.selection.confirmation import Confirmation
@@ -43,6 +44,20 @@ class Option:
 
 
 @dataclass(frozen=True, eq=False)
+class Kind:
+    """The same effect of another kind, fitted with everything else in the place of the chosen one.
+
+    behind : float
+        by how much less it explains, parameters and what the usual kind is preferred by counted [noise variances]
+    term : Term
+        the effect, in the arm's own torque
+    """
+
+    behind: float
+    term: Term
+
+
+@dataclass(frozen=True, eq=False)
 class Choice:
     """One step of the selection.
 
@@ -54,12 +69,15 @@ class Choice:
         of the chosen one, family-wise
     was_given : bool
         whether others had found it, so that nothing else was looked at in its place
+    kinds : tuple of Kind
+        other kinds of the chosen one; known only once all that is missing is in the model
     """
 
     options: tuple[Option, ...]
     confirmation: Confirmation | None
     p_value: float
     was_given: bool = False
+    kinds: tuple[Kind, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -107,7 +107,7 @@ class Selector:
         for term in beforehand:
             option = self._option(fit, term)
             p_value = self.admission.p_value(option, fit, blocks=False)
-            confirmation = self._confirmation(fit, option)
+            confirmation = self.confirmation(fit, option)
             confirmed = confirmation is None or confirmation.confirmed(cautious=not self.pure_error)
             if p_value < self.admission.level and confirmed:
                 choices.append(Choice((option,), confirmation, p_value, was_given=True))
@@ -211,7 +211,7 @@ class Selector:
                     continue
                 below = [each for each in fitted if each.score <= option.score]
                 chosen = where_held_out_shows(option, fit, self.fitter, self.held_out)
-                confirmation = self._confirmation(fit, chosen)
+                confirmation = self.confirmation(fit, chosen)
                 if p_value >= level and (confirmation is None or confirmation.gain_z < CLEARLY_PREDICTED):
                     continue
                 alike = equivalents(chosen, below, fit, self.screen, self.admission.inflation(chosen.fit))
@@ -287,7 +287,7 @@ class Selector:
             return fit, compared
         without = self.fitter.fit(with_terms(fit.model, [*terms[:place], *terms[place + 1 :]]))
         for option in better:
-            confirmation = self._confirmation(without, option)
+            confirmation = self.confirmation(without, option)
             if confirmation is None or confirmation.confirmed(cautious=not self.pure_error):
                 return option.fit, Choice(distinct([option, *kept]), confirmation, compared.p_value)
             kept = tuple(each for each in kept if each is not option)
@@ -317,7 +317,16 @@ class Selector:
         own, *later = [set(choice.options[0].candidate.effect.touched(count)) for choice in choices[place:]]
         return choices[place].was_given or any(own & each for each in later)
 
-    def _confirmation(self, fit: Fit, option: Option) -> Confirmation | None:
+    def confirmation(self, fit: Fit, option: Option) -> Confirmation | None:
+        """What motion that was not used says of an option; None where there is none.
+
+        Parameters
+        ----------
+        fit : Fit
+            the model without it
+        option : Option
+            the last term of its model
+        """
         term = option.fit.model.terms[-1]
         if isinstance(term.effect, TimeLocalEffect):
             return interleaved_confirmation(term, fit, option.fit, self.screen, self.held_out)
