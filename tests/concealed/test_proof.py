@@ -47,6 +47,25 @@ def test_one_trial_from_draw_to_page(
     assert (tmp_path / "proof.md").read_text() == page
 
 
+@pytest.mark.parametrize(
+    ("words", "until"),
+    [([], 660.0), (["--minutes", "2"], 120.0), (["--full"], None), (["--full", "--minutes", "2"], 120.0)],
+)
+def test_only_the_reduced_set_ends_by_itself(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], until: float | None
+) -> None:
+    asked: list[float | None] = []
+
+    def run(*_: object, until: float | None) -> int:
+        asked.append(until)
+        return 0
+
+    monkeypatch.setattr(proof, "run", run)
+    monkeypatch.setattr(sys, "argv", ["prove", "--out", str(tmp_path), "--jobs", "1", *words])
+    proof.main()
+    assert asked == [until]
+
+
 @pytest.mark.usefixtures("one_trial")
 def test_what_is_no_outcome_ends_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "outcomes.jsonl").write_text("nonsense\n")

@@ -16,6 +16,7 @@ class AsymmetricCoulomb(Effect):
     """τ = a |A(q̇)|: Coulomb friction is larger by a one way and smaller by a the other."""
 
     has_step: ClassVar[bool] = True
+    of_motion_and_step: ClassVar[bool] = True
     id: ClassVar[str] = "asymmetric_coulomb"
     arguments: ClassVar[frozenset[str] | None] = frozenset({"velocity"})
     equation: ClassVar[str] = "tau = a |sgn(qd)|, sgn smoothed: Coulomb friction F_c + a forwards, F_c - a backwards"

@@ -29,6 +29,7 @@ class PositionDependentFriction(Effect):
     """
 
     has_step: ClassVar[bool] = True
+    of_motion_and_step: ClassVar[bool] = True
     id: ClassVar[str] = "position_dependent_friction"
     arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "velocity"})
     equation: ClassVar[str] = "tau = sgn(qd) (a cos kq + b sin kq)"

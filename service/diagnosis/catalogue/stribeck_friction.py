@@ -25,6 +25,7 @@ class StribeckFriction(Effect):
     """τ = s A(q̇) exp(-(|q̇|/v_s)^α)."""
 
     has_step: ClassVar[bool] = True
+    of_motion_and_step: ClassVar[bool] = True
     id: ClassVar[str] = "stribeck_friction"
     arguments: ClassVar[frozenset[str] | None] = frozenset({"velocity"})
     equation: ClassVar[str] = "tau = s sgn(qd) exp(-(|qd|/v_s)^alpha)"

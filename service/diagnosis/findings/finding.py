@@ -22,7 +22,7 @@ from service.diagnosis.selection.choice import Option, Selection
 from service.diagnosis.selection.confirmation import HeldOut
 from service.diagnosis.selection.equivalence import doubt, probability_among
 from service.diagnosis.selection.interleaved import interleaved_confirmation
-from service.diagnosis.selection.shape_error import groups_of, standings, without_group
+from service.diagnosis.selection.shape_error import groups_of, standings
 from service.recording.recording import Array
 
 
@@ -139,7 +139,7 @@ def selected_findings(
     covariance = fitter.covariance(fit) * inflation
     groups = groups_of(fit.model)
     after = sizes(fit.model, fitter, held_out)
-    all_without = [without_group(fit, places, fitter) for places in groups.values()]
+    all_without = [fitter.without(fit, places) for places in groups.values()]
     own = standings(selection.nominal, fit, all_without, fitter, inflation)
     found = []
     for places, without, standing in zip(groups.values(), all_without, own, strict=True):

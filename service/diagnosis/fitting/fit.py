@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from service.diagnosis.fitting.bounded_step import bounded_step
 from service.diagnosis.fitting.projection import JointColumns, Projection, project
+from service.diagnosis.fitting.white_columns import WhiteColumns
 from service.diagnosis.model.extended import ExtendedModel, with_terms
-from service.diagnosis.model.residual import residual_rows
 from service.diagnosis.model.term import Term
-from service.diagnosis.observations.observations import Observations, Piece
+from service.diagnosis.observations.observations import Observations
 from service.recording.recording import Array
 
 STEPS = 25
@@ -29,6 +29,9 @@ TRUSTED = (1.0, 0.25, 0.06, 0.015)
 
 FARTHEST = 3.0
 """Factor beyond which a constant of the friction curve does not move from where the identification found it."""
+
+KEPT = 8
+"""Fits without some terms that are kept."""
 
 AT_LIMIT = 1e-6
 """Part of its largest step within which a constant or a shape is at its limit."""
@@ -73,8 +76,31 @@ class Fit:
         return max(at_least, self.energy / self.projection.freedom)
 
 
+@dataclass(frozen=True, eq=False)
+class _Linearised:
+    """A model as it is.
+
+    model : ExtendedModel
+        the model
+    residual : list of (R_j,) float64
+        what it leaves, whitened
+    columns : list of JointColumns
+        the slopes of its torque in all its parameters
+    """
+
+    model: ExtendedModel
+    residual: list[Array]
+    columns: list[JointColumns]
+
+    @property
+    def energy(self) -> float:
+        """Σ r² of the data's rows and of the prior's."""
+        _, left = self.model.prior()
+        return float(_energies(self.residual).sum() + left @ left)
+
+
 class Fitter:
-    """Fits extended models to the same observations; columns that never change are whitened once.
+    """Fits extended models to the same observations.
 
     Parameters
     ----------
@@ -84,7 +110,8 @@ class Fitter:
 
     def __init__(self, observations: Observations) -> None:
         self.observations = observations
-        self._rigid: dict[int, Array] = {}
+        self._white = WhiteColumns(observations)
+        self._without: dict[tuple[Fit, tuple[int, ...]], Fit] = {}
 
     def fit(self, model: ExtendedModel, *, steps: int = STEPS) -> Fit:
         """Fit all parameters.
@@ -97,75 +124,83 @@ class Fitter:
             most Gauss–Newton steps
         """
         limits = _constants_limits(model)
-        model, residual = self._linear_optimum(model)
-        energy = _energy(model, residual)
-        projection = self._project(self._columns(model), residual, model)
+        at = self._linear_optimum(model)
+        projection = self._project(at)
         for _ in range(steps):
-            if energy - projection.energy < SETTLED:
+            if at.energy - projection.energy < SETTLED:
                 break
-            tried = self._descended(model, projection, energy, limits)
+            tried = self._descended(at, projection, limits)
             if tried is None:
                 break
-            model, residual = tried
-            gained, energy = energy - _energy(model, residual), _energy(model, residual)
-            projection = self._project(self._columns(model), residual, model)
+            gained, at = at.energy - tried.energy, tried
+            projection = self._project(at)
             if gained < SETTLED:
                 break
-        projection, spread = self._within_limits(model, residual, projection, limits)
-        return Fit(model, projection, energy, _energies(residual), spread)
+        projection, spread = self._within_limits(at, projection, limits)
+        return Fit(at.model, projection, at.energy, _energies(at.residual), spread)
 
-    def _within_limits(
-        self, model: ExtendedModel, residual: list[Array], projection: Projection, limits: Array
-    ) -> tuple[Projection, Array]:
+    def _within_limits(self, at: _Linearised, projection: Projection, limits: Array) -> tuple[Projection, Array]:
         """The projection without what would only lead beyond limits, and the spread of all parameters.
 
         What they would do beyond is nothing that the model can do; but nor does a shape's bound make it known.
         """
-        stopped = _stopped(model, projection.step, limits)
+        stopped = _stopped(at.model, projection.step, limits)
         if not stopped:
             return projection, projection.spread
-        columns, constants = self._columns(model), [place for place in stopped if _is_constant(model, place)]
-        within = self._project(_without(columns, stopped), residual, model)
+        constants = [place for place in stopped if _is_constant(at.model, place)]
+        within = self._project(replace(at, columns=_without(at.columns, stopped)))
         if constants == stopped:
             return within, within.spread
-        return within, self._project(_without(columns, constants), residual, model).spread
+        return within, self._project(replace(at, columns=_without(at.columns, constants))).spread
 
-    def _descended(
-        self, model: ExtendedModel, projection: Projection, energy: float, limits: Array
-    ) -> tuple[ExtendedModel, list[Array]] | None:
+    def _descended(self, at: _Linearised, projection: Projection, limits: Array) -> _Linearised | None:
         """The longest step after which no more is left than before, as `_linear_optimum` gives it."""
-        curved, lower, upper, reach = _room(model, limits)
+        curved, lower, upper, reach = _room(at.model, limits)
         for trusted in TRUSTED:
             low, high = np.maximum(lower, -trusted * reach), np.minimum(upper, trusted * reach)
             step = bounded_step(projection.step, projection.spread, curved, low, high, reach)
-            tried = self._linear_optimum(_stepped(model, step))
-            if _energy(*tried) <= energy * (1.0 + 1e-12):
+            tried = self._linear_optimum(_stepped(at.model, step))
+            if tried.energy <= at.energy * (1.0 + 1e-12):
                 return tried
         return None
 
-    def _linear_optimum(self, model: ExtendedModel) -> tuple[ExtendedModel, list[Array]]:
-        """The model with the best Θ and coefficients for its shapes, and its residual.
+    def _linear_optimum(self, model: ExtendedModel) -> _Linearised:
+        """The model with the best Θ and coefficients for its shapes.
 
         A step in a shape that is cut short would else leave coefficients that belong to another shape.
         """
-        residual, columns = self._linearised(model)
+        at = self._linearised(model)
         linear = np.ones(model.size, dtype=bool)
         linear[model.structure.size : model.structure.size + len(model.constants)] = False
         linear[list(model.unmoved)] = False
         for term, place in zip(model.terms, model.term_places(), strict=True):
             linear[place.start + len(term.coefficients) : place.stop] = False
-        kept = [linear[own.index] for own in columns]
+        kept = [linear[own.index] for own in at.columns]
         places = np.cumsum(linear) - 1
         own = [
-            JointColumns(places[each.index[mask]], each.rows[mask]) for each, mask in zip(columns, kept, strict=True)
+            JointColumns(places[each.index[mask]], each.rows[mask]) for each, mask in zip(at.columns, kept, strict=True)
         ]
-        found = project(own, residual, int(linear.sum()))
         step = np.zeros(model.size)
-        step[linear] = found.step
-        moved = _stepped(model, step)
-        if model.terms:  # their columns may depend on Θ
-            return moved, self._residual(moved)
-        return moved, list(found.residual)
+        step[linear] = project(own, at.residual, int(linear.sum())).step
+        return self._linearised(_stepped(model, step))
+
+    def without(self, fit: Fit, places: Sequence[int]) -> Fit:
+        """The model fitted anew without some of its terms; the last few are kept, as several ask for the same.
+
+        Parameters
+        ----------
+        fit : Fit
+            the model
+        places : sequence of int
+            of the terms that are left out
+        """
+        key = fit, tuple(sorted(places))
+        if key not in self._without:
+            while len(self._without) >= KEPT:
+                self._without.pop(next(iter(self._without)))
+            terms = [term for place, term in enumerate(fit.model.terms) if place not in places]
+            self._without[key] = self.fit(with_terms(fit.model, terms))
+        return self._without[key]
 
     def projected(self, model: ExtendedModel) -> Fit:
         """The linear step at a model as it is, without moving it.
@@ -175,8 +210,7 @@ class Fitter:
         model : ExtendedModel
             the model
         """
-        residual, columns = self._linearised(model)
-        projection = self._project(columns, residual, model)
+        projection = self._project(self._linearised(model))
         return Fit(model, projection, projection.energy, _energies(projection.residual), projection.spread)
 
     def covariance(self, fit: Fit) -> Array:
@@ -199,7 +233,7 @@ class Fitter:
         model : ExtendedModel
             the model
         """
-        return self._residual(model)
+        return self._linearised(model).residual
 
     def columns(self, model: ExtendedModel) -> list[JointColumns]:
         """Whitened columns of all parameters of a model, one entry a joint.
@@ -209,82 +243,20 @@ class Fitter:
         model : ExtendedModel
             the model
         """
-        return self._columns(model)
+        return self._linearised(model).columns
 
-    def _project(self, columns: list[JointColumns], residual: list[Array], model: ExtendedModel) -> Projection:
+    def _linearised(self, model: ExtendedModel) -> _Linearised:
+        return _Linearised(model, *self._white.linearised(model))
+
+    def _project(self, at: _Linearised) -> Projection:
         noise = self.observations.noise
-        rows = sum(own.share * len(row) for own, row in zip(noise, residual, strict=True))
-        return replace(project(columns, residual, model.size, model.prior()), independent=rows)
-
-    def _linearised(self, model: ExtendedModel) -> tuple[list[Array], list[JointColumns]]:
-        return self._residual(model), self._columns(model)
-
-    def _residual(self, model: ExtendedModel) -> list[Array]:
-        rows = residual_rows(model, self.observations)
-        return [self.observations.white(joint, pieces)[0] for joint, pieces in enumerate(rows)]
-
-    def _columns(self, model: ExtendedModel) -> list[JointColumns]:
-        observations = self.observations
-        pieces = [_moving_columns(model, piece) for piece in observations]
-        result = []
-        for joint in range(observations.robot.joint_count):
-            rigid = model.factor(joint) * self._white_rigid(model, joint)
-            moving = observations.white(joint, [piece[joint].rows for piece in pieces])
-            places = [model.structure.joint_columns(joint)[: len(rigid)], pieces[0][joint].index]
-            result.append(JointColumns(np.concatenate(places).astype(np.intp), np.concatenate([rigid, moving])))
-        return result
-
-    def _white_rigid(self, model: ExtendedModel, joint: int) -> Array:
-        """Columns of the links, which no fit changes."""
-        if joint not in self._rigid:
-            own = len(model.structure.terms[joint].names)
-            columns = [piece.prepared.joint_columns(model.structure, joint)[:-own] for piece in self.observations]
-            rows = [piece.repeated(each) for piece, each in zip(self.observations, columns, strict=True)]
-            self._rigid[joint] = self.observations.white(joint, rows)
-        return self._rigid[joint]
-
-
-def _moving_columns(model: ExtendedModel, piece: Piece) -> list[JointColumns]:
-    """Columns of one piece that change with the model, in the common band: friction, its constants, and all terms."""
-    motion, structure = piece.prepared.motion, model.structure
-    joints = range(structure.robot.joint_count)
-    rows: list[list[Array]] = [[] for _ in joints]
-    places: list[list[int]] = [[] for _ in joints]
-    for joint in joints:
-        terms = structure.joint_term_columns(joint, motion.velocity[:, joint], motion.acceleration[:, joint])
-        factor = model.factor(joint)
-        rows[joint].append(piece.repeated(factor * motion.band.reduce(terms)))
-        places[joint] += list(structure.joint_columns(joint)[-len(terms) :])
-        of_constants, slopes = model.sensitivity_columns(piece, joint)
-        rows[joint].append(_with_steps_of_terms(piece.repeated(factor * slopes), of_constants, joint, model, piece))
-        places[joint] += of_constants
-    for term, place in zip(model.terms, model.term_places(), strict=True):
-        derivatives = model.term_derivatives(term, model.signals(piece))
-        for slot, joint in enumerate(term.effect.touched(len(joints))):
-            rows[joint].append(piece.reduced(derivatives[:, slot]))
-            places[joint] += list(range(place.start, place.stop))
-    return [JointColumns(np.array(index), np.concatenate(own)) for index, own in zip(places, rows, strict=True)]
-
-
-def _with_steps_of_terms(slopes: Array, places: list[int], joint: int, model: ExtendedModel, piece: Piece) -> Array:
-    """∂τ/∂log K of a joint's constants, and what K_v changes of the terms there that have friction's step in them."""
-    stepping = [term for term in model.terms if term.effect.has_step and term.effect.joint == joint]
-    for row, place in enumerate(places):
-        if model.constants[place - model.structure.size] == (joint, "k_v"):
-            for term in stepping:
-                slopes[row] += piece.reduced(model.step_sensitivity(term, model.signals(piece)))[0]
-    return slopes
+        rows = sum(own.share * len(row) for own, row in zip(noise, at.residual, strict=True))
+        return replace(project(at.columns, at.residual, at.model.size, at.model.prior()), independent=rows)
 
 
 def _energies(residual: Sequence[Array]) -> Array:
     """Σ r² by joint, (n,)."""
     return np.array([float(row @ row) for row in residual])
-
-
-def _energy(model: ExtendedModel, residual: list[Array]) -> float:
-    """Σ r² of the data's rows and of the prior's."""
-    _, left = model.prior()
-    return float(_energies(residual).sum() + left @ left)
 
 
 def _constants_limits(model: ExtendedModel) -> Array:

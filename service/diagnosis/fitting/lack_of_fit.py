@@ -79,7 +79,7 @@ def lack_of_fit(fit: Fit, observations: Observations, *, pure_error: bool, seed:
     share = fit.projection.spread.shape[1] / max(rows, 1.0)
     repeated = pure_error_rows(observations)
     for joint, residual in enumerate(fit.projection.residual):
-        rows = [piece.reduced(_features(piece, joint, observations, seed)) for piece in observations]
+        rows = [_reduced_features(piece, joint, observations, seed) for piece in observations]
         white = observations.white(joint, rows)
         basis = fit.projection.basis[joint]
         outside = white - (white @ basis.T) @ basis
@@ -139,6 +139,14 @@ def _f_test(columns: Array, residual: Array, freedom: float) -> tuple[float, flo
         return 1.0, 0.0
     by_chance = len(span) * rest / freedom
     return float(stats.f.sf(inside / by_chance, len(span), freedom)), inside - by_chance
+
+
+def _reduced_features(piece: Piece, joint: int, observations: Observations, seed: int) -> Array:
+    """The features in the common band, (k, P M): the same whatever the model and the noise, and made once."""
+    key = f"features of joint {joint}, seed {seed}"
+    if key not in piece.memory:
+        piece.memory[key] = piece.reduced(_features(piece, joint, observations, seed))
+    return piece.memory[key]
 
 
 def _features(piece: Piece, joint: int, observations: Observations, seed: int) -> Array:

@@ -114,8 +114,24 @@ class ExtendedModel:
         """The nominal part alone."""
         return replace(self, terms=())
 
-    def sensitivity_columns(self, piece: Piece, joint: int) -> tuple[list[int], Array]:
-        """∂τ/∂log K of a joint's own estimated constants, in the common band, (k, M), with their places.
+    def slope_amplitudes(self, joint: int) -> tuple[list[int], Array]:
+        """Places of a joint's own estimated constants among all parameters, and the coefficients beside them, (k,).
+
+        Parameters
+        ----------
+        joint : int
+            joint index, from 0
+        """
+        places, amplitudes = [], []
+        for place, (owner, name) in enumerate(self.constants):
+            if owner == joint:
+                column = self.structure.coefficient(joint, "stiction" if name == "k_v" else "stribeck")
+                amplitudes.append(0.0 if column is None else float(self.parameters[column]))
+                places.append(self.structure.size + place)
+        return places, np.array(amplitudes)
+
+    def slope_columns(self, piece: Piece, joint: int) -> Array:
+        """∂τ/∂log K of a joint's own estimated constants for coefficients of one, in the common band, (k, M).
 
         Parameters
         ----------
@@ -124,18 +140,13 @@ class ExtendedModel:
         joint : int
             joint index, from 0
         """
-        places, rows = [], []
         velocity = piece.prepared.motion.velocity[:, joint]
-        for place, (owner, name) in enumerate(self.constants):
-            if owner == joint:
-                column = self.structure.coefficient(joint, "stiction" if name == "k_v" else "stribeck")
-                amplitude = 0.0 if column is None else self.parameters[column]
-                value = self.constant(place)
-                rows.append(amplitude * value * smooth_sign_slope(velocity, value))
-                places.append(self.structure.size + place)
-        if not rows:
-            return places, np.zeros((0, piece.rows))
-        return places, piece.prepared.motion.band.reduce(np.stack(rows))
+        values = [self.constant(place) for place, (owner, _) in enumerate(self.constants) if owner == joint]
+        if not values:
+            return np.zeros((0, piece.rows))
+        return piece.prepared.motion.band.reduce(
+            np.stack([value * smooth_sign_slope(velocity, value) for value in values])
+        )
 
     def standard_parameters(self) -> Array:
         """Standard parameters with the fitted base parameters, (10 n,): those in combinations only are zero."""
@@ -161,6 +172,29 @@ class ExtendedModel:
         kept.append((key, signals))
         del kept[:-SIGNALS_KEPT]
         return signals
+
+    def signals_of_terms(self, piece: Piece) -> Signals:
+        """The same as far as the columns of its terms need it: where none depends on Θ, what is known of any other Θ.
+
+        Parameters
+        ----------
+        piece : Piece
+            from the observations
+        """
+        known: list[tuple[tuple[object, ...], Signals]] = piece.memory.get("signals", [])
+        effects = [term.effect for term in self.terms]
+        if not known or not all(each.of_motion_alone or each.of_motion_and_step for each in effects):
+            return self.signals(piece)
+        _, last = known[-1]
+        if np.array_equal(last.steepness, self.steepness):
+            return last
+        kept: dict[bytes, Signals] = piece.memory.setdefault("signals_of_terms", {})
+        key = self.steepness.tobytes()
+        if key not in kept:
+            while len(kept) >= SIGNALS_KEPT:
+                kept.pop(next(iter(kept)))
+            kept[key] = _with_steepness(last, self.steepness)
+        return kept[key]
 
     def _made_signals(self, piece: Piece) -> Signals:
         """The same, made anew."""
@@ -224,10 +258,10 @@ class ExtendedModel:
         signals : Signals
             one piece of motion
         """
-        joint = term.effect.joint
+        own = np.arange(len(signals.steepness)) == term.effect.joint
         ahead, behind = (
-            self.term_torque(term, _with_steepness(signals, joint, np.exp(sign * STEEPNESS_DIFFERENCE)))
-            for sign in (1.0, -1.0)
+            self.term_torque(term, _with_steepness(signals, signals.steepness * np.exp(sign * own)))
+            for sign in (STEEPNESS_DIFFERENCE, -STEEPNESS_DIFFERENCE)
         )
         return (ahead - behind) / (2.0 * STEEPNESS_DIFFERENCE)
 
@@ -256,11 +290,11 @@ class ExtendedModel:
         return np.stack(rows)
 
 
-def _with_steepness(signals: Signals, joint: int | None, factor: float) -> Signals:
-    """The same signals with another K_v at a joint."""
-    steepness, step = signals.steepness.copy(), signals.step.copy()
-    steepness[joint] *= factor
-    step[joint] = smooth_sign(signals.velocity[joint], steepness[joint])
+def _with_steepness(signals: Signals, steepness: Array) -> Signals:
+    """The same signals with other K_v, (n,)."""
+    step = signals.step.copy()
+    for joint in np.flatnonzero(steepness != signals.steepness):
+        step[joint] = smooth_sign(signals.velocity[joint], steepness[joint])
     return replace(signals, steepness=steepness, step=step, _memory={})
 
 

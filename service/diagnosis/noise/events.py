@@ -14,7 +14,7 @@ from service.diagnosis.fitting.fit import Fit, Fitter
 from service.diagnosis.model.extended import ExtendedModel, with_terms
 from service.diagnosis.model.residual import residual_rows
 from service.diagnosis.model.term import Term
-from service.diagnosis.noise.floor import with_noise
+from service.diagnosis.noise.floor import with_noise, with_pure_error
 from service.diagnosis.observations.observations import Observations
 from service.diagnosis.observations.whitening import JointNoise
 from service.diagnosis.screening.refinement import refined
@@ -63,8 +63,11 @@ def beside_events(
         ranked = sorted(likely, key=lambda each: -each.score)
         for candidate in ranked[:LOOKED_AT]:
             tried = fitter.fit(_with(fit, refined(candidate, fit, screen, signals)))
+            agreed = with_pure_error(observations, tried.model)
+            if agreed is None or not _agree_better(_variances(agreed), _variances(best)):
+                continue
             found, still_pure = with_noise(observations, tried.model, effects)
-            if still_pure and _agree_better(_variances(found), _variances(best)):
+            if still_pure:
                 fit, best, pure_error = tried, found, still_pure
                 break
         else:

@@ -51,13 +51,28 @@ def with_noise(
     effects : sequence of Effect
         the catalogue, for the saturated fit
     """
+    known = with_pure_error(observations, model)
+    if known is None:
+        return observations.with_noise(_saturated_noise(observations, model, effects)), False
+    return _beyond_pure_error(known, model, effects)
+
+
+def with_pure_error(observations: Observations, model: ExtendedModel) -> Observations | None:
+    """The observations with the noise that repetitions show; None where they are too few at some joint.
+
+    Parameters
+    ----------
+    observations : Observations
+        the data
+    model : ExtendedModel
+        any model; the motion of each repetition is its own
+    """
     differences = [] if rounding_repeats(observations) else list(repeated_differences(observations, model))
     pure = [[(rows[j], used[j], factor) for rows, used, factor in differences] for j in _joints(observations)]
-    if all(sum(int(used.sum()) for _, used, _ in parts) >= FEWEST_ROWS for parts in pure):
-        share = _band_share(observations)
-        noise = [fitted_noise(parts, share) for parts in pure]
-        return _beyond_pure_error(observations.with_noise(noise), model, effects)
-    return observations.with_noise(_saturated_noise(observations, model, effects)), False
+    if any(sum(int(used.sum()) for _, used, _ in parts) < FEWEST_ROWS for parts in pure):
+        return None
+    share = _band_share(observations)
+    return observations.with_noise([fitted_noise(parts, share) for parts in pure])
 
 
 def repeated_differences(

@@ -56,8 +56,7 @@ def with_best_kinds(selection: Selection, selector: Selector) -> Selection:
 
 def _weighed(fit: Fit, choice: Choice, place: int, selector: Selector) -> tuple[Choice, Fit]:
     """A choice with its best kind in front, and the model with that, its term last; the same model where it has it."""
-    term, others = fit.model.terms[place], [each for at, each in enumerate(fit.model.terms) if at != place]
-    without = selector.fitter.fit(with_terms(fit.model, others))
+    term, without = fit.model.terms[place], selector.fitter.without(fit, [place])
     there, options = _fitted_kinds(term, without, fit, choice, selector)
     best, inflation = there, selector.admission.inflation(fit)
     for option in sorted(options, key=lambda each: -_preference(each)):

@@ -10,7 +10,7 @@ from service.diagnosis.model.extended import with_terms
 from service.diagnosis.selection.admission import Admission
 from service.diagnosis.selection.choice import Choice, Selection
 from service.diagnosis.selection.proxies import proxies
-from service.diagnosis.selection.shape_error import HARDLY, groups_of, standings, without_group
+from service.diagnosis.selection.shape_error import HARDLY, groups_of, standings
 
 Pruned = tuple[Fit, list[Choice]]
 """A model, and the choices that are left in it."""
@@ -33,7 +33,7 @@ def without_superfluous(fit: Fit, choices: list[Choice], fitter: Fitter, admissi
     while choices:
         gains = []
         for place in range(len(choices)):
-            without = without_group(fit, [place], fitter)
+            without = fitter.without(fit, [place])
             gains.append((without.energy - fit.energy, without))
         weakest = int(np.argmin([gain for gain, _ in gains]))
         candidate = replace(choices[weakest].options[0].candidate, gain=max(gains[weakest][0], 0.0))
@@ -81,7 +81,7 @@ def without_errors_of_larger_ones(selection: Selection, fitter: Fitter, admissio
     """
     while len(groups := list(groups_of(selection.fit.model).values())) > 1:
         fit = selection.fit
-        without = [without_group(fit, places, fitter) for places in groups]
+        without = [fitter.without(fit, places) for places in groups]
         found = standings(selection.nominal, fit, without, fitter, admission.inflation(fit))
         least = min(range(len(groups)), key=lambda number: found[number].certainty)
         if found[least].certainty >= HARDLY:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from service.diagnosis.catalogue import TimeLocalEffect
 from service.diagnosis.fitting.fit import Fit, Fitter
-from service.diagnosis.model.extended import ExtendedModel, with_terms
+from service.diagnosis.model.extended import ExtendedModel
 from service.diagnosis.model.term import Term
 from service.diagnosis.screening.screen import Candidate, Screen, model_signals
 from service.diagnosis.selection.admission import Admission
@@ -281,11 +281,11 @@ class Selector:
 
     def _exchanged(self, fit: Fit, compared: Choice, place: int) -> tuple[Fit, Choice]:
         """A choice with the best of its alternatives in front; one that held-out recordings refute is none."""
-        own, kept, terms = compared.options[0], compared.options, fit.model.terms
+        own, kept = compared.options[0], compared.options
         better = sorted((each for each in kept if each.score > own.score), key=lambda each: -each.score)
         if not better:
             return fit, compared
-        without = self.fitter.fit(with_terms(fit.model, [*terms[:place], *terms[place + 1 :]]))
+        without = self.fitter.without(fit, [place])
         for option in better:
             confirmation = self.confirmation(without, option)
             if confirmation is None or confirmation.confirmed(cautious=not self.pure_error):
@@ -299,7 +299,7 @@ class Selector:
         effect = terms[place].effect
         if effect.repeats and sum(_chosen(other) == _chosen(choice) for other in choices) > 1:
             return replace(choice, options=choice.options[:1])
-        without = self.fitter.fit(with_terms(fit.model, [*terms[:place], *terms[place + 1 :]]))
+        without = self.fitter.without(fit, [place])
         own = replace(choice.options[0], fit=fit, gain=without.energy - fit.energy)
         others = [fitted_option(each.candidate, without, self.fitter) for each in choice.options[1:]]
         if self._may_have_changed(choices, place) and len(choices) <= MOST_EFFECTS:

@@ -82,23 +82,6 @@ def groups_of(model: ExtendedModel) -> Groups:
     return groups
 
 
-def without_group(fit: Fit, places: Sequence[int], fitter: Fitter) -> Fit:
-    """The model fitted anew without some of its terms.
-
-    Parameters
-    ----------
-    fit : Fit
-        the model
-    places : sequence of int
-        of the terms that are left out
-    fitter : Fitter
-        of the training recordings
-    """
-    return fitter.fit(
-        with_terms(fit.model, [term for place, term in enumerate(fit.model.terms) if place not in places])
-    )
-
-
 def standings(nominal: Fit, fit: Fit, without: Sequence[Fit], fitter: Fitter, inflation: float) -> list[Standing]:
     """What each group of terms is beside the others.
 

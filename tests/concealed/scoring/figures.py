@@ -251,6 +251,7 @@ ASKED: tuple[Asked, ...] = (
     ),
     Asked("form-instead", "… and the right family is not among the findings", ("form",), _wrong_instead, fault=True),
     Asked("unknown", f"{NOTHING}: {PARTLY}", ("unknown",), _admitted, 0.90),
+    Asked("unknown-located", f"{NOTHING}: the largest mismatch is at its joint", ("unknown",), _key("located"), 0.90),
     Asked("unknown-wrong", f"{NOTHING}: a {WRONG}", ("unknown",), _confident_and_wrong, fault=True),
     Asked("aliased", "motion that hides the effect: within a set", ("aliased",), _key("named")),
     Asked("aliased-again", "… with the recommended motion recorded too", ("aliased",), _again, 0.90),
