@@ -2,7 +2,7 @@
 
     python tests/benchmarks/benchmark_diagnosis.py
 
-The arm is simulated in virtual time, sound and with a worn bearing. Recordings are read from CSV, and each diagnosis
+The arm is simulated in virtual time, sound, with a worn bearing, and with a spring beside that. Recordings are read from CSV, and each diagnosis
 runs in a process of its own, from reading to the finished document. Run it alone.
 """
 
@@ -37,9 +37,13 @@ HARMONICS = 5
 REACH = 0.25
 """Part of the limits that the motions use, roughly."""
 
+VISCOUS = {"effect": "asymmetric_viscous", "joint": 2, "amplitude": 4.0}
+SPRING = {"effect": "joint_spring", "joint": 4, "stiffness": 1.5}
+
 CASES: dict[str, list[dict[str, Any]]] = {
     "sound": [],
-    "asymmetric viscous friction at joint 2": [{"effect": "asymmetric_viscous", "joint": 2, "amplitude": 4.0}],
+    "asymmetric viscous friction at joint 2": [VISCOUS],
+    "the same, and a spring at joint 4": [VISCOUS, SPRING],
 }
 
 
