@@ -2,8 +2,8 @@
 
     python tests/benchmarks/benchmark_diagnosis.py
 
-The arm is simulated in virtual time, sound, with a worn bearing, and with a spring beside that. Recordings are read from CSV, and each diagnosis
-runs in a process of its own, from reading to the finished document. Run it alone.
+The arm is simulated in virtual time, sound, with a worn bearing, and with a spring beside that. Recordings are read
+from CSV, and each diagnosis runs in a process of its own, from reading to the finished document. Run it alone.
 """
 
 import json
