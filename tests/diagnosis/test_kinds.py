@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from diagnosis.diagnosed_arm import at_joint, recordings
-from identification.simulated import Array, SimulatedArm, paper_robot
+from diagnosis.diagnosed_arm import recordings
+from diagnosis.test_fit import JOINT, SPEED, stribeck
+from identification.simulated import paper_robot
 from service.diagnosis import diagnose
 from service.diagnosis.catalogue import Quantity
 from service.diagnosis.findings.diagnosed import Diagnosis
@@ -19,14 +20,6 @@ from service.diagnosis.model.term import Term
 from service.diagnosis.selection.choice import Choice, Kind, Selection
 from service.diagnosis.selection.kinds import with_best_kinds
 from service.diagnosis.selection.selector import Selector
-
-JOINT, SIZE, SPEED = 1, 2.5, 0.3
-
-
-def stribeck(arm: SimulatedArm, rigid: Array) -> Array:
-    """Friction that rises towards rest by more than plain friction has, exponent 1."""
-    v = arm.exact.exact.velocity[:, JOINT]
-    return at_joint(JOINT, SIZE * 2.0 / np.pi * np.arctan(500.0 * v) * np.exp(-np.abs(v) / SPEED))
 
 
 @pytest.fixture(scope="module")
