@@ -24,22 +24,24 @@ def run(
 ) -> int:
     """Try what is not kept yet, in the order given; the number of trials left over after `until` [s].
 
-    With a time limit, trials that have not begun by then are not begun.
+    With a time limit, trials that have not begun by then are not begun, though workers may have been given them.
     """
-    begin = time.monotonic()
+    end = None if until is None else time.time() + until
     there = {(each["series"], each["seed"], each["arm"]) for each in kept.outcomes}
-    futures = {executor.submit(outcome, task): task for task in tasks if task.key not in there}
+    futures = {executor.submit(in_time, task, end): task for task in tasks if task.key not in there}
     left = len(futures)
     for future in as_completed(futures):
-        if future.cancelled():
-            continue
-        kept.add(future.result())
-        told(kept.outcomes[-1])
-        left -= 1
-        if until is not None and time.monotonic() - begin > until:
-            for each in futures:
-                each.cancel()
+        found = future.result()
+        if found is not None:
+            kept.add(found)
+            told(found)
+            left -= 1
     return left
+
+
+def in_time(task: Task, end: float | None) -> Outcome | None:
+    """A trial's outcome; None where it would begin after an instant of the wall clock [s]."""
+    return outcome(task) if end is None or time.time() < end else None
 
 
 def commit() -> str:

@@ -73,3 +73,20 @@ def test_a_set_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.Monk
     assert sorted(told) == [2, 3]
     assert left == 0
     assert len(Kept(kept.path).outcomes) == 4
+
+
+def test_what_would_begin_too_late_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Though the executor was given all of it at once."""
+    clock = [100.0]
+
+    def outcome(task: Task) -> dict[str, Any]:
+        clock[0] += 60.0
+        return {"series": task.series, "seed": task.seed, "arm": task.arm}
+
+    monkeypatch.setattr(running, "outcome", outcome)
+    monkeypatch.setattr(running.time, "time", lambda: clock[0])
+    kept = Kept(tmp_path / "outcomes.jsonl")
+    tasks = [Task("sound", seed) for seed in range(5)]
+    left = running.run(tasks, kept, AtOnce(), lambda each: None, until=150.0)
+    assert sorted(each["seed"] for each in kept.outcomes) == [0, 1, 2]
+    assert left == 2
