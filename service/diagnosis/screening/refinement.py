@@ -47,22 +47,45 @@ def refined_kinds(candidate: Candidate, fit: Fit, screen: Screen, signals: Seque
     signals : sequence of Signals
         of every piece under that model
     """
-    effect = candidate.effect
 
     def best_of(shapes: Array) -> tuple[int, Candidate]:
-        found = screen.at_shapes(effect, shapes, fit, signals)
-        gains, coefficients = statistics(found, [each.positive for each in effect.coefficients])
-        best = int(np.argmax(gains))
-        return best, replace(
-            candidate,
-            shape=shapes[best],
-            coefficients=coefficients[best],
-            gain=float(gains[best]),
-            gram=found.gram[best],
-        )
+        return best_of_shapes(candidate, candidate.effect, shapes, fit, screen, signals)
 
     nearby = _zoomed(candidate, best_of)
-    return [nearby, *(_zoomed(best_of(shapes)[1], best_of) for shapes in effect.alike(nearby.shape))]
+    return [nearby, *(_zoomed(best_of(shapes)[1], best_of) for shapes in candidate.effect.alike(nearby.shape))]
+
+
+def best_of_shapes(
+    candidate: Candidate, effect: Effect, shapes: Array, fit: Fit, screen: Screen, signals: Sequence[Signals]
+) -> tuple[int, Candidate]:
+    """Which of some shapes of a form explains most, and the candidate there.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        of this form, or of another one of the same effect
+    effect : Effect
+        the form
+    shapes : (g, k) float64
+        values of its shape parameters
+    fit : Fit
+        the model so far
+    screen : Screen
+        of the observations
+    signals : sequence of Signals
+        of every piece under that model
+    """
+    found = screen.at_shapes(effect, shapes, fit, signals)
+    gains, coefficients = statistics(found, [each.positive for each in effect.coefficients])
+    best = int(np.argmax(gains))
+    return best, replace(
+        candidate,
+        effect=effect,
+        shape=shapes[best],
+        coefficients=coefficients[best],
+        gain=float(gains[best]),
+        gram=found.gram[best],
+    )
 
 
 def _zoomed(candidate: Candidate, best_of: Callable[[Array], tuple[int, Candidate]]) -> Candidate:

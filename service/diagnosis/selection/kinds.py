@@ -8,15 +8,12 @@ takes its best kind and goes on to its optimum; the others say how far its param
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from service.diagnosis.catalogue import Effect, Signals
 from service.diagnosis.fitting.fit import Fit
-from service.diagnosis.fitting.projection import statistics
 from service.diagnosis.model.extended import with_terms
 from service.diagnosis.model.term import Term
 from service.diagnosis.model.torque_scale import scaled_back
-from service.diagnosis.screening.refinement import refined_kinds
+from service.diagnosis.screening.refinement import best_of_shapes, refined_kinds
 from service.diagnosis.screening.screen import Candidate, Screen, model_signals
 from service.diagnosis.selection.choice import Choice, Kind, Option, Selection, is_physical, outsized, place_of
 from service.diagnosis.selection.equivalence import FORMULA_ERROR, doubt
@@ -85,7 +82,8 @@ def _fitted_kinds(
     """
     fitter, screen = selector.fitter, selector.screen
     signals = model_signals(without.model, screen.observations)
-    own = _beside(without, term.effect, term.shape[None], choice.options[0].candidate, screen, signals)
+    known = choice.options[0].candidate
+    _, own = best_of_shapes(known, term.effect, term.shape[None], without, screen, signals)
     options = []
     for candidate in (own, *_other_kinds(own, without, screen, signals)):
         start = replace(term, effect=candidate.effect, shape=candidate.shape, coefficients=candidate.coefficients)
@@ -99,27 +97,10 @@ def _fitted_kinds(
 def _other_kinds(own: Candidate, without: Fit, screen: Screen, signals: Sequence[Signals]) -> list[Candidate]:
     """All other kinds that explain nearly as much before they are fitted."""
     forms = [each for each in screen.effects if (each.id, each.joint) == place_of(own) and each is not own.effect]
-    starts = [_beside(without, each, each.grid, own, screen, signals) for each in forms]
+    starts = [best_of_shapes(own, each, each.grid, without, screen, signals)[1] for each in forms]
     found = refined_kinds(own, without, screen, signals)[1:]
     found += [kind for start in starts for kind in refined_kinds(start, without, screen, signals)]
     return [each for each in found if each.gain > WORTH_REFINING * own.gain]
-
-
-def _beside(
-    without: Fit, effect: Effect, shapes: np.ndarray, like: Candidate, screen: Screen, signals: Sequence[Signals]
-) -> Candidate:
-    """A form at the best of some shapes beside a model."""
-    found = screen.at_shapes(effect, shapes, without, signals)
-    gains, coefficients = statistics(found, [each.positive for each in effect.coefficients])
-    best = int(np.argmax(gains - effect.reluctance(shapes)))
-    return replace(
-        like,
-        effect=effect,
-        shape=shapes[best],
-        coefficients=coefficients[best],
-        gain=float(gains[best]),
-        gram=found.gram[best],
-    )
 
 
 def _preference(option: Option) -> float:
