@@ -50,6 +50,11 @@ COMPARED = frozenset(SERIES) - {"sound", "sound-sensing", "sound-coarse", "form"
 """Series whose truth has a form in the catalogue, so that an oracle can know it."""
 
 
+LONG = frozenset({"aliased", REAL_SERIES})
+"""Series whose trials take minutes on a slow machine: a recommended motion is recorded too, or a real
+arm's recordings are long."""
+
+
 def real_tasks(names: Sequence[str], commit: str) -> list[Task]:
     """Trials on recordings of real arms; none where those are not there."""
     return [Task(REAL_SERIES, 0, name, commit) for name in names if (data() / REAL[name].recordings).is_dir()]
@@ -59,3 +64,8 @@ def tasks(counts: dict[str, int], first_seed: int, commit: str) -> list[Task]:
     """All trials of a set, the series mixed evenly: a set that is cut short is a smaller one of the same mix."""
     places = [((number + 0.5) / count, series, number) for series, count in counts.items() for number in range(count)]
     return [Task(series, first_seed + number, None, commit, series in COMPARED) for _, series, number in sorted(places)]
+
+
+def long_first(tasks: Sequence[Task]) -> list[Task]:
+    """The same trials, otherwise in their order: what begins last ends soon."""
+    return sorted(tasks, key=lambda task: task.series not in LONG)

@@ -37,6 +37,14 @@ def test_a_set_that_is_cut_short_is_a_smaller_one_of_the_same_mix() -> None:
         assert abs(first[series] - count / 4) <= 1.0
 
 
+def test_what_takes_long_begins_first() -> None:
+    tasks = sets.tasks(sets.REDUCED, 0, "")
+    ordered = sets.long_first(tasks)
+    count = sets.REDUCED["aliased"]
+    assert {task.series for task in ordered[:count]} == {"aliased"}
+    assert ordered[count:] == [task for task in tasks if task.series != "aliased"]
+
+
 def test_reports_begin_at_seeds_that_nobody_has_looked_at() -> None:
     assert sets.REPORTING >= 1_000_000
     assert prove_command.REPORTING == sets.REPORTING
