@@ -1,6 +1,7 @@
 """What happened, line by line: appended by several processes, read by any number of followers, kept over restarts."""
 
 import errno
+import fcntl
 import json
 import os
 from collections.abc import Mapping
@@ -28,8 +29,8 @@ class LoggedEvent:
 class EventLog:
     """A file of JSON objects, one a line, that only ever grows.
 
-    A line is written by one call, so that lines of several processes never mix. A line that a full disk cut off keeps
-    its number and is passed over.
+    Who appends holds the file's lock meanwhile: lines of several processes never mix, and a line that another has half
+    written is not taken for one that a full disk cut off. Such a line keeps its number and is passed over.
     """
 
     def __init__(self, path: Path) -> None:
@@ -58,12 +59,14 @@ class EventLog:
         line = json.dumps(content, ensure_ascii=False, allow_nan=False).encode() + b"\n"
         descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o640)
         try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
             size = os.fstat(descriptor).st_size
             is_torn = size > 0 and os.pread(descriptor, 1, size - 1) != b"\n"
             line = b"\n" + line if is_torn else line
             if os.write(descriptor, line) < len(line):
                 raise OSError(errno.ENOSPC, "the disk took a part of a line only", str(self.path))
         finally:
+            fcntl.flock(descriptor, fcntl.LOCK_UN)  # closing does not where a process forked meanwhile holds it, too
             os.close(descriptor)
 
     def last(self) -> dict[str, Any] | None:

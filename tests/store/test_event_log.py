@@ -1,9 +1,11 @@
 """Logs that grow: numbers that stay, followers that go on where they ended, lines that never mix."""
 
 import errno
+import fcntl
 import json
 import multiprocessing
 import resource
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -116,6 +118,20 @@ def test_a_line_that_the_disk_takes_a_part_of_is_an_error_and_can_be_written_aga
     assert raised.value.errno == errno.ENOSPC
     log.append({"n": 2})
     assert contents(log) == [(1, 1), (3, 2)]
+
+
+def test_a_line_that_another_process_is_still_writing_is_waited_for(log: EventLog) -> None:
+    log.append({"n": 1})
+    appending = threading.Thread(target=log.append, args=({"n": 3},))
+    with log.path.open("ab", buffering=0) as other:
+        fcntl.flock(other, fcntl.LOCK_EX)
+        other.write(b'{"n": ')
+        appending.start()
+        appending.join(0.1)
+        assert appending.is_alive()
+        other.write(b"2}\n")
+    appending.join()
+    assert contents(log) == [(1, 1), (2, 2), (3, 3)]
 
 
 def test_lines_of_several_processes_never_mix(log: EventLog) -> None:
