@@ -156,10 +156,13 @@ class Fitter:
     def _descended(self, at: _Linearised, projection: Projection, limits: Array) -> _Linearised | None:
         """The longest step after which no more is left than before, as `_linear_optimum` gives it."""
         curved, lower, upper, reach = _room(at.model, limits)
+        last = None
         for trusted in TRUSTED:
             low, high = np.maximum(lower, -trusted * reach), np.minimum(upper, trusted * reach)
             step = bounded_step(projection.step, projection.spread, curved, low, high, reach)
-            tried = self._linear_optimum(_stepped(at.model, step))
+            if last is not None and np.array_equal(step, last):
+                continue  # it was within these limits before
+            tried, last = self._linear_optimum(_stepped(at.model, step)), step
             if tried.energy <= at.energy * (1.0 + 1e-12):
                 return tried
         return None
