@@ -81,3 +81,27 @@ def test_terms_that_need_no_parameters_have_the_same_columns_beside_any(diagnosi
         expected = columns_of(effect, model, diagnosis, as_term=False)
         for one, two in zip(found, expected, strict=True):
             np.testing.assert_allclose(one, two, rtol=1e-9, atol=1e-12, err_msg=effect.id)
+
+
+def test_columns_that_are_kept_are_those_that_would_be_made(diagnosis: Diagnosis) -> None:
+    """One after the other: another Θ, another K_v, another shape, other coefficients, and the first again."""
+    observations, model = diagnosis.fitter.observations, full(diagnosis)
+    steeper = tuple(replace(each, k_v=1.2 * each.k_v) for each in model.structure.terms)
+    curve, *others = model.terms
+    assert curve.effect.id == "stribeck_friction"
+    models = [
+        model,
+        replace(model, parameters=1.1 * model.parameters),
+        replace(model, structure=model.structure.with_terms(steeper)),
+        with_terms(model, [replace(curve, shape=1.05 * curve.shape), *others]),
+        with_terms(model, [replace(each, coefficients=1.3 * each.coefficients) for each in model.terms]),
+        model,
+    ]
+    keeping = WhiteColumns(observations)
+    for each in models:
+        found, expected = keeping.linearised(each), WhiteColumns(observations).linearised(each)
+        for one, two in zip(found[0], expected[0], strict=True):
+            np.testing.assert_allclose(one, two, rtol=1e-9, atol=1e-9)
+        for one, two in zip(found[1], expected[1], strict=True):
+            np.testing.assert_array_equal(one.index, two.index)
+            np.testing.assert_allclose(one.rows, two.rows, rtol=1e-9, atol=1e-9)

@@ -32,6 +32,7 @@ def tilt_directions(gravity: Array) -> tuple[Array, Array]:
 class BaseTilt(Effect):
     """τ = ∂τ/∂g (|g| α_1 e_1 + |g| α_2 e_2), e_1 and e_2 across gravity."""
 
+    of_motion_alone: ClassVar[bool] = True  # the consistent links, as for `KinematicError`
     id: ClassVar[str] = "base_tilt"
     arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "others"})
     equation: ClassVar[str] = "tau = dtau/dg (|g| (alpha_1 e_1 + alpha_2 e_2)), e_1 and e_2 across gravity"

@@ -48,7 +48,7 @@ def body_columns(signals: Signals) -> Array:
         last = np.arange(count * (signals.robot.joint_count - 1), count * signals.robot.joint_count)
         return np.ascontiguousarray(torque_regressor(signals.robot, *state, columns=last).transpose(2, 1, 0))
 
-    return signals.remembered("body at the last link", made)
+    return signals.remembered_of_motion("body at the last link", made)
 
 
 def body_quantities(mass: float, place: Array, covariance: Array) -> Sequence[Quantity]:

@@ -38,7 +38,8 @@ class Effect(ABC):
         bounds of the shape parameters
 
     Columns of an effect `of_motion_alone` are the same beside every model, and are made once; those of one that
-    `has_step` change with K_v of its joint; one `of_motion_and_step` changes with nothing else of the model.
+    `has_step` change with K_v of its joint; one `of_motion_and_step` changes with nothing else of the model, and one
+    `of_motion_and_load` with nothing but the links that it has found, as far as they load the joint.
     Columns that are a linear filter of the load are `linear_in_load`: noise of the positions, which changes the
     predicted load, is in them as it is in the residual.
     What a sensor does not pass on, a spring carries for the motor, or a displaced link for its neighbours,
@@ -61,6 +62,7 @@ class Effect(ABC):
     of_motion_alone: ClassVar[bool] = False
     has_step: ClassVar[bool] = False
     of_motion_and_step: ClassVar[bool] = False
+    of_motion_and_load: ClassVar[bool] = False
     linear_in_load: ClassVar[bool] = False
     may_exceed_measured: ClassVar[bool] = False
     screened: ClassVar[bool] = True

@@ -38,6 +38,7 @@ _WINDOW = (
 class ExternalContact(TimeLocalEffect):
     """τ = J(q)ᵀ F w(t), F at the origin of the last link's frame in base axes."""
 
+    of_motion_alone: ClassVar[bool] = True
     id: ClassVar[str] = "external_contact"
     arguments: ClassVar[frozenset[str] | None] = frozenset({"time"})
     equation: ClassVar[str] = "tau = J(q)^T F w(t), or tau_j = c w(t); w = 1 or a half sine from t_0 to t_1"

@@ -27,6 +27,7 @@ class FrictionCoupling(Effect):
         s
     """
 
+    of_motion_alone: ClassVar[bool] = True
     id: ClassVar[str] = "friction_coupling"
     arguments: ClassVar[frozenset[str] | None] = frozenset({"velocity", "others"})
     equation: ClassVar[str] = "tau_j = f sgn(v) + w v, tau_k = +-tau_j, v = qd_j +- qd_k"

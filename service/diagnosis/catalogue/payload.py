@@ -26,6 +26,7 @@ from service.recording.recording import Array
 class Payload(Effect):
     """τ = m Φ_body(r), the torque of a point mass at r of the last link."""
 
+    of_motion_alone: ClassVar[bool] = True
     id: ClassVar[str] = "payload"
     arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "velocity", "acceleration", "others"})
     equation: ClassVar[str] = "tau = m Phi_body(q, qd, qdd; r)"

@@ -30,6 +30,7 @@ INSTANTS = 12
 class PayloadChange(TimeLocalEffect):
     """τ = m Φ_body(r) w(t), Φ_body the torque of a point mass at r of the last link."""
 
+    of_motion_alone: ClassVar[bool] = True
     id: ClassVar[str] = "payload_change"
     arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "velocity", "acceleration", "others", "time"})
     equation: ClassVar[str] = "tau = m Phi_body(q, qd, qdd; r) w(t), w = 1 from t_on to t_off"

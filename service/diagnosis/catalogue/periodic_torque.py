@@ -253,6 +253,7 @@ class Cogging(_Periodic):
 class TorqueRipple(_Periodic):
     """τ = τ_rb Σ a sin(k q + φ)."""
 
+    of_motion_and_load: ClassVar[bool] = True
     id: ClassVar[str] = "torque_ripple"
     arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "load"})
     equation: ClassVar[str] = "tau = tau_rb sum a sin(k q + phi)"

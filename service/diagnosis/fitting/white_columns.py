@@ -1,7 +1,8 @@
 """What a model leaves, and the slopes of that in all its parameters, in whitened rows.
 
 A model is linear in Θ and in its terms' coefficients, so that its torque is a combination of its own columns. Columns
-of the links never change; those of friction change with its constants alone, and are kept from one model to the next.
+of the links never change; those of friction change with its constants alone, those of a term with its shape and, of
+some effects, with what the nominal part says. They are kept from one model to the next.
 """
 
 from collections.abc import Sequence
@@ -10,12 +11,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from service.diagnosis.fitting.projection import JointColumns
-from service.diagnosis.model.extended import ExtendedModel
+from service.diagnosis.model.extended import ExtendedModel, term_columns
+from service.diagnosis.model.term import Term
 from service.diagnosis.observations.observations import Observations
 from service.recording.recording import Array
 
 KEPT = 2
 """Sets of friction columns that are kept a joint: those of the model at hand, and of the step that is tried."""
+
+TERMS_KEPT = 24
+"""Terms whose columns are kept: as many as two models have, and those that a step tried."""
 
 Constants = tuple[object, ...]
 
@@ -59,6 +64,7 @@ class WhiteColumns:
 
     def __init__(self, observations: Observations) -> None:
         self._observations = observations
+        self._term_columns: dict[tuple[object, ...], dict[int, Array]] = {}
         self._measured: dict[int, Array] = {}
         self._rigid: dict[int, Array] = {}
         self._friction: dict[int, dict[Constants, _Friction]] = {}
@@ -91,24 +97,37 @@ class WhiteColumns:
         joints = range(self._observations.robot.joint_count)
         index: list[list[int]] = [[] for _ in joints]
         coefficients: list[list[float]] = [[] for _ in joints]
-        rows: list[list[list[Array]]] = [[[] for _ in self._observations] for _ in joints]
+        rows: list[list[Array]] = [[np.zeros((0, len(self._white_measured(joint))))] for joint in joints]
         for term, place in zip(model.terms, model.term_places(), strict=True):
-            touched = term.effect.touched(len(joints))
-            for joint in touched:
+            for joint, (columns, *slopes) in self._white_term(model, term).items():
                 index[joint] += range(place.start, place.stop)
-                coefficients[joint] += [*term.coefficients, *[0.0] * len(term.free_shapes)]
-            for number, piece in enumerate(self._observations):
-                derivatives = model.term_derivatives(term, model.signals_of_terms(piece))
-                for slot, joint in enumerate(touched):
-                    rows[joint][number].append(piece.reduced(derivatives[:, slot]))
-        found = []
-        for joint in joints:
-            parts = [np.concatenate(own) for own in rows[joint]] if index[joint] else []
-            count = len(self._white_measured(joint))
-            white = self._observations.white(joint, parts) if parts else np.zeros((0, count))
-            columns = JointColumns(np.array(index[joint], dtype=np.intp), white)
-            found.append(_Terms(np.array(coefficients[joint]), columns))
-        return found
+                coefficients[joint] += [*term.coefficients, *[0.0] * len(slopes)]
+                rows[joint] += [columns, *((term.coefficients @ each)[None] for each in slopes)]
+        return [
+            _Terms(np.array(weights), JointColumns(np.array(places, dtype=np.intp), np.concatenate(own)))
+            for places, weights, own in zip(index, coefficients, rows, strict=True)
+        ]
+
+    def _white_term(self, model: ExtendedModel, term: Term) -> dict[int, Array]:
+        """Columns of a term and their slopes in its free shapes, (1 + f, c, R_j), at every joint that it touches."""
+        key = term.effect, term.shape.tobytes(), _beside(model, term)
+        if key not in self._term_columns:
+            while len(self._term_columns) >= TERMS_KEPT:
+                self._term_columns.pop(next(iter(self._term_columns)))
+            self._term_columns[key] = self._made_term(model, term)
+        return self._term_columns[key]
+
+    def _made_term(self, model: ExtendedModel, term: Term) -> dict[int, Array]:
+        """The same, made anew."""
+        touched = term.effect.touched(self._observations.robot.joint_count)
+        rows: dict[int, list[Array]] = {joint: [] for joint in touched}
+        for piece in self._observations:
+            columns = term_columns(term, model.signals_of_terms(piece))
+            for slot, joint in enumerate(touched):
+                rows[joint].append(piece.reduced(columns[:, :, slot].reshape(-1, *columns.shape[3:])))
+        white = {joint: self._observations.white(joint, parts) for joint, parts in rows.items()}
+        count = len(term.coefficients)
+        return {joint: each.reshape(-1, count, each.shape[1]) for joint, each in white.items()}
 
     def _white_measured(self, joint: int) -> Array:
         """Measured torque, (R,)."""
@@ -154,3 +173,13 @@ class WhiteColumns:
         ]
         white = self._observations.white(joint, [np.asarray(rows) for rows in pieces])
         return np.where(np.array(of_k_v)[:, None], white, 0.0)
+
+
+def _beside(model: ExtendedModel, term: Term) -> tuple[object, ...]:
+    """What else of a model changes a term's columns."""
+    effect = term.effect
+    if effect.of_motion_alone:
+        return ()
+    if effect.of_motion_and_step:
+        return (model.steepness[slice(None) if effect.joint is None else effect.joint].tobytes(),)
+    return model.structure.terms, model.parameters.tobytes()

@@ -275,19 +275,32 @@ class ExtendedModel:
         signals : Signals
             one piece of motion
         """
-        steps = [shape_step(term, place) for place in term.free_shapes]
-        shapes = [term.shape]
-        for place, step in zip(term.free_shapes, steps, strict=True):
-            for sign in (1.0, -1.0):
-                moved = term.shape.copy()
-                moved[place] += sign * step
-                shapes.append(moved)
-        columns = term.effect.columns(signals, np.stack(shapes))
-        rows = [*columns[0]]
-        for number, step in enumerate(steps):
-            ahead, behind = columns[1 + 2 * number], columns[2 + 2 * number]
-            rows.append(np.tensordot(term.coefficients, ahead - behind, axes=1) / (2.0 * step))
-        return np.stack(rows)
+        columns, *slopes = term_columns(term, signals)
+        by_shape: list[Array] = [np.tensordot(term.coefficients, each, axes=1) for each in slopes]
+        return np.asarray(np.stack([*columns, *by_shape]), dtype=np.float64)
+
+
+def term_columns(term: Term, signals: Signals) -> Array:
+    """Columns of a term, then their slopes in each of its free shapes, (1 + f, c, m, N) or (1 + f, c, m, P, N).
+
+    Parameters
+    ----------
+    term : Term
+        the effect with its shape
+    signals : Signals
+        one piece of motion
+    """
+    steps = [shape_step(term, place) for place in term.free_shapes]
+    shapes = [term.shape]
+    for place, step in zip(term.free_shapes, steps, strict=True):
+        for sign in (1.0, -1.0):
+            moved = term.shape.copy()
+            moved[place] += sign * step
+            shapes.append(moved)
+    columns, *moved_columns = term.effect.columns(signals, np.stack(shapes))
+    ahead, behind = moved_columns[0::2], moved_columns[1::2]
+    slopes = [(a - b) / (2.0 * step) for a, b, step in zip(ahead, behind, steps, strict=True)]
+    return np.stack([columns, *slopes])
 
 
 def _with_steepness(signals: Signals, steepness: Array) -> Signals:

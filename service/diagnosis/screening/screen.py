@@ -29,6 +29,10 @@ THREADS = 2
 SHAPES_AT_ONCE = 48
 """Shapes whose columns are made together: bounds memory."""
 
+SAME_LOAD = 0.02
+"""Part of a joint's load, rms, by which it may differ between two models that share the columns it shapes: what those
+explain errs by as much, far less than between two shapes of a grid. Whoever refines or fits a form makes its own."""
+
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
@@ -96,6 +100,30 @@ class Candidate:
         return 0.5 if self.count == 1 and self.effect.coefficients[0].positive else 1.0
 
 
+@dataclass(frozen=True, eq=False)
+class _Kept:
+    """Whitened columns of some shapes of a grid.
+
+    columns : dict of int to (g, c, R_j) float64
+        at every joint that the effect touches
+    loads : list of (N,) float64
+        of the effect's joint in every piece, where they shape the columns
+    """
+
+    columns: dict[int, Array]
+    loads: list[Array]
+
+    @property
+    def size(self) -> int:
+        """Bytes."""
+        return sum(rows.nbytes for rows in self.columns.values())
+
+    def serves(self, loads: Sequence[Array]) -> bool:
+        """Whether columns beside other loads would be nearly the same."""
+        differ = sum(float((new - old) @ (new - old)) for new, old in zip(loads, self.loads, strict=True))
+        return differ <= SAME_LOAD**2 * sum(float(old @ old) for old in self.loads)
+
+
 class Screen:
     """Screens effects on the same observations; effective numbers of shapes are worked out once.
 
@@ -118,8 +146,7 @@ class Screen:
         self.effects = tuple(effects)
         self._seed = seed
         self._count_all = count_all
-        self._kept_columns: dict[tuple[int, int], dict[int, Array]] = {}
-        self._kept_bytes = 0
+        self._kept: dict[tuple[int, int], _Kept] = {}
         self._numbers: dict[int, float] = {}
         self._windows: dict[int, Windows] = {}
         self._first: tuple[Fit, list[Candidate]] | None = None
@@ -217,16 +244,19 @@ class Screen:
         return found
 
     def _grid_columns(self, place: int, first: int, effect: Effect, signals: Sequence[Signals]) -> dict[int, Array]:
-        """Whitened columns of some of the grid's shapes; those that no model changes are kept."""
-        kept = self._kept_columns.get((place, first))
-        if kept is not None:
-            return kept
-        columns = self.white_columns(effect, effect.grid[first : first + SHAPES_AT_ONCE], signals)
-        size = sum(rows.nbytes for rows in columns.values())
-        if effect.of_motion_alone and self._kept_bytes + size < MOST_KEPT:
-            self._kept_columns[place, first] = columns
-            self._kept_bytes += size
-        return columns
+        """Whitened columns of some of the grid's shapes; those that no model changes by much are kept."""
+        loads = [own.load[effect.joint or 0] for own in signals] if effect.of_motion_and_load else []
+        kept = self._kept.pop((place, first), None)
+        if kept is None or not kept.serves(loads):
+            kept = _Kept(self.white_columns(effect, effect.grid[first : first + SHAPES_AT_ONCE], signals), loads)
+        if effect.of_motion_alone or effect.of_motion_and_load:
+            self._keep((place, first), kept)
+        return kept.columns
+
+    def _keep(self, place: tuple[int, int], found: _Kept) -> None:
+        """Keep columns for the next model where there is room."""
+        if sum(each.size for each in list(self._kept.values())) + found.size < MOST_KEPT:
+            self._kept[place] = found
 
     def _through_windows(self, place: int, effect: TimeLocalEffect, fit: Fit, signals: Sequence[Signals]) -> Moments:
         """Moments of all windows, on rows that are whitened once."""
