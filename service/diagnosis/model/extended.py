@@ -276,8 +276,8 @@ class ExtendedModel:
             one piece of motion
         """
         columns, *slopes = term_columns(term, signals)
-        by_shape: list[Array] = [np.tensordot(term.coefficients, each, axes=1) for each in slopes]
-        return np.asarray(np.stack([*columns, *by_shape]), dtype=np.float64)
+        by_shape = [np.tensordot(term.coefficients, each, axes=1).astype(np.float64) for each in slopes]
+        return np.stack([*columns, *by_shape])
 
 
 def term_columns(term: Term, signals: Signals) -> Array:
