@@ -17,8 +17,8 @@ from concealed.scoring.rescored import rescored
 from concealed.scoring.tables import summary
 
 QUICK_MINUTES = 12.0
-"""After so long the reduced set begins no trial more. Those that take long begin first, a short one has taken a minute
-and a half on a slow machine: all is to end within a quarter of an hour."""
+"""After so long the reduced set begins no trial more, and `concealed.running.run.PATIENCE_S` later it gives up what is
+not done: all is to end within a quarter of an hour. Trials that take long begin first."""
 
 
 def main() -> None:

@@ -7,11 +7,15 @@ from concurrent.futures import Executor, as_completed
 from pathlib import Path
 
 from concealed.running.kept import Kept, Outcome
+from concealed.running.time_limit import TimeIsUp, time_limit
 from concealed.task import Task, outcome
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 JUDGED = ("service", "sim_backend", "drivers", "tests/concealed")
 """What an outcome depends on."""
+
+PATIENCE_S = 120.0
+"""How long after the last instant to begin at trials are given up: a few take minutes to be simulated at all."""
 
 
 def run(
@@ -24,7 +28,8 @@ def run(
 ) -> int:
     """Try what is not kept yet, in the order given; the number of trials left over after `until` [s].
 
-    With a time limit, trials that have not begun by then are not begun, though workers may have been given them.
+    With a time limit, trials that have not begun by then are not begun, though workers may have been given them, and
+    those that have not ended `PATIENCE_S` later are given up.
     """
     end = None if until is None else time.time() + until
     there = {(each["series"], each["seed"], each["arm"]) for each in kept.outcomes}
@@ -40,8 +45,16 @@ def run(
 
 
 def in_time(task: Task, end: float | None) -> Outcome | None:
-    """A trial's outcome; None where it would begin after an instant of the wall clock [s]."""
-    return outcome(task) if end is None or time.time() < end else None
+    """A trial's outcome; None where it would begin after an instant of the wall clock [s], or end long after it."""
+    if end is None:
+        return outcome(task)
+    if time.time() >= end:
+        return None
+    try:
+        with time_limit(end + PATIENCE_S - time.time()):
+            return outcome(task)
+    except TimeIsUp:
+        return None
 
 
 def commit() -> str:
