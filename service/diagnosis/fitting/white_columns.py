@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from service.diagnosis.catalogue import Effect
 from service.diagnosis.fitting.projection import JointColumns
 from service.diagnosis.model.extended import ExtendedModel, term_columns
 from service.diagnosis.model.term import Term
@@ -64,7 +65,7 @@ class WhiteColumns:
 
     def __init__(self, observations: Observations) -> None:
         self._observations = observations
-        self._term_columns: dict[tuple[object, ...], dict[int, Array]] = {}
+        self._term_columns: dict[tuple[object, ...], tuple[Effect, dict[int, Array]]] = {}
         self._measured: dict[int, Array] = {}
         self._rigid: dict[int, Array] = {}
         self._friction: dict[int, dict[Constants, _Friction]] = {}
@@ -110,12 +111,13 @@ class WhiteColumns:
 
     def _white_term(self, model: ExtendedModel, term: Term) -> dict[int, Array]:
         """Columns of a term and their slopes in its free shapes, (1 + f, c, R_j), at every joint that it touches."""
-        key = term.effect, term.shape.tobytes(), _beside(model, term)
+        # by the effect's identity, for one of a user's may have no hash; it is kept, so that no other takes that
+        key = id(term.effect), term.shape.tobytes(), _beside(model, term)
         if key not in self._term_columns:
             while len(self._term_columns) >= TERMS_KEPT:
                 self._term_columns.pop(next(iter(self._term_columns)))
-            self._term_columns[key] = self._made_term(model, term)
-        return self._term_columns[key]
+            self._term_columns[key] = term.effect, self._made_term(model, term)
+        return self._term_columns[key][1]
 
     def _made_term(self, model: ExtendedModel, term: Term) -> dict[int, Array]:
         """The same, made anew."""
