@@ -23,8 +23,8 @@ SMALL = 1e-4
 
 SLOPES_HZ = (100.0, 25.0, 25.0)
 """Rates at which derivatives by position, velocity and acceleration are taken. They change with the pose, by far slower
-than a recording, that by position with the acceleration too: on simulated arms they err by 0.4, 0.8 and 0.02 % at most.
-"""
+than a recording, that by position with the acceleration too: at the 16 joints of three simulated arms they err by 0.4,
+0.8 and 0.02 % at most, rms."""
 
 LEAST_INERTIA = 0.05
 """Share of a joint's largest inertia below which a fitted one is an error of the fit."""
