@@ -39,7 +39,7 @@ def full(diagnosis: Diagnosis) -> ExtendedModel:
 
 def test_the_residual_is_what_the_model_leaves_of_the_measured_torque(diagnosis: Diagnosis) -> None:
     observations, model = diagnosis.fitter.observations, full(diagnosis)
-    found, _ = WhiteColumns(observations).linearised(model)
+    found = WhiteColumns(observations).residual(model)
     for joint, rows in enumerate(residual_rows(model, observations)):
         (expected,) = observations.white(joint, rows)
         np.testing.assert_allclose(found[joint], expected, atol=1e-9 * np.abs(expected).max())
@@ -50,10 +50,10 @@ def test_columns_are_the_differences_of_the_residual_in_every_parameter_of_the_l
     white = WhiteColumns(diagnosis.fitter.observations)
     terms = [each for each in full(diagnosis).terms if each.effect.id in ("torque_gain_error", "joint_spring")]
     model = with_terms(full(diagnosis), terms)
-    residual, columns = white.linearised(model)
+    residual, columns = white.residual(model), white.all(model)
     for place in range(model.structure.base_count):
         step = np.eye(model.structure.size)[place]
-        moved, _ = white.linearised(replace(model, parameters=model.parameters + step))
+        moved = white.residual(replace(model, parameters=model.parameters + step))
         for joint, own in enumerate(columns):
             expected = own.rows[own.index == place].sum(axis=0) if (own.index == place).any() else 0.0
             found = residual[joint] - moved[joint]
@@ -99,9 +99,10 @@ def test_columns_that_are_kept_are_those_that_would_be_made(diagnosis: Diagnosis
     ]
     keeping = WhiteColumns(observations)
     for each in models:
-        found, expected = keeping.linearised(each), WhiteColumns(observations).linearised(each)
-        for one, two in zip(found[0], expected[0], strict=True):
+        fresh = WhiteColumns(observations)
+        for one, two in zip(keeping.residual(each), fresh.residual(each), strict=True):
             np.testing.assert_allclose(one, two, rtol=1e-9, atol=1e-9)
-        for one, two in zip(found[1], expected[1], strict=True):
-            np.testing.assert_array_equal(one.index, two.index)
-            np.testing.assert_allclose(one.rows, two.rows, rtol=1e-9, atol=1e-9)
+        for make in (WhiteColumns.linear, WhiteColumns.all):
+            for found, expected in zip(make(keeping, each), make(fresh, each), strict=True):
+                np.testing.assert_array_equal(found.index, expected.index)
+                np.testing.assert_allclose(found.rows, expected.rows, rtol=1e-9, atol=1e-9)

@@ -12,6 +12,7 @@ from service.diagnosis.fitting.white_columns import WhiteColumns
 from service.diagnosis.model.extended import ExtendedModel, with_terms
 from service.diagnosis.model.term import Term
 from service.diagnosis.observations.observations import Observations
+from service.diagnosis.work.last_few import LastFew
 from service.recording.recording import Array
 
 STEPS = 25
@@ -77,20 +78,17 @@ class Fit:
 
 
 @dataclass(frozen=True, eq=False)
-class _Linearised:
+class _Tried:
     """A model as it is.
 
     model : ExtendedModel
         the model
     residual : list of (R_j,) float64
         what it leaves, whitened
-    columns : list of JointColumns
-        the slopes of its torque in all its parameters
     """
 
     model: ExtendedModel
     residual: list[Array]
-    columns: list[JointColumns]
 
     @property
     def energy(self) -> float:
@@ -111,7 +109,7 @@ class Fitter:
     def __init__(self, observations: Observations) -> None:
         self.observations = observations
         self._white = WhiteColumns(observations)
-        self._without: dict[tuple[Fit, tuple[int, ...]], Fit] = {}
+        self._without: LastFew[tuple[Fit, tuple[int, ...]], Fit] = LastFew(KEPT)
 
     def fit(self, model: ExtendedModel, *, steps: int = STEPS) -> Fit:
         """Fit all parameters.
@@ -139,7 +137,7 @@ class Fitter:
         projection, spread = self._within_limits(at, projection, limits)
         return Fit(at.model, projection, at.energy, _energies(at.residual), spread)
 
-    def _within_limits(self, at: _Linearised, projection: Projection, limits: Array) -> tuple[Projection, Array]:
+    def _within_limits(self, at: _Tried, projection: Projection, limits: Array) -> tuple[Projection, Array]:
         """The projection without what would only lead beyond limits, and the spread of all parameters.
 
         What they would do beyond is nothing that the model can do; but nor does a shape's bound make it known.
@@ -148,12 +146,12 @@ class Fitter:
         if not stopped:
             return projection, projection.spread
         constants = [place for place in stopped if _is_constant(at.model, place)]
-        within = self._project(replace(at, columns=_without(at.columns, stopped)))
+        within = self._project(at, but=stopped)
         if constants == stopped:
             return within, within.spread
-        return within, self._project(replace(at, columns=_without(at.columns, constants))).spread
+        return within, self._project(at, but=constants).spread
 
-    def _descended(self, at: _Linearised, projection: Projection, limits: Array) -> _Linearised | None:
+    def _descended(self, at: _Tried, projection: Projection, limits: Array) -> _Tried | None:
         """The longest step after which no more is left than before, as `_linear_optimum` gives it."""
         curved, lower, upper, reach = _room(at.model, limits)
         last = None
@@ -167,25 +165,23 @@ class Fitter:
                 return tried
         return None
 
-    def _linear_optimum(self, model: ExtendedModel) -> _Linearised:
+    def _linear_optimum(self, model: ExtendedModel) -> _Tried:
         """The model with the best Θ and coefficients for its shapes.
 
         A step in a shape that is cut short would else leave coefficients that belong to another shape.
         """
-        at = self._linearised(model)
+        at = self._tried(model)
         linear = np.ones(model.size, dtype=bool)
         linear[model.structure.size : model.structure.size + len(model.constants)] = False
         linear[list(model.unmoved)] = False
         for term, place in zip(model.terms, model.term_places(), strict=True):
             linear[place.start + len(term.coefficients) : place.stop] = False
-        kept = [linear[own.index] for own in at.columns]
         places = np.cumsum(linear) - 1
-        own = [
-            JointColumns(places[each.index[mask]], each.rows[mask]) for each, mask in zip(at.columns, kept, strict=True)
-        ]
+        columns = [(own, linear[own.index]) for own in self._white.linear(model)]
+        free = [JointColumns(places[own.index[moves]], own.rows[moves]) for own, moves in columns]
         step = np.zeros(model.size)
-        step[linear] = project(own, at.residual, int(linear.sum())).step
-        return self._linearised(_stepped(model, step))
+        step[linear] = project(free, at.residual, int(linear.sum())).step
+        return self._tried(_stepped(model, step))
 
     def without(self, fit: Fit, places: Sequence[int]) -> Fit:
         """The model fitted anew without some of its terms; the last few are kept, as several ask for the same.
@@ -197,13 +193,9 @@ class Fitter:
         places : sequence of int
             of the terms that are left out
         """
+        terms = [term for place, term in enumerate(fit.model.terms) if place not in places]
         key = fit, tuple(sorted(places))
-        if key not in self._without:
-            while len(self._without) >= KEPT:
-                self._without.pop(next(iter(self._without)))
-            terms = [term for place, term in enumerate(fit.model.terms) if place not in places]
-            self._without[key] = self.fit(with_terms(fit.model, terms))
-        return self._without[key]
+        return self._without.get(key, lambda: self.fit(with_terms(fit.model, terms)))
 
     def projected(self, model: ExtendedModel) -> Fit:
         """The linear step at a model as it is, without moving it.
@@ -213,7 +205,7 @@ class Fitter:
         model : ExtendedModel
             the model
         """
-        projection = self._project(self._linearised(model))
+        projection = self._project(self._tried(model))
         return Fit(model, projection, projection.energy, _energies(projection.residual), projection.spread)
 
     def covariance(self, fit: Fit) -> Array:
@@ -236,7 +228,7 @@ class Fitter:
         model : ExtendedModel
             the model
         """
-        return self._linearised(model).residual
+        return self._white.residual(model)
 
     def columns(self, model: ExtendedModel) -> list[JointColumns]:
         """Whitened columns of all parameters of a model, one entry a joint.
@@ -246,15 +238,17 @@ class Fitter:
         model : ExtendedModel
             the model
         """
-        return self._linearised(model).columns
+        return self._white.all(model)
 
-    def _linearised(self, model: ExtendedModel) -> _Linearised:
-        return _Linearised(model, *self._white.linearised(model))
+    def _tried(self, model: ExtendedModel) -> _Tried:
+        return _Tried(model, self._white.residual(model))
 
-    def _project(self, at: _Linearised) -> Projection:
+    def _project(self, at: _Tried, but: Sequence[int] = ()) -> Projection:
+        """The linear step at a model, in all parameters but some."""
         noise = self.observations.noise
         rows = sum(own.share * len(row) for own, row in zip(noise, at.residual, strict=True))
-        return replace(project(at.columns, at.residual, at.model.size, at.model.prior()), independent=rows)
+        columns = _without(self._white.all(at.model), but)
+        return replace(project(columns, at.residual, at.model.size, at.model.prior()), independent=rows)
 
 
 def _energies(residual: Sequence[Array]) -> Array:
@@ -280,8 +274,10 @@ def _is_constant(model: ExtendedModel, place: int) -> bool:
     return 0 <= place - model.structure.size < len(model.constants)
 
 
-def _without(columns: list[JointColumns], places: list[int]) -> list[JointColumns]:
+def _without(columns: list[JointColumns], places: Sequence[int]) -> list[JointColumns]:
     """The same with nothing in the columns of some parameters."""
+    if not places:
+        return columns
     return [JointColumns(own.index, np.where(np.isin(own.index, places)[:, None], 0.0, own.rows)) for own in columns]
 
 

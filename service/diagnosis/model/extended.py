@@ -8,6 +8,8 @@ import numpy as np
 from service.diagnosis.catalogue import Signals
 from service.diagnosis.model.term import Term, shape_step
 from service.diagnosis.observations.observations import Piece
+from service.diagnosis.work.last_few import LastFew
+from service.diagnosis.work.side_by_side import THREADS
 from service.dynamics import smooth_sign, smooth_sign_slope
 from service.identification.shape_sensitivity import ShapeParameter
 from service.identification.structure import ModelStructure
@@ -16,7 +18,7 @@ from service.recording.recording import Array
 HOLDING = 1e8
 """Inverse of the standard error [SI] of a parameter that no fit may move."""
 
-SIGNALS_KEPT = 3
+SIGNALS_KEPT = 3 * THREADS
 """Sets of signals that are kept a piece: those of the model at hand, of the step that is tried, and of one more."""
 
 STEEPNESS_DIFFERENCE = 0.01
@@ -163,15 +165,9 @@ class ExtendedModel:
         piece : Piece
             from the observations
         """
-        kept: list[tuple[tuple[object, ...], Signals]] = piece.memory.setdefault("signals", [])
-        key = (self.structure, self.parameters, self.links)
-        for known, signals in kept:
-            if all(a is b for a, b in zip(known, key, strict=True)):
-                return signals
-        signals = self._made_signals(piece)
-        kept.append((key, signals))
-        del kept[:-SIGNALS_KEPT]
-        return signals
+        key = self.structure, self.parameters, self.links
+        made = _kept_signals(piece).get(tuple(map(id, key)), lambda: (key, self._made_signals(piece)))
+        return made[1]
 
     def signals_of_terms(self, piece: Piece) -> Signals:
         """The same as far as the columns of its terms need it: where none depends on Θ, what is known of any other Θ.
@@ -181,20 +177,15 @@ class ExtendedModel:
         piece : Piece
             from the observations
         """
-        known: list[tuple[tuple[object, ...], Signals]] = piece.memory.get("signals", [])
+        latest = _kept_signals(piece).latest
         effects = [term.effect for term in self.terms]
-        if not known or not all(each.of_motion_alone or each.of_motion_and_step for each in effects):
+        if latest is None or not all(each.of_motion_alone or each.of_motion_and_step for each in effects):
             return self.signals(piece)
-        _, last = known[-1]
-        if np.array_equal(last.steepness, self.steepness):
-            return last
-        kept: dict[bytes, Signals] = piece.memory.setdefault("signals_of_terms", {})
-        key = self.steepness.tobytes()
-        if key not in kept:
-            while len(kept) >= SIGNALS_KEPT:
-                kept.pop(next(iter(kept)))
-            kept[key] = _with_steepness(last, self.steepness)
-        return kept[key]
+        _, known = latest
+        if np.array_equal(known.steepness, self.steepness):
+            return known
+        kept: LastFew[bytes, Signals] = piece.memory.setdefault("signals of terms", LastFew(SIGNALS_KEPT))
+        return kept.get(self.steepness.tobytes(), lambda: _with_steepness(known, self.steepness))
 
     def _made_signals(self, piece: Piece) -> Signals:
         """The same, made anew."""
@@ -233,8 +224,7 @@ class ExtendedModel:
         signals : Signals
             one piece of motion
         """
-        (columns,) = term.effect.columns(signals, term.shape[None])
-        return np.asarray(np.tensordot(term.coefficients, columns, axes=1), dtype=np.float64)
+        return np.asarray(np.tensordot(term.coefficients, term_columns(term, signals), axes=1), dtype=np.float64)
 
     def factor(self, joint: int) -> float:
         """By how much the terms of a joint multiply what the plain model's parameters make there.
@@ -275,13 +265,13 @@ class ExtendedModel:
         signals : Signals
             one piece of motion
         """
-        columns, *slopes = term_columns(term, signals)
+        slopes = shape_slopes(term, signals) if term.free_shapes else ()
         by_shape = [np.tensordot(term.coefficients, each, axes=1).astype(np.float64) for each in slopes]
-        return np.stack([*columns, *by_shape])
+        return np.stack([*term_columns(term, signals), *by_shape])
 
 
 def term_columns(term: Term, signals: Signals) -> Array:
-    """Columns of a term, then their slopes in each of its free shapes, (1 + f, c, m, N) or (1 + f, c, m, P, N).
+    """Columns of a term, (c, m, N) or (c, m, P, N) for the joints that it touches.
 
     Parameters
     ----------
@@ -290,17 +280,34 @@ def term_columns(term: Term, signals: Signals) -> Array:
     signals : Signals
         one piece of motion
     """
-    steps = [shape_step(term, place) for place in term.free_shapes]
-    shapes = [term.shape]
-    for place, step in zip(term.free_shapes, steps, strict=True):
-        for sign in (1.0, -1.0):
-            moved = term.shape.copy()
-            moved[place] += sign * step
-            shapes.append(moved)
-    columns, *moved_columns = term.effect.columns(signals, np.stack(shapes))
-    ahead, behind = moved_columns[0::2], moved_columns[1::2]
-    slopes = [(a - b) / (2.0 * step) for a, b, step in zip(ahead, behind, steps, strict=True)]
-    return np.stack([columns, *slopes])
+    (columns,) = term.effect.columns(signals, term.shape[None])
+    return columns
+
+
+def shape_slopes(term: Term, signals: Signals) -> Array:
+    """Slopes of a term's columns in each of its free shapes, at least one, (f, c, m, N) or (f, c, m, P, N).
+
+    Parameters
+    ----------
+    term : Term
+        the effect with its shape
+    signals : Signals
+        one piece of motion
+    """
+    free = term.free_shapes
+    steps = np.array([shape_step(term, place) for place in free])
+    shapes = np.tile(term.shape, (2, len(free), 1))
+    shapes[0, np.arange(len(free)), free] += steps
+    shapes[1, np.arange(len(free)), free] -= steps
+    columns = term.effect.columns(signals, shapes.reshape(2 * len(free), -1))
+    ahead, behind = columns[: len(free)], columns[len(free) :]
+    return (ahead - behind) / (2.0 * steps).reshape(-1, *[1] * (columns.ndim - 1))
+
+
+def _kept_signals(piece: Piece) -> LastFew[tuple[int, ...], tuple[object, Signals]]:
+    """Signals under the last few models, by the identity of what they depend on, which is kept beside them."""
+    kept: LastFew[tuple[int, ...], tuple[object, Signals]] = piece.memory.setdefault("signals", LastFew(SIGNALS_KEPT))
+    return kept
 
 
 def _with_steepness(signals: Signals, steepness: Array) -> Signals:

@@ -1,7 +1,6 @@
 """Every form of every effect beside the fitted model: how much each would explain, and how likely noise does that."""
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +13,7 @@ from service.diagnosis.model.extended import ExtendedModel
 from service.diagnosis.observations.observations import Observations
 from service.diagnosis.screening.effective_number import effective_number
 from service.diagnosis.screening.windows import Windows, white_torque, windowed_moments, windows_on_rows, windows_tried
+from service.diagnosis.work.side_by_side import side_by_side
 from service.recording.recording import Array
 
 MOST_KEPT = 400 * 1024 * 1024
@@ -22,9 +22,6 @@ MOST_KEPT = 400 * 1024 * 1024
 WORTH_COUNTING = 1e-3
 """Chance below which the best of many windows is worth the draws that tell how many windows there are in effect; above,
 all of them count, which changes no decision."""
-
-THREADS = 2
-"""Forms looked at side by side. More gain nothing: what they share is the memory's speed, and Python between arrays."""
 
 SHAPES_AT_ONCE = 48
 """Shapes whose columns are made together: bounds memory."""
@@ -162,8 +159,7 @@ class Screen:
         if self._first is None or self._first[0] is not fit:
             signals = [fit.model.signals(piece) for piece in self.observations]
             places = range(len(self.effects))
-            with ThreadPoolExecutor(THREADS) as threads:
-                found = list(threads.map(lambda at: self._candidate(at, self.effects[at], fit, signals), places))
+            found = side_by_side(lambda at: self._candidate(at, self.effects[at], fit, signals), places)
             if self._first is not None:
                 return found
             self._first = fit, found  # the nominal model, which is looked at twice

@@ -1,0 +1,1 @@
+"""How the same work is not done twice, and independent work is done side by side."""
