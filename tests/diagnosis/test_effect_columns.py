@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from arms import random_parameters, ur5_like
 from pinocchio_arm import pinocchio_model
 from service.diagnosis.catalogue import Effect, Setting, Signals, catalogue, possible_effects
-from service.diagnosis.catalogue.deflection import FIRST_ORDER
+from service.diagnosis.catalogue.deflection import FIRST_ORDER, inertia_of_link, torque_of_deflection
 from service.diagnosis.catalogue.joint_elasticity import DAMPING, transmitted
 from service.diagnosis.catalogue.late_torque import Lag, Shift
 from service.robot import JointType, Robot
@@ -384,3 +384,40 @@ def test_what_gives_way_is_what_the_link_swings_on() -> None:
     assert elastic.is_consistent(np.array([1e-6]), np.array([10.0, 0.0])), (
         "where nothing swings there is nothing to compare"
     )
+
+
+@pytest.mark.parametrize("joint", range(SIGNALS.robot.joint_count))
+def test_torque_of_a_small_deflection_is_that_of_the_moved_link(joint: int) -> None:
+    """Pinocchio's torque where the link is, less that where its encoder says, of an arm whose links are known."""
+    s, reach = SIGNALS, 1e-5
+    time = np.arange(s.position.shape[1]) / s.rate_hz
+    omega = 2.0 * np.pi * 3.0
+    lag, rate, change = (
+        reach * omega**order * wave
+        for order, wave in enumerate((np.sin(omega * time), np.cos(omega * time), -np.sin(omega * time)))
+    )
+    moved = [each.copy() for each in (s.position, s.velocity, s.acceleration)]
+    for state, part in zip(moved, (lag, rate, change), strict=True):
+        state[joint] -= part
+    expected = torque(s.robot, s.links, *moved) - torque(s.robot, s.links, s.position, s.velocity, s.acceleration)
+    found = torque_of_deflection(s, joint, lag)
+    assert np.linalg.norm(found - expected) < 0.01 * np.linalg.norm(expected)
+
+
+@pytest.mark.parametrize("joint", range(SIGNALS.robot.joint_count))
+def test_inertia_that_a_transmission_moves_is_on_the_mass_matrix_diagonal(joint: int) -> None:
+    s = SIGNALS
+    model = pinocchio_model(s.robot, s.links)
+    data = model.createData()
+    expected = np.array([pin.crba(model, data, q)[joint, joint] for q in s.position.T])
+    np.testing.assert_allclose(inertia_of_link(s, joint), expected, rtol=0.01)
+
+
+def test_slopes_that_are_kept_serve_other_links() -> None:
+    """The same motion under a model with other links: of those that are kept, nothing is left of the first."""
+    rng = np.random.default_rng(1)
+    other = replace(SIGNALS, bodies=1.5 * SIGNALS.bodies * rng.uniform(0.9, 1.1, len(SIGNALS.bodies)), _memory={})
+    fresh = replace(other, of_motion={}, _memory={})
+    lag = 1e-3 * np.sin(np.arange(SIGNALS.position.shape[1]) / 100.0)
+    torque_of_deflection(SIGNALS, 2, lag)
+    np.testing.assert_array_equal(torque_of_deflection(other, 2, lag), torque_of_deflection(fresh, 2, lag))

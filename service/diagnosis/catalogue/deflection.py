@@ -9,13 +9,16 @@ from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from service.diagnosis.catalogue.effect import Effect
 from service.diagnosis.catalogue.parameters import Quantity, Shape
 from service.diagnosis.catalogue.setting import Setting
 from service.diagnosis.catalogue.signals import Signals
-from service.dynamics import inverse_dynamics
+from service.diagnosis.work.last_few import LastFew
+from service.diagnosis.work.side_by_side import THREADS
+from service.dynamics import torque_regressor
 from service.recording.recording import Array
 
 SMALL = 1e-4
@@ -26,6 +29,10 @@ SLOPES_HZ = (100.0, 25.0, 25.0)
 than a recording, that by position with the acceleration too: at the 16 joints of three simulated arms they err by 0.4,
 0.8 and 0.02 % at most, rms."""
 
+KEPT = 2 * THREADS
+"""Joints whose columns' slopes are kept a piece: fits are about one or two joints at a time, and each motion needs
+some 0.1 MB a second and joint."""
+
 LEAST_INERTIA = 0.05
 """Share of a joint's largest inertia below which a fitted one is an error of the fit."""
 
@@ -35,6 +42,10 @@ simulated arms 0.02 to 0.25 beyond the standard error."""
 
 BAND = Shape("band", "Hz", fixed=True, reported=False)
 """Of the load that deflects the transmission."""
+
+
+_Slopes = tuple[NDArray[np.intp], NDArray[np.float32]]
+"""Samples (K,) at which slopes are taken, and those of some columns of Φ there, (n, C, K): 1e-7 is more than enough."""
 
 
 class Deflection(Effect):
@@ -162,17 +173,30 @@ def _slopes(signals: Signals, joint: int) -> tuple[Array, Array, Array]:
 
 
 def _by_state(signals: Signals, joint: int) -> tuple[Array, Array, Array]:
-    """∂τ/∂q_j, ∂τ/∂q̇_j, ∂τ/∂q̈_j along the motion, (n, N) each; torque is quadratic in q̇ and linear in q̈."""
+    """∂τ/∂q_j, ∂τ/∂q̇_j, ∂τ/∂q̈_j along the motion, (n, N) each: combinations of the columns' own slopes."""
+    kept: LastFew[tuple[int, bytes], list[_Slopes]] = signals.remembered_of_motion("slopes", lambda: LastFew(KEPT))
+    columns = np.flatnonzero(signals.bodies)
+    orders = kept.get((joint, columns.tobytes()), lambda: _slopes_of_columns(signals, joint, columns))
+    parameters = signals.bodies[columns].astype(np.float32)
+    every = np.arange(signals.position.shape[-1])
+    by_position, by_velocity, by_acceleration = (
+        np.asarray(CubicSpline(knots, (parameters @ slopes).astype(np.float64), axis=1)(every))
+        for knots, slopes in orders
+    )
+    return by_position, by_velocity, by_acceleration
+
+
+def _slopes_of_columns(signals: Signals, joint: int, columns: NDArray[np.intp]) -> list[_Slopes]:
+    """The same of some columns of Φ in τ = Φ Θ by q_j, q̇_j and q̈_j; it is quadratic in q̇ and linear in q̈."""
     count = signals.position.shape[-1]
-    slopes = []
+    found = []
     for order, (step, rate_hz) in enumerate(zip((SMALL, 1.0, 1.0), SLOPES_HZ, strict=True)):
         knots = np.unique(np.append(np.arange(0, count, max(int(signals.rate_hz // rate_hz), 1)), count - 1))
         state = [each.T[knots] for each in (signals.position, signals.velocity, signals.acceleration)]
-        torques = []
+        ends = []
         for sign in (0.5, -0.5):
             moved = [each.copy() if place == order else each for place, each in enumerate(state)]
             moved[order][:, joint] += sign * step
-            torques.append(inverse_dynamics(signals.robot, signals.bodies, *moved).T)
-        slope = (torques[0] - torques[1]) / step
-        slopes.append(slope if len(knots) == count else CubicSpline(knots, slope, axis=1)(np.arange(count)))
-    return slopes[0], slopes[1], slopes[2]
+            ends.append(torque_regressor(signals.robot, *moved, columns=columns).transpose(1, 2, 0))
+        found.append((knots, ((ends[0] - ends[1]) / step).astype(np.float32)))
+    return found
