@@ -99,8 +99,8 @@ def table_of(gains: Sequence[tuple[Effect, float]], monkeypatch: pytest.MonkeyPa
         Candidate(form, np.ones(2), np.ones(1), gain, np.eye(1), True, 1.0, 1.0) for form, gain in gains
     ]
     table.fit = FIT
-    monkeypatch.setattr(Table, "refined", lambda self, candidate: candidate)
-    monkeypatch.setattr(Table, "fitted", lambda self, candidate: Option(candidate, FIT, candidate.gain))
+    monkeypatch.setattr(Table, "refined", lambda self, candidates: list(candidates))
+    monkeypatch.setattr(Table, "fitted", lambda self, candidates: [Option(each, FIT, each.gain) for each in candidates])
     return table
 
 
@@ -116,7 +116,7 @@ def test_another_form_of_what_was_refused_is_asked_where_training_hardly_tells_t
         left = sorted(table.candidates, key=lambda each: -each.gain)
         asked = None if choices or not left else left[0]
         is_true = asked is not None and asked.effect is forms[1]
-        return asked and Choice((table.fitted(asked),), SEEN if is_true else REFUTED, 0.0)
+        return asked and Choice(tuple(table.fitted([asked])), SEEN if is_true else REFUTED, 0.0)
 
     monkeypatch.setattr(Selector, "_table", lambda self, fit, choices, refused: table)
     monkeypatch.setattr(Selector, "_best", best)

@@ -17,6 +17,7 @@ from service.diagnosis.selection.choice import Choice, Option, Selection, distin
 from service.diagnosis.selection.equivalence import EQUIVALENT
 from service.diagnosis.selection.selector import MOST_FITTED, Selector
 from service.diagnosis.selection.table import fitted_option
+from service.diagnosis.work.side_by_side import side_by_side
 
 WITH_A_CONSTANT = ("joint_spring",)
 """Effects whose own constant is the nominal model's offset: beside one, the offset is no finding of its own."""
@@ -47,8 +48,9 @@ def instead_of_a_constant(
     lasting = Screen(screen.observations, near)
     touching = [each for each in lasting.candidates(without) if each.gain > 0.5 * enough]
     signals = model_signals(without.model, screen.observations)
-    closest = sorted((refined(each, without, lasting, signals) for each in touching), key=lambda each: -each.score)
-    options = [fitted_option(candidate, without, fitter) for candidate in closest[:MOST_FITTED]]
+    closest = side_by_side(lambda each: refined(each, without, lasting, signals), touching)
+    closest.sort(key=lambda each: -each.score)
+    options = side_by_side(lambda each: fitted_option(each, without, fitter), closest[:MOST_FITTED])
     near_enough = [each for each in options if each.score > enough - 1.0 and is_physical(each, without)]
     return distinct(sorted(near_enough, key=lambda each: -each.score))
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from service.diagnosis.fitting.fit import Fit, Fitter
 from service.diagnosis.model.extended import ExtendedModel
+from service.diagnosis.work.side_by_side import side_by_side
 from service.identification import Identification
 from service.identification.friction_shape import SEPARATION
 from service.recording.recording import Array
@@ -109,7 +110,7 @@ def _best_stribeck(best: Fit, fitter: Fitter, joint: int, speed: float) -> Fit:
     """The fit with a Stribeck term at one joint, or as it was."""
     slopes = [value / speed for value in STRIBECK_SLOPES]
     apart = [slope for slope in slopes if slope * SEPARATION <= best.model.structure.terms[joint].k_v]
-    tried = [fitter.fit(_with_stribeck(best.model, joint, float(slope)), steps=0) for slope in apart]
+    tried = side_by_side(lambda slope: fitter.fit(_with_stribeck(best.model, joint, float(slope)), steps=0), apart)
     falling = [fit for fit in tried if _falls(fit.model, joint)]
     if not falling:
         return best
@@ -144,7 +145,8 @@ def _with_stribeck(model: ExtendedModel, joint: int, delta: float) -> ExtendedMo
 
 def _best_slope(best: Fit, fitter: Fitter, joint: int, speed: float) -> Fit:
     """The fit with one joint's slope where it fits best."""
-    tried = [fitter.fit(_with_slope(best.model, joint, float(value) / speed), steps=0) for value in SLOPES]
+    slopes = SLOPES / speed
+    tried = side_by_side(lambda slope: fitter.fit(_with_slope(best.model, joint, float(slope)), steps=0), slopes)
     nearest = min(tried, key=lambda each: each.energy)
     if nearest.energy > best.energy:
         return best

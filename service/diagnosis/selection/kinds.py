@@ -19,6 +19,7 @@ from service.diagnosis.selection.choice import Choice, Kind, Option, Selection, 
 from service.diagnosis.selection.equivalence import FORMULA_ERROR, doubt
 from service.diagnosis.selection.pruning import without_superfluous
 from service.diagnosis.selection.selector import WORTH_REFINING, Selector
+from service.diagnosis.work.side_by_side import side_by_side
 
 FARTHER = 1.0
 """What a fit has to explain more to take another's place, in units of what counts as one noise variance between them:
@@ -84,13 +85,14 @@ def _fitted_kinds(
     signals = model_signals(without.model, screen.observations)
     known = choice.options[0].candidate
     _, own = best_of_shapes(known, term.effect, term.shape[None], without, screen, signals)
-    options = []
-    for candidate in (own, *_other_kinds(own, without, screen, signals)):
+
+    def fitted(candidate: Candidate) -> Option:
         start = replace(term, effect=candidate.effect, shape=candidate.shape, coefficients=candidate.coefficients)
         found = fitter.fit(with_terms(fit.model, [*without.model.terms, start]))
-        option = Option(candidate, found, without.energy - found.energy)
-        if is_physical(option, without) and not outsized(option, fitter.observations):
-            options.append(option)
+        return Option(candidate, found, without.energy - found.energy)
+
+    tried = side_by_side(fitted, [own, *_other_kinds(own, without, screen, signals)])
+    options = [each for each in tried if is_physical(each, without) and not outsized(each, fitter.observations)]
     return Option(own, fit, without.energy - fit.energy), options
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from service.diagnosis.selection.admission import Admission
 from service.diagnosis.selection.choice import Choice, Selection
 from service.diagnosis.selection.proxies import proxies
 from service.diagnosis.selection.shape_error import HARDLY, groups_of, standings
+from service.diagnosis.work.side_by_side import side_by_side
 
 Pruned = tuple[Fit, list[Choice]]
 """A model, and the choices that are left in it."""
@@ -31,17 +33,19 @@ def without_superfluous(fit: Fit, choices: list[Choice], fitter: Fitter, admissi
         what was asked of each
     """
     while choices:
-        gains = []
-        for place in range(len(choices)):
-            without = fitter.without(fit, [place])
-            gains.append((without.energy - fit.energy, without))
-        weakest = int(np.argmin([gain for gain, _ in gains]))
-        candidate = replace(choices[weakest].options[0].candidate, gain=max(gains[weakest][0], 0.0))
+        without = side_by_side(partial(_fit_without, fitter, fit), range(len(choices)))
+        gains = [each.energy - fit.energy for each in without]
+        weakest = int(np.argmin(gains))
+        candidate = replace(choices[weakest].options[0].candidate, gain=max(gains[weakest], 0.0))
         if candidate.p_value(admission.inflation(fit), refined=True) < admission.level:
             break
-        fit = gains[weakest][1]
+        fit = without[weakest]
         choices = [choice for place, choice in enumerate(choices) if place != weakest]
     return fit, choices
+
+
+def _fit_without(fitter: Fitter, fit: Fit, place: int) -> Fit:
+    return fitter.without(fit, [place])
 
 
 def without_proxies(nominal: Fit, fit: Fit, choices: list[Choice], fitter: Fitter, admission: Admission) -> Pruned:

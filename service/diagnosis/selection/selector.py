@@ -26,6 +26,7 @@ from service.diagnosis.selection.outside import where_held_out_shows
 from service.diagnosis.selection.position_bias import is_position_noise
 from service.diagnosis.selection.pruning import without_proxies, without_superfluous
 from service.diagnosis.selection.table import Table, fitted_option
+from service.diagnosis.work.side_by_side import side_by_side
 
 MOST_EFFECTS = 4
 """Different effects in one model; what one joint does, the others may do as well."""
@@ -175,9 +176,9 @@ class Selector:
     def _other_forms(self, table: Table, refused: Option) -> list[Candidate]:
         """Forms of a refused effect that training hardly tells from it: the other side of a cable, another exponent."""
         others, doubt = _siblings(table, refused.candidate), EQUIVALENT * self.admission.inflation(refused.fit)
-        refined = [table.refined(each) for each in others]
-        near = [each for each in refined if each.score > refused.score - CLOSE]
-        alike = [each.effect for each in near if table.fitted(each).score > refused.score - doubt]
+        near = [each for each in table.refined(others) if each.score > refused.score - CLOSE]
+        fitted = zip(near, table.fitted(near), strict=True)
+        alike = [each.effect for each, option in fitted if option.score > refused.score - doubt]
         return [each for each in others if each.effect in alike]
 
     def _best(self, table: Table, choices: Sequence[Choice]) -> Choice | None:
@@ -189,11 +190,11 @@ class Selector:
         if not significant:
             return None
         top = max(each.gain for each in significant)
-        closest = [table.refined(each) for each in significant if each.gain > WORTH_REFINING * top]
+        closest = table.refined([each for each in significant if each.gain > WORTH_REFINING * top])
         closest.sort(key=lambda each: -each.score)
         near = CLOSE * self.admission.inflation(fit) + EQUIVALENT * FORMULA_ERROR * closest[0].gain
         tried = [each for each in closest[:MOST_FITTED] if each.score > closest[0].score - near]
-        fitted = [table.fitted(each) for each in tried]
+        fitted = table.fitted(tried)
         impossible = [each.candidate for each in fitted if not is_physical(each, fit)]
         fitted = [each for each in fitted if each.candidate not in impossible]
         fitted = [each for each in fitted if not outsized(each, self.screen.observations)]
@@ -301,7 +302,8 @@ class Selector:
             return replace(choice, options=choice.options[:1])
         without = self.fitter.without(fit, [place])
         own = replace(choice.options[0], fit=fit, gain=without.energy - fit.energy)
-        others = [fitted_option(each.candidate, without, self.fitter) for each in choice.options[1:]]
+        rivals = [each.candidate for each in choice.options[1:]]
+        others = side_by_side(lambda each: fitted_option(each, without, self.fitter), rivals)
         if self._may_have_changed(choices, place) and len(choices) <= MOST_EFFECTS:
             rest = [other for at, other in enumerate(choices) if at != place]
             again = self._best(self._table(without, rest, set()), rest)

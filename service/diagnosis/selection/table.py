@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from service.diagnosis.model.term import Term
 from service.diagnosis.screening.refinement import refined
 from service.diagnosis.screening.screen import Candidate, Screen, model_signals
 from service.diagnosis.selection.choice import Option, Place, driving, outsized, place_of
+from service.diagnosis.work.side_by_side import side_by_side
+
+Done = TypeVar("Done")
 
 
 class Table:
@@ -48,29 +52,34 @@ class Table:
         """
         self.candidates = [each for each in self.candidates if place_of(each) != place or each in but]
 
-    def refined(self, candidate: Candidate) -> Candidate:
-        """The candidate at its best shape.
+    def refined(self, candidates: Sequence[Candidate]) -> list[Candidate]:
+        """Candidates at their best shapes.
 
         Parameters
         ----------
-        candidate : Candidate
-            one of the table
+        candidates : sequence of Candidate
+            of the table
         """
-        if id(candidate) not in self._refined:
-            self._refined[id(candidate)] = refined(candidate, self.fit, self._screen, self._signals)
-        return self._refined[id(candidate)]
+        return _each_once(candidates, self._refined, lambda each: refined(each, self.fit, self._screen, self._signals))
 
-    def fitted(self, candidate: Candidate) -> Option:
-        """The refined candidate fitted with everything else.
+    def fitted(self, candidates: Sequence[Candidate]) -> list[Option]:
+        """Refined candidates, each fitted with everything else.
 
         Parameters
         ----------
-        candidate : Candidate
-            as `refined` gives it
+        candidates : sequence of Candidate
+            as `refined` gives them
         """
-        if id(candidate) not in self._fitted:
-            self._fitted[id(candidate)] = fitted_option(candidate, self.fit, self._fitter)
-        return self._fitted[id(candidate)]
+        return _each_once(candidates, self._fitted, lambda each: fitted_option(each, self.fit, self._fitter))
+
+
+def _each_once(
+    candidates: Sequence[Candidate], known: dict[int, Done], work: Callable[[Candidate], Done]
+) -> list[Done]:
+    """What comes of each candidate, worked out where it is not known yet."""
+    new = [each for each in candidates if id(each) not in known]
+    known.update(zip(map(id, new), side_by_side(work, new), strict=True))
+    return [known[id(each)] for each in candidates]
 
 
 def fitted_option(candidate: Candidate, fit: Fit, fitter: Fitter) -> Option:
