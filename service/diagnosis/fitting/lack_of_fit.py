@@ -21,6 +21,10 @@ HATS = 12
 MEASURABLE = 1.0
 """Standard errors of the noise's power, as repetitions tell it, that a mismatch exceeds it by."""
 
+DIRECTION = 1e-3
+"""Singular value of the features beside a model, of unit length each, below which there is no direction of its own,
+relative to the largest."""
+
 LEVEL = 1e-3
 """Chance, over all joints and both tests, at which a mismatch is called significant."""
 
@@ -130,15 +134,17 @@ def _f_test(columns: Array, residual: Array, freedom: float) -> tuple[float, flo
     columns = columns[scale > 1e-9 * max(float(scale.max(initial=0.0)), 1e-300)]
     if not len(columns):
         return 1.0, 0.0
-    _, singular, right = np.linalg.svd(columns / np.linalg.norm(columns, axis=1)[:, None], full_matrices=False)
-    span = right[singular > 1e-3 * singular[0]]
-    inside = float(np.sum((span @ residual) ** 2))
+    unit = columns / np.linalg.norm(columns, axis=1)[:, None]
+    energies, axes = np.linalg.eigh(unit @ unit.T)
+    known = energies > DIRECTION**2 * energies[-1]
+    count = int(known.sum())
+    inside = float(np.sum((axes[:, known].T @ (unit @ residual)) ** 2 / energies[known]))
     rest = float(residual @ residual) - inside
-    freedom -= len(span)
-    if freedom < len(span) or rest <= 0.0:
+    freedom -= count
+    if freedom < count or rest <= 0.0:
         return 1.0, 0.0
-    by_chance = len(span) * rest / freedom
-    return float(stats.f.sf(inside / by_chance, len(span), freedom)), inside - by_chance
+    by_chance = count * rest / freedom
+    return float(stats.f.sf(inside / by_chance, count, freedom)), inside - by_chance
 
 
 def _reduced_features(piece: Piece, joint: int, observations: Observations, seed: int) -> Array:
