@@ -159,7 +159,7 @@ class _Frame:
             # A right angle: components trade places, and one changes its sign.
             self._blocks[i], self._blocks[k] = self._blocks[k], self._blocks[i]
             flipped = self._blocks[k if sine > 0 else i][: self._rows]
-            np.negative(flipped, out=flipped)
+            flipped *= -1.0  # np.negative of NumPy 2.4 reads past columns of a single sample
             return
         first, second = self._blocks[i][: self._rows], self._blocks[k][: self._rows]
         from_first = np.multiply(first, sine, out=self._scratch[0, : self._rows])
