@@ -5,9 +5,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from service.dynamics.chain_motion import Array, ChainMotion
-from service.dynamics.regressor import CHUNK, TorqueRegressor
+from service.dynamics.regressor import CHUNK
 from service.robot.kinematics import link_placements
 from service.robot.robot import STANDARD_PARAMETERS, LinkInertia, Robot
+
+_LEVI_CIVITA = np.array([[[(i - j) * (j - k) * (k - i) / 2.0 for k in range(3)] for j in range(3)] for i in range(3)])
+"""ε_ijk."""
 
 
 def inverse_dynamics(robot: Robot, parameters: Array, q: Array, qd: Array, qdd: Array) -> Array:
@@ -31,14 +34,16 @@ def inverse_dynamics(robot: Robot, parameters: Array, q: Array, qd: Array, qdd: 
     (N, n) float64
         joint torque or force, without friction [Nm or N]
     """
-    columns = np.flatnonzero(parameters)
-    regressor = TorqueRegressor(robot, columns=columns, chunk=min(CHUNK, max(len(q), 1)))
-    torque = np.empty(q.shape)
+    joints, maps = robot.joint_count, [_wrench_of_motion(link) for link in _links(parameters)]
+    motion = ChainMotion(robot, min(CHUNK, max(len(q), 1)))
+    torque = np.zeros((joints, len(q)))
     for part in _chunks(len(q)):
-        phi = np.empty((robot.joint_count, len(columns), len(q[part])))
-        regressor.write(q[part], qd[part], qdd[part], phi)
-        torque[part] = np.einsum("icn,c->ni", phi, parameters[columns])
-    return torque
+        state = [np.ascontiguousarray(each[part].T) for each in (q, qd, qdd)]
+        for link, (wrench_of, moved) in enumerate(zip(maps, motion.links(*state), strict=True)):
+            wrench = wrench_of @ np.stack([*moved.acceleration, *(entry for row in moved.field for entry in row)])
+            for screw, component in zip((*moved.screw_angular, *moved.screw_linear), wrench, strict=True):
+                torque[: link + 1, part] += screw * component
+    return np.ascontiguousarray(torque.T)
 
 
 def gravity_torque(robot: Robot, parameters: Array, q: Array) -> Array:
@@ -150,6 +155,19 @@ def _spatial_inertia(link: LinkInertia) -> Array:
     x, y, z = link.first_moment
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.block([[link.inertia, cross], [-cross, link.mass * np.eye(3)]])
+
+
+def _wrench_of_motion(link: LinkInertia) -> Array:
+    """What makes moment n and force f at a link's origin of its motion, (n, f) = G (a, M), (6, 12).
+
+    A point at r accelerates by a + M r. With m, ms and Σ = ∫ r rᵀ dm = ½ tr(I) 1 - I,
+    f = m a + M ms and n = ∫ r × (a + M r) dm = ms × a + ε : (M Σ), n_i = ε_ijk (M Σ)_kj.
+    """
+    second = 0.5 * np.trace(link.inertia) * np.eye(3) - link.inertia
+    x, y, z = link.first_moment
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    of_field = np.einsum("ijk,jl->ikl", _LEVI_CIVITA, second).reshape(3, 9)
+    return np.block([[cross, of_field], [link.mass * np.eye(3), np.kron(np.eye(3), link.first_moment)]])
 
 
 def _chunks(samples: int) -> Iterator[slice]:
