@@ -12,6 +12,7 @@ from scipy import stats
 
 from service.diagnosis.fitting.fit import Fit
 from service.diagnosis.observations.observations import Observations, Piece
+from service.diagnosis.work.side_by_side import side_by_side
 from service.recording.recording import Array
 
 FEATURES = 60
@@ -82,13 +83,14 @@ def lack_of_fit(fit: Fit, observations: Observations, *, pure_error: bool, seed:
     rows = sum(own.share * len(row) for own, row in zip(observations.noise, fit.projection.residual, strict=True))
     share = fit.projection.spread.shape[1] / max(rows, 1.0)
     repeated = pure_error_rows(observations)
+    freedoms = [
+        noise.share * len(residual) * (1.0 - share)
+        for noise, residual in zip(observations.noise, fit.projection.residual, strict=True)
+    ]
+    tests = side_by_side(lambda joint: _omnibus(fit, observations, joint, freedoms[joint], seed), range(joints))
     for joint, residual in enumerate(fit.projection.residual):
-        rows = [_reduced_features(piece, joint, observations, seed) for piece in observations]
-        white = observations.white(joint, rows)
-        basis = fit.projection.basis[joint]
-        outside = white - (white @ basis.T) @ basis
-        freedom = observations.noise[joint].share * len(residual) * (1.0 - share)
-        omnibus[joint], beyond_chance = _f_test(outside, residual, freedom)
+        omnibus[joint], beyond_chance = tests[joint]
+        freedom = freedoms[joint]
         if omnibus[joint] < _level(joints):
             structured[joint] = max(beyond_chance, 0.0)
         over = observations.noise[joint].over_repetitions
@@ -126,6 +128,14 @@ def pure_error_rows(observations: Observations) -> Array:
 def _level(joints: int) -> float:
     """Chance at which one test at one joint is called significant."""
     return LEVEL / (2 * joints)
+
+
+def _omnibus(fit: Fit, observations: Observations, joint: int, freedom: float, seed: int) -> tuple[float, float]:
+    """The omnibus test of one joint, as `_f_test` gives it."""
+    rows = [_reduced_features(piece, joint, observations, seed) for piece in observations]
+    white = observations.white(joint, rows)
+    basis = fit.projection.basis[joint]
+    return _f_test(white - (white @ basis.T) @ basis, fit.projection.residual[joint], freedom)
 
 
 def _f_test(columns: Array, residual: Array, freedom: float) -> tuple[float, float]:

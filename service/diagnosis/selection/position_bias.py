@@ -21,6 +21,7 @@ from service.diagnosis.fitting.projection import moments
 from service.diagnosis.observations.observations import Piece
 from service.diagnosis.screening.screen import Screen, model_signals
 from service.diagnosis.selection.choice import Option
+from service.diagnosis.work.side_by_side import side_by_side
 from service.recording.conditioning.filters import smooth_each
 from service.recording.recording import Array
 
@@ -48,8 +49,8 @@ def is_position_noise(option: Option, fit: Fit, screen: Screen) -> bool:
         return False
     signals = model_signals(fit.model, screen.observations)
     in_common = float(screen.at_shapes(term.effect, term.shape[None], fit, signals).target[0, 0])
-    rng = np.random.default_rng(0)
-    expected = np.mean([_drawn(term.effect, term.shape, fit, screen, signals, rng) for _ in range(DRAWS)])
+    sources = [np.random.default_rng([0, number]) for number in range(DRAWS)]
+    expected = np.mean(side_by_side(lambda rng: _drawn(term.effect, term.shape, fit, screen, signals, rng), sources))
     return bool(expected > MOST * in_common)
 
 
