@@ -125,11 +125,11 @@ class Deflection(Effect):
         inertia = np.tile(inertia_of_link(signals, joint), times)
         bands = np.unique(shapes[:, band])
         loads = {cutoff_hz: np.tile(signals.smoothed(signals.load[joint], cutoff_hz), times) for cutoff_hz in bands}
-        found = []
-        for shape in shapes:
+        found = np.empty((len(shapes), 1, *signals.position.shape))
+        for row, shape in zip(found, shapes, strict=True):
             lag = self.deflection(loads[shape[band]], inertia, shape, signals.rate_hz)[-count:]
-            found.append(torque_of_deflection(signals, joint, lag))
-        return np.stack(found)[:, None]
+            row[0] = torque_of_deflection(signals, joint, lag)
+        return found
 
 
 def torque_of_deflection(signals: Signals, joint: int, deflection: Array) -> Array:
@@ -151,7 +151,10 @@ def torque_of_deflection(signals: Signals, joint: int, deflection: Array) -> Arr
     """
     by_position, by_velocity, by_acceleration = _slopes(signals, joint)
     rate = signals.derivative(deflection)
-    return -(by_position * deflection + by_velocity * rate + by_acceleration * signals.derivative(rate))
+    torque = by_position * -deflection
+    torque -= by_velocity * rate
+    torque -= by_acceleration * signals.derivative(rate)
+    return torque
 
 
 def inertia_of_link(signals: Signals, joint: int) -> Array:

@@ -19,6 +19,7 @@ from service.diagnosis.observations.observations import Observations
 from service.diagnosis.observations.whitening import JointNoise
 from service.diagnosis.screening.refinement import refined
 from service.diagnosis.screening.screen import Candidate, Screen, model_signals
+from service.diagnosis.work.side_by_side import side_by_side
 from service.identification.autocorrelation import Autoregression
 from service.recording.recording import Array
 
@@ -58,26 +59,30 @@ def beside_events(
     screen, fitter = Screen(rows, passing, count_all=True), Fitter(rows)
     fit = fitter.projected(model)
     for _ in range(MOST_EVENTS):
-        signals = model_signals(fit.model, rows)
         likely = [each for each in screen.candidates(fit) if each.p_value() < CHANCE]
         ranked = sorted(likely, key=lambda each: -each.score)
-        for candidate in ranked[:LOOKED_AT]:
-            tried = fitter.fit(_with(fit, refined(candidate, fit, screen, signals)))
-            agreed = with_pure_error(observations, tried.model)
+        for each in _fitted(ranked[:LOOKED_AT], fit, screen, fitter):
+            agreed = with_pure_error(observations, each.model)
             if agreed is None or not _agree_better(_variances(agreed), _variances(best)):
                 continue
-            found, still_pure = with_noise(observations, tried.model, effects)
+            found, still_pure = with_noise(observations, each.model, effects)
             if still_pure:
-                fit, best, pure_error = tried, found, still_pure
+                fit, best, pure_error = each, found, still_pure
                 break
         else:
             break
     return best, pure_error
 
 
-def _with(fit: Fit, candidate: Candidate) -> ExtendedModel:
-    term = Term(candidate.effect, candidate.shape, candidate.coefficients)
-    return with_terms(fit.model, [*fit.model.terms, term])
+def _fitted(candidates: Sequence[Candidate], fit: Fit, screen: Screen, fitter: Fitter) -> list[Fit]:
+    """The model with each of some candidates, refined."""
+    signals = model_signals(fit.model, screen.observations)
+
+    def fitted(candidate: Candidate) -> Fit:
+        best = refined(candidate, fit, screen, signals)
+        return fitter.fit(with_terms(fit.model, [*fit.model.terms, Term(best.effect, best.shape, best.coefficients)]))
+
+    return side_by_side(fitted, candidates)
 
 
 def _white(observations: Observations, model: ExtendedModel) -> list[JointNoise]:

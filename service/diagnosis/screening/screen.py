@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy.special import chdtrc, fdtrc
 
 from service.diagnosis.catalogue import Effect, Signals, TimeLocalEffect
 from service.diagnosis.fitting.fit import Fit
@@ -87,9 +87,8 @@ class Candidate:
         """
         free = sum(self.effect.is_free(place) for place in range(len(self.shape))) if refined else 0
         count = self.count + free
-        known = np.isinf(freedom)
-        share = self.gain / inflation
-        tail = float(stats.chi2.sf(share, count) if known else stats.f.sf(share / count, count, freedom))
+        share = max(self.gain, 0.0) / inflation
+        tail = float(chdtrc(count, share) if np.isinf(freedom) else fdtrc(count, freedom, share / count))
         return min(1.0, self.shapes_tried * tail * (1.0 if free else self._one_sided))
 
     @property
@@ -269,7 +268,7 @@ class Screen:
     def _may_count(self, found: Moments) -> bool:
         """Whether any of many shapes would be worth a look if it were the only one."""
         gains, _ = statistics(found, [False] * found.target.shape[1])
-        return float(stats.chi2.sf(gains.max(initial=0.0), found.target.shape[1])) < WORTH_COUNTING
+        return float(chdtrc(found.target.shape[1], gains.max(initial=0.0))) < WORTH_COUNTING
 
     def _draws(self, place: int) -> np.random.Generator:
         """Source of an effect's draws, whichever thread makes them."""
