@@ -78,7 +78,7 @@ class Fit:
 
 
 @dataclass(frozen=True, eq=False)
-class _Tried:
+class Tried:
     """A model as it is.
 
     model : ExtendedModel
@@ -122,7 +122,7 @@ class Fitter:
             most Gauss–Newton steps
         """
         limits = _constants_limits(model)
-        at = self._linear_optimum(model)
+        at = self.linear_optimum(model)
         projection = self._project(at)
         for _ in range(steps):
             if at.energy - projection.energy < SETTLED:
@@ -137,7 +137,7 @@ class Fitter:
         projection, spread = self._within_limits(at, projection, limits)
         return Fit(at.model, projection, at.energy, _energies(at.residual), spread)
 
-    def _within_limits(self, at: _Tried, projection: Projection, limits: Array) -> tuple[Projection, Array]:
+    def _within_limits(self, at: Tried, projection: Projection, limits: Array) -> tuple[Projection, Array]:
         """The projection without what would only lead beyond limits, and the spread of all parameters.
 
         What they would do beyond is nothing that the model can do; but nor does a shape's bound make it known.
@@ -151,8 +151,8 @@ class Fitter:
             return within, within.spread
         return within, self._project(at, but=constants).spread
 
-    def _descended(self, at: _Tried, projection: Projection, limits: Array) -> _Tried | None:
-        """The longest step after which no more is left than before, as `_linear_optimum` gives it."""
+    def _descended(self, at: Tried, projection: Projection, limits: Array) -> Tried | None:
+        """The longest step after which no more is left than before, as `linear_optimum` gives it."""
         curved, lower, upper, reach = _room(at.model, limits)
         last = None
         for trusted in TRUSTED:
@@ -160,15 +160,20 @@ class Fitter:
             step = bounded_step(projection.step, projection.spread, curved, low, high, reach)
             if last is not None and np.array_equal(step, last):
                 continue  # it was within these limits before
-            tried, last = self._linear_optimum(_stepped(at.model, step)), step
+            tried, last = self.linear_optimum(_stepped(at.model, step)), step
             if tried.energy <= at.energy * (1.0 + 1e-12):
                 return tried
         return None
 
-    def _linear_optimum(self, model: ExtendedModel) -> _Tried:
+    def linear_optimum(self, model: ExtendedModel) -> Tried:
         """The model with the best Θ and coefficients for its shapes.
 
         A step in a shape that is cut short would else leave coefficients that belong to another shape.
+
+        Parameters
+        ----------
+        model : ExtendedModel
+            with the constants and shapes that it keeps
         """
         at = self._tried(model)
         linear = np.ones(model.size, dtype=bool)
@@ -240,10 +245,10 @@ class Fitter:
         """
         return self._white.all(model)
 
-    def _tried(self, model: ExtendedModel) -> _Tried:
-        return _Tried(model, self._white.residual(model))
+    def _tried(self, model: ExtendedModel) -> Tried:
+        return Tried(model, self._white.residual(model))
 
-    def _project(self, at: _Tried, but: Sequence[int] = ()) -> Projection:
+    def _project(self, at: Tried, but: Sequence[int] = ()) -> Projection:
         """The linear step at a model, in all parameters but some."""
         noise = self.observations.noise
         rows = sum(own.share * len(row) for own, row in zip(noise, at.residual, strict=True))

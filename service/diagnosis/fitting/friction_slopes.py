@@ -110,8 +110,8 @@ def _best_stribeck(best: Fit, fitter: Fitter, joint: int, speed: float) -> Fit:
     """The fit with a Stribeck term at one joint, or as it was."""
     slopes = [value / speed for value in STRIBECK_SLOPES]
     apart = [slope for slope in slopes if slope * SEPARATION <= best.model.structure.terms[joint].k_v]
-    tried = side_by_side(lambda slope: fitter.fit(_with_stribeck(best.model, joint, float(slope)), steps=0), apart)
-    falling = [fit for fit in tried if _falls(fit.model, joint)]
+    tried = side_by_side(lambda slope: fitter.linear_optimum(_with_stribeck(best.model, joint, float(slope))), apart)
+    falling = [each for each in tried if _falls(each.model, joint)]
     if not falling:
         return best
     refined = fitter.fit(min(falling, key=lambda each: each.energy).model)
@@ -146,7 +146,7 @@ def _with_stribeck(model: ExtendedModel, joint: int, delta: float) -> ExtendedMo
 def _best_slope(best: Fit, fitter: Fitter, joint: int, speed: float) -> Fit:
     """The fit with one joint's slope where it fits best."""
     slopes = SLOPES / speed
-    tried = side_by_side(lambda slope: fitter.fit(_with_slope(best.model, joint, float(slope)), steps=0), slopes)
+    tried = side_by_side(lambda slope: fitter.linear_optimum(_with_slope(best.model, joint, float(slope))), slopes)
     nearest = min(tried, key=lambda each: each.energy)
     if nearest.energy > best.energy:
         return best

@@ -75,12 +75,13 @@ def beside_events(
 
 
 def _fitted(candidates: Sequence[Candidate], fit: Fit, screen: Screen, fitter: Fitter) -> list[Fit]:
-    """The model with each of some candidates, refined."""
+    """The model with each of some candidates at its best shape: near enough for what repetitions differ by."""
     signals = model_signals(fit.model, screen.observations)
 
     def fitted(candidate: Candidate) -> Fit:
         best = refined(candidate, fit, screen, signals)
-        return fitter.fit(with_terms(fit.model, [*fit.model.terms, Term(best.effect, best.shape, best.coefficients)]))
+        term = Term(best.effect, best.shape, best.coefficients)
+        return fitter.fit(with_terms(fit.model, [*fit.model.terms, term]), steps=0)
 
     return side_by_side(fitted, candidates)
 
