@@ -52,6 +52,12 @@ class AnyTable:
     def refuse(self, place: Place, but: Sequence[Candidate] = ()) -> None:
         self.refused.add(place)
 
+    def refined(self, candidates: Sequence[Candidate]) -> list[Candidate]:
+        return list(candidates)
+
+    def fitted(self, candidates: Sequence[Candidate]) -> list[Option]:
+        return [Option(each, FIT, each.gain) for each in candidates]
+
 
 def grown(monkeypatch: pytest.MonkeyPatch, waves_at: int) -> tuple[list[Place], list[Place]]:
     """Waves at a joint that only a model with the spring of joint 1 predicts; what is chosen, what was refused."""
