@@ -16,8 +16,8 @@ from service.diagnosis.catalogue.effect import Effect
 from service.diagnosis.catalogue.parameters import Quantity, Shape
 from service.diagnosis.catalogue.setting import Setting
 from service.diagnosis.catalogue.signals import Signals
-from service.diagnosis.work.last_few import LastFew
-from service.diagnosis.work.side_by_side import THREADS
+from service.diagnosis.computation.last_few import LastFew
+from service.diagnosis.computation.side_by_side import THREADS
 from service.dynamics import torque_regressor
 from service.recording.recording import Array
 

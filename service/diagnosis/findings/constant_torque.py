@@ -9,6 +9,7 @@ import numpy as np
 
 from service.diagnosis.catalogue import TimeLocalEffect
 from service.diagnosis.catalogue.plain_terms import TorqueOffset
+from service.diagnosis.computation.side_by_side import side_by_side
 from service.diagnosis.findings.finding import without_nominal
 from service.diagnosis.fitting.fit import Fit, Fitter
 from service.diagnosis.screening.refinement import refined
@@ -17,7 +18,6 @@ from service.diagnosis.selection.choice import Choice, Option, Selection, distin
 from service.diagnosis.selection.equivalence import EQUIVALENT
 from service.diagnosis.selection.selector import MOST_FITTED, Selector
 from service.diagnosis.selection.table import fitted_option
-from service.diagnosis.work.side_by_side import side_by_side
 
 WITH_A_CONSTANT = ("joint_spring",)
 """Effects whose own constant is the nominal model's offset: beside one, the offset is no finding of its own."""

@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from service.diagnosis.computation.last_few import LastFew
 from service.diagnosis.fitting.bounded_step import bounded_step
 from service.diagnosis.fitting.projection import JointColumns, Projection, project
 from service.diagnosis.fitting.white_columns import WhiteColumns
 from service.diagnosis.model.extended import ExtendedModel, with_terms
 from service.diagnosis.model.term import Term
 from service.diagnosis.observations.observations import Observations
-from service.diagnosis.work.last_few import LastFew
 from service.recording.recording import Array
 
 STEPS = 25

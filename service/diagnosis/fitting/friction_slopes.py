@@ -11,9 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from service.diagnosis.computation.side_by_side import side_by_side
 from service.diagnosis.fitting.fit import Fit, Fitter
 from service.diagnosis.model.extended import ExtendedModel
-from service.diagnosis.work.side_by_side import side_by_side
 from service.identification import Identification
 from service.identification.friction_shape import SEPARATION
 from service.recording.recording import Array

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
+from service.diagnosis.computation.side_by_side import side_by_side
 from service.diagnosis.fitting.fit import Fit
 from service.diagnosis.observations.observations import Observations, Piece
-from service.diagnosis.work.side_by_side import side_by_side
 from service.recording.recording import Array
 
 FEATURES = 60

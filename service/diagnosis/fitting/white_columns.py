@@ -11,12 +11,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from service.diagnosis.catalogue import Effect
+from service.diagnosis.computation.last_few import LastFew
+from service.diagnosis.computation.side_by_side import THREADS
 from service.diagnosis.fitting.projection import JointColumns
 from service.diagnosis.model.extended import ExtendedModel, shape_slopes, term_columns
 from service.diagnosis.model.term import Term
 from service.diagnosis.observations.observations import Observations
-from service.diagnosis.work.last_few import LastFew
-from service.diagnosis.work.side_by_side import THREADS
 from service.recording.recording import Array
 
 FRICTION_KEPT = 2 * THREADS

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from service.diagnosis.catalogue import Signals
+from service.diagnosis.computation.last_few import LastFew
+from service.diagnosis.computation.side_by_side import THREADS
 from service.diagnosis.model.term import Term, shape_step
 from service.diagnosis.observations.observations import Piece
-from service.diagnosis.work.last_few import LastFew
-from service.diagnosis.work.side_by_side import THREADS
 from service.dynamics import smooth_sign, smooth_sign_slope
 from service.identification.shape_sensitivity import ShapeParameter
 from service.identification.structure import ModelStructure

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from service.diagnosis.catalogue import Effect
+from service.diagnosis.computation.side_by_side import side_by_side
 from service.diagnosis.fitting.fit import Fit, Fitter
 from service.diagnosis.model.extended import ExtendedModel, with_terms
 from service.diagnosis.model.residual import residual_rows
@@ -19,7 +20,6 @@ from service.diagnosis.observations.observations import Observations
 from service.diagnosis.observations.whitening import JointNoise
 from service.diagnosis.screening.refinement import refined
 from service.diagnosis.screening.screen import Candidate, Screen, model_signals
-from service.diagnosis.work.side_by_side import side_by_side
 from service.identification.autocorrelation import Autoregression
 from service.recording.recording import Array
 

@@ -7,13 +7,13 @@ import numpy as np
 from scipy.special import chdtrc, fdtrc
 
 from service.diagnosis.catalogue import Effect, Signals, TimeLocalEffect
+from service.diagnosis.computation.side_by_side import side_by_side
 from service.diagnosis.fitting.fit import Fit
 from service.diagnosis.fitting.projection import INVISIBLE, Moments, moments, statistics
 from service.diagnosis.model.extended import ExtendedModel
 from service.diagnosis.observations.observations import Observations
 from service.diagnosis.screening.effective_number import effective_number
 from service.diagnosis.screening.windows import Windows, white_torque, windowed_moments, windows_on_rows, windows_tried
-from service.diagnosis.work.side_by_side import side_by_side
 from service.recording.recording import Array
 
 MOST_KEPT = 400 * 1024 * 1024

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from service.diagnosis.catalogue import Effect, Signals
+from service.diagnosis.computation.side_by_side import side_by_side
 from service.diagnosis.fitting.fit import Fit
 from service.diagnosis.model.extended import with_terms
 from service.diagnosis.model.term import Term
@@ -19,7 +20,6 @@ from service.diagnosis.selection.choice import Choice, Kind, Option, Selection, 
 from service.diagnosis.selection.equivalence import FORMULA_ERROR, doubt
 from service.diagnosis.selection.pruning import without_superfluous
 from service.diagnosis.selection.selector import WORTH_REFINING, Selector
-from service.diagnosis.work.side_by_side import side_by_side
 
 FARTHER = 1.0
 """What a fit has to explain more to take another's place, in units of what counts as one noise variance between them:

@@ -16,12 +16,12 @@ import numpy as np
 
 from service.diagnosis.catalogue import Effect, Signals
 from service.diagnosis.catalogue.deflection import torque_of_deflection
+from service.diagnosis.computation.side_by_side import side_by_side
 from service.diagnosis.fitting.fit import Fit
 from service.diagnosis.fitting.projection import moments
 from service.diagnosis.observations.observations import Piece
 from service.diagnosis.screening.screen import Screen, model_signals
 from service.diagnosis.selection.choice import Option
-from service.diagnosis.work.side_by_side import side_by_side
 from service.recording.conditioning.filters import smooth_each
 from service.recording.recording import Array
 

@@ -2,17 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
+from service.diagnosis.computation.side_by_side import side_by_side
 from service.diagnosis.fitting.fit import Fit, Fitter
 from service.diagnosis.model.extended import with_terms
 from service.diagnosis.selection.admission import Admission
 from service.diagnosis.selection.choice import Choice, Selection
 from service.diagnosis.selection.proxies import proxies
 from service.diagnosis.selection.shape_error import HARDLY, groups_of, standings
-from service.diagnosis.work.side_by_side import side_by_side
 
 Pruned = tuple[Fit, list[Choice]]
 """A model, and the choices that are left in it."""
@@ -33,7 +32,7 @@ def without_superfluous(fit: Fit, choices: list[Choice], fitter: Fitter, admissi
         what was asked of each
     """
     while choices:
-        without = side_by_side(partial(_fit_without, fitter, fit), range(len(choices)))
+        without = _each_without([[place] for place in range(len(choices))], fit, fitter)
         gains = [each.energy - fit.energy for each in without]
         weakest = int(np.argmin(gains))
         candidate = replace(choices[weakest].options[0].candidate, gain=max(gains[weakest], 0.0))
@@ -42,10 +41,6 @@ def without_superfluous(fit: Fit, choices: list[Choice], fitter: Fitter, admissi
         fit = without[weakest]
         choices = [choice for place, choice in enumerate(choices) if place != weakest]
     return fit, choices
-
-
-def _fit_without(fitter: Fitter, fit: Fit, place: int) -> Fit:
-    return fitter.without(fit, [place])
 
 
 def without_proxies(nominal: Fit, fit: Fit, choices: list[Choice], fitter: Fitter, admission: Admission) -> Pruned:
@@ -85,7 +80,7 @@ def without_errors_of_larger_ones(selection: Selection, fitter: Fitter, admissio
     """
     while len(groups := list(groups_of(selection.fit.model).values())) > 1:
         fit = selection.fit
-        without = [fitter.without(fit, places) for places in groups]
+        without = _each_without(groups, fit, fitter)
         found = standings(selection.nominal, fit, without, fitter, admission.inflation(fit))
         least = min(range(len(groups)), key=lambda number: found[number].certainty)
         if found[least].certainty >= HARDLY:
@@ -93,6 +88,11 @@ def without_errors_of_larger_ones(selection: Selection, fitter: Fitter, admissio
         fit, choices = _without(groups[least], fit, list(selection.choices), fitter)
         selection = replace(selection, fit=fit, choices=tuple(choices))
     return selection
+
+
+def _each_without(groups: Sequence[Sequence[int]], fit: Fit, fitter: Fitter) -> list[Fit]:
+    """The model fitted anew without each of some groups of its terms."""
+    return side_by_side(lambda places: fitter.without(fit, places), groups)
 
 
 def _without(dropped: Sequence[int], fit: Fit, choices: list[Choice], fitter: Fitter) -> Pruned:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from service.diagnosis.catalogue import TimeLocalEffect
+from service.diagnosis.computation.side_by_side import side_by_side
 from service.diagnosis.fitting.fit import Fit, Fitter
 from service.diagnosis.model.extended import ExtendedModel
 from service.diagnosis.model.term import Term
@@ -26,7 +27,6 @@ from service.diagnosis.selection.outside import where_held_out_shows
 from service.diagnosis.selection.position_bias import is_position_noise
 from service.diagnosis.selection.pruning import without_proxies, without_superfluous
 from service.diagnosis.selection.table import Table, fitted_option
-from service.diagnosis.work.side_by_side import side_by_side
 
 MOST_EFFECTS = 4
 """Different effects in one model; what one joint does, the others may do as well."""

@@ -6,13 +6,13 @@ from typing import TypeVar
 
 import numpy as np
 
+from service.diagnosis.computation.side_by_side import side_by_side
 from service.diagnosis.fitting.fit import Fit, Fitter
 from service.diagnosis.model.extended import ExtendedModel, with_terms
 from service.diagnosis.model.term import Term
 from service.diagnosis.screening.refinement import refined
 from service.diagnosis.screening.screen import Candidate, Screen, model_signals
 from service.diagnosis.selection.choice import Option, Place, driving, outsized, place_of
-from service.diagnosis.work.side_by_side import side_by_side
 
 Done = TypeVar("Done")
 
