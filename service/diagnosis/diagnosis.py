@@ -131,25 +131,34 @@ def _selected(
     if states_friction(identification.robot):
         selection = with_better_than_constants(selection, selector)
     selection = without_errors_of_larger_ones(selection, selector.fitter, selector.admission)
-    if selector.held_out is not None and identification.constrained:
-        selection = _unless_plainer_is_better(selection, delivered_model(identification), selector.held_out)
+    if identification.constrained:
+        selection = _unless_plainer_is_better(selection, delivered_model(identification), selector)
     return selection, selector
 
 
-def _unless_plainer_is_better(selection: Selection, delivered: ExtendedModel, held_out: HeldOut) -> Selection:
-    """Nothing selected, where the plain model of a possible body predicts held-out motion better than all of it.
+def _unless_plainer_is_better(selection: Selection, delivered: ExtendedModel, selector: Selector) -> Selection:
+    """The plain model of a possible body and nothing selected, where it predicts held-out motion better than all of it.
 
     Motion that excites an arm too poorly leaves free parameters that no body has; findings then explain their errors.
-    They stand where they predict some joint clearly better and none clearly worse, each joint by itself: the one with
-    the least noise would else speak for all.
+    Without findings the possible body is the model, as an identification delivers it: what the free parameters say of
+    other motion is worth nothing.
     """
-    if not selection.choices:
+    if selection.choices and _predicts_better(selection.fit.model, delivered, selector.held_out):
         return selection
-    gains = held_out.joint_gains_z(delivered, selection.fit.model)
-    whole = held_out.block_gains(delivered, selection.fit.model).sum()
-    if gains.min() > CLEARLY_WORSE and (gains.max() > PREDICTED_BETTER or whole > 0.0):
-        return selection
-    return Selection(selection.nominal, selection.nominal, (), (*selection.rejected, *selection.choices))
+    plain = selector.fitter.projected(delivered)
+    return Selection(plain, plain, (), (*selection.rejected, *selection.choices))
+
+
+def _predicts_better(model: ExtendedModel, plain: ExtendedModel, held_out: HeldOut | None) -> bool:
+    """Whether a model predicts some joint clearly better than a plainer one and none clearly worse; if nobody can tell.
+
+    Each joint by itself: the one with the least noise would else speak for all.
+    """
+    if held_out is None:
+        return True
+    gains = held_out.joint_gains_z(plain, model)
+    whole = held_out.block_gains(plain, model).sum()
+    return bool(gains.min() > CLEARLY_WORSE and (gains.max() > PREDICTED_BETTER or whole > 0.0))
 
 
 def _held_out(

@@ -1,7 +1,9 @@
 """Whole diagnoses of the paper's arm, effects concealed by formulas of their own."""
 
 import itertools
+from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from closing_time import is_over
 from diagnosis.diagnosed_arm import EffectTorque, at_joint, recordings
 from identification.simulated import Array, SimulatedArm, paper_robot
 from service.diagnosis import Diagnosis, DiagnosisDocument, Verdict, diagnose, document
+from service.identification import Identification, identify
 
 TRAIN, HELD_OUT = (1, 2, 3), (11, 12)
 FEW, MANY = 4.2, 150.0
@@ -180,6 +183,20 @@ def test_nothing_is_named_where_nothing_is_missing(seed: int) -> None:
     assert found.verdict is Verdict.CONSISTENT
     assert not found.findings
     assert found.constancy.holds
+
+
+def test_where_physics_rejects_the_free_estimate_and_nothing_is_named_the_delivered_model_stays(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def rejected(*of: Any) -> Identification:
+        found = identify(*of)
+        return replace(found, constrained=True, parameters=1.01 * found.free_parameters)
+
+    monkeypatch.setattr("service.diagnosis.diagnosis.identify", rejected)
+    rng = np.random.default_rng(0)
+    found = diagnose(paper_robot(), recordings(TRAIN, None, rng), recordings(HELD_OUT, None, rng))
+    assert not found.findings
+    assert np.array_equal(found.selection.fit.model.parameters, found.identification.parameters)
 
 
 def test_what_could_have_been_seen_is_told_and_what_could_not() -> None:
