@@ -150,9 +150,9 @@ def _unless_plainer_is_better(selection: Selection, delivered: ExtendedModel, se
 
 
 def _predicts_better(model: ExtendedModel, plain: ExtendedModel, held_out: HeldOut | None) -> bool:
-    """Whether a model predicts some joint clearly better than a plainer one and none clearly worse; if nobody can tell.
+    """Whether a model predicts some joint clearly better than a plainer one and none clearly worse.
 
-    Each joint by itself: the one with the least noise would else speak for all.
+    Each joint by itself: the one with the least noise would else speak for all. Without held-out motion it stands.
     """
     if held_out is None:
         return True
