@@ -163,22 +163,38 @@ class Dataset:
 
     def _prepare(self) -> Iterator[PreparedMotion]:
         """Condition, evaluate the regressor, and reduce."""
-        regressor = TorqueRegressor(self.robot, columns=self.base.independent_columns)
         for index, conditioner in enumerate(self.conditioners):
             for measured in conditioner.motions(self.cutoff_hz):
-                motion = _without_jitter(measured, conditioner.moving)
-                whole = np.empty((self.robot.joint_count, regressor.column_count, len(motion.position)))
-                regressor.write_shares(motion.position, motion.velocity, motion.acceleration, whole)
-                rigid = tuple(row[self.base.outward(joint)] for joint, row in enumerate(whole))
-                reduce = motion.band.reduce
-                yield PreparedMotion(
-                    motion,
-                    rigid,
-                    tuple(reduce(columns) for columns in rigid),
-                    reduce(np.ascontiguousarray(motion.mean_torque.T)),
-                    motion.band.reduce_mask(np.asarray(motion.measured.any(axis=0)).T),
-                    index,
-                )
+                yield prepared_motion(_without_jitter(measured, conditioner.moving), self.robot, self.base, index)
+
+
+def prepared_motion(motion: Motion, robot: Robot, base: BaseParameters, recording: int) -> PreparedMotion:
+    """One piece of motion with its rigid-body columns, at the recorded rate and in the common band.
+
+    Parameters
+    ----------
+    motion : Motion
+        the conditioned motion
+    robot : Robot
+        the arm
+    base : BaseParameters
+        its identifiable combinations
+    recording : int
+        index of the recording it came from
+    """
+    regressor = TorqueRegressor(robot, columns=base.independent_columns)
+    whole = np.empty((robot.joint_count, regressor.column_count, len(motion.position)))
+    regressor.write_shares(motion.position, motion.velocity, motion.acceleration, whole)
+    rigid = tuple(row[base.outward(joint)] for joint, row in enumerate(whole))
+    reduce = motion.band.reduce
+    return PreparedMotion(
+        motion,
+        rigid,
+        tuple(reduce(columns) for columns in rigid),
+        reduce(np.ascontiguousarray(motion.mean_torque.T)),
+        motion.band.reduce_mask(np.asarray(motion.measured.any(axis=0)).T),
+        recording,
+    )
 
 
 def _without_jitter(motion: Motion, moving: Mask) -> Motion:

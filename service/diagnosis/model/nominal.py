@@ -1,5 +1,6 @@
 """The nominal model: what an identification found, in the form that a diagnosis extends."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -81,7 +82,7 @@ def identified_rotors(identification: Identification) -> dict[int, float]:
 
 
 def setting_of(
-    model: ExtendedModel, observations: Observations, conditioners: list[Conditioner], cutoff_hz: float | None
+    model: ExtendedModel, observations: Observations, conditioners: Sequence[Conditioner], cutoff_hz: float | None
 ) -> Setting:
     """The arm and the ranges of its recorded motion.
 
@@ -91,7 +92,7 @@ def setting_of(
         the nominal model
     observations : Observations
         the training recordings
-    conditioners : list of Conditioner
+    conditioners : sequence of Conditioner
         the same, as surveyed
     cutoff_hz : float or None
         the band; half the sampling rate where None

@@ -29,6 +29,24 @@ def predicted_rows(model: ExtendedModel, piece: Piece) -> Array:
     return total
 
 
+def full_torque(model: ExtendedModel, piece: Piece) -> Array:
+    """The model's torque at the recorded rate, of the first repetition where they differ, (n, N).
+
+    Parameters
+    ----------
+    model : ExtendedModel
+        the model
+    piece : Piece
+        from the observations
+    """
+    signals = model.signals(piece)
+    total = signals.torque.copy()
+    for term in model.terms:
+        torque = model.term_torque(term, signals)
+        total[list(term.effect.touched(len(total)))] += torque if torque.ndim == 2 else torque[:, 0]
+    return total
+
+
 def residual_rows(model: ExtendedModel, observations: Observations) -> list[list[Array]]:
     """Measured less modelled torque in the common band: per joint, per piece, (1, P M).
 
@@ -48,7 +66,7 @@ def residual_rows(model: ExtendedModel, observations: Observations) -> list[list
 
 
 def raw_squares(model: ExtendedModel, observations: Observations) -> tuple[Array, Array]:
-    """Σ e² and number of samples of every joint at the recorded rate, no filter, (n,) each.
+    """Σ e² and number of samples of every joint at the recorded rate, no filter, (n,) each; motion as it was measured.
 
     Parameters
     ----------
@@ -59,7 +77,7 @@ def raw_squares(model: ExtendedModel, observations: Observations) -> tuple[Array
     """
     count = observations.robot.joint_count
     squares, samples = np.zeros(count), np.zeros(count)
-    for piece in observations:
+    for piece in observations.as_measured or observations:
         signals, motion = _quiet(model.signals(piece), piece, model), piece.prepared.motion
         predicted = np.repeat(signals.torque[:, None], piece.repetitions, axis=1)
         for term in model.terms:

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from service.diagnosis.catalogue import Effect
 from service.diagnosis.fitting.fit import Fitter
 from service.diagnosis.model.extended import ExtendedModel
-from service.diagnosis.model.residual import residual_rows
-from service.diagnosis.observations.observations import BoolArray, Observations, Piece
+from service.diagnosis.model.residual import full_torque, residual_rows
+from service.diagnosis.observations.observations import BoolArray, Observations
 from service.diagnosis.observations.period_pairs import period_pairs, rounding_repeats
 from service.diagnosis.observations.whitening import JointNoise, fitted_noise
 from service.diagnosis.screening.screen import Screen, model_signals
@@ -98,22 +98,12 @@ def repeated_differences(
         pairs = list(period_pairs(observations, piece))
         if not pairs:
             continue
-        residual = motion.torque[0].T - _full_torque(model, piece)
+        residual = motion.torque[0].T - full_torque(model, piece)
         measured = np.ascontiguousarray(motion.measured[0].T)
         for pair in pairs:
             rows = motion.band.reduce(np.ascontiguousarray(pair.later(residual) - residual[:, pair.earlier]))
             used = motion.band.reduce_mask(measured[:, pair.earlier] & measured[:, pair.near])
             yield rows, used, pair.factor
-
-
-def _full_torque(model: ExtendedModel, piece: Piece) -> Array:
-    """Torque of a model at the recorded rate, (n, N)."""
-    signals = model.signals(piece)
-    total = signals.torque.copy()
-    for term in model.terms:
-        torque = model.term_torque(term, signals)
-        total[list(term.effect.touched(len(total)))] += torque if torque.ndim == 2 else torque[:, 0]
-    return total
 
 
 def _joints(observations: Observations) -> range:

@@ -60,6 +60,8 @@ class Piece:
         band of each joint's own motion [Hz]
     position_noise : PositionNoise
         noise and rounding of the measured positions
+    by_position : (n,) bool
+        joints whose acceleration was made of their positions
     quiet_hz : (n,) float64 or None
         bands in which the velocities say most of single samples [Hz]; None for no filter
     rigid_hz : float or None
@@ -74,6 +76,7 @@ class Piece:
     time: Array
     state_hz: Array
     position_noise: PositionNoise
+    by_position: BoolArray
     quiet_hz: Array | None = None
     rigid_hz: float | None = None
     memory: dict[str, Any] = field(default_factory=dict, repr=False)
@@ -159,6 +162,8 @@ class Observations:
         where each recording's motion repeats
     weightings : tuple of RowWeighting
         how much the whitened rows of each joint count; empty where all count alike
+    as_measured : Observations or None
+        the same recordings with their motion as it was measured, by which residuals are stated; None where these are
     """
 
     robot: Robot
@@ -167,6 +172,7 @@ class Observations:
     noise: tuple[JointNoise, ...] = ()
     repetitions: tuple[tuple[Repetition, ...], ...] = ()
     weightings: tuple[RowWeighting, ...] = ()
+    as_measured: "Observations | None" = None
     _kept: dict[int, BoolArray] = field(default_factory=dict, repr=False)
 
     @staticmethod
@@ -302,4 +308,5 @@ def _piece(prepared: PreparedMotion, start_s: float, conditioner: Conditioner, s
     torque = np.stack([reduce(without_spikes(np.ascontiguousarray(each.T))) for each in motion.torque], axis=1)
     widest = np.full(motion.position.shape[1], motion.rate_hz / 2.0)
     width = widest if state_hz is None else np.minimum(state_hz, widest)
-    return Piece(prepared, torque, used, time, width, conditioner.noise)
+    source = conditioner.source
+    return Piece(prepared, torque, used, time, width, conditioner.noise, ~(source.velocity | source.acceleration))

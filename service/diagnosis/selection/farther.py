@@ -31,7 +31,7 @@ def looked_farther(
     if not farther:
         return selection
     progress("look farther")
-    before = len(selector.screen.effects)
+    before = selector.looked_at_before + len(selector.screen.effects)
     screen = Screen(rows, farther)
     beyond = Selector(screen, selector.fitter, selector.held_out, pure_error=pure_error, looked_at_before=before)
     return beyond.continued(selection, progress)

@@ -33,6 +33,7 @@ def guided_by(model: ExtendedModel, selector: Selector) -> Selector | None:
         Fitter(rows),
         held_out if confirming is None else HeldOut(confirming),
         pure_error=selector.pure_error,
+        looked_at_before=selector.looked_at_before,
     )
 
 

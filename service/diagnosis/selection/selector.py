@@ -89,6 +89,7 @@ class Selector:
         self.fitter = fitter
         self.held_out = held_out
         self.pure_error = pure_error
+        self.looked_at_before = looked_at_before
         self.admission = Admission(screen, pure_error=pure_error, looked_at_before=looked_at_before)
 
     def select(self, model: ExtendedModel, beforehand: Sequence[Term], progress: Callable[[str], None]) -> Selection:

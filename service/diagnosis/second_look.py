@@ -1,0 +1,83 @@
+"""A second look in a wider band, taken where the first has found nothing.
+
+What is fast, as a compliant gear, a delay or play, shows most where the first band ends. Wider, noise of the positions
+would explain itself; so there the accelerations are those that the motion most likely had, given the torque. What
+happens once, or changes over time, is slow, and is not looked for again. What is found counts where the first band's
+rows, which know less, say nothing else of its size.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy import stats
+
+from service.diagnosis.catalogue import possible_effects
+from service.diagnosis.findings.diagnosed import Diagnosis
+from service.diagnosis.findings.verdict import Verdict
+from service.diagnosis.in_band import Progress, concluded, confirming_rows, selected, selector_on
+from service.diagnosis.model.extended import with_terms
+from service.diagnosis.model.likely_accelerations import with_likely_accelerations
+from service.diagnosis.model.nominal import setting_of
+from service.diagnosis.observations.band import wider_cutoff
+from service.diagnosis.observations.observations import Observations
+from service.diagnosis.screening.screen import model_signals
+from service.diagnosis.selection.choice import Selection
+from service.recording.conditioning import Conditioner
+
+OTHER_SIZE = 1e-3
+"""Chance below which the first band's rows speak of another size."""
+
+
+def looked_again(
+    first: Diagnosis, recordings: Sequence[Conditioner], held_out: Sequence[Conditioner], progress: Progress
+) -> Diagnosis:
+    """What a wider band shows where nothing was found and nothing seemed to be left; else the first diagnosis.
+
+    Parameters
+    ----------
+    first : Diagnosis
+        in the band of the first look
+    recordings, held_out : sequence of Conditioner
+        training and held-out recordings, surveyed
+    progress : callable
+        told the name of each step as it begins, and what was found
+    """
+    identification, model = first.identification, first.selection.nominal.model
+    cutoff = wider_cutoff(recordings, identification, model.steepness, first.cutoff_hz)
+    if cutoff is None or first.verdict is not Verdict.CONSISTENT:
+        return first
+    progress("look again in a wider band")
+    base = identification.structure.base
+    rows = Observations.prepare(recordings, first.robot, base, cutoff, model.steepness)
+    unseen = confirming_rows(held_out, identification, cutoff, model.steepness)
+    rows = replace(with_likely_accelerations(rows, model, cutoff), as_measured=first.fitter.observations)
+    if unseen is not None and first.held_out is not None:
+        unseen = with_likely_accelerations(unseen, model, cutoff)
+        unseen = replace(unseen, as_measured=first.held_out.observations)
+    setting = setting_of(model, rows, recordings, cutoff)
+    effects = [effect for effect in possible_effects(setting) if effect.repeats_with_motion]
+    selector = selector_on(rows, unseen, model, effects, looked_at_before=len(first.screen.effects))
+    selection, selector = selected(selector, model, identification, setting, progress)
+    if not selection.choices or not _agrees(first, selection):
+        return first
+    return concluded(identification, setting, selector, selection, cutoff)
+
+
+def _agrees(first: Diagnosis, selection: Selection) -> bool:
+    """Whether the first band's rows allow every term the size that was found, each beside all others.
+
+    (ĉ - c)ᵀ G (ĉ - c) with G ĉ = g, the information and the scores of its columns there at the same shape.
+    """
+    terms = selection.fit.model.terms
+    for place, term in enumerate(terms):
+        beside = with_terms(first.selection.fit.model, [*terms[:place], *terms[place + 1 :]])
+        fit = first.fitter.projected(beside)
+        signals = model_signals(beside, first.fitter.observations)
+        found = first.screen.at_shapes(term.effect, term.shape[None], fit, signals)
+        information, scores = found.gram[0], found.target[0]
+        off = np.linalg.pinv(information, hermitian=True) @ scores - term.coefficients
+        distance = float(off @ information @ off) / first.inflation
+        if stats.chi2.sf(distance, len(off)) < OTHER_SIZE:
+            return False
+    return True
