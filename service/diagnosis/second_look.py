@@ -59,15 +59,22 @@ def looked_again(
     effects = [effect for effect in possible_effects(setting) if effect.repeats_with_motion]
     selector = selector_on(rows, unseen, model, effects, looked_at_before=len(first.screen.effects))
     selection, selector = selected(selector, model, identification, setting, progress)
-    if not selection.choices or not _agrees(first, selection):
+    if not selection.choices or not agrees(first, selection):
         return first
     return concluded(identification, setting, selector, selection, cutoff)
 
 
-def _agrees(first: Diagnosis, selection: Selection) -> bool:
+def agrees(first: Diagnosis, selection: Selection) -> bool:
     """Whether the first band's rows allow every term the size that was found, each beside all others.
 
     (ĉ - c)ᵀ G (ĉ - c) with G ĉ = g, the information and the scores of its columns there at the same shape.
+
+    Parameters
+    ----------
+    first : Diagnosis
+        in the first band
+    selection : Selection
+        what was selected in another
     """
     terms = selection.fit.model.terms
     for place, term in enumerate(terms):

@@ -15,18 +15,20 @@ from service.recording.conditioning import Conditioner
 BAND_HZ = 8.0
 
 
-def observed(wave: float | Array = 0.0) -> tuple[Observations, ExtendedModel]:
+def observed(
+    wave: float | Array = 0.0, band_hz: float = BAND_HZ, noise: float = POSITION_NOISE
+) -> tuple[Observations, ExtendedModel]:
     """Two periods of a motion with a wave [Nm] in every torque, or (3,), that no model has, and that repeats."""
     rng = np.random.default_rng(0)
     ((arm, _),) = motions((1,))
     extra = wave * np.sin(2.0 * np.pi * 1.7 * arm.exact.time[:, None])
-    position_noise = POSITION_NOISE * rng.standard_normal(arm.exact.position.shape)
+    position_noise = noise * rng.standard_normal(arm.exact.position.shape)
     recording = arm.recording(arm.white(PAPER_NOISE, rng), position_noise, extra_torque=extra)
     identification = identify(arm.robot, [recording])
     model = nominal_model(identification)
     conditioners = [Conditioner.survey(recording, arm.robot)]
     base = identification.structure.base
-    return Observations.prepare(conditioners, arm.robot, base, BAND_HZ, model.steepness), model
+    return Observations.prepare(conditioners, arm.robot, base, band_hz, model.steepness), model
 
 
 def test_no_repetition_is_averaged() -> None:

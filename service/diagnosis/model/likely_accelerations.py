@@ -42,10 +42,10 @@ TRANSITION = (1.5, 2.0)
 """Frequencies relative to the cut-off between which noise fades out of consideration: the band's own slope ends before,
 and beyond it nothing enters any row."""
 
-SOLVED = 1e-4
+SOLVED = 1e-3
 """Residual of the conjugate gradients, relative to the right-hand side."""
 
-MOST_STEPS = 50
+MOST_STEPS = 100
 
 
 def with_likely_accelerations(observations: Observations, model: ExtendedModel, cutoff_hz: float) -> Observations:

@@ -1,0 +1,83 @@
+"""A wider band is looked at where the first one shows nothing, and believed where the first one does not object."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from concealed.sealing.sealed import made
+from diagnosis.diagnosed_arm import EffectTorque, at_joint, recordings
+from identification.simulated import Array, SimulatedArm, paper_robot
+from service.diagnosis import Diagnosis, Verdict, diagnose
+from service.diagnosis.catalogue.elastic_forces import JointSpring
+from service.diagnosis.model.extended import with_terms
+from service.diagnosis.model.term import Term
+from service.diagnosis.second_look import agrees
+
+WIDER = "look again in a wider band"
+
+
+def spring(arm: SimulatedArm, rigid: Array) -> Array:
+    return at_joint(0, 0.6 * (arm.exact.exact.position[:, 0] - 0.2))
+
+
+def diagnosed(effect: EffectTorque | None) -> tuple[Diagnosis, list[str]]:
+    steps: list[str] = []
+    found = recordings((1, 2), effect, np.random.default_rng(3))
+    return diagnose(paper_robot(), found, progress=steps.append), steps
+
+
+def test_nothing_is_looked_for_twice_where_something_was_found() -> None:
+    diagnosis, steps = diagnosed(spring)
+    assert [each.place for each in diagnosis.findings] == [("joint_spring", 0)]
+    assert WIDER not in steps
+
+
+def test_a_sound_arm_is_looked_at_again_and_stays_sound() -> None:
+    steps: list[str] = []
+    _, trial = made("sound", 18000010)
+    diagnosis = diagnose(trial.robot, trial.train, trial.held_out, progress=steps.append)
+    assert steps[-1] == WIDER
+    assert diagnosis.verdict is Verdict.CONSISTENT
+    assert diagnosis.fitter.observations.as_measured is None, "what is reported is the first look"
+
+
+@pytest.fixture(scope="module")
+def sound() -> Diagnosis:
+    return diagnosed(None)[0]
+
+
+@pytest.mark.parametrize(("times", "agreed"), [(0.0, True), (1.0, True), (6.0, False), (-6.0, False)])
+def test_the_first_band_objects_to_a_size_that_it_would_have_seen(sound: Diagnosis, times: float, agreed: bool) -> None:
+    """Six of its own standard errors from what it estimates itself."""
+    nominal = sound.selection.fit.model
+    effect = JointSpring(0)
+    fit = sound.fitter.fit(with_terms(nominal, [Term(effect, np.zeros(0), np.array([0.1]))]))
+    estimate = fit.model.terms[0].coefficients[0]
+    error = float(np.sqrt(sound.fitter.covariance(fit)[-1, -1]))
+    term = Term(effect, np.zeros(0), np.array([estimate + times * error]))
+    found = replace(sound.selection, fit=replace(fit, model=with_terms(nominal, [term])))
+    assert agrees(sound, found) is agreed
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [17000014, 17000006])
+def test_a_compliant_gear_too_weak_for_the_first_band_is_named_in_the_second(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Eight standard errors strong if accelerations were known; predicted on motion that was not used as well."""
+    case, trial = made("weak", seed, "paper")
+    assert case.places == (("joint_elasticity", 2),)
+    seen = diagnose(trial.robot, trial.train, trial.held_out)
+    assert [each.place for each in seen.findings] == list(case.places)
+    assert seen.verdict is Verdict.EXPLAINED
+
+    def one_look(first: Diagnosis, *rest: Any) -> Diagnosis:
+        return first
+
+    monkeypatch.setattr("service.diagnosis.diagnosis.looked_again", one_look)
+    first = diagnose(trial.robot, trial.train, trial.held_out)
+    assert not first.findings
+    assert seen.cutoff_hz > first.cutoff_hz
+    assert seen.before.train == pytest.approx(first.before.train, rel=0.01), "residuals are those of measured motion"
