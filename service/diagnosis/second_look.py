@@ -2,8 +2,8 @@
 
 What is fast, as a compliant gear, a delay or play, shows most where the first band ends. Wider, noise of the positions
 would explain itself; so there the accelerations are those that the motion most likely had, given the torque. What
-happens once, or changes over time, is slow, and is not looked for again. What is found counts where the first band's
-rows, which know less, say nothing else of its size.
+happens once, or changes over time, is slow, and is not looked for again; nor is what the first band does not speak for
+at all. What is found counts where that band's rows, which know less, say nothing else of its size.
 """
 
 from collections.abc import Sequence
@@ -22,8 +22,12 @@ from service.diagnosis.model.nominal import setting_of
 from service.diagnosis.observations.band import wider_cutoff
 from service.diagnosis.observations.observations import Observations
 from service.diagnosis.screening.screen import model_signals
-from service.diagnosis.selection.choice import Selection
+from service.diagnosis.selection.choice import Place, Selection, place_of
 from service.recording.conditioning import Conditioner
+
+SPOKEN_FOR = 0.5
+"""Chance of what an effect explains in the first band, below which it is looked for again. What s = 8 hid there and the
+second band showed had 0.2 and less; every second effect that is not there has more than this."""
 
 OTHER_SIZE = 1e-3
 """Chance below which the first band's rows speak of another size."""
@@ -56,12 +60,22 @@ def looked_again(
         unseen = with_likely_accelerations(unseen, model, cutoff)
         unseen = replace(unseen, as_measured=first.held_out.observations)
     setting = setting_of(model, rows, recordings, cutoff)
-    effects = [effect for effect in possible_effects(setting) if effect.repeats_with_motion]
+    spoken_for = _spoken_for(first)
+    effects = [each for each in possible_effects(setting) if (each.id, each.joint) in spoken_for]
     selector = selector_on(rows, unseen, model, effects, looked_at_before=len(first.screen.effects))
     selection, selector = selected(selector, model, identification, setting, progress)
     if not selection.choices or not agrees(first, selection):
         return first
     return concluded(identification, setting, selector, selection, cutoff)
+
+
+def _spoken_for(first: Diagnosis) -> set[Place]:
+    """Effects and places of which the first band shows a trace at least, of those that are as fast as the motion."""
+    return {
+        place_of(each)
+        for each in first.screen.candidates(first.selection.nominal)
+        if each.effect.repeats_with_motion and each.p_value(first.inflation) < SPOKEN_FOR
+    }
 
 
 def agrees(first: Diagnosis, selection: Selection) -> bool:

@@ -28,16 +28,16 @@ class TorqueOverlay(Document):
 
 
 def judging_observations(diagnosis: Diagnosis) -> tuple[Observations, bool]:
-    """The held-out rows, or the training rows where there are none; and whether they are held out.
+    """The held-out rows, or the training rows where there are none, as measured; and whether they are held out.
 
     Parameters
     ----------
     diagnosis : Diagnosis
         the result
     """
-    if diagnosis.held_out is None:
-        return diagnosis.fitter.observations, False
-    return diagnosis.held_out.observations, True
+    held_out = diagnosis.held_out
+    rows = diagnosis.fitter.observations if held_out is None else held_out.observations
+    return rows.as_measured or rows, held_out is not None
 
 
 def torque_overlays(diagnosis: Diagnosis) -> list[TorqueOverlay]:
@@ -65,7 +65,7 @@ def torque_overlays(diagnosis: Diagnosis) -> list[TorqueOverlay]:
                 measured=rounded(piece.torque[joint].ravel()[rows]),
                 before=rounded(predicted[place][0][joint][rows]),
                 after=rounded(predicted[place][1][joint][rows]),
-                noise=float(np.sqrt(diagnosis.fitter.observations.noise[joint].model.variance)),
+                noise=float(np.sqrt(observations.noise[joint].model.variance)),
             )
         )
     return found
