@@ -73,3 +73,13 @@ def test_columns_are_made_anew_where_the_load_is_another(diagnosis: Diagnosis) -
     expected = grams(Screen(diagnosis.fitter.observations, screen.effects), beside(diagnosis, 1.2))
     for one, two in zip(found, expected, strict=True):
         np.testing.assert_allclose(one, two, rtol=1e-9)
+
+
+def test_only_what_is_wanted_is_screened_and_as_if_all_were(diagnosis: Diagnosis) -> None:
+    screen, fit = Screen(diagnosis.fitter.observations, shaped_by_load(diagnosis)), beside(diagnosis, 1.2)
+    screen.candidates(beside(diagnosis, 1.0))
+    every = screen.candidates(fit)
+    some = screen.candidates(fit, lambda effect: effect.id == "backlash")
+    expected = [each for each in every if each.effect.id == "backlash"]
+    assert [each.effect for each in some] == [each.effect for each in expected] != []
+    assert [each.gain for each in some] == [each.gain for each in expected]

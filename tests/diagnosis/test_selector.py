@@ -157,7 +157,7 @@ def test_what_is_counted_are_kinds_and_not_joints(effect: Effect, allowed: bool)
     """Springs at three joints leave room for three other effects, and for a fourth spring beside those."""
     asked = Selector(SCREEN, FITTER, None, pure_error=True)
     chosen: list[Place] = [("joint_spring", joint) for joint in range(3)]
-    candidate = Candidate(effect, np.ones(0), np.ones(1), 50.0, np.eye(1), True, 1.0, 1.0)
-    assert asked.allowed(candidate, chosen, set())
+    assert asked.allowed(effect, chosen, set())
     chosen += [("time_delay", None), ("base_tilt", None), ("cable_force", 1)]
-    assert asked.allowed(candidate, chosen, set()) is allowed
+    assert asked.allowed(effect, chosen, set()) is allowed
+    assert not asked.allowed(effect, [], {(effect.id, effect.joint)}), "what was refused is not looked at again"

@@ -1,6 +1,6 @@
 """Every form of every effect beside the fitted model: how much each would explain, and how likely noise does that."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -147,22 +147,26 @@ class Screen:
         self._windows: dict[int, Windows] = {}
         self._first: tuple[Fit, list[Candidate]] | None = None
 
-    def candidates(self, fit: Fit) -> list[Candidate]:
-        """Every form at its best shape on the grid.
+    def candidates(self, fit: Fit, wanted: Callable[[Effect], bool] = lambda effect: True) -> list[Candidate]:
+        """Every form that is wanted at its best shape on the grid.
 
         Parameters
         ----------
         fit : Fit
             the model so far
+        wanted : callable
+            whether an effect is looked at
         """
-        if self._first is None or self._first[0] is not fit:
-            signals = [fit.model.signals(piece) for piece in self.observations]
-            places = range(len(self.effects))
-            found = side_by_side(lambda at: self._candidate(at, self.effects[at], fit, signals), places)
-            if self._first is not None:
-                return found
-            self._first = fit, found  # the nominal model, which is looked at twice
-        return list(self._first[1])
+        if self._first is None:  # the nominal model, which is looked at again
+            self._first = fit, self._screened(fit, range(len(self.effects)))
+        if self._first[0] is fit:
+            return [each for each in self._first[1] if wanted(each.effect)]
+        return self._screened(fit, [at for at, effect in enumerate(self.effects) if wanted(effect)])
+
+    def _screened(self, fit: Fit, places: Sequence[int]) -> list[Candidate]:
+        """Some of the forms, by their places among all."""
+        signals = [fit.model.signals(piece) for piece in self.observations]
+        return side_by_side(lambda at: self._candidate(at, self.effects[at], fit, signals), places)
 
     def at_shapes(self, effect: Effect, shapes: Array, fit: Fit, signals: Sequence[Signals]) -> Moments:
         """Moments of an effect at any shapes.

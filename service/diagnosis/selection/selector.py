@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from service.diagnosis.catalogue import TimeLocalEffect
+from service.diagnosis.catalogue import Effect, TimeLocalEffect
 from service.diagnosis.computation.side_by_side import side_by_side
 from service.diagnosis.fitting.fit import Fit, Fitter
 from service.diagnosis.model.extended import ExtendedModel
@@ -227,23 +227,23 @@ class Selector:
         chosen = [_chosen(choice) for choice in choices]
         return Table(fit, self.screen, self.fitter, lambda each: self.allowed(each, chosen, refused))
 
-    def allowed(self, candidate: Candidate, chosen: Sequence[Place], refused: set[Place]) -> bool:
-        """Whether a form may be added to a model.
+    def allowed(self, effect: Effect, chosen: Sequence[Place], refused: set[Place]) -> bool:
+        """Whether an effect may be added to a model.
 
         Parameters
         ----------
-        candidate : Candidate
-            the form
+        effect : Effect
+            in any form
         chosen : sequence of (str, int or None)
             effects and places that the model has
         refused : set of (str, int or None)
             effects and places that were refused
         """
-        place = place_of(candidate)
-        if place in refused or candidate.gain <= 0.0:
+        place = effect.id, effect.joint
+        if place in refused:
             return False
         if place in chosen:
-            return candidate.effect.repeats and chosen.count(place) < MOST_REPEATS
+            return effect.repeats and chosen.count(place) < MOST_REPEATS
         kinds = {effect for effect, _ in chosen if effect not in UNCOUNTED}
         return place[0] in (*UNCOUNTED, *kinds) or len(kinds) < MOST_EFFECTS
 

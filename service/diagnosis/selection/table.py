@@ -6,6 +6,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from service.diagnosis.catalogue import Effect
 from service.diagnosis.computation.side_by_side import side_by_side
 from service.diagnosis.fitting.fit import Fit, Fitter
 from service.diagnosis.model.extended import ExtendedModel, with_terms
@@ -29,14 +30,14 @@ class Table:
     fitter : Fitter
         of the same
     allowed : callable
-        whether a form may be added to the model at all
+        whether an effect may be added to the model at all
     """
 
-    def __init__(self, fit: Fit, screen: Screen, fitter: Fitter, allowed: Callable[[Candidate], bool]) -> None:
+    def __init__(self, fit: Fit, screen: Screen, fitter: Fitter, allowed: Callable[[Effect], bool]) -> None:
         self.fit = fit
         self._screen, self._fitter = screen, fitter
         self._signals = model_signals(fit.model, screen.observations)
-        self.candidates = [each for each in screen.candidates(fit) if allowed(each)]
+        self.candidates = [each for each in screen.candidates(fit, allowed) if each.gain > 0.0]
         self._refined: dict[int, Candidate] = {}
         self._fitted: dict[int, Option] = {}
 
