@@ -16,7 +16,7 @@ from service.diagnosis.catalogue import possible_effects
 from service.diagnosis.findings.diagnosed import Diagnosis
 from service.diagnosis.findings.verdict import Verdict
 from service.diagnosis.in_band import Progress, concluded, confirming_rows, selected, selector_on
-from service.diagnosis.model.extended import with_terms
+from service.diagnosis.model.extended import ExtendedModel, with_terms
 from service.diagnosis.model.likely_accelerations import with_likely_accelerations
 from service.diagnosis.model.nominal import setting_of
 from service.diagnosis.observations.band import wider_cutoff
@@ -55,10 +55,9 @@ def looked_again(
     base = identification.structure.base
     rows = Observations.prepare(recordings, first.robot, base, cutoff, model.steepness)
     unseen = confirming_rows(held_out, identification, cutoff, model.steepness)
-    rows = replace(with_likely_accelerations(rows, model, cutoff), as_measured=first.fitter.observations)
+    rows = _likely(rows, model, cutoff, first.fitter.observations)
     if unseen is not None and first.held_out is not None:
-        unseen = with_likely_accelerations(unseen, model, cutoff)
-        unseen = replace(unseen, as_measured=first.held_out.observations)
+        unseen = _likely(unseen, model, cutoff, first.held_out.observations)
     setting = setting_of(model, rows, recordings, cutoff)
     spoken_for = _spoken_for(first)
     effects = [each for each in possible_effects(setting) if (each.id, each.joint) in spoken_for]
@@ -67,6 +66,11 @@ def looked_again(
     if not selection.choices or not agrees(first, selection):
         return first
     return concluded(identification, setting, selector, selection, cutoff)
+
+
+def _likely(rows: Observations, model: ExtendedModel, cutoff_hz: float, measured: Observations) -> Observations:
+    """Rows of most likely accelerations, whose residuals are stated by the motion as it was measured."""
+    return replace(with_likely_accelerations(rows, model, cutoff_hz), as_measured=measured)
 
 
 def _spoken_for(first: Diagnosis) -> set[Place]:
