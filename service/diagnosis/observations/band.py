@@ -51,8 +51,9 @@ STEPS_SEEN = 2.5
 alone sets the comparison, a joint's own band is opened that far."""
 
 SECOND_LOOK = 1.3
-"""Width over the identification's band in which a second look is taken, at most. At 1.7 none of the effects is found that
-are missed at 1.3, and before much was asked of it, two of 26 simulated arms that lack nothing were given a name at 1.6."""
+"""Width over the identification's band in which a second look is taken, at most. At 1.7 none of the effects is found
+that are missed at 1.3, and before much was asked of it, two of 26 simulated arms that lack nothing were given a name at
+1.6."""
 
 WORTH_A_LOOK = 1.1
 """Width over the first look's band below which a second would see nothing else."""
