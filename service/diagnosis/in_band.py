@@ -26,7 +26,6 @@ from service.diagnosis.noise.events import beside_events
 from service.diagnosis.noise.floor import with_noise
 from service.diagnosis.observations.observations import Observations
 from service.diagnosis.screening.screen import Screen
-from service.diagnosis.selection.admission import LEVEL
 from service.diagnosis.selection.choice import Selection
 from service.diagnosis.selection.confirmation import CLEARLY_WORSE, HeldOut
 from service.diagnosis.selection.farther import looked_farther
@@ -204,7 +203,7 @@ def concluded(
     screen, fitter, held_out, pure_error = selector.screen, selector.fitter, selector.held_out, selector.pure_error
     observations = fitter.observations
     inflation = 1.0 if pure_error else selection.fit.inflation()
-    level = LEVEL / max(len(screen.effects), 1)
+    level = selector.admission.level
     misfit_after = lack_of_fit(selection.fit, observations, pure_error=pure_error)
     return Diagnosis(
         identification=identification,
@@ -224,6 +223,7 @@ def concluded(
         after=sizes(selection.fit.model, fitter, held_out),
         noise_std=identification.residuals.noise_std,
         pure_error=pure_error,
+        level=level,
         cutoff_hz=cutoff_hz,
         screen=screen,
         fitter=fitter,

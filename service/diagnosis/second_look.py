@@ -13,6 +13,7 @@ import numpy as np
 from scipy import stats
 
 from service.diagnosis.catalogue import possible_effects
+from service.diagnosis.findings.detectability import Detectable
 from service.diagnosis.findings.diagnosed import Diagnosis
 from service.diagnosis.findings.verdict import Verdict
 from service.diagnosis.in_band import Progress, concluded, confirming_rows, selected, selector_on
@@ -65,7 +66,8 @@ def looked_again(
     selection, selector = selected(selector, model, identification, setting, progress)
     if not selection.choices or not agrees(first, selection):
         return first
-    return concluded(identification, setting, selector, selection, cutoff)
+    second = concluded(identification, setting, selector, selection, cutoff)
+    return replace(second, detectable=_detectable(first, second))
 
 
 def _likely(rows: Observations, model: ExtendedModel, cutoff_hz: float, measured: Observations) -> Observations:
@@ -80,6 +82,12 @@ def _spoken_for(first: Diagnosis) -> set[Place]:
         for each in first.screen.candidates(first.selection.nominal)
         if each.effect.repeats_with_motion and each.p_value(first.inflation) < SPOKEN_FOR
     }
+
+
+def _detectable(first: Diagnosis, second: Diagnosis) -> tuple[Detectable, ...]:
+    """What would have been seen: in the wider band where it was looked for there, else in the first."""
+    wider = {(each.effect, each.joint): each for each in second.detectable}
+    return tuple(wider.get((each.effect, each.joint), each) for each in first.detectable)
 
 
 def agrees(first: Diagnosis, selection: Selection) -> bool:

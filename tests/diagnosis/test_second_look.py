@@ -80,4 +80,7 @@ def test_a_compliant_gear_too_weak_for_the_first_band_is_named_in_the_second(
     first = diagnose(trial.robot, trial.train, trial.held_out)
     assert not first.findings
     assert seen.cutoff_hz > first.cutoff_hz
+    assert [(each.effect, each.joint) for each in seen.detectable] == [
+        (each.effect, each.joint) for each in first.detectable
+    ], "what would have been seen is told of the whole catalogue"
     assert seen.before.train == pytest.approx(first.before.train, rel=0.01), "residuals are those of measured motion"

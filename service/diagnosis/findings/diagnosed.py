@@ -73,6 +73,8 @@ class Diagnosis:
         torque noise a sample at the recorded rate [Nm or N]
     pure_error : bool
         whether the noise is known from repetitions
+    level : float
+        chance of a false name that each form was given
     cutoff_hz : float
         band of the comparison [Hz]
     screen : Screen
@@ -100,6 +102,7 @@ class Diagnosis:
     after: FitSizes
     noise_std: Array
     pure_error: bool
+    level: float
     cutoff_hz: float
     screen: Screen
     fitter: Fitter

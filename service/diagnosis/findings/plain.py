@@ -22,7 +22,7 @@ from service.diagnosis.findings.constant_torque import WITH_A_CONSTANT, instead_
 from service.diagnosis.findings.diagnosed import Diagnosis
 from service.diagnosis.findings.finding import Finding, sizes, without_nominal
 from service.diagnosis.model.term import Term
-from service.diagnosis.selection.admission import LEVEL, SMALLEST_SHARE
+from service.diagnosis.selection.admission import SMALLEST_SHARE
 from service.diagnosis.selection.equivalence import probability_among
 from service.diagnosis.selection.shape_error import HARDLY
 from service.robot import Robot
@@ -85,13 +85,12 @@ def _finding(effect: PlainTerm, diagnosis: Diagnosis) -> Finding | None:
     if place is None:
         return None
     value, variance = float(fit.model.parameters[place]), float(fit.covariance[place, place]) * inflation
-    level = LEVEL / max(len(diagnosis.screen.effects), 1)
-    if variance <= 0.0 or stats.chi2.sf(value**2 / variance, 1) >= level:
+    if variance <= 0.0 or stats.chi2.sf(value**2 / variance, 1) >= diagnosis.level:
         return None
     without = without_nominal(fit, place, diagnosis.fitter)
     gain = without.energy - fit.energy
     # Beside an effect whose columns change with the parameters, the linear standard error may be too small: both count.
-    if stats.chi2.sf(max(gain, 0.0) / inflation, 1) >= level:
+    if stats.chi2.sf(max(gain, 0.0) / inflation, 1) >= diagnosis.level:
         return None
     residual = fit.projection.residual[joint]
     if not diagnosis.pure_error and gain < SMALLEST_SHARE * float(residual @ residual):
