@@ -12,7 +12,7 @@ from service.diagnosis.model.extended import ExtendedModel
 from service.diagnosis.model.likely_accelerations import TRANSITION, acceleration_noise, with_likely_accelerations
 from service.diagnosis.model.residual import raw_squares
 from service.diagnosis.noise.floor import with_noise
-from service.diagnosis.observations.observations import Observations
+from service.diagnosis.observations.observations import BoolArray, Observations
 from service.diagnosis.screening.screen import Screen, model_signals
 from service.dynamics import mass_matrix
 from service.recording.recording import Array
@@ -41,7 +41,7 @@ def drawn(rng: np.random.Generator) -> tuple[Array, Array, Array]:
     return noise, inertia, torque - np.einsum("tij,jt->it", inertia, noise)
 
 
-def likely(residual: Array, inertia: Array, known: Array | None = None, density: Array = DENSITY) -> Array:
+def likely(residual: Array, inertia: Array, known: BoolArray | None = None, density: Array = DENSITY) -> Array:
     known = np.ones(residual.shape, dtype=bool) if known is None else known
     return acceleration_noise(residual, known, inertia, density, TORQUE_NOISE, RATE_HZ, CUTOFF_HZ)
 

@@ -28,7 +28,7 @@ from scipy.sparse.linalg import LinearOperator, cg
 
 from service.diagnosis.model.extended import ExtendedModel
 from service.diagnosis.model.residual import full_torque
-from service.diagnosis.observations.observations import Observations, Piece
+from service.diagnosis.observations.observations import BoolArray, Observations, Piece
 from service.diagnosis.observations.spikes import without_spikes
 from service.dynamics import mass_matrix
 from service.identification.dataset import prepared_motion
@@ -72,7 +72,13 @@ def with_likely_accelerations(observations: Observations, model: ExtendedModel, 
 
 
 def acceleration_noise(
-    residual: Array, known: Array, inertia: Array, density: Array, torque_noise: Array, rate_hz: float, cutoff_hz: float
+    residual: Array,
+    known: BoolArray,
+    inertia: Array,
+    density: Array,
+    torque_noise: Array,
+    rate_hz: float,
+    cutoff_hz: float,
 ) -> Array:
     """n̂: the accelerations' most likely noise within and around a band, (n, N) [rad/s² or m/s²].
 

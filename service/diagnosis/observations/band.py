@@ -71,8 +71,7 @@ def diagnosis_cutoff(conditioners: Sequence[Conditioner], identification: Identi
     steepness : (n,) float64
         K_v of every joint's friction [s/rad or s/m]
     """
-    rate = min(conditioner.timing.rate_hz for conditioner in conditioners)
-    widest = min(WIDEST_HZ, OPEN_SHARE * rate)
+    widest = _widest(conditioners)
     limit = quiet_limit(conditioners)
     quiet = widest if limit is None else min(widest, NOISE_MARGIN * limit)
     identified = identification.cutoff_hz
@@ -81,8 +80,7 @@ def diagnosis_cutoff(conditioners: Sequence[Conditioner], identification: Identi
     if explained_share(conditioners, identification) < LITTLE:
         return max(min(quiet, WIDENING * identified), min(identified, widest))
     noisiest = min(c.noise.limit_hz or np.inf for c in conditioners)
-    steps = min(float(step_bands(conditioner, steepness, BLURRED).min()) for conditioner in conditioners)
-    return min(identified, widest, max(noisiest, steps / STEPS_SEEN))
+    return min(identified, widest, max(noisiest, _without_corners(conditioners, steepness, BLURRED)))
 
 
 def wider_cutoff(
@@ -103,10 +101,19 @@ def wider_cutoff(
     """
     if identification.cutoff_hz is None:
         return None
-    rate = min(conditioner.timing.rate_hz for conditioner in conditioners)
-    steps = min(float(step_bands(conditioner, steepness, AT_MOST_BLURRED).min()) for conditioner in conditioners)
-    wider = min(SECOND_LOOK * identification.cutoff_hz, steps / STEPS_SEEN, WIDEST_HZ, OPEN_SHARE * rate)
+    without_corners = _without_corners(conditioners, steepness, AT_MOST_BLURRED)
+    wider = min(SECOND_LOOK * identification.cutoff_hz, without_corners, _widest(conditioners))
     return wider if wider > WORTH_A_LOOK * cutoff_hz else None
+
+
+def _widest(conditioners: Sequence[Conditioner]) -> float:
+    """Band that is never exceeded [Hz]."""
+    return min(WIDEST_HZ, OPEN_SHARE * min(conditioner.timing.rate_hz for conditioner in conditioners))
+
+
+def _without_corners(conditioners: Sequence[Conditioner], steepness: Array, blurred: float) -> float:
+    """Widest band that shows no corners of friction's steps where noise of the velocities may be `blurred` [Hz]."""
+    return min(float(step_bands(conditioner, steepness, blurred).min()) for conditioner in conditioners) / STEPS_SEEN
 
 
 def state_cutoffs(conditioner: Conditioner, cutoff_hz: float | None, steepness: Array | None) -> Array | None:
