@@ -46,6 +46,7 @@ class Effect(ABC):
     `may_exceed_measured`; nothing else can.
     An effect that is `screened` is looked for beside the nominal model; any other becomes a finding by comparison with
     a given model.
+    What an effect that is `within_step` explains lies where friction turns its sign and nowhere else.
     One that does not do the same whenever the motion does, that does not `repeats_with_motion`, passes for noise there.
     What its law depends on are its `arguments`: ``position``, ``velocity``, ``acceleration`` of its joint, the ``load``
     on its transmission, ``time``, the ``others``' motion; None where it acts on whatever torque there is.
@@ -63,6 +64,7 @@ class Effect(ABC):
     has_step: ClassVar[bool] = False
     of_motion_and_step: ClassVar[bool] = False
     of_motion_and_load: ClassVar[bool] = False
+    within_step: ClassVar[bool] = False
     linear_in_load: ClassVar[bool] = False
     may_exceed_measured: ClassVar[bool] = False
     screened: ClassVar[bool] = True

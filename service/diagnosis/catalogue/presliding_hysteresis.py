@@ -61,6 +61,7 @@ class PreslidingHysteresis(Effect):
 
     has_step: ClassVar[bool] = True
     of_motion_and_step: ClassVar[bool] = True
+    within_step: ClassVar[bool] = True
     id: ClassVar[str] = "presliding_hysteresis"
     arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "velocity"})
     equation: ClassVar[str] = "tau = F (z - sgn(qd)), dz/dt = qd/x_s - |qd| z/x_s"
