@@ -10,10 +10,13 @@ from concealed.sealing.sealed import made
 from diagnosis.diagnosed_arm import EffectTorque, at_joint, recordings
 from identification.simulated import Array, SimulatedArm, paper_robot
 from service.diagnosis import Diagnosis, Verdict, diagnose
+from service.diagnosis.catalogue import Effect
 from service.diagnosis.catalogue.elastic_forces import JointSpring
+from service.diagnosis.in_band import selector_on
 from service.diagnosis.model.extended import with_terms
 from service.diagnosis.model.term import Term
 from service.diagnosis.second_look import agrees
+from service.diagnosis.selection.selector import Selector
 
 WIDER = "look again in a wider band"
 
@@ -41,6 +44,23 @@ def test_a_sound_arm_is_looked_at_again_and_stays_sound() -> None:
     assert steps[-1] == WIDER
     assert diagnosis.verdict is Verdict.CONSISTENT
     assert diagnosis.fitter.observations.as_measured is None, "what is reported is the first look"
+
+
+def test_what_is_slow_or_within_frictions_step_is_not_looked_for_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Noise of the velocities blurs that step, in a bristle's column and in what is left to explain alike."""
+    asked: list[Effect] = []
+
+    def remembering(*rows: Any, **counted: Any) -> Selector:
+        asked.extend(rows[-1])
+        return selector_on(*rows, **counted)
+
+    monkeypatch.setattr("service.diagnosis.second_look.selector_on", remembering)
+    monkeypatch.setattr("service.diagnosis.second_look.SPOKEN_FOR", 2.0)
+    _, trial = made("sound", 18000010)
+    first = diagnose(trial.robot, trial.train, trial.held_out)
+    fast = {each.id for each in first.screen.effects if each.repeats_with_motion}
+    assert "presliding_hysteresis" in fast, "the first look asks for it"
+    assert {each.id for each in asked} == fast - {"presliding_hysteresis"}
 
 
 @pytest.fixture(scope="module")
