@@ -2,8 +2,9 @@
 
 Machines are shared: the whole of one may be taken away for a tenth of a second, which no program can make good. A test
 of mark `realtime` that fails while that was seen to happen raises `MachineStoodStillError`, and is run again
-(``make test-slow``). A test that fails without it has failed; but on a machine too slow for emulated devices, which is
-measured, a failure was to be expected, and is told as one.
+(``make test-slow``). A test that fails without it has failed. On a machine too slow for emulated devices, which is
+measured, a failure was to be expected, and is told as one; so is the last of a test's runs, where the host's other
+machines, not this one's programs, took the time of every one.
 """
 
 import os
@@ -20,6 +21,8 @@ import machine_speed
 PERIOD_S = 0.005
 STANDSTILL_S = 0.025
 """Six cycles of 250 Hz: more than a control loop with a real-time priority ever waits for another program [s]."""
+MOST_TAKEN = 0.1
+"""Part of a test's time up to which what other machines took of a processor does not count."""
 
 
 class MachineStoodStillError(Exception):
@@ -65,12 +68,23 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
     if item.get_closest_marker("realtime") is None:
         return (yield)
     with Onlooker() as onlooker:
+        begin, taken = time.monotonic(), machine_speed.taken_s()
         try:
             return (yield)
         except (Exception, pytest.fail.Exception) as error:
-            if machine_speed.physics_step_s() > machine_speed.QUICK_ENOUGH_S:
-                took, why = 1e3 * machine_speed.physics_step_s(), str(error).partition("\n")[0]
-                pytest.xfail(f"too slow a machine ({took:.2f} ms for a step of the physics): {why}")
-            if onlooker.longest_s < STANDSTILL_S:
+            taken_part = (machine_speed.taken_s() - taken) / (time.monotonic() - begin)
+            why = str(error).partition("\n")[0]
+            if (step_s := machine_speed.physics_step_s()) > machine_speed.QUICK_ENOUGH_S:
+                pytest.xfail(f"too slow a machine ({1e3 * step_s:.2f} ms for a step of the physics): {why}")
+            if taken_part > MOST_TAKEN and _is_last_run(item):
+                pytest.xfail(f"other machines took {taken_part:.0%} of a processor, run after run: {why}")
+            if taken_part <= MOST_TAKEN and onlooker.longest_s < STANDSTILL_S:
                 raise
-            raise MachineStoodStillError(f"for {1e3 * onlooker.longest_s:.0f} ms; the test failed: {error}") from error
+            account = f"for {1e3 * onlooker.longest_s:.0f} ms, and {taken_part:.0%} of a processor was taken from it"
+            raise MachineStoodStillError(f"{account}; the test failed: {error}") from error
+
+
+def _is_last_run(item: pytest.Item) -> bool:
+    """Whether a failing test would not be run again; never where it was not to be run again at all."""
+    reruns = item.config.getoption("reruns", default=None) or 0
+    return 0 < reruns < getattr(item, "execution_count", 0)

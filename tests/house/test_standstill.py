@@ -1,5 +1,6 @@
 """A test against the clock is run again only where the machine stood still under it."""
 
+import itertools
 from typing import Any
 
 import pytest
@@ -22,10 +23,29 @@ def test_against_the_clock():
 """
 
 
-def outcomes(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, microseconds: int, step_s: float) -> Any:
+FAILS_ALWAYS = """
+import pytest
+
+@pytest.mark.realtime
+def test_against_the_clock():
+    assert False
+"""
+
+
+def outcomes(
+    pytester: pytest.Pytester,
+    monkeypatch: pytest.MonkeyPatch,
+    test: str,
+    *,
+    step_s: float = machine_speed.QUICK_ENOUGH_S,
+    taken_s: float = 0.0,
+) -> Any:
+    """What is said of a test where a step of the physics takes so long, and so much is taken in each of its runs."""
+    readings = itertools.count()
     monkeypatch.setattr(machine_speed, "physics_step_s", lambda: step_s)
+    monkeypatch.setattr(machine_speed, "taken_s", lambda: taken_s * next(readings))
     pytester.makeini("[pytest]\nmarkers = realtime\n")
-    pytester.makepyfile(FAILS_AT_FIRST.format(microseconds=microseconds))
+    pytester.makepyfile(test)
     result = pytester.runpytest_inprocess("-p", "standstill", "--reruns", "1", "--only-rerun", "MachineStoodStill")
     return result.parseoutcomes()
 
@@ -34,14 +54,37 @@ def outcomes(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, microse
 def test_a_failure_counts_unless_the_machine_stood_still(
     pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, microseconds: int, outcome: dict[str, int]
 ) -> None:
-    assert outcomes(pytester, monkeypatch, microseconds, machine_speed.QUICK_ENOUGH_S) == outcome
+    test = FAILS_AT_FIRST.format(microseconds=microseconds)
+    assert outcomes(pytester, monkeypatch, test) == outcome
 
 
 @pytest.mark.parametrize("microseconds", [100_000, 0])
 def test_a_failure_is_expected_of_a_machine_that_is_too_slow(
     pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, microseconds: int
 ) -> None:
-    assert outcomes(pytester, monkeypatch, microseconds, 1.01 * machine_speed.QUICK_ENOUGH_S) == {"xfailed": 1}
+    test = FAILS_AT_FIRST.format(microseconds=microseconds)
+    assert outcomes(pytester, monkeypatch, test, step_s=1.01 * machine_speed.QUICK_ENOUGH_S) == {"xfailed": 1}
+
+
+def test_a_machine_whose_time_is_taken_is_given_another_run(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    test = FAILS_AT_FIRST.format(microseconds=0)
+    assert outcomes(pytester, monkeypatch, test, taken_s=60.0) == {"passed": 1, "rerun": 1}
+
+
+@pytest.mark.parametrize(
+    ("taken_s", "outcome"), [(60.0, {"xfailed": 1, "rerun": 1}), (0.0, {"failed": 1})], ids=["taken", "not taken"]
+)
+def test_what_never_had_the_machine_has_not_failed(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, taken_s: float, outcome: dict[str, int]
+) -> None:
+    assert outcomes(pytester, monkeypatch, FAILS_ALWAYS, taken_s=taken_s) == outcome
+
+
+def test_what_was_taken_only_grows() -> None:
+    before = machine_speed.taken_s()
+    assert 0.0 <= before <= machine_speed.taken_s()
 
 
 def test_the_machine_s_speed_is_that_of_the_physics() -> None:
