@@ -41,8 +41,8 @@ from service.robot import Robot
 Progress = Callable[[str], None]
 
 PREDICTED_BETTER = 2.0
-"""Standard errors by which one of two models predicts a joint better; worse, it is by `CLEARLY_WORSE`: of many joints
-one is so by chance, at a size that nobody would see."""
+"""Standard errors by which one of two models predicts a joint better; worse, it is by `CLEARLY_WORSE` and by more than
+the other joints gain: of many joints one is so by chance, at a size that nobody would see."""
 
 
 def selector_on(
@@ -160,13 +160,15 @@ def _unless_plainer_is_better(selection: Selection, delivered: ExtendedModel, se
 def _predicts_better(model: ExtendedModel, plain: ExtendedModel, held_out: HeldOut | None) -> bool:
     """Whether a model predicts some joint clearly better than a plainer one and none clearly worse.
 
-    Each joint by itself: the one with the least noise would else speak for all. Without held-out motion it stands.
+    Each joint by itself: the one with the least noise would else speak for all. A loss that the best of them outweighs
+    is no clear one: what was free to explain one joint may cost another a little. Without held-out motion it stands.
     """
     if held_out is None:
         return True
     gains = held_out.joint_gains_z(plain, model)
     whole = held_out.block_gains(plain, model).sum()
-    return bool(gains.min() > CLEARLY_WORSE and (gains.max() > PREDICTED_BETTER or whole > 0.0))
+    clearly_worse = min(CLEARLY_WORSE, -float(gains.max()))
+    return bool(gains.min() > clearly_worse and (gains.max() > PREDICTED_BETTER or whole > 0.0))
 
 
 def _observed(observations: Observations, model: ExtendedModel, effects: Sequence[Effect]) -> tuple[Observations, bool]:
