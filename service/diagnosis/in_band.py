@@ -19,6 +19,7 @@ from service.diagnosis.findings.plain import states_friction
 from service.diagnosis.fitting.fit import Fitter
 from service.diagnosis.fitting.lack_of_fit import lack_of_fit
 from service.diagnosis.fitting.regressor_noise import row_weightings
+from service.diagnosis.fitting.spilled_misfit import without_spilled
 from service.diagnosis.model.extended import ExtendedModel
 from service.diagnosis.model.nominal import delivered_model, identified_rotors
 from service.diagnosis.model.term import Term
@@ -206,6 +207,7 @@ def concluded(
     observations = fitter.observations
     inflation = 1.0 if pure_error else selection.fit.inflation()
     level = selector.admission.level
+    misfit_before = lack_of_fit(selection.nominal, observations, pure_error=pure_error)
     misfit_after = lack_of_fit(selection.fit, observations, pure_error=pure_error)
     return Diagnosis(
         identification=identification,
@@ -213,7 +215,7 @@ def concluded(
         selection=selection,
         findings=selected_findings(selection, screen, fitter, held_out, misfit_after, inflation),
         mismatch=locate(selection, observations, misfit_after.significant),
-        misfit_before=lack_of_fit(selection.nominal, observations, pure_error=pure_error),
+        misfit_before=without_spilled(misfit_before, selection.nominal, fitter, pure_error=pure_error),
         misfit_after=misfit_after,
         constancy=constancy(fitter, selection.fit, None if held_out is None else held_out.fitter, inflation),
         detectable=(

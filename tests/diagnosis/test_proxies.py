@@ -27,7 +27,7 @@ def crossed(arm: SimulatedArm, rigid: Array) -> Array:
 
 @pytest.fixture(scope="module")
 def diagnosis() -> Diagnosis:
-    rng = np.random.default_rng(1)  # with 5, what is wrong at the second joint spills over to the third by chance
+    rng = np.random.default_rng(1)
     return diagnose(paper_robot(), recordings((1, 2), crossed, rng), recordings((11,), crossed, rng))
 
 

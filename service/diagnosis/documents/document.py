@@ -233,12 +233,12 @@ def _statement(finding: Finding, quantities: Sequence[Quantity], others: Sequenc
 
 
 def _unknown(diagnosis: Diagnosis, names: Sequence[str]) -> list[FindingEntry]:
-    """What is significant and not explained, joint by joint, where nothing could be named at all."""
+    """What is significant and not explained, joint by joint, most of all first, where nothing could be named at all."""
     if diagnosis.verdict is not Verdict.UNEXPLAINED:
         return []
     before = diagnosis.before
     held_out = None if before.held_out is None else _floats(before.held_out)
-    return [
+    entries = [
         FindingEntry(
             effect=UNKNOWN,
             joint=names[found.joint],
@@ -258,6 +258,7 @@ def _unknown(diagnosis: Diagnosis, names: Sequence[str]) -> list[FindingEntry]:
         for found, significant in zip(diagnosis.mismatch, diagnosis.mismatched, strict=True)
         if significant
     ]
+    return sorted(entries, key=lambda each: -each.gain)
 
 
 def _shifts(diagnosis: Diagnosis) -> list[ShiftEntry]:

@@ -5,7 +5,7 @@ residual of a saturated fit stands in for it: the nominal model and as many cand
 left-out effect is not taken for the noise's colour and whitened away.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -35,6 +35,12 @@ ROWS_A_COLUMN = 25
 FAR_ABOVE = 2.0
 """What even a saturated fit leaves, relative to the pure error's power, beyond which it is what counts: what nothing in
 the catalogue explains is then the larger part of the disturbance, and has a colour of its own."""
+
+NO_BETTER = 0.8
+"""Part of what was left at a joint that is left without the rows of a worse one too, from which it is its own."""
+
+LEFT_OUT = 100.0
+"""Factor to the noise of a joint that is left out: what no other joint tells stays what it is."""
 
 
 def with_noise(
@@ -141,16 +147,45 @@ def _beyond_pure_error(
     fit = Fitter(observations).fit(model)
     if fit.inflation() < FAR_ABOVE:
         return observations, True
-    left = _saturated(observations, fit.model, effects)
-    above = [float(rows @ rows) / (len(rows) * own.share) for rows, own in zip(left, observations.noise, strict=True)]
-    if max(above) <= FAR_ABOVE:
+    far = _far_above(observations, fit.model, effects)
+    if not far:
         return observations, True
     other = _saturated_noise(observations, fit.model, effects)
     noise = [
-        replace(of_fit, over_repetitions=far) if far > FAR_ABOVE else of_repetitions
-        for of_repetitions, of_fit, far in zip(observations.noise, other, above, strict=True)
+        replace(other[joint], over_repetitions=far[joint]) if joint in far else own
+        for joint, own in enumerate(observations.noise)
     ]
     return observations.with_noise(noise), False
+
+
+def _far_above(observations: Observations, model: ExtendedModel, effects: Sequence[Effect]) -> dict[int, float]:
+    """Joints at which even a saturated fit leaves far more than repetitions differ by, and how much more.
+
+    They share the links: what is wrong at one bends these, and others look wrong for it. So the worst is left out
+    before the others are looked at again, and with it those that look no better for that.
+    """
+    far: dict[int, float] = {}
+    suspects, before = _suspects(observations, model, effects, range(len(observations.noise))), {}
+    while suspects:
+        worst = max(suspects.values())
+        far |= {j: left for j, left in suspects.items() if left == worst or left > NO_BETTER * before.get(j, np.inf)}
+        others = suspects.keys() - far.keys()
+        if not others:
+            break
+        rows = observations.with_noise(
+            [own.times(LEFT_OUT) if j in far else own for j, own in enumerate(observations.noise)]
+        )
+        before, suspects = suspects, _suspects(rows, Fitter(rows).fit(model).model, effects, others)
+    return far
+
+
+def _suspects(
+    observations: Observations, model: ExtendedModel, effects: Sequence[Effect], joints: Iterable[int]
+) -> dict[int, float]:
+    """Those of some joints at which a saturated fit leaves far more than the noise, and how much [noise variances]."""
+    left = _saturated(observations, model, effects)
+    power = {j: float(left[j] @ left[j]) / (len(left[j]) * observations.noise[j].share) for j in joints}
+    return {joint: own for joint, own in power.items() if own > FAR_ABOVE}
 
 
 def _saturated(observations: Observations, model: ExtendedModel, effects: Sequence[Effect]) -> list[Array]:

@@ -1,7 +1,7 @@
 """The noise of one joint's rows, and the filter that makes it white."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +49,20 @@ class JointNoise:
     def order(self) -> int:
         """Rows that the filter takes from the beginning of a piece."""
         return self.model.order
+
+    def times(self, factor: float) -> "JointNoise":
+        """Noise of the same colour, so many times as large.
+
+        Parameters
+        ----------
+        factor : float
+            to its standard deviation
+        """
+        power = factor**2
+        model = Autoregression(
+            self.model.coefficients, power * self.model.innovation_variance, power * self.model.variance
+        )
+        return replace(self, model=model)
 
     def whitened(self, rows: Array) -> Array:
         """Rows (..., T) made white with unit variance, (..., T - p).
