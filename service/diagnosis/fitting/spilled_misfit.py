@@ -6,17 +6,12 @@ left at another joint is that one's own, and the largest of these is left out ne
 those that remain.
 """
 
-from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
 
 from service.diagnosis.fitting.fit import Fit, Fitter
 from service.diagnosis.fitting.lack_of_fit import LackOfFit, lack_of_fit
-from service.diagnosis.observations.observations import Observations
-
-LEFT_OUT = 1e-2
-"""Weight of the rows of a joint that is left out: parameters that no other joint tells stay what they are."""
 
 
 def without_spilled(misfit: LackOfFit, fit: Fit, fitter: Fitter, *, pure_error: bool) -> LackOfFit:
@@ -38,7 +33,7 @@ def without_spilled(misfit: LackOfFit, fit: Fit, fitter: Fitter, *, pure_error: 
         return misfit
     while suspects:
         wrong.add(max(suspects, key=lambda joint: apart.excess[joint]))
-        rows = _without(wrong, fitter.observations)
+        rows = fitter.observations.without_joints(wrong)
         apart = lack_of_fit(Fitter(rows).fit(fit.model), rows, pure_error=pure_error)
         suspects = (_significant(apart) & _significant(misfit)) - wrong
     spilled = np.isin(np.arange(len(misfit.excess)), list(_significant(misfit) - wrong))
@@ -50,13 +45,3 @@ def without_spilled(misfit: LackOfFit, fit: Fit, fitter: Fitter, *, pure_error: 
 def _significant(misfit: LackOfFit) -> set[int]:
     """Joints at which more than noise is left."""
     return {joint for joint, told in enumerate(misfit.significant) if told}
-
-
-def _without(joints: Collection[int], observations: Observations) -> Observations:
-    """The rows with those of some joints as good as left out."""
-    return observations.with_weightings(
-        [
-            replace(own, weights=own.weights * (LEFT_OUT if joint in joints else 1.0))
-            for joint, own in enumerate(observations.weightings)
-        ]
-    )

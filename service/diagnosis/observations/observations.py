@@ -5,7 +5,7 @@ joint that comes to rest creeps a little differently every time, and the average
 between repetitions beyond their motion is noise, or something that changes over time (`service.diagnosis.noise.floor`).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -25,6 +25,9 @@ from service.recording.recording import Array
 from service.robot import Robot
 
 BoolArray = NDArray[np.bool_]
+
+LEFT_OUT = 1e-2
+"""Weight of the rows of a joint that is left out."""
 
 
 @dataclass(frozen=True)
@@ -239,6 +242,17 @@ class Observations:
             one a joint, or none where all rows count alike
         """
         return replace(self, weightings=tuple(weightings))
+
+    def without_joints(self, joints: Collection[int]) -> "Observations":
+        """The same rows, those of some joints as good as left out: what no other joint tells stays what it is.
+
+        Parameters
+        ----------
+        joints : collection of int
+            indices, from 0
+        """
+        weights = [LEFT_OUT if joint in joints else 1.0 for joint in range(len(self.weightings))]
+        return self.with_weightings([own.times(weight) for own, weight in zip(self.weightings, weights, strict=True)])
 
     def torque(self, joint: int) -> list[Array]:
         """Measured torque of one joint in the common band, piece by piece, (1, P M) each.

@@ -7,6 +7,7 @@ import numpy as np
 
 from service.diagnosis.computation.side_by_side import side_by_side
 from service.diagnosis.fitting.fit import Fit, Fitter
+from service.diagnosis.fitting.lack_of_fit import lack_of_fit
 from service.diagnosis.model.extended import with_terms
 from service.diagnosis.selection.admission import Admission
 from service.diagnosis.selection.choice import Choice, Selection
@@ -60,7 +61,21 @@ def without_proxies(nominal: Fit, fit: Fit, choices: list[Choice], fitter: Fitte
     dropped = proxies(nominal, fit, choices, fitter.observations, pure_error=admission.pure_error)
     if not dropped:
         return fit, choices
-    return without_superfluous(*_without(dropped, fit, choices, fitter), fitter, admission)
+    fit, choices = without_superfluous(*_without(dropped, fit, choices, fitter), fitter, admission)
+    return _without_spilled(fit, choices, fitter, admission)
+
+
+def _without_spilled(fit: Fit, choices: list[Choice], fitter: Fitter, admission: Admission) -> Pruned:
+    """Drop what is superfluous as soon as no link is bent for joints at which more than noise is left."""
+    left = lack_of_fit(fit, fitter.observations, pure_error=admission.pure_error).significant
+    wrong = {joint for joint, told in enumerate(left) if told}
+    if not wrong or not choices:
+        return fit, choices
+    apart = Fitter(fitter.observations.without_joints(wrong))
+    _, needed = without_superfluous(apart.fit(fit.model), choices, apart, admission)
+    own = [wrong.issuperset(choice.options[0].candidate.effect.touched(len(left))) for choice in choices]
+    spilled = [place for place, choice in enumerate(choices) if choice not in needed and not own[place]]
+    return _without(spilled, fit, choices, fitter)
 
 
 def without_errors_of_larger_ones(selection: Selection, fitter: Fitter, admission: Admission) -> Selection:
