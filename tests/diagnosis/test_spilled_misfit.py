@@ -1,6 +1,7 @@
 """Joints share the links: what is wrong at one must not be told of the others."""
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 import pytest
@@ -9,8 +10,13 @@ from concealed.generator.trial import unknown_trial
 from diagnosis.diagnosed_arm import at_joint, recordings
 from identification.simulated import Array, SimulatedArm, paper_robot
 from service.diagnosis import diagnose, document
+from service.diagnosis.findings.diagnosed import Diagnosis
 from service.diagnosis.fitting.lack_of_fit import lack_of_fit
 from service.diagnosis.noise.floor import FAR_ABOVE
+from service.diagnosis.selection.admission import Admission
+from service.diagnosis.selection.choice import Choice
+from service.diagnosis.selection.pruning import without_proxies, without_superfluous
+from service.diagnosis.selection.table import fitted_option
 
 pytestmark = pytest.mark.slow
 
@@ -25,15 +31,40 @@ def crossed(size: float) -> Callable[[SimulatedArm, Array], Array]:
     return torque
 
 
+@cache
+def diagnosed(seed: int) -> Diagnosis:
+    rng = np.random.default_rng(seed)
+    train, held_out = (recordings(motions, crossed(1.5), rng) for motions in ((1, 2), (11,)))
+    return diagnose(paper_robot(), train, held_out)
+
+
 def test_what_the_fit_spreads_is_told_of_the_joint_that_is_wrong() -> None:
     """With this noise the plain model leaves more than noise at the third joint too, where nothing is wrong."""
-    rng = np.random.default_rng(5)
-    train, held_out = (recordings(motions, crossed(1.5), rng) for motions in ((1, 2), (11,)))
-    found = diagnose(paper_robot(), train, held_out)
+    found = diagnosed(5)
     plain = lack_of_fit(found.selection.nominal, found.fitter.observations, pure_error=found.pure_error)
     assert plain.significant == [False, True, True]
     assert found.misfit_before.significant == [False, True, False]
     assert [(each.effect, each.joint) for each in document(found).findings] == [("unknown", "joint2")]
+
+
+@pytest.mark.parametrize("seed", [1, 5])
+def test_what_explains_bent_links_is_not_named(seed: int) -> None:
+    """A gain of the third joint makes up for links that were bent for the second: nothing of it is there."""
+    found = diagnosed(seed)
+    nominal, fitter = found.selection.nominal, found.fitter
+    gain, *_ = [
+        each
+        for each in found.screen.candidates(nominal)
+        if each.effect.id == "torque_gain_error" and each.effect.joint == 2
+    ]
+    option = fitted_option(gain, nominal, fitter)
+    choices = [Choice((option,), None, 0.0)]
+    admission = Admission(found.screen, pure_error=True)
+    _, plainly_needed = without_superfluous(option.fit, choices, fitter, admission)
+    assert plainly_needed == choices
+    fit, kept = without_proxies(nominal, option.fit, choices, fitter, admission)
+    assert kept == []
+    assert fit.model.terms == ()
 
 
 def test_the_noise_of_other_joints_stays_what_repetitions_differ_by() -> None:

@@ -45,7 +45,7 @@ def without_superfluous(fit: Fit, choices: list[Choice], fitter: Fitter, admissi
 
 
 def without_proxies(nominal: Fit, fit: Fit, choices: list[Choice], fitter: Fitter, admission: Admission) -> Pruned:
-    """Drop what only stands in for an effect that the catalogue does not have, and what was needed beside that alone.
+    """Drop what only stands in for an effect that the catalogue does not have, and what was needed for that alone.
 
     Parameters
     ----------
@@ -59,17 +59,18 @@ def without_proxies(nominal: Fit, fit: Fit, choices: list[Choice], fitter: Fitte
         what was asked of each
     """
     dropped = proxies(nominal, fit, choices, fitter.observations, pure_error=admission.pure_error)
-    if not dropped:
-        return fit, choices
-    fit, choices = without_superfluous(*_without(dropped, fit, choices, fitter), fitter, admission)
+    if dropped:
+        fit, choices = without_superfluous(*_without(dropped, fit, choices, fitter), fitter, admission)
     return _without_spilled(fit, choices, fitter, admission)
 
 
 def _without_spilled(fit: Fit, choices: list[Choice], fitter: Fitter, admission: Admission) -> Pruned:
     """Drop what is superfluous as soon as no link is bent for joints at which more than noise is left."""
+    if not choices:
+        return fit, choices
     left = lack_of_fit(fit, fitter.observations, pure_error=admission.pure_error).significant
     wrong = {joint for joint, told in enumerate(left) if told}
-    if not wrong or not choices:
+    if not wrong:
         return fit, choices
     apart = Fitter(fitter.observations.without_joints(wrong))
     _, needed = without_superfluous(apart.fit(fit.model), choices, apart, admission)
