@@ -39,9 +39,6 @@ the catalogue explains is then the larger part of the disturbance, and has a col
 NO_BETTER = 0.8
 """Part of what was left at a joint that is left without the rows of a worse one too, from which it is its own."""
 
-LEFT_OUT = 100.0
-"""Factor to the noise of a joint that is left out: what no other joint tells stays what it is."""
-
 
 def with_noise(
     observations: Observations, model: ExtendedModel, effects: Sequence[Effect]
@@ -172,9 +169,7 @@ def _far_above(observations: Observations, model: ExtendedModel, effects: Sequen
         others = suspects.keys() - far.keys()
         if not others:
             break
-        rows = observations.with_noise(
-            [own.times(LEFT_OUT) if j in far else own for j, own in enumerate(observations.noise)]
-        )
+        rows = observations.without_joints(far)
         before, suspects = suspects, _suspects(rows, Fitter(rows).fit(model).model, effects, others)
     return far
 

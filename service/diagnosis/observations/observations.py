@@ -26,8 +26,8 @@ from service.robot import Robot
 
 BoolArray = NDArray[np.bool_]
 
-LEFT_OUT = 1e-2
-"""Weight of the rows of a joint that is left out."""
+LEFT_OUT = 100.0
+"""Factor to the noise of a joint that is left out."""
 
 
 @dataclass(frozen=True)
@@ -251,8 +251,8 @@ class Observations:
         joints : collection of int
             indices, from 0
         """
-        weights = [LEFT_OUT if joint in joints else 1.0 for joint in range(len(self.weightings))]
-        return self.with_weightings([own.times(weight) for own, weight in zip(self.weightings, weights, strict=True)])
+        noise = [own.times(LEFT_OUT) if joint in joints else own for joint, own in enumerate(self.noise)]
+        return replace(self, noise=tuple(noise))
 
     def torque(self, joint: int) -> list[Array]:
         """Measured torque of one joint in the common band, piece by piece, (1, P M) each.

@@ -8,7 +8,7 @@ share, each of unknown size with standard deviation 1. In units of the rows' noi
 and W followed by (I + SᵀS)^(-1/2) makes them white again. The second factor differs from I in k directions only.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -60,16 +60,6 @@ class RowWeighting:
             rows R
         """
         return RowWeighting(np.ones(count), np.empty((0, count)), np.empty(0))
-
-    def times(self, factor: float) -> "RowWeighting":
-        """The same, all rows counting so many times as much.
-
-        Parameters
-        ----------
-        factor : float
-            to every weight
-        """
-        return replace(self, weights=factor * self.weights)
 
     def applied(self, rows: Array) -> Array:
         """Whitened rows as they count, (k, R).
