@@ -23,6 +23,8 @@ STANDSTILL_S = 0.025
 """Six cycles of 250 Hz: more than a control loop with a real-time priority ever waits for another program [s]."""
 MOST_TAKEN = 0.1
 """Part of a test's time up to which what other machines took of a processor does not count."""
+TAKEN_PARTS = pytest.StashKey[list[float]]()
+"""What they took in each of a test's failed runs."""
 
 
 class MachineStoodStillError(Exception):
@@ -76,7 +78,9 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
             why = str(error).partition("\n")[0]
             if (step_s := machine_speed.physics_step_s()) > machine_speed.QUICK_ENOUGH_S:
                 pytest.xfail(f"too slow a machine ({1e3 * step_s:.2f} ms for a step of the physics): {why}")
-            if taken_part > MOST_TAKEN and _is_last_run(item):
+            runs = item.stash.setdefault(TAKEN_PARTS, [])
+            runs.append(taken_part)
+            if min(runs) > MOST_TAKEN and _is_last_run(item):
                 pytest.xfail(f"other machines took {taken_part:.0%} of a processor, run after run: {why}")
             if taken_part <= MOST_TAKEN and onlooker.longest_s < STANDSTILL_S:
                 raise

@@ -1,6 +1,7 @@
 """A test against the clock is run again only where the machine stood still under it."""
 
 import itertools
+from collections.abc import Sequence
 from typing import Any
 
 import pytest
@@ -24,10 +25,12 @@ def test_against_the_clock():
 
 
 FAILS_ALWAYS = """
+import ctypes
 import pytest
 
 @pytest.mark.realtime
 def test_against_the_clock():
+    ctypes.PyDLL(None).usleep({microseconds})
     assert False
 """
 
@@ -38,12 +41,12 @@ def outcomes(
     test: str,
     *,
     step_s: float = machine_speed.QUICK_ENOUGH_S,
-    taken_s: float = 0.0,
+    taken_s: Sequence[float] = (0.0, 0.0),
 ) -> Any:
-    """What is said of a test where a step of the physics takes so long, and so much is taken in each of its runs."""
-    readings = itertools.count()
+    """What is said of a test where a step of the physics takes so long, and so much is taken in its two runs."""
+    readings = itertools.accumulate(itertools.chain.from_iterable((0.0, each) for each in taken_s))
     monkeypatch.setattr(machine_speed, "physics_step_s", lambda: step_s)
-    monkeypatch.setattr(machine_speed, "taken_s", lambda: taken_s * next(readings))
+    monkeypatch.setattr(machine_speed, "taken_s", lambda: next(readings))
     pytester.makeini("[pytest]\nmarkers = realtime\n")
     pytester.makepyfile(test)
     result = pytester.runpytest_inprocess("-p", "standstill", "--reruns", "1", "--only-rerun", "MachineStoodStill")
@@ -70,16 +73,24 @@ def test_a_machine_whose_time_is_taken_is_given_another_run(
     pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     test = FAILS_AT_FIRST.format(microseconds=0)
-    assert outcomes(pytester, monkeypatch, test, taken_s=60.0) == {"passed": 1, "rerun": 1}
+    assert outcomes(pytester, monkeypatch, test, taken_s=(60.0, 0.0)) == {"passed": 1, "rerun": 1}
 
 
-@pytest.mark.parametrize(
-    ("taken_s", "outcome"), [(60.0, {"xfailed": 1, "rerun": 1}), (0.0, {"failed": 1})], ids=["taken", "not taken"]
-)
+@pytest.mark.parametrize(("microseconds", "taken_s", "outcome"), [
+    (0, (60.0, 60.0), {"xfailed": 1, "rerun": 1}),
+    (0, (60.0, 0.0), {"failed": 1, "rerun": 1}),
+    (0, (0.0, 0.0), {"failed": 1}),
+    (100_000, (0.0, 60.0), {"failed": 1, "rerun": 1}),  # the first run had the machine, and kept it itself
+])  # fmt: skip
 def test_what_never_had_the_machine_has_not_failed(
-    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, taken_s: float, outcome: dict[str, int]
+    pytester: pytest.Pytester,
+    monkeypatch: pytest.MonkeyPatch,
+    microseconds: int,
+    taken_s: Sequence[float],
+    outcome: dict[str, int],
 ) -> None:
-    assert outcomes(pytester, monkeypatch, FAILS_ALWAYS, taken_s=taken_s) == outcome
+    test = FAILS_ALWAYS.format(microseconds=microseconds)
+    assert outcomes(pytester, monkeypatch, test, taken_s=taken_s) == outcome
 
 
 def test_what_was_taken_only_grows() -> None:
