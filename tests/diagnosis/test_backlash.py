@@ -84,7 +84,8 @@ def test_gaps_of_any_size(gap: float) -> None:
     np.testing.assert_allclose(np.median(np.abs(place - expected)), 0.0, atol=1e-3)
 
 
-def test_on_springy_teeth_it_is_where_a_solver_with_small_steps_has_it() -> None:
+@pytest.mark.parametrize("loss", [0.8, 8.0, 80.0])
+def test_on_springy_teeth_it_is_where_a_solver_with_small_steps_has_it(loss: float) -> None:
     gap, stiffness = 6e-3, 900.0
     inertia = 0.3 + 0.15 * np.sin(2.0 * np.pi * 0.3 * TIME)
     load = 3.0 * np.cos(2.0 * np.pi * 0.7 * TIME) + 1.5 * np.sin(2.0 * np.pi * 1.9 * TIME)
@@ -92,31 +93,36 @@ def test_on_springy_teeth_it_is_where_a_solver_with_small_steps_has_it() -> None
 
     def rates(time: float, state: np.ndarray) -> list[float]:
         side, overlap = np.sign(state[0]), abs(state[0]) - 0.5 * gap
-        teeth = side * max(0.0, stiffness * overlap + damping * side * state[1]) if overlap > 0.0 else 0.0
+        apart = side * state[1]
+        force = stiffness * overlap * (1.0 + loss * apart) + damping * apart
+        teeth = side * max(0.0, force) if overlap > 0.0 else 0.0
         return [state[1], (np.interp(time, TIME, load) - teeth) / np.interp(time, TIME, inertia)]
 
     start = [0.5 * gap + load[0] / stiffness, 0.0]
     solved = solve_ivp(rates, (0.0, TIME[-1]), start, t_eval=TIME, max_step=1e-3, rtol=1e-6, atol=1e-9).y[0]
-    found = gap * place_between_springs(load, inertia, gap, 1.0 / stiffness, RATE)
+    found = gap * place_between_springs(load, inertia, gap, 1.0 / stiffness, loss, RATE)
     assert np.std(found - solved) < 0.05 * np.std(solved)
 
 
 def test_a_link_of_no_known_inertia_crosses_at_once_however_its_teeth_give_way() -> None:
     """A fit may know of none where little is excited, though the arm's setting had one."""
     load = 3.0 * np.sin(2.0 * np.pi * 0.7 * TIME)
-    place = SpringyTeeth(0).deflection(load, np.zeros(len(TIME)), np.array([1e-3, 10.0, 1e-4]), RATE)
+    place = SpringyTeeth(0).deflection(load, np.zeros(len(TIME)), np.array([1e-3, 10.0, 1e-4, 8.0]), RATE)
     np.testing.assert_array_equal(place, np.where(load >= 0.0, 0.5, -0.5))
 
 
-@given(st.integers(0, 2**32 - 1), st.floats(1e-6, 1.0), st.floats(1e-6, 1e-2))
-def test_springy_teeth_hold_it_whatever_it_weighs_on_its_way(seed: int, gap: float, compliance: float) -> None:
+@given(st.integers(0, 2**32 - 1), st.floats(1e-6, 1.0), st.floats(1e-6, 1e-2), st.floats(0.0, 1e3))
+def test_springy_teeth_hold_it_whatever_it_weighs_on_its_way(
+    seed: int, gap: float, compliance: float, loss: float
+) -> None:
     rng = np.random.default_rng(seed)
     load = np.cumsum(rng.standard_normal(200)) + 0.1
     inertia = rng.uniform(0.05, 1.0, 200)
-    place = place_between_springs(load, inertia, gap, compliance, 100.0)
+    place = place_between_springs(load, inertia, gap, compliance, loss, 100.0)
     assert np.isfinite(place).all()
     if load[0] != 0.0:
-        np.testing.assert_allclose(place_between_springs(-load, inertia, gap, compliance, 100.0), -place, rtol=1e-9)
+        mirrored = place_between_springs(-load, inertia, gap, compliance, loss, 100.0)
+        np.testing.assert_allclose(mirrored, -place, rtol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -124,11 +130,11 @@ def test_springy_teeth_hold_it_whatever_it_weighs_on_its_way(seed: int, gap: flo
     [
         (Backlash, [1.3e-3, 10.0], 1e-3, False, True),
         (Backlash, [2.0e-3, 10.0], 1e-3, True, False),
-        (SpringyTeeth, [1e-3, 10.0, 1e-4], 0.5e-3, True, True),
-        (SpringyTeeth, [1e-3, 10.0, 1e-4], 0.5e-3, False, False),
-        (SpringyTeeth, [1e-3, 10.0, 1e-4], 0.7e-3, False, True),
-        (SpringyTeeth, [1e-3, 10.0, 1e-4], 0.3e-3, True, False),
-        (SpringyTeeth, [1e-3, 10.0, 1e-4], 1.7e-3, True, False),
+        (SpringyTeeth, [1e-3, 10.0, 1e-4, 8.0], 0.5e-3, True, True),
+        (SpringyTeeth, [1e-3, 10.0, 1e-4, 8.0], 0.5e-3, False, False),
+        (SpringyTeeth, [1e-3, 10.0, 1e-4, 8.0], 0.7e-3, False, True),
+        (SpringyTeeth, [1e-3, 10.0, 1e-4, 8.0], 0.3e-3, True, False),
+        (SpringyTeeth, [1e-3, 10.0, 1e-4, 8.0], 1.7e-3, True, False),
     ],
 )
 def test_bounces_that_come_at_other_instants_take_some_of_the_gap_and_not_most(

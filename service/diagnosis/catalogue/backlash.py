@@ -28,15 +28,26 @@ FARTHEST_FLOWN = 1.6
 """Gap that is flown over, relative to b, beyond which no teeth are as far apart: on simulated arms it is 0.75 to
 1.3 of b, and 2 or more where something else is taken for play."""
 
+SPRINGY_GAPS = np.geomspace(2e-5, 1e-2, 9)
+"""Gaps on springy teeth that are looked at, relative to the joint's range of motion: closer to each other, as a link
+that swings comes back at other instants, and smaller, as it swings on after them."""
+
+SPRINGY_BAND = 3.0
+"""Band of the load on springy teeth, relative to the common one: when a link meets them hangs on all of it."""
+
 RESONANCES = np.array([0.7, 1.0, 1.5, 2.2])
 """Resonances of the link on springy teeth at its mean inertia, relative to the common band."""
 
 STEPS = 15.0
 """Steps of the integration in a period of the resonance at its least inertia."""
 
-DAMPING = 0.35
-"""Damping ratio of teeth that touch. Where less is lost a link bounces on, but when it comes back hangs on everything
-that a recording does not show: on simulated arms more is explained by 0.35 than by the damping that they have."""
+LOSSES = np.array([0.8, 8.0, 80.0])
+"""Least, usual and largest share of their force that teeth lose a speed [s/rad or s/m]: what strikes them by v bounces
+back by some v - 2/3 c v²."""
+
+DAMPING = 0.2
+"""Damping ratio of teeth that touch, beside what they lose under load: where less is lost a link bounces on, but when it
+comes back hangs on everything that a recording does not show."""
 
 SAME = 1.6
 """Factor between the gap that is crossed on springy teeth and the one that is found, up to which they are the same."""
@@ -88,11 +99,14 @@ def place_between_teeth(load: Array, inertia: Array, gap: float, rate_hz: float)
     return place
 
 
-def place_between_springs(load: Array, inertia: Array, gap: float, compliance: float, rate_hz: float) -> Array:
+def place_between_springs(
+    load: Array, inertia: Array, gap: float, compliance: float, loss: float, rate_hz: float
+) -> Array:
     """Where a link is against its motor, in gaps, where the teeth give way under load.
 
-    I δ̈ = τ_rb - T with T = max(0, K x + D ẋ) of the overlap x = |δ| - b/2 where that is above zero, against δ: teeth
-    push and never pull. D = 2 ζ √(K Ī). By leapfrog steps, from rest on the teeth under the first load.
+    I δ̈ = τ_rb - T with T = max(0, K x (1 + c ẋ) + D ẋ) of the overlap x = |δ| - b/2 where that is above zero, against
+    δ: teeth push and never pull. c is the loss of Hunt and Crossley (J. Appl. Mech. 42, 1975), which grows with the
+    overlap, D = 2 ζ √(K Ī). By leapfrog steps, from rest on the teeth under the first load.
 
     Parameters
     ----------
@@ -104,6 +118,8 @@ def place_between_springs(load: Array, inertia: Array, gap: float, compliance: f
         b, above zero [rad or m]
     compliance : float
         1/K [rad/Nm or m/N]
+    loss : float
+        c [s/rad or s/m]
     rate_hz : float
         sampling rate [Hz]
 
@@ -121,12 +137,15 @@ def place_between_springs(load: Array, inertia: Array, gap: float, compliance: f
     damping = 2.0 * DAMPING * math.sqrt(float(inertia.mean()) / compliance)
     dampings = np.interp(instants, time, damping / inertia).tolist()
     place = math.copysign(0.5 + abs(float(load[0])) * compliance / gap, float(load[0]))
-    speed, places = 0.0, []
+    speed, lost, places = 0.0, loss * gap, []
     for push, spring, damper in zip(pushes, stiffness, dampings, strict=True):
         places.append(place)
-        side, overlap = math.copysign(1.0, place), abs(place) - 0.5
-        contact = side * max(0.0, spring * overlap + damper * side * speed) if overlap > 0.0 else 0.0
-        speed += step * (push - contact)
+        overlap, coasting = abs(place) - 0.5, speed + step * push
+        speed = coasting
+        if overlap > 0.0:  # what depends on the speed counts at the step's end: stable however much is lost
+            side, force = math.copysign(1.0, place), spring * overlap
+            stopped = (side * coasting - step * force) / (1.0 + step * (lost * force + damper))
+            speed = side * min(stopped, side * coasting)
         place += step * speed
     return np.asarray(CubicSpline(instants, places)(time))
 
@@ -233,6 +252,7 @@ class SpringyTeeth(Backlash):
     shapes: ClassVar[tuple[Shape, ...]] = (
         *Backlash.shapes,
         Shape("swinging", "{q}/{tau}", logarithmic=True, reported=False),
+        Shape("loss", "s/{q}", logarithmic=True, reported=False),
     )
 
     @classmethod
@@ -248,11 +268,12 @@ class SpringyTeeth(Backlash):
         for joint in cls.deflected_joints(setting):
             if setting.inertia[joint] <= 0.0:
                 continue
-            gaps = GAPS * (setting.highest[joint] - setting.lowest[joint])
+            gaps = SPRINGY_GAPS * (setting.highest[joint] - setting.lowest[joint])
             swinging = 1.0 / ((2.0 * np.pi * RESONANCES * setting.cutoff_hz) ** 2 * setting.inertia[joint])
-            grid = mesh(gaps, BANDS[:1] * setting.cutoff_hz, swinging)
-            lower, upper = grid.min(axis=0), grid.max(axis=0)
-            made.append(cls(joint, grid, lower * [0.5, 1.0, 0.7], upper * [2.0, 1.0, 1.4]))
+            grid = mesh(gaps, np.array([SPRINGY_BAND * setting.cutoff_hz]), swinging, LOSSES[1:2])
+            lower, upper = grid.min(axis=0) * [0.5, 1.0, 0.7, 1.0], grid.max(axis=0) * [2.0, 1.0, 1.4, 1.0]
+            lower[-1], upper[-1] = LOSSES[0], LOSSES[-1]
+            made.append(cls(joint, grid, lower, upper))
         return made
 
     @classmethod
@@ -273,8 +294,9 @@ class SpringyTeeth(Backlash):
         ----------
         coefficients : (1,) float64
             b [rad or m]
-        shape : (3,) float64
-            gap that is crossed [rad or m], band of the load [Hz], compliance of the teeth [rad/Nm or m/N]
+        shape : (4,) float64
+            gap that is crossed [rad or m], band of the load [Hz], compliance of the teeth [rad/Nm or m/N], their loss
+            [s/rad or s/m]
         alone : bool
             whether nothing else is known to be missing
         """
@@ -288,11 +310,12 @@ class SpringyTeeth(Backlash):
         ----------
         load, inertia : (N,) float64
             of the link, inertia zero where it is not known [Nm or N, kg m² or kg]
-        shape : (3,) float64
-            gap that is crossed [rad or m], band of the load [Hz], compliance of the teeth [rad/Nm or m/N]
+        shape : (4,) float64
+            gap that is crossed [rad or m], band of the load [Hz], compliance of the teeth [rad/Nm or m/N], their loss
+            [s/rad or s/m]
         rate_hz : float
             sampling rate [Hz]
         """
         if not inertia.all():
             return place_between_teeth(load, inertia, float(shape[0]), rate_hz)
-        return place_between_springs(load, inertia, float(shape[0]), float(shape[2]), rate_hz)
+        return place_between_springs(load, inertia, float(shape[0]), float(shape[2]), float(shape[3]), rate_hz)

@@ -29,6 +29,9 @@ relative to the largest."""
 LEVEL = 1e-3
 """Chance, over all joints and both tests, at which a mismatch is called significant."""
 
+RARE = 0.01
+"""Chance at one joint, by either test, from which it is worth to look for more there."""
+
 
 @dataclass(frozen=True, eq=False)
 class LackOfFit:
@@ -61,6 +64,11 @@ class LackOfFit:
         """Per joint, whether it is significant and an excess that can be measured: less is nothing to look for."""
         pairs = zip(self.significant, self.excess, self.measurable, strict=True)
         return [significant and bool(excess > least) for significant, excess, least in pairs]
+
+    @property
+    def worth_a_look(self) -> list[bool]:
+        """Per joint, whether so much is left rarely by chance: a search asks more of what it finds than this test."""
+        return [bool(min(a, b) < RARE) for a, b in zip(self.omnibus, self.pure_error, strict=True)]
 
 
 def lack_of_fit(fit: Fit, observations: Observations, *, pure_error: bool, seed: int = 0) -> LackOfFit:

@@ -74,7 +74,8 @@ def _without_spilled(fit: Fit, choices: list[Choice], fitter: Fitter, admission:
         return fit, choices
     apart = Fitter(fitter.observations.without_joints(wrong))
     _, needed = without_superfluous(apart.fit(fit.model), choices, apart, admission)
-    own = [wrong.issuperset(choice.options[0].candidate.effect.touched(len(left))) for choice in choices]
+    effects = [choice.options[0].candidate.effect for choice in choices]
+    own = [effect.joint in wrong or wrong.issuperset(effect.touched(len(left))) for effect in effects]
     spilled = [place for place, choice in enumerate(choices) if choice not in needed and not own[place]]
     return _without(spilled, fit, choices, fitter)
 
