@@ -2,8 +2,9 @@
 
     python tests/benchmarks/benchmark_diagnosis.py
 
-The arm is simulated in virtual time, sound, with a worn bearing, and with a spring beside that. Recordings are read
-from CSV, and each diagnosis runs in a process of its own, from reading to the finished document. Run it alone.
+The arm is simulated in virtual time, sound, with a worn bearing, and with a spring beside that; then what no catalogue
+has is added to the sound arm's torque, as large as its noise. Recordings are read from CSV, and each diagnosis runs in
+a process of its own, from reading to the finished document. Run it alone.
 """
 
 import json
@@ -14,17 +15,20 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 TESTS = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(TESTS.parent), str(TESTS)]
 
 from concealed.generator.arms import NOISE_STD, arm_named, without_truth  # noqa: E402
+from concealed.generator.unknown import UNKNOWN  # noqa: E402
 from service.acquisition import RunOptions, make_backend, run_trajectory  # noqa: E402
 from service.diagnosis import diagnose, document  # noqa: E402
-from service.recording import read_recording  # noqa: E402
+from service.recording import Recording, read_recording, write_recording  # noqa: E402
 from service.robot import Robot  # noqa: E402
 from service.trajectory import FourierSegment, FourierSeries, Trajectory  # noqa: E402
 
@@ -45,6 +49,12 @@ CASES: dict[str, list[dict[str, Any]]] = {
     "asymmetric viscous friction at joint 2": [VISCOUS],
     "the same, and a spring at joint 4": [VISCOUS, SPRING],
 }
+
+LAWS = ("vibration", "crossed_spring", "speed_in_waves", "slipstream", "bump")
+STRANGE = 1
+"""Joint, counted from 0, at which those act."""
+SMOOTHED = 9
+"""Samples over which the speed that such a law is given is a mean."""
 
 
 def motion(robot: Robot, seed: int) -> Trajectory:
@@ -81,6 +91,24 @@ def record(robot: Robot, effects: list[dict[str, Any]], folder: Path) -> None:
     (folder / "robot.pickle").write_bytes(pickle.dumps(without_truth(robot, states_friction=False)))
 
 
+def add_law(law: str, folder: Path, into: Path) -> None:
+    """The recordings of one folder with the torque of a law of no catalogue, in another."""
+    (into / "robot.pickle").write_bytes((folder / "robot.pickle").read_bytes())
+    for number in range(RECORDINGS):
+        plain = read_recording(folder / f"run-{number}" / "recording.csv")
+        seen = plain.samples()
+        velocity = uniform_filter1d(np.gradient(seen.position, seen.time, axis=0), SMOOTHED, axis=0)
+        passage = SimpleNamespace(position=seen.position, velocity=velocity)
+        torque = UNKNOWN[law](passage, STRANGE, np.random.default_rng(5))
+        effort = seen.effort.copy()
+        effort[:, STRANGE] += NOISE_STD[ARM][STRANGE] * torque / torque.std()
+        changed = Recording.from_arrays(
+            plain.name, seen.time, seen.position, effort, effort_kind=plain.effort_kind, period=seen.period
+        )
+        (into / f"run-{number}").mkdir()
+        write_recording(changed, into / f"run-{number}" / "recording.csv")
+
+
 def measured_here(folder: Path) -> dict[str, Any]:
     """A diagnosis in this process, its seconds and its memory."""
     robot = pickle.loads((folder / "robot.pickle").read_bytes())
@@ -105,13 +133,22 @@ def main() -> None:
     for name, effects in CASES.items():
         with tempfile.TemporaryDirectory(prefix="bench-") as folder:
             record(robot, effects, Path(folder))
-            words = [sys.executable, __file__, "--in", folder]
-            told = json.loads(subprocess.run(words, check=True, capture_output=True, text=True).stdout)
-        print(
-            f"{name}: {told['seconds']:.1f} s ({told['processor_seconds']:.1f} s of processor), "
-            f"{told['memory_gb']:.2f} GB, {told['verdict']} {' '.join(told['findings'])}",
-            flush=True,
-        )
+            tell(name, folder)
+            for law in LAWS if not effects else ():
+                with tempfile.TemporaryDirectory(prefix="bench-") as strange:
+                    add_law(law, Path(folder), Path(strange))
+                    tell(f"unknown: {law}", strange)
+
+
+def tell(name: str, folder: str) -> None:
+    """Diagnose a folder's recordings in a process of its own, and print the line."""
+    words = [sys.executable, __file__, "--in", folder]
+    told = json.loads(subprocess.run(words, check=True, capture_output=True, text=True).stdout)
+    print(
+        f"{name}: {told['seconds']:.1f} s ({told['processor_seconds']:.1f} s of processor), "
+        f"{told['memory_gb']:.2f} GB, {told['verdict']} {' '.join(told['findings'])}",
+        flush=True,
+    )
 
 
 if __name__ == "__main__":

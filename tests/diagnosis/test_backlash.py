@@ -178,3 +178,24 @@ def test_play_whose_bounces_no_model_foresees_is_named_and_its_gap_told(
     assert [(each.effect, each.joint) for each in found] == [("backlash", f"joint{joint}")]
     (told,) = found[0].parameters
     assert abs(told.value - gap) < 2.0 * told.std < 0.6 * gap
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("joint", "gap", "seed"), [(3, 3.8e-4, 3), (2, 4.34e-4, 2)])
+def test_play_is_named_where_a_spring_explains_a_part_and_where_bounces_leave_some(
+    joint: int, gap: float, seed: int
+) -> None:
+    """A spring explains most of the first, and stood in its place; more than noise is left at the second's joint."""
+    play = {"effect": "backlash", "joint": joint, "gap": gap, "contact_stiffness": 1e4, "rotor_inertia": 0.004}
+    trial = recorded_trial("paper", Concealed((), (play,)), motion_seed=0, seed=seed)
+    found = document(diagnose(trial.robot, trial.train, trial.held_out)).findings
+    assert [(each.effect, each.joint) for each in found] == [("backlash", f"joint{joint}")]
+
+
+@pytest.mark.slow
+def test_a_spring_stays_a_spring() -> None:
+    """Teeth with a vanishing gap are one, too, with a damping to choose: they have to explain clearly more."""
+    spring = {"effect": "joint_elasticity", "joint": 1, "stiffness": 2600.0, "damping": 5.2, "rotor_inertia": 0.004}
+    trial = recorded_trial("paper", Concealed((), (spring,)), motion_seed=0, seed=28)
+    found = document(diagnose(trial.robot, trial.train, trial.held_out)).findings
+    assert [(each.effect, each.joint) for each in found] == [("joint_elasticity", "joint1")]

@@ -26,6 +26,12 @@ def test_a_test_that_fires_without_any_excess_is_no_mismatch() -> None:
     assert found.mismatch == [False, False, True, False]
 
 
+def test_a_search_begins_where_a_test_is_not_sure_yet() -> None:
+    found = LackOfFit(np.array([1e-9, 0.5, 0.005, 0.5]), np.array([1.0, 5e-3, 1.0, 0.5]), *np.zeros((3, 4)))
+    assert found.significant == [True, False, False, False]
+    assert found.worth_a_look == [True, True, True, False]
+
+
 @pytest.mark.parametrize(("holds", "predicts"), [(True, True), (False, True), (True, False)])
 def test_what_cannot_be_measured_counts_where_parameters_move_or_predictions_fail(holds: bool, predicts: bool) -> None:
     """Joint by joint: a significant excess below and above what can be measured, and one that is not significant."""

@@ -75,7 +75,7 @@ def grown(monkeypatch: pytest.MonkeyPatch, waves_at: int) -> tuple[list[Place], 
     monkeypatch.setattr(Selector, "_settled", lambda self, fit, choices: (fit, choices))
     selector = Selector(SCREEN, FITTER, None, pure_error=True)
     selector.admission = PLAIN
-    _, choices, rejected = selector._grown(FIT, [], lambda step: None)
+    _, choices, rejected = selector._grown(FIT, FIT, [], lambda step: None)
     return tuple([place_of(each.options[0].candidate) for each in found] for found in (choices, rejected))  # type: ignore[return-value]
 
 
@@ -128,7 +128,7 @@ def test_another_form_of_what_was_refused_is_asked_where_training_hardly_tells_t
     monkeypatch.setattr(Selector, "_best", best)
     selector = Selector(SCREEN, FITTER, None, pure_error=True)
     selector.admission = PLAIN
-    _, found, rejected = selector._grown(FIT, [], lambda step: None)
+    _, found, rejected = selector._grown(FIT, FIT, [], lambda step: None)
     assert [each.options[0].candidate.effect.id for each in found] == chosen
     assert [each.options[0].candidate.effect for each in rejected] == [forms[-1]]
 

@@ -46,8 +46,8 @@ LOSSES = np.array([0.8, 8.0, 80.0])
 back by some v - 2/3 c v²."""
 
 DAMPING = 0.2
-"""Damping ratio of teeth that touch, beside what they lose under load: where less is lost a link bounces on, but when it
-comes back hangs on everything that a recording does not show."""
+"""Damping ratio of teeth that touch, beside what they lose under load: where less is lost a link bounces on, but when
+it comes back hangs on everything that a recording does not show."""
 
 SAME = 1.6
 """Factor between the gap that is crossed on springy teeth and the one that is found, up to which they are the same."""
@@ -254,6 +254,7 @@ class SpringyTeeth(Backlash):
         Shape("swinging", "{q}/{tau}", logarithmic=True, reported=False),
         Shape("loss", "s/{q}", logarithmic=True, reported=False),
     )
+    swings: ClassVar[bool] = True
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:

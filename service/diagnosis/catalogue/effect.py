@@ -40,8 +40,8 @@ class Effect(ABC):
     Columns of an effect `of_motion_alone` are the same beside every model, and are made once; those of one that
     `has_step` change with K_v of its joint; one `of_motion_and_step` changes with nothing else of the model, and one
     `of_motion_and_load` with nothing but the links that it has found, as far as they load the joint.
-    Columns that are a linear filter of the load are `linear_in_load`: noise of the positions, which changes the
-    predicted load, is in them as it is in the residual.
+    Columns of what `swings` with the load hold the noise of the positions as the residual does: it changes the load that
+    is predicted, and a resonance turns its phase round.
     What a sensor does not pass on, a spring carries for the motor, or a displaced link for its neighbours,
     `may_exceed_measured`; nothing else can.
     An effect that is `screened` is looked for beside the nominal model; any other becomes a finding by comparison with
@@ -65,7 +65,7 @@ class Effect(ABC):
     of_motion_and_step: ClassVar[bool] = False
     of_motion_and_load: ClassVar[bool] = False
     within_step: ClassVar[bool] = False
-    linear_in_load: ClassVar[bool] = False
+    swings: ClassVar[bool] = False
     may_exceed_measured: ClassVar[bool] = False
     screened: ClassVar[bool] = True
     repeats_with_motion: ClassVar[bool] = True

@@ -80,7 +80,7 @@ class JointElasticity(Deflection):
     revealing_motion: ClassVar[str] = "sharp reversals from constant speed, and an encoder on the link"
     coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("c", "{q}/{tau}", positive=True),)
     shapes: ClassVar[tuple[Shape, ...]] = (BAND, Shape("swinging", "{q}/{tau}", fixed=True, reported=False))
-    linear_in_load: ClassVar[bool] = True
+    swings: ClassVar[bool] = True
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:

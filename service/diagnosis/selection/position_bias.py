@@ -1,9 +1,9 @@
 """What noise of the positions puts into an elastic transmission's column and into the residual alike.
 
 A motion that is known as q + n predicts a torque that is wrong by G n, and G n is missing in the residual. An
-elasticity's column is made of that same torque, x(q + n) = x + X n, so that even where nothing is missing
+elasticity's column, or that of springy teeth, is made of that same torque, so that even where nothing is missing
 
-    E[xᵀ M r] = E[(X n)ᵀ M (-G n)],        M = I - W W⁺,
+    E[xᵀ M r] = E[(x(q + n) - x(q))ᵀ M (-G n)],        M = I - W W⁺,
 
 is not zero. A transmission that follows its load at once gets a negative compliance from that, which cannot be; one
 that resonates within the band turns the phase round, and gets a positive one. The expectation is taken over draws of n
@@ -33,7 +33,7 @@ MOST = 1.0 / 3.0
 
 
 def is_position_noise(option: Option, fit: Fit, screen: Screen) -> bool:
-    """Whether noise of the positions accounts for more than `MOST` of what an elasticity explains.
+    """Whether noise of the positions accounts for more than `MOST` of what an effect that swings explains.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def is_position_noise(option: Option, fit: Fit, screen: Screen) -> bool:
         of the training recordings
     """
     term = option.fit.model.terms[-1]
-    if not term.effect.linear_in_load:
+    if not term.effect.swings:
         return False
     signals = model_signals(fit.model, screen.observations)
     in_common = float(screen.at_shapes(term.effect, term.shape[None], fit, signals).target[0, 0])
@@ -57,18 +57,20 @@ def is_position_noise(option: Option, fit: Fit, screen: Screen) -> bool:
 def _drawn(
     effect: Effect, shape: Array, fit: Fit, screen: Screen, signals: list[Signals], rng: np.random.Generator
 ) -> float:
-    """(X n)ᵀ M (-G n) for one draw of n."""
+    """(x(q + n) - x(q))ᵀ M (-G n) for one draw of n."""
     observations = screen.observations
     changes = [_predicted(own, _noise(piece, rng)) for piece, own in zip(observations, signals, strict=True)]
     moved = [
-        replace(own, load=piece.without_noise_of_inertia(change))
+        replace(own, load=own.load + piece.without_noise_of_inertia(change))
         for piece, own, change in zip(observations, signals, changes, strict=True)
     ]
     rows = [piece.reduced(-change) for piece, change in zip(observations, changes, strict=True)]
     joints = range(len(rows[0]))
     residual = [observations.white(joint, [each[joint : joint + 1] for each in rows])[0] for joint in joints]
     beside = replace(fit.projection, residual=tuple(_projected(residual, fit)))
-    return float(moments(beside, screen.white_columns(effect, shape[None], moved)).target[0, 0])
+    noisy, plain = (screen.white_columns(effect, shape[None], each) for each in (moved, signals))
+    changed = {joint: noisy[joint] - plain[joint] for joint in noisy}
+    return float(moments(beside, changed).target[0, 0])
 
 
 def _noise(piece: Piece, rng: np.random.Generator) -> Array:

@@ -12,10 +12,13 @@ from service.diagnosis.catalogue import TimeLocalEffect
 from service.diagnosis.fitting.fit import Fit
 from service.diagnosis.fitting.lack_of_fit import lack_of_fit
 from service.diagnosis.observations.observations import Observations
-from service.diagnosis.selection.choice import Choice
+from service.diagnosis.selection.choice import Choice, Place, place_of
 
 EXPLAINED = 0.6
 """Share of a joint's excess residual that findings have to explain between them where they leave more than noise."""
+
+TELLING = 3
+"""Orders of one periodic effect from which it shows whether more of them can ever explain as much."""
 
 
 def proxies(
@@ -55,6 +58,38 @@ def proxies(
         doubtful = isinstance(effect, TimeLocalEffect) and joints & unexplained
         if joints <= weak or (doubtful and choice.options[0].gain < _left(fit, joints)):
             found.append(place)
+    return found
+
+
+def hopeless(
+    nominal: Fit, fit: Fit, choices: Sequence[Choice], observations: Observations, most_repeats: int
+) -> set[Place]:
+    """Effects of several orders that would leave most of what there is to explain with all orders that they may have.
+
+    None of those to come explains more than the last one did: the best comes first.
+
+    Parameters
+    ----------
+    nominal, fit : Fit
+        models without and with all choices so far
+    choices : sequence of Choice
+        one a term of `fit`
+    observations : Observations
+        the rows that both were fitted to, their noise known from repetitions
+    most_repeats : int
+        orders that an effect may have
+    """
+    gains: dict[Place, list[float]] = {}
+    for choice in choices:
+        gains.setdefault(place_of(choice.options[0].candidate), []).append(choice.options[0].gain)
+    found = set()
+    for (effect, joint), own in gains.items():
+        if len(own) < TELLING or joint is None:
+            continue
+        noise = observations.noise[joint].share * len(fit.projection.residual[joint])
+        before, after = (max(each.joint_energies[joint] - noise, 0.0) for each in (nominal, fit))
+        if after - (most_repeats - len(own)) * own[-1] > (1.0 - EXPLAINED) * before:
+            found.add((effect, joint))
     return found
 
 

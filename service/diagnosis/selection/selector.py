@@ -25,6 +25,7 @@ from service.diagnosis.selection.equivalence import EQUIVALENT, FORMULA_ERROR, e
 from service.diagnosis.selection.interleaved import interleaved_confirmation
 from service.diagnosis.selection.outside import where_held_out_shows
 from service.diagnosis.selection.position_bias import is_position_noise
+from service.diagnosis.selection.proxies import hopeless
 from service.diagnosis.selection.pruning import without_proxies, without_superfluous
 from service.diagnosis.selection.table import Table, fitted_option
 
@@ -114,7 +115,7 @@ class Selector:
             if p_value < self.admission.level and confirmed:
                 choices.append(Choice((option,), confirmation, p_value, was_given=True))
                 fit = option.fit
-        fit, grown, rejected = self._grown(fit, choices, progress)
+        fit, grown, rejected = self._grown(nominal, fit, choices, progress)
         fit, choices = without_superfluous(fit, grown, self.fitter, self.admission)
         dropped = [each for each in grown if each not in choices]
         choices = [with_rivals(each, dropped) for each in choices]
@@ -132,7 +133,7 @@ class Selector:
         progress : callable
             told what was found
         """
-        fit, choices, rejected = self._grown(selection.fit, list(selection.choices), progress)
+        fit, choices, rejected = self._grown(selection.nominal, selection.fit, list(selection.choices), progress)
         if len(choices) == len(selection.choices):
             return selection
         fit, choices = without_superfluous(fit, choices, self.fitter, self.admission)
@@ -140,14 +141,14 @@ class Selector:
         return Selection(selection.nominal, fit, tuple(choices), (*selection.rejected, *rejected))
 
     def _grown(
-        self, fit: Fit, choices: list[Choice], progress: Callable[[str], None]
+        self, nominal: Fit, fit: Fit, choices: list[Choice], progress: Callable[[str], None]
     ) -> tuple[Fit, list[Choice], list[Choice]]:
         """A model with one effect after the other, as long as one is significant and confirmed; what was refused."""
         names = [joint.name for joint in fit.model.structure.robot.joints]
         refused: list[Choice] = []
         rejected: list[Choice] = []
         while len(choices) < MOST_TERMS:
-            choice = self._next(fit, choices, refused)
+            choice = self._next(fit, choices, refused, self._spent(nominal, fit, choices))
             rejected += [each for each in refused if each not in rejected]
             if choice is None:
                 break
@@ -160,9 +161,15 @@ class Selector:
             progress(f"found {choice.options[0].candidate.effect.name(names)}")
         return fit, choices, rejected
 
-    def _next(self, fit: Fit, choices: Sequence[Choice], rejected: list[Choice]) -> Choice | None:
+    def _spent(self, nominal: Fit, fit: Fit, choices: Sequence[Choice]) -> set[Place]:
+        """Effects of which no more orders are worth a look."""
+        if not self.pure_error:
+            return set()
+        return hopeless(nominal, fit, choices, self.screen.observations, MOST_REPEATS)
+
+    def _next(self, fit: Fit, choices: Sequence[Choice], rejected: list[Choice], spent: set[Place]) -> Choice | None:
         """The best significant and confirmed option; what held-out recordings refuse is added to `rejected`."""
-        refused = {_chosen(choice) for choice in rejected}
+        refused = {_chosen(choice) for choice in rejected} | spent
         table, before = self._table(fit, choices, refused), len(rejected)
         while len(rejected) < MOST_REJECTED:
             choice = self._best(table, choices)
