@@ -40,8 +40,8 @@ class Effect(ABC):
     Columns of an effect `of_motion_alone` are the same beside every model, and are made once; those of one that
     `has_step` change with K_v of its joint; one `of_motion_and_step` changes with nothing else of the model, and one
     `of_motion_and_load` with nothing but the links that it has found, as far as they load the joint.
-    Columns of what `swings` with the load hold the noise of the positions as the residual does: it changes the load that
-    is predicted, and a resonance turns its phase round.
+    Columns of what `swings` with the load hold the noise of the positions as the residual does: it changes the load
+    that is predicted, and a resonance turns its phase round.
     What a sensor does not pass on, a spring carries for the motor, or a displaced link for its neighbours,
     `may_exceed_measured`; nothing else can.
     An effect that is `screened` is looked for beside the nominal model; any other becomes a finding by comparison with

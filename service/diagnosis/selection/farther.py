@@ -39,8 +39,7 @@ def looked_farther(
         if _explained(instead) > _explained(selection) + EQUIVALENT:
             selection = instead
     left = lack_of_fit(selection.fit, selector.screen.observations, pure_error=selector.pure_error)
-    joints = {joint for joint, is_worth in enumerate(left.worth_a_look) if is_worth}
-    missing = [each for each in forms if joints.intersection(each.touched(len(left.excess)))]
+    missing = [each for each in forms if each.joint is not None and left.worth_a_look[each.joint]]
     return _on_forms(missing, selector).continued(selection, progress) if missing else selection
 
 

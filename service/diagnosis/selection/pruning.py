@@ -1,11 +1,10 @@
 """What a model is better without, once all that seemed to be missing is in it."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
-from service.diagnosis.computation.side_by_side import side_by_side
+from service.diagnosis.computation.side_by_side import THREADS, side_by_side
 from service.diagnosis.fitting.fit import Fit, Fitter
 from service.diagnosis.fitting.lack_of_fit import lack_of_fit
 from service.diagnosis.model.extended import with_terms
@@ -32,16 +31,33 @@ def without_superfluous(fit: Fit, choices: list[Choice], fitter: Fitter, admissi
     admission : Admission
         what was asked of each
     """
+    losses: dict[Choice, float] = {}
     while choices:
-        without = _each_without([[place] for place in range(len(choices))], fit, fitter)
-        gains = [each.energy - fit.energy for each in without]
-        weakest = int(np.argmin(gains))
-        candidate = replace(choices[weakest].options[0].candidate, gain=max(gains[weakest], 0.0))
+        weakest, without = _weakest(fit, choices, losses, fitter)
+        candidate = replace(choices[weakest].options[0].candidate, gain=max(losses[choices[weakest]], 0.0))
         if candidate.p_value(admission.inflation(fit), refined=True) < admission.level:
             break
-        fit = without[weakest]
+        fit = without
         choices = [choice for place, choice in enumerate(choices) if place != weakest]
     return fit, choices
+
+
+def _weakest(fit: Fit, choices: Sequence[Choice], losses: dict[Choice, float], fitter: Fitter) -> tuple[int, Fit]:
+    """Place of the choice without which least is lost, and the fit without it; `losses` are brought up to date.
+
+    What was lost beside more choices is hardly less beside fewer: they are asked anew in that order, until those that
+    are left cannot lose less than the least that was found.
+    """
+    waiting = sorted(range(len(choices)), key=lambda place: losses.get(choices[place], -math.inf))
+    least, weakest, found = math.inf, 0, fit
+    while waiting and losses.get(choices[waiting[0]], -math.inf) < least:
+        count = max(THREADS, sum(choices[place] not in losses for place in waiting))
+        asked, waiting = waiting[:count], waiting[count:]
+        for place, without in zip(asked, _each_without([[place] for place in asked], fit, fitter), strict=True):
+            losses[choices[place]] = without.energy - fit.energy
+            if losses[choices[place]] < least:
+                least, weakest, found = losses[choices[place]], place, without
+    return weakest, found
 
 
 def without_proxies(nominal: Fit, fit: Fit, choices: list[Choice], fitter: Fitter, admission: Admission) -> Pruned:
@@ -72,10 +88,12 @@ def _without_spilled(fit: Fit, choices: list[Choice], fitter: Fitter, admission:
     wrong = {joint for joint, told in enumerate(left) if told}
     if not wrong:
         return fit, choices
-    apart = Fitter(fitter.observations.without_joints(wrong))
-    _, needed = without_superfluous(apart.fit(fit.model), choices, apart, admission)
     effects = [choice.options[0].candidate.effect for choice in choices]
     own = [effect.joint in wrong or wrong.issuperset(effect.touched(len(left))) for effect in effects]
+    if all(own):
+        return fit, choices
+    apart = Fitter(fitter.observations.without_joints(wrong))
+    _, needed = without_superfluous(apart.fit(fit.model), choices, apart, admission)
     spilled = [place for place, choice in enumerate(choices) if choice not in needed and not own[place]]
     return _without(spilled, fit, choices, fitter)
 

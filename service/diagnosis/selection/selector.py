@@ -25,7 +25,7 @@ from service.diagnosis.selection.equivalence import EQUIVALENT, FORMULA_ERROR, e
 from service.diagnosis.selection.interleaved import interleaved_confirmation
 from service.diagnosis.selection.outside import where_held_out_shows
 from service.diagnosis.selection.position_bias import is_position_noise
-from service.diagnosis.selection.proxies import hopeless
+from service.diagnosis.selection.proxies import TELLING, hopeless
 from service.diagnosis.selection.pruning import without_proxies, without_superfluous
 from service.diagnosis.selection.table import Table, fitted_option
 
@@ -46,6 +46,9 @@ WORTH_REFINING = 0.6
 
 MOST_FITTED = 8
 """Forms that are fitted with all parameters free before the best is chosen."""
+
+FEW = 2
+"""…the same where one more order of many is about to be chosen: its rivals are asked again beside it."""
 
 CLOSE = 40.0
 """Score below the best, in noise variances, within which a form is fitted with all parameters free."""
@@ -201,7 +204,9 @@ class Selector:
         closest = table.refined([each for each in significant if each.gain > WORTH_REFINING * top])
         closest.sort(key=lambda each: -each.score)
         near = CLOSE * self.admission.inflation(fit) + EQUIVALENT * FORMULA_ERROR * closest[0].gain
-        tried = [each for each in closest[:MOST_FITTED] if each.score > closest[0].score - near]
+        is_routine = [_chosen(choice) for choice in choices].count(place_of(closest[0])) >= TELLING
+        most = FEW if is_routine else MOST_FITTED
+        tried = [each for each in closest[:most] if each.score > closest[0].score - near]
         fitted = table.fitted(tried)
         impossible = [each.candidate for each in fitted if not is_physical(each, fit)]
         fitted = [each for each in fitted if each.candidate not in impossible]
