@@ -15,7 +15,6 @@ import sys
 import tempfile
 import time
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -25,6 +24,7 @@ TESTS = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(TESTS.parent), str(TESTS)]
 
 from concealed.generator.arms import NOISE_STD, arm_named, without_truth  # noqa: E402
+from concealed.generator.forward import Passage  # noqa: E402
 from concealed.generator.unknown import UNKNOWN  # noqa: E402
 from service.acquisition import RunOptions, make_backend, run_trajectory  # noqa: E402
 from service.diagnosis import diagnose, document  # noqa: E402
@@ -98,7 +98,7 @@ def add_law(law: str, folder: Path, into: Path) -> None:
         plain = read_recording(folder / f"run-{number}" / "recording.csv")
         seen = plain.samples()
         velocity = uniform_filter1d(np.gradient(seen.position, seen.time, axis=0), SMOOTHED, axis=0)
-        passage = SimpleNamespace(position=seen.position, velocity=velocity)
+        passage = Passage(seen.position, velocity, seen.effort)
         torque = UNKNOWN[law](passage, STRANGE, np.random.default_rng(5))
         effort = seen.effort.copy()
         effort[:, STRANGE] += NOISE_STD[ARM][STRANGE] * torque / torque.std()
