@@ -31,16 +31,21 @@ def looked_farther(
     progress : callable
         told the name of the step, and what was found
     """
-    progress("look farther")
-    forms = farther_effects(setting)
-    for joint in _chosen_at(selection):
+    forms, chosen = farther_effects(setting), _chosen_at(selection)
+    if chosen:
+        progress("look farther")
+    for joint in chosen:
         own = [form for form in forms if form.joint == joint]
         instead = _in_place(joint, selection, own, selector, progress)
         if _explained(instead) > _explained(selection) + EQUIVALENT:
             selection = instead
-    left = lack_of_fit(selection.fit, selector.screen.observations, pure_error=selector.pure_error)
-    missing = [each for each in forms if each.joint is not None and left.worth_a_look[each.joint]]
-    return _on_forms(missing, selector).continued(selection, progress) if missing else selection
+    left = lack_of_fit(selection.fit, selector.screen.observations, pure_error=selector.pure_error).worth_a_look
+    missing = [each for each in forms if (any(left) if each.joint is None else left[each.joint])]
+    if not missing:
+        return selection
+    if not chosen:
+        progress("look farther")
+    return _on_forms(missing, selector).continued(selection, progress)
 
 
 def _on_forms(forms: Sequence[Effect], selector: Selector) -> Selector:
