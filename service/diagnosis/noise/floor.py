@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.diagnosis.catalogue import Effect
+from service.diagnosis.computation.side_by_side import side_by_side
 from service.diagnosis.fitting.fit import Fitter
 from service.diagnosis.model.extended import ExtendedModel
 from service.diagnosis.model.residual import full_torque, residual_rows
@@ -31,6 +32,8 @@ MOST_ADDED = 40
 
 ROWS_A_COLUMN = 25
 
+SAME_COLUMN = 1e-2
+"""Part of a column outside those that are taken, below which it is one of them."""
 
 FAR_ABOVE = 2.0
 """What even a saturated fit leaves, relative to the pure error's power, beyond which it is what counts: what nothing in
@@ -56,7 +59,8 @@ def with_noise(
     """
     known = with_pure_error(observations, model)
     if known is None:
-        return observations.with_noise(_saturated_noise(observations, model, effects)), False
+        told = _saturated_noise(observations, model, effects, _joints(observations))
+        return observations.with_noise(list(told.values())), False
     return _beyond_pure_error(known, model, effects)
 
 
@@ -125,16 +129,18 @@ def _band_share(observations: Observations) -> float:
     return min(shares, default=1.0)
 
 
-def _saturated_noise(observations: Observations, model: ExtendedModel, effects: Sequence[Effect]) -> list[JointNoise]:
-    """Noise of what a saturated fit leaves."""
+def _saturated_noise(
+    observations: Observations, model: ExtendedModel, effects: Sequence[Effect], joints: Iterable[int]
+) -> dict[int, JointNoise]:
+    """Noise of what a saturated fit leaves at some joints."""
     residual = residual_rows(model, observations)
     plain = []
     for joint in _joints(observations):
         power = float(np.mean(np.concatenate([rows[0] for rows in residual[joint]]) ** 2)) + np.finfo(float).tiny
         plain.append(JointNoise(Autoregression(np.empty(0), power, power)))
-    left = _saturated(observations.with_noise(plain), model, effects)
+    left = _saturated(observations.with_noise(plain), model, effects, joints)
     share = _band_share(observations)
-    return [fitted_noise(_by_piece(observations, j, rows * plain[j].std), share) for j, rows in enumerate(left)]
+    return {j: fitted_noise(_by_piece(observations, j, rows * plain[j].std), share) for j, rows in left.items()}
 
 
 def _beyond_pure_error(
@@ -147,7 +153,7 @@ def _beyond_pure_error(
     far = _far_above(observations, fit.model, effects)
     if not far:
         return observations, True
-    other = _saturated_noise(observations, fit.model, effects)
+    other = _saturated_noise(observations, fit.model, effects, sorted(far))
     noise = [
         replace(other[joint], over_repetitions=far[joint]) if joint in far else own
         for joint, own in enumerate(observations.noise)
@@ -178,55 +184,77 @@ def _suspects(
     observations: Observations, model: ExtendedModel, effects: Sequence[Effect], joints: Iterable[int]
 ) -> dict[int, float]:
     """Those of some joints at which a saturated fit leaves far more than the noise, and how much [noise variances]."""
-    left = _saturated(observations, model, effects)
-    power = {j: float(left[j] @ left[j]) / (len(left[j]) * observations.noise[j].share) for j in joints}
+    fit = Fitter(observations).projected(model)
+    doubtful = [j for j in joints if _power(observations, j, fit.projection.residual[j]) > FAR_ABOVE]
+    left = _saturated(observations, model, effects, doubtful)
+    power = {joint: _power(observations, joint, rows) for joint, rows in left.items()}
     return {joint: own for joint, own in power.items() if own > FAR_ABOVE}
 
 
-def _saturated(observations: Observations, model: ExtendedModel, effects: Sequence[Effect]) -> list[Array]:
-    """What the nominal model and the candidates together leave, whitened rows joint by joint."""
+def _power(observations: Observations, joint: int, rows: Array) -> float:
+    """Power of what is left at a joint [noise variances]."""
+    return float(rows @ rows) / (len(rows) * observations.noise[joint].share)
+
+
+def _saturated(
+    observations: Observations, model: ExtendedModel, effects: Sequence[Effect], joints: Iterable[int]
+) -> dict[int, Array]:
+    """What the nominal model and the candidates together leave at some joints, whitened rows."""
     fit = Fitter(observations).projected(model)
     screen = Screen(observations, effects)
     signals = model_signals(model, observations)
-    columns: dict[int, list[Array]] = {joint: [] for joint in range(observations.robot.joint_count)}
-    for effect, shapes in ((each, each.rough_grid()) for each in effects):
-        white_columns = screen.white_columns(effect, shapes, signals) if len(shapes) else {}
-        for joint, white in white_columns.items():
-            columns[joint].append(white.reshape(-1, white.shape[-1]))
-    left = []
-    for joint, parts in columns.items():
+    columns: dict[int, list[Array]] = {joint: [] for joint in joints}
+    rough = [(effect, effect.rough_grid()) for effect in effects]
+    told = [(effect, shapes) for effect, shapes in rough if len(shapes) and _touches(effect, columns, observations)]
+    for white in side_by_side(lambda each: screen.white_columns(*each, signals), told):
+        for joint in columns.keys() & white.keys():
+            columns[joint].append(white[joint].reshape(-1, white[joint].shape[-1]))
+
+    def left(joint: int) -> Array:
         basis, residual = fit.projection.basis[joint], fit.projection.residual[joint]
-        every = np.concatenate(parts) if parts else np.zeros((0, len(residual)))
-        left.append(_pursued(every - (every @ basis.T) @ basis, residual))
-    return left
+        every = np.concatenate(columns[joint]) if columns[joint] else np.zeros((0, len(residual)))
+        return _pursued(every - (every @ basis.T) @ basis, residual)
+
+    return dict(zip(columns, side_by_side(left, columns), strict=True))
+
+
+def _touches(effect: Effect, joints: Iterable[int], observations: Observations) -> bool:
+    """Whether an effect is one of some joints."""
+    return not set(effect.touched(observations.robot.joint_count)).isdisjoint(joints)
 
 
 def _pursued(columns: Array, residual: Array) -> Array:
-    """The residual after orthogonal matching pursuit, as long as columns explain more than chance allows."""
+    """The residual after orthogonal matching pursuit, as long as columns explain more than chance allows.
+
+    Columns are made orthogonal to those taken in their Gram matrix G alone, which is far smaller than they are: with c
+    the row of G of the one taken, Gᵢⱼ - cᵢcⱼ, and scores s - c s_best, all normalised anew.
+    """
     norms = np.linalg.norm(columns, axis=1)
     columns = columns[norms > 1e-9 * max(norms.max(initial=0.0), 1e-300)]
     if not len(columns):
         return residual
-    columns = columns / np.linalg.norm(columns, axis=1, keepdims=True)
     best_of_many = 2.0 * np.log(len(columns))
     chance = best_of_many + 6.0
-    left, taken = residual, 0
+    energy, taken = float(residual @ residual), []
+    gram, scores, places = columns @ columns.T, columns @ residual, np.arange(len(columns))
     for _ in range(min(MOST_ADDED, len(residual) // ROWS_A_COLUMN)):
-        scores = columns @ left
+        norms = np.sqrt(np.diag(gram))
+        gram, scores = gram / np.outer(norms, norms), scores / norms
         best = int(np.argmax(np.abs(scores)))
-        if scores[best] ** 2 < chance * float(left @ left) / len(left):
+        if scores[best] ** 2 < chance * energy / len(residual):
             break
-        taken += 1
-        chosen = columns[best].copy()
-        left = left - scores[best] * chosen
-        columns -= np.outer(columns @ chosen, chosen)
-        norms = np.linalg.norm(columns, axis=1)
-        columns = columns[norms > 1e-2]
-        if not len(columns):
+        taken.append(places[best])
+        energy -= float(scores[best]) ** 2
+        shared = gram[best]
+        gram, scores = gram - np.outer(shared, shared), scores - scores[best] * shared
+        others = np.diag(gram) > SAME_COLUMN**2
+        gram, scores, places = gram[np.ix_(others, others)], scores[others], places[others]
+        if not len(places):
             break
-        columns /= np.linalg.norm(columns, axis=1, keepdims=True)
+    solution, *_ = np.linalg.lstsq(columns[taken].T, residual)
+    left = residual - solution @ columns[taken]
     # Each column, chosen among many, took this much noise with it.
-    return left * np.sqrt(len(left) / max(len(left) - best_of_many * taken, 0.2 * len(left)))
+    return left * np.sqrt(len(left) / max(len(left) - best_of_many * len(taken), 0.2 * len(left)))
 
 
 def _by_piece(observations: Observations, joint: int, rows: Array) -> Iterator[tuple[Array, BoolArray, float]]:

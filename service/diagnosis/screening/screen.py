@@ -23,6 +23,9 @@ WORTH_COUNTING = 1e-3
 """Chance below which the best of many windows is worth the draws that tell how many windows there are in effect; above,
 all of them count, which changes no decision."""
 
+MOST_TOLD = 400
+"""Shapes of which it is told how many count in effect; more count one by one, which is never too bold."""
+
 SHAPES_AT_ONCE = 48
 """Shapes whose columns are made together: bounds memory."""
 
@@ -145,7 +148,7 @@ class Screen:
         self._kept: dict[tuple[int, int], _Kept] = {}
         self._numbers: dict[int, float] = {}
         self._windows: dict[int, Windows] = {}
-        self._first: tuple[Fit, list[Candidate]] | None = None
+        self._found: dict[Fit, dict[int, Candidate]] = {}
 
     def candidates(self, fit: Fit, wanted: Callable[[Effect], bool] = lambda effect: True) -> list[Candidate]:
         """Every form that is wanted at its best shape on the grid.
@@ -157,11 +160,15 @@ class Screen:
         wanted : callable
             whether an effect is looked at
         """
-        if self._first is None:  # the nominal model, which is looked at again
-            self._first = fit, self._screened(fit, range(len(self.effects)))
-        if self._first[0] is fit:
-            return [each for each in self._first[1] if wanted(each.effect)]
-        return self._screened(fit, [at for at, effect in enumerate(self.effects) if wanted(effect)])
+        places = [at for at, effect in enumerate(self.effects) if wanted(effect)]
+        if fit not in self._found:
+            if len(self._found) > 1:
+                self._found.popitem()  # the last model's; those of the nominal one, the first, are asked for again
+            self._found[fit] = {}
+        known = self._found[fit]
+        new = [at for at in places if at not in known]
+        known.update(zip(new, self._screened(fit, new), strict=True))
+        return [known[at] for at in places]
 
     def _screened(self, fit: Fit, places: Sequence[int]) -> list[Candidate]:
         """Some of the forms, by their places among all."""
@@ -235,11 +242,12 @@ class Screen:
         for first in range(0, len(effect.grid), SHAPES_AT_ONCE):
             columns = self._grid_columns(place, first, effect, signals)
             parts.append(moments(fit.projection, columns))
-            if not known and len(effect.grid) > 1:
+            if not known and 1 < len(effect.grid) <= MOST_TOLD:
                 whitened.append(columns)
         found = Moments(*(np.concatenate([getattr(part, name) for part in parts]) for name in Moments.__annotations__))
         if not known:
-            self._numbers[place] = effective_number(found, whitened, self._draws(place)) if whitened else 1.0
+            told = effective_number(found, whitened, self._draws(place)) if whitened else float(len(effect.grid))
+            self._numbers[place] = told
         return found
 
     def _grid_columns(self, place: int, first: int, effect: Effect, signals: Sequence[Signals]) -> dict[int, Array]:

@@ -4,11 +4,12 @@ Beside what was selected, or in its place: the usual forms of other effects may 
 a form makes, and stand at its joint beside which it is no longer seen for what it is.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 from service.diagnosis.catalogue import Effect, Setting, farther_effects
 from service.diagnosis.fitting.lack_of_fit import lack_of_fit
+from service.diagnosis.fitting.spilled_misfit import without_spilled
 from service.diagnosis.screening.screen import Screen
 from service.diagnosis.selection.choice import Selection
 from service.diagnosis.selection.equivalence import EQUIVALENT
@@ -31,28 +32,40 @@ def looked_farther(
     progress : callable
         told the name of the step, and what was found
     """
-    forms, chosen = farther_effects(setting), _chosen_at(selection)
+    chosen = _chosen_at(selection)
+    screen = Screen(selector.screen.observations, farther_effects(setting))
     if chosen:
         progress("look farther")
     for joint in chosen:
-        own = [form for form in forms if form.joint == joint]
-        instead = _in_place(joint, selection, own, selector, progress)
+        instead = _in_place(joint, selection, screen, selector, progress)
         if _explained(instead) > _explained(selection) + EQUIVALENT:
             selection = instead
-    left = lack_of_fit(selection.fit, selector.screen.observations, pure_error=selector.pure_error).worth_a_look
-    missing = [each for each in forms if (any(left) if each.joint is None else left[each.joint])]
-    if not missing:
+    left = _left(selection, selector)
+    others = _with(screen, selector, lambda each: any(left) if each.joint is None else bool(left[each.joint]))
+    if not any(map(others.wanted, screen.effects)):
         return selection
     if not chosen:
         progress("look farther")
-    return _on_forms(missing, selector).continued(selection, progress)
+    return others.continued(selection, progress)
 
 
-def _on_forms(forms: Sequence[Effect], selector: Selector) -> Selector:
+def _left(selection: Selection, selector: Selector) -> list[bool]:
+    """Per joint, whether more than noise is left, and not only for another one that bends the links."""
+    pure_error = selector.pure_error
+    misfit = lack_of_fit(selection.fit, selector.screen.observations, pure_error=pure_error)
+    return without_spilled(misfit, selection.fit, selector.fitter, pure_error=pure_error).worth_a_look
+
+
+def _with(screen: Screen, selector: Selector, wanted: Callable[[Effect], bool]) -> Selector:
     """The selector with other forms than it has looked at."""
-    before = selector.looked_at_before + len(selector.screen.effects)
-    screen = Screen(selector.screen.observations, forms)
-    return Selector(screen, selector.fitter, selector.held_out, pure_error=selector.pure_error, looked_at_before=before)
+    return Selector(
+        screen,
+        selector.fitter,
+        selector.held_out,
+        pure_error=selector.pure_error,
+        looked_at_before=selector.looked_at_before + len(selector.screen.effects),
+        wanted=wanted,
+    )
 
 
 def _chosen_at(selection: Selection) -> list[int]:
@@ -62,14 +75,16 @@ def _chosen_at(selection: Selection) -> list[int]:
 
 
 def _in_place(
-    joint: int, selection: Selection, forms: Sequence[Effect], selector: Selector, progress: Callable[[str], None]
+    joint: int, selection: Selection, screen: Screen, selector: Selector, progress: Callable[[str], None]
 ) -> Selection:
-    """What comes of some forms in place of all that was selected at a joint, and of what is missing beside them."""
+    """What comes of such forms in place of all that was selected at a joint, and of what is missing beside them."""
     places = [at for at, choice in enumerate(selection.choices) if choice.options[0].candidate.effect.joint == joint]
+    if not places:  # what took another joint's place has left nothing to stand here
+        return selection
     kept = tuple(choice for at, choice in enumerate(selection.choices) if at not in places)
     cleared = replace(selection, fit=selector.fitter.without(selection.fit, places), choices=kept)
-    others = _on_forms(forms, selector)
-    most = max((each.gain for each in others.screen.candidates(cleared.fit)), default=0.0)
+    others = _with(screen, selector, lambda each: each.joint == joint)
+    most = max((each.gain for each in screen.candidates(cleared.fit, others.wanted)), default=0.0)
     if most < WORTH_REFINING * (cleared.fit.energy - selection.fit.energy):
         return selection
     found = others.continued(cleared, progress)

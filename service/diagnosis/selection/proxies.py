@@ -6,13 +6,14 @@ noise is known from repetitions. A window in time can stand in for anything that
 once explains its joints wholly, or more than all that it leaves, noise included; else it is something else.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 
 from service.diagnosis.catalogue import TimeLocalEffect
 from service.diagnosis.fitting.fit import Fit
-from service.diagnosis.fitting.lack_of_fit import lack_of_fit
+from service.diagnosis.fitting.lack_of_fit import LackOfFit, lack_of_fit
 from service.diagnosis.observations.observations import Observations
-from service.diagnosis.selection.choice import Choice, Place, place_of
+from service.diagnosis.selection.choice import EXPECTED, Choice, Place, place_of
 
 EXPLAINED = 0.6
 """Share of a joint's excess residual that findings have to explain between them where they leave more than noise."""
@@ -20,11 +21,32 @@ EXPLAINED = 0.6
 TELLING = 3
 """Orders of one periodic effect from which it shows whether more of them can ever explain as much."""
 
+CROWDED = 3
+"""Different effects at one joint beside which more orders than those are no physics: such a series fits anything."""
+
+
+def weak_likenesses(nominal: Fit, fit: Fit, choices: Sequence[Choice], observations: Observations) -> list[int]:
+    """Places of the choices at joints where all of them together leave most of what there is to explain.
+
+    With fewer of them they leave more: no other choice has to be dropped before that is known.
+
+    Parameters
+    ----------
+    nominal, fit : Fit
+        models without and with all choices
+    choices : sequence of Choice
+        one a term of `fit`
+    observations : Observations
+        the rows that both were fitted to, their noise known from repetitions
+    """
+    before, after = (lack_of_fit(each, observations, pure_error=True) for each in (nominal, fit))
+    return _weak(choices, before, after)
+
 
 def proxies(
     nominal: Fit, fit: Fit, choices: Sequence[Choice], observations: Observations, *, pure_error: bool
 ) -> list[int]:
-    """Places of the choices that are at joints where the model leaves most of what there is to explain.
+    """Places of the choices that only stand in for something else.
 
     Parameters
     ----------
@@ -43,22 +65,32 @@ def proxies(
     if not any(after.significant):
         return []
     before = lack_of_fit(nominal, observations, pure_error=pure_error)
+    unexplained = {joint for joint, left in enumerate(after.significant) if left}
+    found = set(_weak(choices, before, after)) if pure_error else set()
+    for place, choice in enumerate(choices):
+        option, joints = choice.options[0], _joints(choice, before)
+        doubtful = isinstance(option.candidate.effect, TimeLocalEffect) and joints & unexplained
+        if doubtful and option.gain < _left(fit, joints):
+            found.add(place)
+    return sorted(found)
+
+
+def _weak(choices: Sequence[Choice], before: LackOfFit, after: LackOfFit) -> list[int]:
+    """Places of the choices at joints where most of what was missing `before` is left `after` them."""
     weak = {
         joint
         for joint, left in enumerate(after.significant)
-        if pure_error and left and after.excess[joint] > (1.0 - EXPLAINED) * before.excess[joint]
+        if left and after.excess[joint] > (1.0 - EXPLAINED) * before.excess[joint]
     }
-    unexplained = {joint for joint, left in enumerate(after.significant) if left}
-    found = []
-    for place, choice in enumerate(choices):
-        effect = choice.options[0].candidate.effect
-        joints = set(effect.touched(len(after.excess)))
-        if len(joints) > 1:  # where anything was wrong: a likeness may spare the others
-            joints = {joint for joint in joints if before.significant[joint]} or joints
-        doubtful = isinstance(effect, TimeLocalEffect) and joints & unexplained
-        if joints <= weak or (doubtful and choice.options[0].gain < _left(fit, joints)):
-            found.append(place)
-    return found
+    return [place for place, choice in enumerate(choices) if _joints(choice, before) <= weak]
+
+
+def _joints(choice: Choice, before: LackOfFit) -> set[int]:
+    """Joints that a choice touches; of several, those where anything was wrong: a likeness may spare the others."""
+    joints = set(choice.options[0].candidate.effect.touched(len(before.significant)))
+    if len(joints) > 1:
+        joints = {joint for joint in joints if before.significant[joint]} or joints
+    return joints
 
 
 def hopeless(
@@ -91,6 +123,23 @@ def hopeless(
         if after - (most_repeats - len(own)) * own[-1] > (1.0 - EXPLAINED) * before:
             found.add((effect, joint))
     return found
+
+
+def endless(choices: Sequence[Choice]) -> set[Place]:
+    """Effects that several orders of make a series, at joints where it is one of many things that were found.
+
+    Parameters
+    ----------
+    choices : sequence of Choice
+        all so far
+    """
+    orders = Counter(place_of(choice.options[0].candidate) for choice in choices)
+    effects = Counter(joint for effect, joint in orders if effect not in EXPECTED)
+    return {
+        (effect, joint)
+        for (effect, joint), count in orders.items()
+        if joint is not None and count >= TELLING and effects[joint] >= CROWDED
+    }
 
 
 def _left(fit: Fit, joints: set[int]) -> float:

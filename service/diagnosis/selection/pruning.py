@@ -10,7 +10,7 @@ from service.diagnosis.fitting.lack_of_fit import lack_of_fit
 from service.diagnosis.model.extended import with_terms
 from service.diagnosis.selection.admission import Admission
 from service.diagnosis.selection.choice import Choice, Selection
-from service.diagnosis.selection.proxies import proxies
+from service.diagnosis.selection.proxies import proxies, weak_likenesses
 from service.diagnosis.selection.shape_error import HARDLY, groups_of, standings
 
 Pruned = tuple[Fit, list[Choice]]
@@ -58,6 +58,21 @@ def _weakest(fit: Fit, choices: Sequence[Choice], losses: dict[Choice, float], f
             if losses[choices[place]] < least:
                 least, weakest, found = losses[choices[place]], place, without
     return weakest, found
+
+
+def without_weak_likenesses(nominal: Fit, fit: Fit, choices: list[Choice], fitter: Fitter) -> Pruned:
+    """Drop all choices at joints where even all of them together leave most of what there is to explain.
+
+    Parameters
+    ----------
+    nominal, fit : Fit
+        models without and with all choices
+    choices : list of Choice
+        one a term
+    fitter : Fitter
+        of the training recordings, their noise known from repetitions
+    """
+    return _without(weak_likenesses(nominal, fit, choices, fitter.observations), fit, choices, fitter)
 
 
 def without_proxies(nominal: Fit, fit: Fit, choices: list[Choice], fitter: Fitter, admission: Admission) -> Pruned:

@@ -25,8 +25,8 @@ from service.diagnosis.selection.equivalence import EQUIVALENT, FORMULA_ERROR, e
 from service.diagnosis.selection.interleaved import interleaved_confirmation
 from service.diagnosis.selection.outside import where_held_out_shows
 from service.diagnosis.selection.position_bias import is_position_noise
-from service.diagnosis.selection.proxies import TELLING, hopeless
-from service.diagnosis.selection.pruning import without_proxies, without_superfluous
+from service.diagnosis.selection.proxies import TELLING, endless, hopeless
+from service.diagnosis.selection.pruning import without_proxies, without_superfluous, without_weak_likenesses
 from service.diagnosis.selection.table import Table, fitted_option
 
 MOST_EFFECTS = 4
@@ -78,6 +78,8 @@ class Selector:
         whether the noise is known from repetitions
     looked_at_before : int
         forms that were looked at with another screen, and count as well
+    wanted : callable
+        which of the screen's forms are looked for; all of them count
     """
 
     def __init__(
@@ -88,12 +90,14 @@ class Selector:
         *,
         pure_error: bool,
         looked_at_before: int = 0,
+        wanted: Callable[[Effect], bool] = lambda effect: True,
     ) -> None:
         self.screen = screen
         self.fitter = fitter
         self.held_out = held_out
         self.pure_error = pure_error
         self.looked_at_before = looked_at_before
+        self.wanted = wanted
         self.admission = Admission(screen, pure_error=pure_error, looked_at_before=looked_at_before)
 
     def select(self, model: ExtendedModel, beforehand: Sequence[Term], progress: Callable[[str], None]) -> Selection:
@@ -119,7 +123,10 @@ class Selector:
                 choices.append(Choice((option,), confirmation, p_value, was_given=True))
                 fit = option.fit
         fit, grown, rejected = self._grown(nominal, fit, choices, progress)
-        fit, choices = without_superfluous(fit, grown, self.fitter, self.admission)
+        choices = list(grown)
+        if self.pure_error:
+            fit, choices = without_weak_likenesses(nominal, fit, choices, self.fitter)
+        fit, choices = without_superfluous(fit, choices, self.fitter, self.admission)
         dropped = [each for each in grown if each not in choices]
         choices = [with_rivals(each, dropped) for each in choices]
         fit, choices = without_proxies(nominal, fit, choices, self.fitter, self.admission)
@@ -168,7 +175,7 @@ class Selector:
         """Effects of which no more orders are worth a look."""
         if not self.pure_error:
             return set()
-        return hopeless(nominal, fit, choices, self.screen.observations, MOST_REPEATS)
+        return hopeless(nominal, fit, choices, self.screen.observations, MOST_REPEATS) | endless(choices)
 
     def _next(self, fit: Fit, choices: Sequence[Choice], rejected: list[Choice], spent: set[Place]) -> Choice | None:
         """The best significant and confirmed option; what held-out recordings refuse is added to `rejected`."""
@@ -252,7 +259,7 @@ class Selector:
             effects and places that were refused
         """
         place = effect.id, effect.joint
-        if place in refused:
+        if place in refused or not self.wanted(effect):
             return False
         if place in chosen:
             return effect.repeats and chosen.count(place) < MOST_REPEATS
