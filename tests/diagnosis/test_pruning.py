@@ -8,19 +8,25 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.diagnosis.catalogue.periodic_torque import Cogging
+from service.diagnosis.catalogue import Effect
+from service.diagnosis.catalogue.periodic_torque import Cogging, TorqueRipple
+from service.diagnosis.catalogue.presliding_hysteresis import PreslidingHysteresis
+from service.diagnosis.catalogue.rotor_inertia import RotorInertia
 from service.diagnosis.screening.screen import Candidate
 from service.diagnosis.selection import pruning
 from service.diagnosis.selection.choice import Choice, Option
-from service.diagnosis.selection.proxies import hopeless
+from service.diagnosis.selection.proxies import TELLING, endless, hopeless
 from service.diagnosis.selection.pruning import without_superfluous
 
 ADMISSION: Any = SimpleNamespace(level=1e-3, inflation=lambda fit: 1.0)
 
 
-def wave(gain: float = 0.0, joint: int = 0) -> Choice:
+COGGING = Cogging(0)
+
+
+def wave(gain: float = 0.0, effect: Effect = COGGING) -> Choice:
     fit: Any = None
-    candidate = Candidate(Cogging(joint), np.zeros(1), np.ones(2), gain, np.eye(2), True, 1.0, 1.0)
+    candidate = Candidate(effect, np.zeros(1), np.ones(2), gain, np.eye(2), True, 1.0, 1.0)
     return Choice((Option(candidate, fit, gain),), None, 0.0)
 
 
@@ -89,3 +95,13 @@ def test_orders_end_where_all_that_may_come_would_leave_most(last: float, ended:
     fit: Any = SimpleNamespace(joint_energies=np.array([1250.0]), projection=rows)
     assert hopeless(nominal, fit, choices, observations, 12) == ({("cogging", 0)} if ended else set())
     assert hopeless(nominal, fit, choices[:2], observations, 12) == set()
+
+
+def test_orders_end_beside_two_other_effects_of_the_joint() -> None:
+    """A series beside other things fits anything; what every geared joint may have is no such thing."""
+    orders = [wave() for _ in range(TELLING)]
+    beside = [wave(effect=each) for each in (TorqueRipple(0), RotorInertia(0), PreslidingHysteresis(1))]
+    third = wave(effect=PreslidingHysteresis(0))
+    assert endless([*orders, *beside]) == set()
+    assert endless([*orders, *beside, third]) == {("cogging", 0)}
+    assert endless([*orders[1:], *beside, third]) == set()

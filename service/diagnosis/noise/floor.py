@@ -16,6 +16,7 @@ from service.diagnosis.computation.side_by_side import side_by_side
 from service.diagnosis.fitting.fit import Fitter
 from service.diagnosis.model.extended import ExtendedModel
 from service.diagnosis.model.residual import full_torque, residual_rows
+from service.diagnosis.noise.pursuit import pursued
 from service.diagnosis.observations.observations import BoolArray, Observations
 from service.diagnosis.observations.period_pairs import period_pairs, rounding_repeats
 from service.diagnosis.observations.whitening import JointNoise, fitted_noise
@@ -26,14 +27,6 @@ from service.recording.recording import Array
 
 FEWEST_ROWS = 150
 """Rows of pure error that a joint's noise model needs."""
-
-MOST_ADDED = 40
-"""Columns of the catalogue in a saturated fit at most, and not more than one in `ROWS_A_COLUMN` rows."""
-
-ROWS_A_COLUMN = 25
-
-SAME_COLUMN = 1e-2
-"""Part of a column outside those that are taken, below which it is one of them."""
 
 FAR_ABOVE = 2.0
 """What even a saturated fit leaves, relative to the pure error's power, beyond which it is what counts: what nothing in
@@ -213,7 +206,7 @@ def _saturated(
     def left(joint: int) -> Array:
         basis, residual = fit.projection.basis[joint], fit.projection.residual[joint]
         every = np.concatenate(columns[joint]) if columns[joint] else np.zeros((0, len(residual)))
-        return _pursued(every - (every @ basis.T) @ basis, residual)
+        return pursued(every - (every @ basis.T) @ basis, residual)
 
     return dict(zip(columns, side_by_side(left, columns), strict=True))
 
@@ -221,40 +214,6 @@ def _saturated(
 def _touches(effect: Effect, joints: Iterable[int], observations: Observations) -> bool:
     """Whether an effect is one of some joints."""
     return not set(effect.touched(observations.robot.joint_count)).isdisjoint(joints)
-
-
-def _pursued(columns: Array, residual: Array) -> Array:
-    """The residual after orthogonal matching pursuit, as long as columns explain more than chance allows.
-
-    Columns are made orthogonal to those taken in their Gram matrix G alone, which is far smaller than they are: with c
-    the row of G of the one taken, Gᵢⱼ - cᵢcⱼ, and scores s - c s_best, all normalised anew.
-    """
-    norms = np.linalg.norm(columns, axis=1)
-    columns = columns[norms > 1e-9 * max(norms.max(initial=0.0), 1e-300)]
-    if not len(columns):
-        return residual
-    best_of_many = 2.0 * np.log(len(columns))
-    chance = best_of_many + 6.0
-    energy, taken = float(residual @ residual), []
-    gram, scores, places = columns @ columns.T, columns @ residual, np.arange(len(columns))
-    for _ in range(min(MOST_ADDED, len(residual) // ROWS_A_COLUMN)):
-        norms = np.sqrt(np.diag(gram))
-        gram, scores = gram / np.outer(norms, norms), scores / norms
-        best = int(np.argmax(np.abs(scores)))
-        if scores[best] ** 2 < chance * energy / len(residual):
-            break
-        taken.append(places[best])
-        energy -= float(scores[best]) ** 2
-        shared = gram[best]
-        gram, scores = gram - np.outer(shared, shared), scores - scores[best] * shared
-        others = np.diag(gram) > SAME_COLUMN**2
-        gram, scores, places = gram[np.ix_(others, others)], scores[others], places[others]
-        if not len(places):
-            break
-    solution, *_ = np.linalg.lstsq(columns[taken].T, residual)
-    left = residual - solution @ columns[taken]
-    # Each column, chosen among many, took this much noise with it.
-    return left * np.sqrt(len(left) / max(len(left) - best_of_many * len(taken), 0.2 * len(left)))
 
 
 def _by_piece(observations: Observations, joint: int, rows: Array) -> Iterator[tuple[Array, BoolArray, float]]:
