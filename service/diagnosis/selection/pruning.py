@@ -7,6 +7,7 @@ from dataclasses import replace
 from service.diagnosis.computation.side_by_side import THREADS, side_by_side
 from service.diagnosis.fitting.fit import Fit, Fitter
 from service.diagnosis.fitting.lack_of_fit import lack_of_fit
+from service.diagnosis.fitting.spilled_misfit import without_spilled
 from service.diagnosis.model.extended import with_terms
 from service.diagnosis.selection.admission import Admission
 from service.diagnosis.selection.choice import Choice, Selection
@@ -99,7 +100,8 @@ def _without_spilled(fit: Fit, choices: list[Choice], fitter: Fitter, admission:
     """Drop what is superfluous as soon as no link is bent for joints at which more than noise is left."""
     if not choices:
         return fit, choices
-    left = lack_of_fit(fit, fitter.observations, pure_error=admission.pure_error).significant
+    misfit = lack_of_fit(fit, fitter.observations, pure_error=admission.pure_error)
+    left = without_spilled(misfit, fit, fitter, pure_error=admission.pure_error).significant
     wrong = {joint for joint, told in enumerate(left) if told}
     if not wrong:
         return fit, choices
