@@ -10,6 +10,7 @@ from identification.simulated import Array, SimulatedArm, paper_robot
 from service.diagnosis import diagnose
 from service.diagnosis.catalogue.external_contact import JointContact
 from service.diagnosis.findings.diagnosed import Diagnosis
+from service.diagnosis.fitting.lack_of_fit import lack_of_fit
 from service.diagnosis.selection.admission import Admission
 from service.diagnosis.selection.choice import Choice
 from service.diagnosis.selection.proxies import proxies
@@ -75,3 +76,30 @@ def test_a_contact_that_explains_more_than_all_that_is_left_is_there_whatever_el
 
     assert dropped(0.99 * left) == [0]
     assert dropped(1.01 * left) == []
+
+
+def bump(arm: SimulatedArm, rigid: Array) -> Array:
+    """Nothing of the catalogue, and so much of it that the fit bends the links of all joints."""
+    q = arm.exact.exact.position[:, 1]
+    return at_joint(1, 0.8 * np.exp(-(((q - np.median(q)) / 0.25) ** 2)))
+
+
+def test_a_joint_that_another_one_bends_does_not_answer_for_itself() -> None:
+    """What explains its misfit is superfluous as soon as the other one's rows are left out."""
+    rng = np.random.default_rng(1)
+    diagnosis = diagnose(paper_robot(), recordings((1, 2), bump, rng), recordings((11,), bump, rng))
+    nominal, fitter, admission = (
+        diagnosis.selection.nominal,
+        diagnosis.fitter,
+        Admission(diagnosis.screen, pure_error=True),
+    )
+    assert lack_of_fit(nominal, fitter.observations, pure_error=True).significant == [True, True, True]
+    assert diagnosis.misfit_before.significant == [False, True, False]
+    shown = [each for each in diagnosis.screen.candidates(nominal) if each.effect.joint == 2]
+    telling = sorted((each for each in shown if each.p_value() < admission.level), key=lambda each: -each.score)
+    assert telling
+    for each in telling[:3]:
+        option = fitted_option(each, nominal, fitter)
+        fit, kept = without_proxies(nominal, option.fit, [Choice((option,), None, 0.0)], fitter, admission)
+        assert kept == [], f"{each.effect.id} explains joint 3, which only joint 2 bends"
+        assert fit.model.terms == ()
