@@ -111,7 +111,7 @@ def place_of(candidate: Candidate) -> Place:
     return candidate.effect.id, candidate.effect.joint
 
 
-def is_physical(option: Option, before: Fit) -> bool:
+def is_physical(option: Option, before: Fit, *, instead: bool = False) -> bool:
     """Whether the term explains anything with coefficients that can be, and leaves friction that can be.
 
     Parameters
@@ -120,6 +120,8 @@ def is_physical(option: Option, before: Fit) -> bool:
         the last term of its model
     before : Fit
         the model without it
+    instead : bool
+        whether it is to explain more than others in whose place it stands: what those of the model leave is no doubt
     """
     term = option.fit.model.terms[-1]
     signs = zip(term.effect.coefficients, term.coefficients, strict=True)
@@ -129,7 +131,7 @@ def is_physical(option: Option, before: Fit) -> bool:
     joint = term.effect.joint
     k_v = None if joint is None else option.fit.model.structure.terms[joint].k_v
     possible = possible and term.effect.is_possible(term.shape, k_v)
-    alone = all(each.effect.id in EXPECTED for each in before.model.terms)
+    alone = instead or all(each.effect.id in EXPECTED for each in before.model.terms)
     possible = possible and term.effect.is_consistent(term.coefficients, term.shape, alone=alone)
     return option.gain > 0.0 and possible and not driving(option.fit) - driving(before)
 

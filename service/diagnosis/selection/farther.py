@@ -11,9 +11,13 @@ from service.diagnosis.catalogue import Effect, Setting, farther_effects
 from service.diagnosis.fitting.lack_of_fit import lack_of_fit
 from service.diagnosis.fitting.spilled_misfit import without_spilled
 from service.diagnosis.screening.screen import Screen
-from service.diagnosis.selection.choice import Selection
+from service.diagnosis.selection.choice import Place, Selection, place_of
 from service.diagnosis.selection.equivalence import EQUIVALENT
 from service.diagnosis.selection.selector import WORTH_REFINING, Selector
+
+
+Stand = tuple[int, set[Place]]
+"""A joint, and effects that were selected there."""
 
 
 def looked_farther(
@@ -32,12 +36,12 @@ def looked_farther(
     progress : callable
         told the name of the step, and what was found
     """
-    chosen = _chosen_at(selection)
+    chosen = _stands(selection)
     screen = Screen(selector.screen.observations, farther_effects(setting))
     if chosen:
         progress("look farther")
-    for joint in chosen:
-        instead = _in_place(joint, selection, screen, selector, progress)
+    for stand in chosen:
+        instead = _in_place(stand, selection, screen, selector, progress)
         if _explained(instead) > _explained(selection) + EQUIVALENT:
             selection = instead
     left = _left(selection, selector)
@@ -56,7 +60,7 @@ def _left(selection: Selection, selector: Selector) -> list[bool]:
     return without_spilled(misfit, selection.fit, selector.fitter, pure_error=pure_error).worth_a_look
 
 
-def _with(screen: Screen, selector: Selector, wanted: Callable[[Effect], bool]) -> Selector:
+def _with(screen: Screen, selector: Selector, wanted: Callable[[Effect], bool], *, instead: bool = False) -> Selector:
     """The selector with other forms than it has looked at."""
     return Selector(
         screen,
@@ -65,25 +69,36 @@ def _with(screen: Screen, selector: Selector, wanted: Callable[[Effect], bool]) 
         pure_error=selector.pure_error,
         looked_at_before=selector.looked_at_before + len(selector.screen.effects),
         wanted=wanted,
+        instead=instead,
     )
 
 
-def _chosen_at(selection: Selection) -> list[int]:
-    """Joints at which something was selected."""
-    joints = {choice.options[0].candidate.effect.joint for choice in selection.choices}
-    return sorted(joint for joint in joints if joint is not None)
+def _stands(selection: Selection) -> list[Stand]:
+    """Joints, and what was selected at each: all of it, and where it is several effects each of them by itself."""
+    at: dict[int, set[Place]] = {}
+    for choice in selection.choices:
+        effect, joint = place_of(choice.options[0].candidate)
+        if joint is not None:
+            at.setdefault(joint, set()).add((effect, joint))
+    found = []
+    for joint, effects in sorted(at.items()):
+        found.append((joint, effects))
+        if len(effects) > 1:
+            found += [(joint, {each}) for each in sorted(effects)]
+    return found
 
 
 def _in_place(
-    joint: int, selection: Selection, screen: Screen, selector: Selector, progress: Callable[[str], None]
+    stand: Stand, selection: Selection, screen: Screen, selector: Selector, progress: Callable[[str], None]
 ) -> Selection:
-    """What comes of such forms in place of all that was selected at a joint, and of what is missing beside them."""
-    places = [at for at, choice in enumerate(selection.choices) if choice.options[0].candidate.effect.joint == joint]
-    if not places:  # what took another joint's place has left nothing to stand here
+    """What comes of such forms in the place of some choices of a joint, and of what is missing beside them."""
+    joint, effects = stand
+    places = [at for at, choice in enumerate(selection.choices) if place_of(choice.options[0].candidate) in effects]
+    if not places:  # what took another's place has left nothing to stand here
         return selection
     kept = tuple(choice for at, choice in enumerate(selection.choices) if at not in places)
     cleared = replace(selection, fit=selector.fitter.without(selection.fit, places), choices=kept)
-    others = _with(screen, selector, lambda each: each.joint == joint)
+    others = _with(screen, selector, lambda each: each.joint == joint, instead=True)
     most = max((each.gain for each in screen.candidates(cleared.fit, others.wanted)), default=0.0)
     if most < WORTH_REFINING * (cleared.fit.energy - selection.fit.energy):
         return selection

@@ -80,6 +80,8 @@ class Selector:
         forms that were looked at with another screen, and count as well
     wanted : callable
         which of the screen's forms are looked for; all of them count
+    instead : bool
+        whether they are looked for in the place of others, and have to explain more than those did
     """
 
     def __init__(
@@ -91,6 +93,7 @@ class Selector:
         pure_error: bool,
         looked_at_before: int = 0,
         wanted: Callable[[Effect], bool] = lambda effect: True,
+        instead: bool = False,
     ) -> None:
         self.screen = screen
         self.fitter = fitter
@@ -98,6 +101,7 @@ class Selector:
         self.pure_error = pure_error
         self.looked_at_before = looked_at_before
         self.wanted = wanted
+        self.instead = instead
         self.admission = Admission(screen, pure_error=pure_error, looked_at_before=looked_at_before)
 
     def select(self, model: ExtendedModel, beforehand: Sequence[Term], progress: Callable[[str], None]) -> Selection:
@@ -215,7 +219,7 @@ class Selector:
         most = FEW if is_routine else MOST_FITTED
         tried = [each for each in closest[:most] if each.score > closest[0].score - near]
         fitted = table.fitted(tried)
-        impossible = [each.candidate for each in fitted if not is_physical(each, fit)]
+        impossible = [each.candidate for each in fitted if not is_physical(each, fit, instead=self.instead)]
         fitted = [each for each in fitted if each.candidate not in impossible]
         fitted = [each for each in fitted if not outsized(each, self.screen.observations)]
         fitted = [each for each in fitted if not is_position_noise(each, fit, self.screen)]
