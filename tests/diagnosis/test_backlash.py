@@ -193,6 +193,19 @@ def test_play_is_named_where_a_spring_explains_a_part_and_where_bounces_leave_so
 
 
 @pytest.mark.slow
+def test_play_is_named_where_a_spring_explains_a_part_beside_larger_bristles() -> None:
+    """In the place of both it is no match for them, and in that of the spring alone it is."""
+    play = {"effect": "backlash", "joint": 6, "gap": 0.0422, "contact_stiffness": 1e4, "rotor_inertia": 0.004}
+    bristles = {"effect": "presliding_hysteresis", "joint": 6, "distance": 1.42e-3}
+    trial = recorded_trial("seven", Concealed((), (play, bristles)), motion_seed=8800, seed=22000001)
+    found = document(diagnose(trial.robot, trial.train, trial.held_out)).findings
+    assert {(each.effect, each.joint) for each in found} == {
+        ("presliding_hysteresis", "joint6"),
+        ("backlash", "joint6"),
+    }
+
+
+@pytest.mark.slow
 def test_a_spring_stays_a_spring() -> None:
     """Teeth with a vanishing gap are one, too, with a damping to choose: they have to explain clearly more."""
     spring = {"effect": "joint_elasticity", "joint": 1, "stiffness": 2600.0, "damping": 5.2, "rotor_inertia": 0.004}

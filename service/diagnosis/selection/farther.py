@@ -15,7 +15,6 @@ from service.diagnosis.selection.choice import Place, Selection, place_of
 from service.diagnosis.selection.equivalence import EQUIVALENT
 from service.diagnosis.selection.selector import WORTH_REFINING, Selector
 
-
 Stand = tuple[int, set[Place]]
 """A joint, and effects that were selected there."""
 
@@ -36,7 +35,7 @@ def looked_farther(
     progress : callable
         told the name of the step, and what was found
     """
-    chosen = _stands(selection)
+    chosen = stands(selection)
     screen = Screen(selector.screen.observations, farther_effects(setting))
     if chosen:
         progress("look farther")
@@ -73,8 +72,14 @@ def _with(screen: Screen, selector: Selector, wanted: Callable[[Effect], bool], 
     )
 
 
-def _stands(selection: Selection) -> list[Stand]:
-    """Joints, and what was selected at each: all of it, and where it is several effects each of them by itself."""
+def stands(selection: Selection) -> list[Stand]:
+    """All that was selected at each joint, and where it is several effects each of them by itself.
+
+    Parameters
+    ----------
+    selection : Selection
+        what there is
+    """
     at: dict[int, set[Place]] = {}
     for choice in selection.choices:
         effect, joint = place_of(choice.options[0].candidate)

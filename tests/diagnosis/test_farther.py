@@ -1,0 +1,29 @@
+"""In whose place forms are tried that show in a small part of the motion only."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from service.diagnosis.catalogue import Effect
+from service.diagnosis.catalogue.base_tilt import BaseTilt
+from service.diagnosis.catalogue.joint_elasticity import JointElasticity
+from service.diagnosis.catalogue.periodic_torque import Cogging
+from service.diagnosis.catalogue.presliding_hysteresis import PreslidingHysteresis
+from service.diagnosis.screening.screen import Candidate
+from service.diagnosis.selection.choice import Choice, Option
+from service.diagnosis.selection.farther import stands
+
+
+def chosen(effect: Effect) -> Choice:
+    fit: Any = None
+    candidate = Candidate(effect, np.zeros(1), np.ones(1), 1.0, np.eye(1), True, 1.0, 1.0)
+    return Choice((Option(candidate, fit, 1.0),), None, 0.0)
+
+
+def test_all_of_a_joint_and_each_effect_where_there_are_several() -> None:
+    """Orders of one effect stand together; what belongs to the whole arm stands nowhere."""
+    effects = (Cogging(3), PreslidingHysteresis(1), Cogging(3), JointElasticity(1), BaseTilt(None))
+    selection: Any = SimpleNamespace(choices=[chosen(each) for each in effects])
+    bristles, spring, order = ("presliding_hysteresis", 1), ("joint_elasticity", 1), ("cogging", 3)
+    assert stands(selection) == [(1, {bristles, spring}), (1, {spring}), (1, {bristles}), (3, {order})]
