@@ -44,9 +44,10 @@ def looked_farther(
         if _explained(instead) > _explained(selection) + EQUIVALENT:
             selection = instead
     left = _left(selection, selector)
-    others = _with(screen, selector, lambda each: any(left) if each.joint is None else bool(left[each.joint]))
-    if not any(map(others.wanted, screen.effects)):
+    if not any(left):
         return selection
+    near = {joint for joint, told in enumerate(left) if told} | {joint for joint, _ in stands(selection)}
+    others = _with(screen, selector, lambda each: each.joint is None or each.joint in near)
     if not chosen:
         progress("look farther")
     return others.continued(selection, progress)

@@ -97,7 +97,11 @@ def without_proxies(nominal: Fit, fit: Fit, choices: list[Choice], fitter: Fitte
 
 
 def _without_spilled(fit: Fit, choices: list[Choice], fitter: Fitter, admission: Admission) -> Pruned:
-    """Drop what is superfluous as soon as no link is bent for joints at which more than noise is left."""
+    """Drop what is superfluous as soon as no link is bent for joints at which more than noise is left.
+
+    What explains more than all that is left there is not made by it. Superfluous it may be all the same: a wrong gain
+    of the last joint is, by itself, a change of its link's masses, which only other joints' rows tell apart.
+    """
     if not choices:
         return fit, choices
     misfit = lack_of_fit(fit, fitter.observations, pure_error=admission.pure_error)
@@ -105,14 +109,20 @@ def _without_spilled(fit: Fit, choices: list[Choice], fitter: Fitter, admission:
     wrong = {joint for joint, told in enumerate(left) if told}
     if not wrong:
         return fit, choices
-    effects = [choice.options[0].candidate.effect for choice in choices]
-    own = [effect.joint in wrong or wrong.issuperset(effect.touched(len(left))) for effect in effects]
-    if all(own):
+    beyond = float(misfit.excess[list(wrong)].sum())
+    stays = [_is_of(wrong, choice, len(left)) or choice.options[0].gain > beyond for choice in choices]
+    if all(stays):
         return fit, choices
     apart = Fitter(fitter.observations.without_joints(wrong))
     _, needed = without_superfluous(apart.fit(fit.model), choices, apart, admission)
-    spilled = [place for place, choice in enumerate(choices) if choice not in needed and not own[place]]
+    spilled = [place for place, choice in enumerate(choices) if choice not in needed and not stays[place]]
     return _without(spilled, fit, choices, fitter)
+
+
+def _is_of(joints: set[int], choice: Choice, joint_count: int) -> bool:
+    """Whether a choice stands at one of some joints, or touches no other."""
+    effect = choice.options[0].candidate.effect
+    return effect.joint in joints or joints.issuperset(effect.touched(joint_count))
 
 
 def without_errors_of_larger_ones(selection: Selection, fitter: Fitter, admission: Admission) -> Selection:
