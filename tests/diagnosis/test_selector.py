@@ -140,7 +140,9 @@ def test_a_form_that_cannot_be_leaves_the_plain_form_of_its_effect_in(
     """A delay, whose torque shifted by too much and weakened for it explains far more; another shift is as doubtful."""
     impossible = Shift(1, np.ones((1, 1)), np.zeros(1), np.ones(1))
     table = table_of([(sibling, 30.0), (impossible, 100.0)], monkeypatch)
-    monkeypatch.setattr(selector, "is_physical", lambda option, fit: option.candidate.effect is not impossible)
+    monkeypatch.setattr(
+        selector, "is_physical", lambda option, fit, **_words: option.candidate.effect is not impossible
+    )
     monkeypatch.setattr(selector, "outsized", lambda option, observations: False)
     monkeypatch.setattr(selector, "is_position_noise", lambda option, fit, screen: False)
     monkeypatch.setattr(selector, "where_held_out_shows", lambda option, fit, fitter, held_out: option)
