@@ -22,7 +22,7 @@ Stand = tuple[int, set[Place]]
 def looked_farther(
     selection: Selection, selector: Selector, setting: Setting, progress: Callable[[str], None]
 ) -> Selection:
-    """The selection with what such forms explain at the joints where something is left.
+    """The selection with what such forms explain: in the place of what was found, and beside it where some is left.
 
     Parameters
     ----------
