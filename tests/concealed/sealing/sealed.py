@@ -1,5 +1,6 @@
 """A trial sealed: recordings and robot file in one folder, the truth in a file elsewhere, its hash told beforehand."""
 
+import contextlib
 import os
 import shutil
 import subprocess
@@ -19,6 +20,7 @@ from concealed.generator.motions import Planned
 from concealed.generator.trial import Trial
 from concealed.sealing.truth import truth_of
 from service.diagnosis.documents.document import DiagnosisDocument
+from service.errors import ScenarioError
 from service.recording import EffortKind, Recording, write_recording
 from service.trajectory import read_trajectory
 
@@ -60,12 +62,16 @@ class Sealed:
 
 
 def made(series: str, seed: int, arm: str | None = None) -> tuple[Case, Trial]:
-    """The trial of a series and a seed: drawn anew where the effect could not be made as strong as wanted."""
+    """The trial of a series and a seed: drawn anew where the effect could not be made as strong as wanted.
+
+    Nor can it where that takes a transmission too soft to carry the arm.
+    """
     for attempt in range(MOST_ATTEMPTS):
         case = drawn(series, seed, arm, attempt)
-        concealed = case.concealed()
-        if abs(concealed.strength - case.wanted) <= REACHED * case.wanted:
-            return case, case.recorded(concealed)
+        with contextlib.suppress(ScenarioError):
+            concealed = case.concealed()
+            if abs(concealed.strength - case.wanted) <= REACHED * case.wanted:
+                return case, case.recorded(concealed)
     raise ValueError(f"{series} {seed}: no effect of {MOST_ATTEMPTS} drawn reaches the strength asked for")
 
 

@@ -133,6 +133,14 @@ def test_an_elastic_joint_is_two_masses(mu: float, pendulum: Any, pendulum_trial
     assert np.max(np.abs(simulated["motor_position"] - simulated["link_position"])) > 5e-3
 
 
+@pytest.mark.parametrize("beside", [0.0, 1e-6, 0.004, -0.0099])
+def test_a_link_that_hangs_straight_rests_between_its_teeth(beside: float, pendulum: Any) -> None:
+    """Either tooth would push it to the other, however far the motor stands to one side of the lowest point."""
+    plant = Plant(pendulum.robot, [Backlash(joint=1, gap=0.02, contact_stiffness=1e4, rotor_inertia=0.1)])
+    plant.place(np.array([beside - np.pi / 2]))
+    assert plant.state.link_position[0] == pytest.approx(-np.pi / 2, abs=1e-12)
+
+
 def test_teeth_lift_off_and_meet(pendulum: Any, pendulum_trial: Any) -> None:
     """Weightless link and small friction: the load reverses often, and the twist crosses the whole gap."""
     loose = pendulum.__class__(moment=1e-9, stiction=0.05, stribeck=0.0, viscous=0.02)
