@@ -1,4 +1,4 @@
-"""Coefficients have to differ from zero with all that is uncertain beside them."""
+"""What is asked of an effect before it may enter a model."""
 
 from types import SimpleNamespace
 from typing import Any, cast
@@ -7,6 +7,17 @@ import numpy as np
 import pytest
 
 from service.diagnosis.selection.admission import Admission
+
+
+@pytest.mark.parametrize(("gain", "pure_error", "fitted"), [(0.9, False, False), (1.1, False, True), (0.9, True, True)])
+def test_what_is_too_small_by_far_is_not_fitted_where_the_noise_is_only_guessed(
+    gain: float, pure_error: bool, fitted: bool
+) -> None:
+    """A hundredth of the 300 that are left at its joints is needed, and a fit may treble what the grid explains."""
+    fit = SimpleNamespace(projection=SimpleNamespace(residual=[np.ones(100), np.ones(200), np.ones(4000)]))
+    candidate = SimpleNamespace(gain=gain, effect=SimpleNamespace(touched=lambda count: (0, 1)))
+    admission = Admission(cast(Any, None), pure_error=pure_error)
+    assert admission.may_be_large_enough(cast(Any, candidate), cast(Any, fit)) is fitted
 
 
 @pytest.mark.parametrize(("std", "correlation", "expected"), [(0.2, 0.0, True), (0.4, 0.0, False), (0.4, -0.9, True)])

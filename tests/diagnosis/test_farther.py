@@ -8,7 +8,7 @@ import numpy as np
 from service.diagnosis.catalogue import Effect
 from service.diagnosis.catalogue.base_tilt import BaseTilt
 from service.diagnosis.catalogue.joint_elasticity import JointElasticity
-from service.diagnosis.catalogue.periodic_torque import Cogging
+from service.diagnosis.catalogue.periodic_torque import Cogging, TorqueRipple
 from service.diagnosis.catalogue.presliding_hysteresis import PreslidingHysteresis
 from service.diagnosis.screening.screen import Candidate
 from service.diagnosis.selection.choice import Choice, Option
@@ -27,3 +27,9 @@ def test_all_of_a_joint_and_each_effect_where_there_are_several() -> None:
     selection: Any = SimpleNamespace(choices=[chosen(each) for each in effects])
     bristles, spring, order = ("presliding_hysteresis", 1), ("joint_elasticity", 1), ("cogging", 3)
     assert stands(selection) == [(1, {bristles, spring}), (1, {spring}), (1, {bristles}), (3, {order})]
+
+
+def test_so_many_that_they_are_no_physics_stand_together_only() -> None:
+    effects = (Cogging(1), PreslidingHysteresis(1), TorqueRipple(1), JointElasticity(1))
+    selection: Any = SimpleNamespace(choices=[chosen(each) for each in effects])
+    assert stands(selection) == [(1, {(each.id, 1) for each in effects})]

@@ -27,7 +27,11 @@ FITTER: Any = None
 PLAIN: Any = SimpleNamespace(inflation=lambda fit: 1.0)
 
 SIGNIFICANT: Any = SimpleNamespace(
-    level=1e-3, inflation=lambda fit: 1.0, p_value=lambda *_, blocks: 0.0, large_enough=lambda *_, known: True
+    level=1e-3,
+    inflation=lambda fit: 1.0,
+    p_value=lambda *_, blocks: 0.0,
+    may_be_large_enough=lambda *_: True,
+    large_enough=lambda *_, known: True,
 )
 
 LATER = Shift(1, np.full((1, 1), 2.0), np.zeros(1), np.ones(1))
@@ -91,6 +95,25 @@ def test_what_was_refused_elsewhere_is_not(monkeypatch: pytest.MonkeyPatch) -> N
     chosen, refused = grown(monkeypatch, waves_at=2)
     assert chosen == [("joint_spring", 0)]
     assert refused == [("cogging", 2)]
+
+
+@pytest.mark.parametrize(
+    ("left", "effects_there", "ends"),
+    [([1], 4, True), ([1, 2], 4, False), ([], 4, False), ([1], 3, False)],
+    ids=["all is left where all was tried", "another joint is wrong too", "nothing is left", "more may be tried"],
+)
+def test_growing_ends_where_a_joint_that_has_everything_is_all_that_is_wrong(
+    monkeypatch: pytest.MonkeyPatch, left: list[int], effects_there: int, ends: bool
+) -> None:
+    """A rotor's inertia is expected everywhere, and two orders of one effect are one."""
+    told = SimpleNamespace(significant=[joint in left for joint in range(3)])
+    monkeypatch.setattr(selector, "lack_of_fit", lambda *_, pure_error: None)
+    monkeypatch.setattr(selector, "without_spilled", lambda *_, pure_error: told)
+    there = (JointSpring(1), Cogging(1), TimeDelay(1), cable(1))[-effects_there:]
+    choices = [choice(each, SEEN) for each in (*there, RotorInertia(1), cable(1), JointSpring(0))]
+    asked = Selector(SCREEN, FITTER, None, pure_error=True)
+    assert asked._is_of_no_catalogue(FIT, choices) is ends
+    assert not Selector(SCREEN, FITTER, None, pure_error=False)._is_of_no_catalogue(FIT, choices)
 
 
 def cable(side: int) -> CableForce:

@@ -45,6 +45,18 @@ def test_the_residual_is_what_the_model_leaves_of_the_measured_torque(diagnosis:
         np.testing.assert_allclose(found[joint], expected, atol=1e-9 * np.abs(expected).max())
 
 
+def test_load_is_the_torque_of_the_links_without_the_noise_of_their_inertia(diagnosis: Diagnosis) -> None:
+    """A filtered sum is the sum of filtered columns; friction and what else a joint has are added as they are."""
+    model = full(diagnosis)
+    structure = model.structure
+    links = np.where(np.arange(structure.size) < structure.base_count, model.parameters, 0.0)
+    for piece in diagnosis.fitter.observations:
+        whole, rigid = piece.prepared.predicted_torque(structure, np.stack([model.parameters, links]))
+        signals, load = model.signals(piece), piece.without_noise_of_inertia(rigid)
+        np.testing.assert_allclose(signals.load, load, atol=1e-9 * np.abs(load).max())
+        np.testing.assert_allclose(signals.torque, whole - rigid + load, atol=1e-9 * np.abs(whole).max())
+
+
 def test_columns_are_the_differences_of_the_residual_in_every_parameter_of_the_links(diagnosis: Diagnosis) -> None:
     """A gain error at the first joint multiplies them, but for the noise that accelerations have in its own column."""
     white = WhiteColumns(diagnosis.fitter.observations)

@@ -15,6 +15,8 @@ from service.diagnosis.catalogue.effect import Effect, per_joint_columns
 from service.diagnosis.catalogue.parameters import Coefficient, Quantity, Shape
 from service.diagnosis.catalogue.setting import Setting
 from service.diagnosis.catalogue.signals import Signals
+from service.diagnosis.computation.last_few import LastFew
+from service.diagnosis.computation.side_by_side import THREADS
 from service.recording.recording import Array
 from service.robot import JointType
 
@@ -37,6 +39,12 @@ FARTHER = 8.0
 twentieth of the time of a sine."""
 
 MOST_FARTHER_ORDERS = 800
+
+FEW = 2
+"""Orders at once up to which sines are kept: one of a fit, and the two of its difference quotient."""
+
+KEPT = 24 * THREADS
+"""Sets of them that are kept a piece: those of a model with all orders that it may have."""
 
 
 def possible_orders(setting: Setting, joint: int) -> Array:
@@ -219,8 +227,12 @@ class _Periodic(Effect):
         )
 
     def _waves(self, signals: Signals, shapes: Array) -> Array:
-        """Sin kq, cos kq, (g, 2, N)."""
-        return waves(signals.position[self.joint or 0], shapes[:, 0])
+        """Sin kq, cos kq, (g, 2, N); of an order or two they are kept, for a fit asks again under other loads."""
+        joint, orders = self.joint or 0, shapes[:, 0]
+        if len(orders) > FEW:
+            return waves(signals.position[joint], orders)
+        kept: LastFew[tuple[int, bytes], Array] = signals.remembered_of_motion("waves", lambda: LastFew(KEPT))
+        return kept.get((joint, orders.tobytes()), lambda: waves(signals.position[joint], orders))
 
 
 class Cogging(_Periodic):

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from service.diagnosis.computation.last_few import LastFew
 from service.diagnosis.fitting.bounded_step import bounded_step
-from service.diagnosis.fitting.projection import JointColumns, Projection, project
+from service.diagnosis.fitting.projection import JointColumns, Projection, fitted_parameters, project
 from service.diagnosis.fitting.white_columns import WhiteColumns
 from service.diagnosis.model.extended import ExtendedModel, with_terms
 from service.diagnosis.model.term import Term
@@ -185,7 +185,7 @@ class Fitter:
         columns = [(own, linear[own.index]) for own in self._white.linear(model)]
         free = [JointColumns(places[own.index[moves]], own.rows[moves]) for own, moves in columns]
         step = np.zeros(model.size)
-        step[linear] = project(free, at.residual, int(linear.sum())).step
+        step[linear] = fitted_parameters(free, at.residual, int(linear.sum()))
         return self._tried(_stepped(model, step))
 
     def without(self, fit: Fit, places: Sequence[int]) -> Fit:

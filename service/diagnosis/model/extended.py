@@ -191,9 +191,13 @@ class ExtendedModel:
         """The same, made anew."""
         prepared, structure = piece.prepared, self.structure
         motion = prepared.motion
-        bodies = np.where(np.arange(structure.size) < structure.base_count, self.parameters, 0.0)
-        whole, rigid = prepared.predicted_torque(structure, np.stack([self.parameters, bodies]))
-        load = piece.without_noise_of_inertia(rigid)
+        load = np.empty(motion.position.T.shape)
+        torque = np.empty_like(load)
+        for joint, rigid in enumerate(piece.quiet_rigid()):
+            links, plain = np.split(self.parameters[structure.joint_columns(joint)], [len(rigid)])
+            own = structure.joint_term_columns(joint, motion.velocity[:, joint], motion.acceleration[:, joint])
+            load[joint] = links @ rigid
+            torque[joint] = load[joint] + plain @ own
         steepness = self.steepness
         velocity = np.ascontiguousarray(motion.velocity.T)
         return Signals(
@@ -205,7 +209,7 @@ class ExtendedModel:
             velocity=velocity,
             acceleration=piece.quiet_acceleration(),
             load=load,
-            torque=whole - rigid + load,
+            torque=torque,
             step=smooth_sign(velocity, steepness[:, None]),
             steepness=steepness,
             bodies=self.standard_parameters(),

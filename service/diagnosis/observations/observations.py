@@ -141,6 +141,12 @@ class Piece:
             self.memory["quiet_acceleration"] = self.without_noise_of_inertia(self.prepared.motion.acceleration.T)
         return self.memory["quiet_acceleration"]
 
+    def quiet_rigid(self) -> list[Array]:
+        """Columns (m_j, N) of the links that each joint moves `without_noise_of_inertia`: made once."""
+        if "quiet_rigid" not in self.memory:
+            self.memory["quiet_rigid"] = [self.without_noise_of_inertia(own) for own in self.prepared.rigid]
+        return self.memory["quiet_rigid"]
+
     def row_times(self) -> Array:
         """Instant of every row, (P M,) [s]."""
         motion = self.prepared.motion

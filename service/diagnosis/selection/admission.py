@@ -7,7 +7,7 @@ import numpy as np
 from scipy import stats
 
 from service.diagnosis.fitting.fit import Fit, Fitter
-from service.diagnosis.screening.screen import Screen
+from service.diagnosis.screening.screen import Candidate, Screen
 from service.diagnosis.selection.block_scores import score_inflation
 from service.diagnosis.selection.choice import Choice, Option
 
@@ -17,6 +17,9 @@ LEVEL = 0.01
 SMALLEST_SHARE = 0.01
 """Share of the residual's energy at the joints it touches that an effect explains at least, where the noise is not
 known from repetitions."""
+
+MORE_THAN_SCREENED = 3.0
+"""Factor by which a fit of everything may make of an effect more than the best shape of its grid explains."""
 
 SHARE_OF_LARGEST = 0.01
 """…and the share of what the largest effect explained: columns that are a little off leave as much."""
@@ -145,6 +148,21 @@ class Admission:
         largest = max((choice.options[0].gain for choice in choices), default=0.0)
         if not known and option.gain < SHARE_OF_LARGEST * largest:
             return False
-        touched = option.candidate.effect.touched(len(fit.projection.residual))
-        energy = sum(float(fit.projection.residual[j] @ fit.projection.residual[j]) for j in touched)
-        return option.gain > SMALLEST_SHARE * energy
+        return option.gain > self._smallest_gain(option.candidate, fit)
+
+    def may_be_large_enough(self, candidate: Candidate, fit: Fit) -> bool:
+        """Whether it may explain a worthwhile share of what is left at its joints, once everything is fitted anew.
+
+        Parameters
+        ----------
+        candidate : Candidate
+            the effect, as screened
+        fit : Fit
+            the model without it
+        """
+        return self.pure_error or MORE_THAN_SCREENED * candidate.gain > self._smallest_gain(candidate, fit)
+
+    def _smallest_gain(self, candidate: Candidate, fit: Fit) -> float:
+        """A worthwhile share of what is left at the joints that an effect touches [noise variances]."""
+        touched = candidate.effect.touched(len(fit.projection.residual))
+        return SMALLEST_SHARE * sum(float(fit.projection.residual[j] @ fit.projection.residual[j]) for j in touched)

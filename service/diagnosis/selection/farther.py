@@ -13,6 +13,7 @@ from service.diagnosis.fitting.spilled_misfit import without_spilled
 from service.diagnosis.screening.screen import Screen
 from service.diagnosis.selection.choice import Place, Selection, place_of
 from service.diagnosis.selection.equivalence import EQUIVALENT
+from service.diagnosis.selection.proxies import FULL
 from service.diagnosis.selection.selector import WORTH_REFINING, Selector
 
 Stand = tuple[int, set[Place]]
@@ -76,6 +77,8 @@ def _with(screen: Screen, selector: Selector, wanted: Callable[[Effect], bool], 
 def stands(selection: Selection) -> list[Stand]:
     """All that was selected at each joint, and where it is several effects each of them by itself.
 
+    Not where they are so many that together they are no physics: what they stand in for is all that is there.
+
     Parameters
     ----------
     selection : Selection
@@ -89,7 +92,7 @@ def stands(selection: Selection) -> list[Stand]:
     found = []
     for joint, effects in sorted(at.items()):
         found.append((joint, effects))
-        if len(effects) > 1:
+        if 1 < len(effects) < FULL:
             found += [(joint, {each}) for each in sorted(effects)]
     return found
 

@@ -7,13 +7,14 @@ once explains its joints wholly, or more than all that it leaves, noise included
 """
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from service.diagnosis.catalogue import TimeLocalEffect
 from service.diagnosis.fitting.fit import Fit
 from service.diagnosis.fitting.lack_of_fit import LackOfFit, lack_of_fit
 from service.diagnosis.observations.observations import Observations
 from service.diagnosis.selection.choice import EXPECTED, Choice, Place, place_of
+from service.recording.recording import Array
 
 EXPLAINED = 0.6
 """Share of a joint's excess residual that findings have to explain between them where they leave more than noise."""
@@ -23,6 +24,9 @@ TELLING = 3
 
 CROWDED = 3
 """Different effects at one joint beside which more orders than those are no physics: such a series fits anything."""
+
+FULL = 4
+"""Different effects at one joint beyond which nothing is looked for there."""
 
 
 def weak_likenesses(nominal: Fit, fit: Fit, choices: Sequence[Choice], observations: Observations) -> list[int]:
@@ -40,7 +44,7 @@ def weak_likenesses(nominal: Fit, fit: Fit, choices: Sequence[Choice], observati
         the rows that both were fitted to, their noise known from repetitions
     """
     before, after = (lack_of_fit(each, observations, pure_error=True) for each in (nominal, fit))
-    return _weak(choices, before, after)
+    return _weak(choices, before, after, nominal.joint_energies - fit.joint_energies)
 
 
 def proxies(
@@ -66,7 +70,8 @@ def proxies(
         return []
     before = lack_of_fit(nominal, observations, pure_error=pure_error)
     unexplained = {joint for joint, left in enumerate(after.significant) if left}
-    found = set(_weak(choices, before, after)) if pure_error else set()
+    explained = nominal.joint_energies - fit.joint_energies
+    found = set(_weak(choices, before, after, explained)) if pure_error else set()
     for place, choice in enumerate(choices):
         option, joints = choice.options[0], _joints(choice, before)
         doubtful = isinstance(option.candidate.effect, TimeLocalEffect) and joints & unexplained
@@ -75,14 +80,23 @@ def proxies(
     return sorted(found)
 
 
-def _weak(choices: Sequence[Choice], before: LackOfFit, after: LackOfFit) -> list[int]:
-    """Places of the choices at joints where most of what was missing `before` is left `after` them."""
+def _weak(choices: Sequence[Choice], before: LackOfFit, after: LackOfFit, explained: Array) -> list[int]:
+    """Places of the choices at joints where most of what was missing `before` is left `after` them.
+
+    One of several joints of which all together explain more elsewhere is there for that, whatever else one of them has.
+    """
     weak = {
         joint
         for joint, left in enumerate(after.significant)
         if left and after.excess[joint] > (1.0 - EXPLAINED) * before.excess[joint]
     }
-    return [place for place, choice in enumerate(choices) if _joints(choice, before) <= weak]
+
+    def is_weak(choice: Choice) -> bool:
+        touched = choice.options[0].candidate.effect.touched(len(before.significant))
+        there, elsewhere = (sum(explained[j] for j in touched if (j in weak) is own) for own in (True, False))
+        return _joints(choice, before) <= weak and there >= elsewhere
+
+    return [place for place, choice in enumerate(choices) if is_weak(choice)]
 
 
 def _joints(choice: Choice, before: LackOfFit) -> set[int]:
@@ -134,12 +148,25 @@ def endless(choices: Sequence[Choice]) -> set[Place]:
         all so far
     """
     orders = Counter(place_of(choice.options[0].candidate) for choice in choices)
-    effects = Counter(joint for effect, joint in orders if effect not in EXPECTED)
-    return {
-        (effect, joint)
-        for (effect, joint), count in orders.items()
-        if joint is not None and count >= TELLING and effects[joint] >= CROWDED
-    }
+    crowded = _joints_of(orders, CROWDED)
+    return {(effect, joint) for (effect, joint), count in orders.items() if count >= TELLING and joint in crowded}
+
+
+def full(choices: Sequence[Choice]) -> set[int]:
+    """Joints at which so many different effects were found that what is left there is of no catalogue.
+
+    Parameters
+    ----------
+    choices : sequence of Choice
+        all so far
+    """
+    return _joints_of({place_of(choice.options[0].candidate) for choice in choices}, FULL)
+
+
+def _joints_of(places: Iterable[Place], least: int) -> set[int]:
+    """Joints that have at least so many different effects."""
+    counts = Counter(joint for effect, joint in places if joint is not None and effect not in EXPECTED)
+    return {joint for joint, count in counts.items() if count >= least}
 
 
 def _left(fit: Fit, joints: set[int]) -> float:

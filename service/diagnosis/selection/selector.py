@@ -6,6 +6,8 @@ from dataclasses import replace
 from service.diagnosis.catalogue import Effect, TimeLocalEffect
 from service.diagnosis.computation.side_by_side import side_by_side
 from service.diagnosis.fitting.fit import Fit, Fitter
+from service.diagnosis.fitting.lack_of_fit import lack_of_fit
+from service.diagnosis.fitting.spilled_misfit import without_spilled
 from service.diagnosis.model.extended import ExtendedModel
 from service.diagnosis.model.term import Term
 from service.diagnosis.screening.screen import Candidate, Screen, model_signals
@@ -25,7 +27,7 @@ from service.diagnosis.selection.equivalence import EQUIVALENT, FORMULA_ERROR, e
 from service.diagnosis.selection.interleaved import interleaved_confirmation
 from service.diagnosis.selection.outside import where_held_out_shows
 from service.diagnosis.selection.position_bias import is_position_noise
-from service.diagnosis.selection.proxies import TELLING, endless, hopeless
+from service.diagnosis.selection.proxies import TELLING, endless, full, hopeless
 from service.diagnosis.selection.pruning import without_proxies, without_superfluous, without_weak_likenesses
 from service.diagnosis.selection.table import Table, fitted_option
 
@@ -134,7 +136,8 @@ class Selector:
         dropped = [each for each in grown if each not in choices]
         choices = [with_rivals(each, dropped) for each in choices]
         fit, choices = without_proxies(nominal, fit, choices, self.fitter, self.admission)
-        fit, choices = self._settled_without_superfluous(fit, choices)
+        if not self._is_of_no_catalogue(fit, choices):  # there, what may stand in for what says nothing
+            fit, choices = self._settled_without_superfluous(fit, choices)
         return Selection(nominal, fit, tuple(choices), tuple(rejected))
 
     def continued(self, selection: Selection, progress: Callable[[str], None]) -> Selection:
@@ -161,7 +164,7 @@ class Selector:
         names = [joint.name for joint in fit.model.structure.robot.joints]
         refused: list[Choice] = []
         rejected: list[Choice] = []
-        while len(choices) < MOST_TERMS:
+        while len(choices) < MOST_TERMS and not self._is_of_no_catalogue(fit, choices):
             choice = self._next(fit, choices, refused, self._spent(nominal, fit, choices))
             rejected += [each for each in refused if each not in rejected]
             if choice is None:
@@ -174,6 +177,16 @@ class Selector:
             refused = [each for each in refused if not _at_one_joint(each, choice)]
             progress(f"found {choice.options[0].candidate.effect.name(names)}")
         return fit, choices, rejected
+
+    def _is_of_no_catalogue(self, fit: Fit, choices: Sequence[Choice]) -> bool:
+        """Whether all that is left is at joints where as much was found as can be, or has spilled over from there."""
+        crowded = full(choices) if self.pure_error else set()
+        if not crowded:
+            return False
+        misfit = lack_of_fit(fit, self.screen.observations, pure_error=True)
+        left = without_spilled(misfit, fit, self.fitter, pure_error=True).significant
+        wrong = {joint for joint, told in enumerate(left) if told}
+        return bool(wrong) and wrong <= crowded
 
     def _spent(self, nominal: Fit, fit: Fit, choices: Sequence[Choice]) -> set[Place]:
         """Effects of which no more orders are worth a look."""
@@ -209,6 +222,7 @@ class Selector:
         level = self.admission.level
         inflation = self.admission.inflation(fit) if not self.pure_error else 1.0
         significant = [each for each in table.candidates if each.p_value(inflation) < level]
+        significant = [each for each in significant if self.admission.may_be_large_enough(each, fit)]
         if not significant:
             return None
         top = max(each.gain for each in significant)
