@@ -386,6 +386,13 @@ def test_what_gives_way_is_what_the_link_swings_on() -> None:
     )
 
 
+def test_shapes_that_their_own_size_contradicts_are_passed_over_where_there_are_others() -> None:
+    elastic = form("joint_elasticity", 2)
+    shapes = np.array([[10.0, 1e-4], [10.0, 0.0], [14.0, 2e-5]])
+    assert elastic.preferable(np.array([[1.6e-5], [3e-5], [1.9e-5]]), shapes).tolist() == [False, True, True]
+    assert elastic.preferable(np.array([[1.6e-5], [1e-7]]), shapes[::2]).tolist() == [True, True], "one must be told"
+
+
 @pytest.mark.parametrize("joint", range(SIGNALS.robot.joint_count))
 def test_torque_of_a_small_deflection_is_that_of_the_moved_link(joint: int) -> None:
     """Pinocchio's torque where the link is, less that where its encoder says, of an arm whose links are known."""

@@ -4,20 +4,22 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 
 from service.diagnosis.catalogue import Effect
+from service.diagnosis.catalogue.backlash import SpringyTeeth
 from service.diagnosis.catalogue.base_tilt import BaseTilt
 from service.diagnosis.catalogue.joint_elasticity import JointElasticity
 from service.diagnosis.catalogue.periodic_torque import Cogging, TorqueRipple
 from service.diagnosis.catalogue.presliding_hysteresis import PreslidingHysteresis
 from service.diagnosis.screening.screen import Candidate
 from service.diagnosis.selection.choice import Choice, Option
-from service.diagnosis.selection.farther import stands
+from service.diagnosis.selection.farther import explained, stands
 
 
 def chosen(effect: Effect) -> Choice:
     fit: Any = None
-    candidate = Candidate(effect, np.zeros(1), np.ones(1), 1.0, np.eye(1), True, 1.0, 1.0)
+    candidate = Candidate(effect, np.zeros(4), np.ones(1), 1.0, np.eye(1), True, 1.0, 1.0)
     return Choice((Option(candidate, fit, 1.0),), None, 0.0)
 
 
@@ -33,3 +35,14 @@ def test_so_many_that_they_are_no_physics_stand_together_only() -> None:
     effects = (Cogging(1), PreslidingHysteresis(1), TorqueRipple(1), JointElasticity(1))
     selection: Any = SimpleNamespace(choices=[chosen(each) for each in effects])
     assert stands(selection) == [(1, {(each.id, 1) for each in effects})]
+
+
+@pytest.mark.parametrize(("energy", "better"), [(92.0, False), (85.0, True)])
+def test_teeth_take_the_place_of_a_spring_where_they_explain_clearly_more(energy: float, better: bool) -> None:
+    """With next to no gap they are a spring on which the link swings, and a resonance fits some noise."""
+
+    def selected(effect: Effect, energy: float) -> Any:
+        return SimpleNamespace(choices=[chosen(effect)], fit=SimpleNamespace(energy=energy))
+
+    spring, teeth = selected(JointElasticity(1), 100.0), selected(SpringyTeeth(1), energy)
+    assert (explained(teeth) > explained(spring)) is better

@@ -49,6 +49,10 @@ DAMPING = 0.2
 """Damping ratio of teeth that touch, beside what they lose under load: where less is lost a link bounces on, but when
 it comes back hangs on everything that a recording does not show."""
 
+MORE_THAN_A_SPRING = 10.0
+"""What springy teeth have to explain more than plainer shapes, beside what tells two effects apart [noise variances]:
+together as much as an elastic joint's resonance."""
+
 SAME = 1.6
 """Factor between the gap that is crossed on springy teeth and the one that is found, up to which they are the same."""
 
@@ -287,6 +291,17 @@ class SpringyTeeth(Backlash):
             the arm
         """
         return ()
+
+    def reluctance(self, shapes: Array) -> Array:
+        """They have to be clearly better than a spring: with next to no gap they are one, with a resonance to choose.
+
+        Parameters
+        ----------
+        shapes : (g, 4) float64
+            gap that is crossed [rad or m], band of the load [Hz], compliance of the teeth [rad/Nm or m/N], their loss
+            [s/rad or s/m]
+        """
+        return np.full(len(shapes), MORE_THAN_A_SPRING)
 
     def is_consistent(self, coefficients: Array, shape: Array, *, alone: bool = False) -> bool:
         """Whether the gap that the link crosses is the one by which it moves.

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from service.diagnosis.catalogue.parameters import Coefficient, Quantity, Shape
 from service.diagnosis.catalogue.setting import Setting
@@ -189,6 +190,22 @@ class Effect(ABC):
             whether nothing else is known to be missing
         """
         return True
+
+    def preferable(self, coefficients: Array, shapes: Array) -> NDArray[np.bool_]:
+        """Shapes to choose among, (g,): those that belong together with their coefficients, or all where none does.
+
+        What explains most may be a shape that its own size contradicts: a resonance at which the data have something
+        else, on a spring that gives way by far less.
+
+        Parameters
+        ----------
+        coefficients : (g, c) float64
+            of every shape
+        shapes : (g, k) float64
+            values of the shape parameters
+        """
+        possible = [self.is_consistent(*each, alone=True) for each in zip(coefficients, shapes, strict=True)]
+        return np.array(possible) if any(possible) else np.ones(len(shapes), dtype=bool)
 
     def touched(self, joint_count: int) -> tuple[int, ...]:
         """Joints whose torque the effect changes: its own one, or all.

@@ -30,7 +30,10 @@ def refined(candidate: Candidate, fit: Fit, screen: Screen, signals: Sequence[Si
         of every piece under that model
     """
     kinds = refined_kinds(candidate, fit, screen, signals)
-    return max(kinds, key=lambda each: each.gain - candidate.effect.reluctance(each.shape[None])[0])
+    effect, shapes = candidate.effect, np.array([each.shape for each in kinds])
+    worth = np.array([each.gain for each in kinds]) - effect.reluctance(shapes)
+    preferable = effect.preferable(np.array([each.coefficients for each in kinds]), shapes)
+    return kinds[int(np.argmax(np.where(preferable, worth, -np.inf)))]
 
 
 def refined_kinds(candidate: Candidate, fit: Fit, screen: Screen, signals: Sequence[Signals]) -> list[Candidate]:
@@ -77,7 +80,7 @@ def best_of_shapes(
     """
     found = screen.at_shapes(effect, shapes, fit, signals)
     gains, coefficients = statistics(found, [each.positive for each in effect.coefficients])
-    best = int(np.argmax(gains))
+    best = int(np.argmax(np.where(effect.preferable(coefficients, shapes), gains, -np.inf)))
     return best, replace(
         candidate,
         effect=effect,

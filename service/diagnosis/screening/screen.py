@@ -222,7 +222,8 @@ class Screen:
         else:
             found = self._on_grid(place, effect, fit, signals)
         gains, coefficients = statistics(found, [each.positive for each in effect.coefficients])
-        best = int(np.argmax(gains - effect.reluctance(effect.grid)))
+        worth = np.where(effect.preferable(coefficients, effect.grid), gains - effect.reluctance(effect.grid), -np.inf)
+        best = int(np.argmax(worth))
         visible = (found.shares > INVISIBLE).all(axis=1)
         return Candidate(
             effect=effect,

@@ -42,7 +42,7 @@ def looked_farther(
         progress("look farther")
     for stand in chosen:
         instead = _in_place(stand, selection, screen, selector, progress)
-        if _explained(instead) > _explained(selection) + EQUIVALENT:
+        if explained(instead) > explained(selection) + EQUIVALENT:
             selection = instead
     left = _left(selection, selector)
     if not any(left):
@@ -115,7 +115,16 @@ def _in_place(
     return selection if found is cleared else selector.continued(found, progress)
 
 
-def _explained(selection: Selection) -> float:
-    """Score of all that was selected: what it explains, less what as many coefficients and shapes would of noise."""
+def explained(selection: Selection) -> float:
+    """Score of all that was selected: what it explains, less what as many coefficients and shapes would of noise.
+
+    Less also what some of these shapes have to explain before they are preferred to plainer ones.
+
+    Parameters
+    ----------
+    selection : Selection
+        what there is
+    """
     chosen = [choice.options[0].candidate for choice in selection.choices]
-    return -selection.fit.energy - sum(each.gain - each.score for each in chosen)
+    doubt = sum(float(each.effect.reluctance(each.shape[None])[0]) for each in chosen)
+    return -selection.fit.energy - sum(each.gain - each.score for each in chosen) - doubt

@@ -19,6 +19,9 @@ from service.recording.recording import Array
 EXPLAINED = 0.6
 """Share of a joint's excess residual that findings have to explain between them where they leave more than noise."""
 
+SPARED = 0.2
+"""Share of what is explained at all joints of a finding, up to which it is not there for what one of them leaves."""
+
 TELLING = 3
 """Orders of one periodic effect from which it shows whether more of them can ever explain as much."""
 
@@ -83,7 +86,7 @@ def proxies(
 def _weak(choices: Sequence[Choice], before: LackOfFit, after: LackOfFit, explained: Array) -> list[int]:
     """Places of the choices at joints where most of what was missing `before` is left `after` them.
 
-    One of several joints of which all together explain more elsewhere is there for that, whatever else one of them has.
+    One of several joints at which nearly all is explained elsewhere is there for that, whatever else one of them has.
     """
     weak = {
         joint
@@ -93,8 +96,8 @@ def _weak(choices: Sequence[Choice], before: LackOfFit, after: LackOfFit, explai
 
     def is_weak(choice: Choice) -> bool:
         touched = choice.options[0].candidate.effect.touched(len(before.significant))
-        there, elsewhere = (sum(explained[j] for j in touched if (j in weak) is own) for own in (True, False))
-        return _joints(choice, before) <= weak and there >= elsewhere
+        there = float(sum(explained[joint] for joint in weak.intersection(touched)))
+        return _joints(choice, before) <= weak and there >= SPARED * float(explained[list(touched)].sum())
 
     return [place for place, choice in enumerate(choices) if is_weak(choice)]
 
