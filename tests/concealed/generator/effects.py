@@ -205,6 +205,7 @@ def joint_elasticity(g: Ground, rng: np.random.Generator) -> Drawn:
         ("joint_elasticity",),
         ("rotor_inertia",),
         largest=0.02,
+        smallest=1e-7,
     )
 
 
