@@ -205,7 +205,7 @@ def joint_elasticity(g: Ground, rng: np.random.Generator) -> Drawn:
         ("joint_elasticity",),
         ("rotor_inertia",),
         largest=0.02,
-        smallest=1e-7,
+        smallest=1e-7,  # where none reaches s another effect is drawn; no file may state a stiffness of 1e9
     )
 
 
