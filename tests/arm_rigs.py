@@ -15,12 +15,12 @@ import pytest
 from numpy.typing import ArrayLike, NDArray
 
 from arms import paper_arm, paper_parameters
-from drivers import ArmState, Backend, ControlMode, DriveLimits, Setpoint, StopPolicy
-from service.robot.robot import FrictionCoefficients, FrictionShape, JointLimits, LinkInertia, Model, Robot
-from sim_backend.device import Injection
-from sim_backend.device.activity import COMMANDED
-from sim_backend.device.trace import read_trace
-from sim_backend.driver import RemoteSimulatedArm, SimulatedArm, start_device
+from tauscope.robot.robot import FrictionCoefficients, FrictionShape, JointLimits, LinkInertia, Model, Robot
+from tauscope_drivers import ArmState, Backend, ControlMode, DriveLimits, Setpoint, StopPolicy
+from tauscope_sim.device import Injection
+from tauscope_sim.device.activity import COMMANDED
+from tauscope_sim.device.trace import read_trace
+from tauscope_sim.driver import RemoteSimulatedArm, SimulatedArm, start_device
 
 Array = NDArray[np.float64]
 

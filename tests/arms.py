@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from service.robot.robot import Joint, JointType, LinkInertia, Placement, Robot, Segment
+from tauscope.robot.robot import Joint, JointType, LinkInertia, Placement, Robot, Segment
 
 Array = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from postgres import Postgres, program_folder, running_postgres
-from service.store.database import Database
+from tauscope.server.store.database.database import Database
 
 
 @pytest.fixture(scope="session")

@@ -8,9 +8,9 @@ from uuid import uuid4
 
 import can
 
-from drivers.canopen.configuration import DriveJoint
-from sim_backend.canopen_bus.axis import AxisMeasurement, AxisMode, AxisScale
-from sim_backend.canopen_bus.drive import EmulatedDrive
+from tauscope_drivers.canopen.configuration import DriveJoint
+from tauscope_sim.canopen_bus.axis import AxisMeasurement, AxisMode, AxisScale
+from tauscope_sim.canopen_bus.drive import EmulatedDrive
 
 GEAR = 50.0
 COUNTS_PER_TURN = 65536

@@ -6,9 +6,9 @@ from datetime import UTC, datetime, timedelta
 from functools import cache
 from typing import Any
 
-from service.identification import IdentificationDocument
-from service.store.database import Candidate
 from snapshots import SNAPSHOTS
+from tauscope.identification import IdentificationDocument
+from tauscope.server.history.model_judgement import Candidate
 
 NOON = datetime(2026, 11, 3, 12, 0, 0, tzinfo=UTC)
 

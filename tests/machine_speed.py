@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from service.robot import read_robot
-from sim_backend.examples import example_robot
-from sim_backend.plant import Plant
+from tauscope.robot import read_robot
+from tauscope_sim.examples import example_robot
+from tauscope_sim.plant import Plant
 
 QUICK_ENOUGH_S = 0.15e-3
 """Mean time of a step of the paper arm's physics with which drives at 250 Hz still answer in time [s].

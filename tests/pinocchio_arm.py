@@ -4,7 +4,7 @@ import numpy as np
 import pinocchio  # pyright: ignore[reportMissingImports]
 from numpy.typing import NDArray
 
-from service.robot.robot import JointType, Placement, Robot
+from tauscope.robot.robot import JointType, Placement, Robot
 
 Array = NDArray[np.float64]
 

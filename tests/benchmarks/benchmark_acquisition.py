@@ -14,14 +14,14 @@ from pathlib import Path
 import numpy as np
 
 TESTS = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(TESTS.parent), str(TESTS)]
+sys.path[:0] = [str(TESTS)]
 
-from acquisition.control_double import RealClock  # noqa: E402
-from acquisition.doubles import PointArm, point_robot, short_motion  # noqa: E402
-from service.acquisition import Connection, RunOptions, RunRecord, make_backend, run_trajectory  # noqa: E402
-from service.robot import Robot, read_robot  # noqa: E402
-from service.trajectory import FourierSegment, FourierSeries, Trajectory  # noqa: E402
-from sim_backend.examples import example_robot  # noqa: E402
+from runtime.control_double import RealClock  # noqa: E402
+from runtime.doubles import PointArm, point_robot, short_motion  # noqa: E402
+from tauscope.robot import Robot, read_robot  # noqa: E402
+from tauscope.runtime import Connection, RunOptions, RunRecord, make_backend, run_trajectory  # noqa: E402
+from tauscope.trajectory import FourierSegment, FourierSeries, Trajectory  # noqa: E402
+from tauscope_sim.examples import example_robot  # noqa: E402
 
 REAL_S = 10.0
 VIRTUAL_S = 30.0

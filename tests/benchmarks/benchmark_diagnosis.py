@@ -21,16 +21,16 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 TESTS = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(TESTS.parent), str(TESTS)]
+sys.path[:0] = [str(TESTS)]
 
 from concealed.generator.arms import NOISE_STD, arm_named, without_truth  # noqa: E402
 from concealed.generator.forward import Passage  # noqa: E402
 from concealed.generator.unknown import UNKNOWN  # noqa: E402
-from service.acquisition import RunOptions, make_backend, run_trajectory  # noqa: E402
-from service.diagnosis import diagnose, document  # noqa: E402
-from service.recording import Recording, read_recording, write_recording  # noqa: E402
-from service.robot import Robot  # noqa: E402
-from service.trajectory import FourierSegment, FourierSeries, Trajectory  # noqa: E402
+from tauscope.diagnosis import diagnose, document  # noqa: E402
+from tauscope.recording import Recording, read_recording, write_recording  # noqa: E402
+from tauscope.robot import Robot  # noqa: E402
+from tauscope.runtime import RunOptions, make_backend, run_trajectory  # noqa: E402
+from tauscope.trajectory import FourierSegment, FourierSeries, Trajectory  # noqa: E402
 
 ARM = "six"
 RATE_HZ = 500.0

@@ -27,16 +27,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 TESTS = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(TESTS.parent), str(TESTS)]
+sys.path[:0] = [str(TESTS)]
 
 from arms import panda_like, ur5_like  # noqa: E402
-from service.dynamics import base_parameters, inverse_dynamics  # noqa: E402
-from service.excitation import ExcitationOptions, design_excitation  # noqa: E402
-from service.excitation.information import ExcitationRegressor  # noqa: E402
-from service.robot import Joint, JointLimits, LinkInertia, Model, Placement, Robot, read_robot  # noqa: E402
-from service.trajectory.fourier_series import MotionSamples  # noqa: E402
-from sim_backend.examples import example_robot  # noqa: E402
-from sim_backend.motion import random_fourier_motion  # noqa: E402
+from tauscope.dynamics import base_parameters, inverse_dynamics  # noqa: E402
+from tauscope.excitation import ExcitationOptions, design_excitation  # noqa: E402
+from tauscope.excitation.information import ExcitationRegressor  # noqa: E402
+from tauscope.robot import Joint, JointLimits, LinkInertia, Model, Placement, Robot, read_robot  # noqa: E402
+from tauscope.trajectory.fourier_series import MotionSamples  # noqa: E402
+from tauscope_sim.examples import example_robot  # noqa: E402
+from tauscope_sim.motion import random_fourier_motion  # noqa: E402
 
 Array = NDArray[np.float64]
 

@@ -18,14 +18,14 @@ from multiprocessing import get_context
 from pathlib import Path
 
 TESTS = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(TESTS.parent), str(TESTS)]
+sys.path[:0] = [str(TESTS)]
 os.environ["PYTHONPATH"] = os.pathsep.join(sys.path[:2])  # the workers import what we do
 os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
 
-from jobs.paper_files import PAPER_ROBOT, write_recording  # noqa: E402
-from service.jobs.executors import ClusterExecutor  # noqa: E402
-from service.jobs.fleet import FleetEntry, FleetResult, analyse_fleet  # noqa: E402
-from service.jobs.fleet_work import identify_robot  # noqa: E402
+from server.queue.paper_files import PAPER_ROBOT, write_recording  # noqa: E402
+from tauscope.server.queue.executors import ClusterExecutor  # noqa: E402
+from tauscope.server.queue.fleet import FleetEntry, FleetResult, analyse_fleet  # noqa: E402
+from tauscope.server.queue.fleet_work import identify_robot  # noqa: E402
 
 
 def write_one(folder: Path, seed: int) -> Path:

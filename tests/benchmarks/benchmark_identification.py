@@ -26,16 +26,16 @@ from statistics import median
 import numpy as np
 
 TESTS = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(TESTS.parent), str(TESTS)]
+sys.path[:0] = [str(TESTS)]
 
 from arms import ur5_like  # noqa: E402
 from pinocchio_arm import pinocchio_model  # noqa: E402
-from service.identification import identify  # noqa: E402
-from service.recording import read_recording  # noqa: E402
-from service.robot import FrictionShape, Joint, LinkInertia, Model, Robot  # noqa: E402
-from sim_backend.motion import FourierMotion  # noqa: E402
-from sim_backend.recording import simulate_recording  # noqa: E402
-from sim_backend.recording_csv import write_recording_csv  # noqa: E402
+from tauscope.identification import identify  # noqa: E402
+from tauscope.recording import read_recording  # noqa: E402
+from tauscope.robot import FrictionShape, Joint, LinkInertia, Model, Robot  # noqa: E402
+from tauscope_sim.motion import FourierMotion  # noqa: E402
+from tauscope_sim.recording import simulate_recording  # noqa: E402
+from tauscope_sim.recording_csv import write_recording_csv  # noqa: E402
 
 RATE_HZ = 500.0
 NOISE_STD = 0.3

@@ -20,14 +20,14 @@ from pathlib import Path
 from typing import Any
 
 TESTS = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(TESTS.parent), str(TESTS)]
+sys.path[:0] = [str(TESTS)]
 
 import httpx2  # noqa: E402
 import numpy as np  # noqa: E402
 
-from api.serving import served  # noqa: E402
-from jobs.paper_files import PAPER_ROBOT  # noqa: E402
-from service.trajectory import MoveSegment, Trajectory, trajectory_json  # noqa: E402
+from server.http.serving import served  # noqa: E402
+from server.queue.paper_files import PAPER_ROBOT  # noqa: E402
+from tauscope.trajectory import MoveSegment, Trajectory, trajectory_json  # noqa: E402
 
 RUNS = "/api/v1/runs"
 START = [0.0, 0.6, 0.6]

@@ -18,13 +18,13 @@ import numpy as np
 import pinocchio  # pyright: ignore[reportMissingImports]
 
 TESTS = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(TESTS.parent), str(TESTS)]
+sys.path[:0] = [str(TESTS)]
 
 from arms import panda_like, random_states, ur5_like  # noqa: E402
 from pinocchio_arm import pinocchio_model, pinocchio_regressor  # noqa: E402
-from service.dynamics.base_parameters import base_parameters  # noqa: E402
-from service.dynamics.regressor import torque_regressor  # noqa: E402
-from service.robot.robot import Robot  # noqa: E402
+from tauscope.dynamics.base_parameters import base_parameters  # noqa: E402
+from tauscope.dynamics.regressor import torque_regressor  # noqa: E402
+from tauscope.robot.robot import Robot  # noqa: E402
 
 ARMS = {
     "6 joints, right angles exact": ur5_like(),

@@ -14,16 +14,16 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 TESTS = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(TESTS.parent), str(TESTS)]
+sys.path[:0] = [str(TESTS)]
 
 import httpx2  # noqa: E402
 import numpy as np  # noqa: E402
 
-from api.serving import served  # noqa: E402
 from benchmarks.benchmark_readers import begin, followed, readers  # noqa: E402
-from service.acquisition import RunState  # noqa: E402
-from service.jobs import RunWorkspace  # noqa: E402
-from service.recording.journal_reading import read_journal  # noqa: E402
+from server.http.serving import served  # noqa: E402
+from tauscope.recording.journal_reading import read_journal  # noqa: E402
+from tauscope.runtime import RunState  # noqa: E402
+from tauscope.server.control.run_workspace import RunWorkspace  # noqa: E402
 
 MOTION_S = 60.0
 """Longer than any run is left to move."""

@@ -3,8 +3,8 @@
 import json
 from typing import Any
 
-from api.serving import Served
-from jobs.paper_files import PAPER_ROBOT
+from server.http.serving import Served
+from server.queue.paper_files import PAPER_ROBOT
 
 ROBOT = "paper-arm"
 SHORT = {

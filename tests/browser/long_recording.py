@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 from playwright.sync_api import Browser, Page, expect
 
-from api.serving import Served
 from browser.conftest import PATIENCE_MS
+from server.http.serving import Served
 
 SAMPLES, JOINTS = 100_000, 7
 PEAK = 60.0

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from api.serving import Served
 from browser.campaign import ROBOT, make_campaign, views_of
 from browser.conftest import Visit
+from server.http.serving import Served
 
 pytestmark = [pytest.mark.system, pytest.mark.slow, pytest.mark.timeout(1200)]
 

@@ -3,9 +3,9 @@
 import pytest
 from playwright.sync_api import expect
 
-from api.conftest import RECORDINGS
-from api.serving import Served
 from browser.conftest import Visit
+from server.http.conftest import RECORDINGS
+from server.http.serving import Served
 
 pytestmark = [pytest.mark.system, pytest.mark.slow]
 

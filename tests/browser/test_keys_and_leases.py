@@ -8,15 +8,15 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
-from api.access.keyed import make_keys
-from api.serving import Served, served
 from browser.conftest import Visit
 from browser.test_moving_arm import begin, state
-from jobs.paper_files import PAPER_ROBOT
 from patience import eventually
-from service.api.access.keys import KeyFile
-from service.api.access.scopes import Scope
-from service.client import ApiError, Client, HeldLease
+from server.auth.keyed import make_keys
+from server.http.serving import Served, served
+from server.queue.paper_files import PAPER_ROBOT
+from tauscope.client import ApiError, Client, HeldLease
+from tauscope.server.auth.keys import KeyFile
+from tauscope.server.auth.scopes import Scope
 
 pytestmark = [pytest.mark.system, pytest.mark.slow, pytest.mark.timeout(1200)]
 

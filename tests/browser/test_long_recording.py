@@ -5,8 +5,8 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Browser, Page
 
-from api.serving import served
 from browser.long_recording import JOINTS, PEAK, SAMPLES, ZOOM, open_long_recording, write_long_recording
+from server.http.serving import served
 
 pytestmark = [pytest.mark.system, pytest.mark.slow]
 

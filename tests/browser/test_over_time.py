@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import expect
 
-from api.serving import Served, served
 from browser.conftest import Visit
 from browser.wear import NIGHTLY, ROBOT, make_history, set_up_schedule
+from server.http.serving import Served, served
 
 pytestmark = [pytest.mark.system, pytest.mark.slow, pytest.mark.timeout(1200)]
 

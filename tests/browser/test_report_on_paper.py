@@ -11,10 +11,10 @@ from playwright.sync_api import Browser
 from diagnosis.diagnosed_arm import recordings
 from diagnosis.test_diagnosis_of_simulated_arms import spring
 from identification.simulated import paper_robot
-from service.diagnosis import diagnose, document
-from service.diagnosis.next_experiment import plan_experiment
-from service.report.diagnosis_report import diagnosis_report
-from service.report.provenance import InputFile, Provenance
+from tauscope.diagnosis import diagnose, document
+from tauscope.diagnosis.next_experiment import plan_experiment
+from tauscope.report.diagnosis_report import diagnosis_report
+from tauscope.report.provenance import InputFile, Provenance
 
 pytestmark = [pytest.mark.system, pytest.mark.slow]
 

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import expect
 
-from api.serving import Served
 from browser.conftest import Visit
-from jobs.paper_files import PAPER_ROBOT
+from server.http.serving import Served
+from server.queue.paper_files import PAPER_ROBOT
 
 pytestmark = [pytest.mark.system, pytest.mark.slow, pytest.mark.timeout(1200)]
 

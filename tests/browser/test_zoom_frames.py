@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser
 
-from api.serving import served
 from browser.long_recording import JOINTS, SAMPLES, ZOOM, open_long_recording, write_long_recording
+from server.http.serving import served
 
 pytestmark = pytest.mark.benchmark
 

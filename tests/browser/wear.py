@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from api.serving import Served, served
-from jobs.paper_files import PAPER_ROBOT
-from service.robot import read_robot
-from sim_backend.motion import random_fourier_motion
-from sim_backend.recording import simulate_recording
-from sim_backend.recording_csv import write_recording_csv
+from server.http.serving import Served, served
+from server.queue.paper_files import PAPER_ROBOT
+from tauscope.robot import read_robot
+from tauscope_sim.motion import random_fourier_motion
+from tauscope_sim.recording import simulate_recording
+from tauscope_sim.recording_csv import write_recording_csv
 
 ROBOT = "paper-arm"
 VISCOUS = (0.5, 0.75, 1.0)

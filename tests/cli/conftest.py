@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from cli.simulated_files import SimulatedFiles, write_files
-from service.cli import main
+from tauscope.cli import main
 
 
 @dataclass(frozen=True)

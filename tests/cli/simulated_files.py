@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
-from service.cli.demo import robot_text_without_model
-from service.robot import Robot, read_robot
-from sim_backend.examples import example_robot
-from sim_backend.motion import random_fourier_motion
-from sim_backend.recording import simulate_recording
-from sim_backend.recording_csv import write_recording_csv
+from tauscope.cli.demo import robot_text_without_model
+from tauscope.robot import Robot, read_robot
+from tauscope_sim.examples import example_robot
+from tauscope_sim.motion import random_fourier_motion
+from tauscope_sim.recording import simulate_recording
+from tauscope_sim.recording_csv import write_recording_csv
 
 NOISE_STD = (0.05, 0.03, 0.07)
 

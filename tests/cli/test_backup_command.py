@@ -3,11 +3,11 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from api.conftest import connected
 from cli.conftest import Ended
-from jobs.executors import InlineExecutor
-from service.api import Settings, create_app
+from server.http.conftest import connected
+from server.queue.executors import InlineExecutor
 from snapshots import SNAPSHOTS, unpacked
+from tauscope.server.http import Settings, create_app
 
 Run = Callable[..., Ended]
 

@@ -8,9 +8,9 @@ import pytest
 
 from cli.conftest import Ended
 from cli.simulated_files import SimulatedFiles, record
-from service.recording import read_recording
-from service.robot import read_robot
-from sim_backend.examples import example_robot
+from tauscope.recording import read_recording
+from tauscope.robot import read_robot
+from tauscope_sim.examples import example_robot
 
 Run = Callable[..., Ended]
 

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from cli.conftest import Ended
-from service.cli import demo_command
-from service.cli.demo import (
+from tauscope.cli import demo_command
+from tauscope.cli.demo import (
     FILES,
     HELD_OUT,
     HELD_OUT_TRAJECTORY,
@@ -28,13 +28,13 @@ from service.cli.demo import (
     TRAIN_TRAJECTORY,
     robot_text_without_model,
 )
-from service.cli.demo_folder import MARK, prepare_folder
-from service.cli.demo_page import DATA, PORT, PageShown, leave_page
-from service.errors import ExportError, StoreError
-from service.recording import read_recording
-from service.robot import read_robot
-from service.trajectory import read_trajectory
-from sim_backend.examples import example_robot
+from tauscope.cli.demo_folder import MARK, prepare_folder
+from tauscope.cli.demo_page import DATA, PORT, PageShown, leave_page
+from tauscope.errors import ExportError, StoreError
+from tauscope.recording import read_recording
+from tauscope.robot import read_robot
+from tauscope.trajectory import read_trajectory
+from tauscope_sim.examples import example_robot
 
 Run = Callable[..., Ended]
 
@@ -47,7 +47,7 @@ def in_whole_demo(test: Callable[..., None]) -> Callable[..., None]:
 def demo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """The demo's folder and what it printed, run as a program of its own."""
     folder = tmp_path_factory.mktemp("demo") / "out"
-    command = [sys.executable, "-m", "service.cli", "demo", "--no-page", "--out", str(folder)]
+    command = [sys.executable, "-m", "tauscope.cli", "demo", "--no-page", "--out", str(folder)]
     ended = subprocess.run(command, check=False, capture_output=True, text=True, timeout=800)
     assert (ended.returncode, ended.stderr) == (0, "")
     return folder, ended.stdout
@@ -66,7 +66,7 @@ def test_it_ends_with_a_running_page_unless_none_is_wanted(
     monkeypatch: pytest.MonkeyPatch, is_terminal: bool, asked: bool | None, shown: PageShown
 ) -> None:
     said: list[PageShown] = []
-    monkeypatch.setattr("service.cli.demo.run_demo", lambda _, page: said.append(page))
+    monkeypatch.setattr("tauscope.cli.demo.run_demo", lambda _, page: said.append(page))
     monkeypatch.setattr(sys, "stdout", Mock(isatty=lambda: is_terminal))
     demo_command.demo(Path("out"), asked)
     assert said == [shown]
@@ -75,7 +75,7 @@ def test_it_ends_with_a_running_page_unless_none_is_wanted(
 @in_whole_demo
 def test_the_page_has_the_finished_campaign_at_another_port_where_its_own_is_taken(demo: tuple[Path, str]) -> None:
     folder = str(demo[0])
-    code = f"from pathlib import Path; from service.cli.demo_page import show_page; show_page(Path({folder!r}))"
+    code = f"from pathlib import Path; from tauscope.cli.demo_page import show_page; show_page(Path({folder!r}))"
     with port_taken(PORT), subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as service:
         assert service.stdout is not None
         address = service.stdout.readline().split()[2].rstrip(",")

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
-import service.cli.identify_run
+import tauscope.cli.identify_run
 from cli.conftest import Ended
 from cli.simulated_files import SimulatedFiles
-from service.cli import main
-from service.cli.program import ExitStatus
+from tauscope.cli import main
+from tauscope.cli.program import ExitStatus
 
 Run = Callable[..., Ended]
-PROGRAM = [sys.executable, "-m", "service.cli"]
+PROGRAM = [sys.executable, "-m", "tauscope.cli"]
 
 
 WRONG_USAGE = {
@@ -127,7 +127,7 @@ def test_a_bug_is_one_line_and_1(run: Run, files: SimulatedFiles, monkeypatch: p
     def fail(*_: object) -> None:
         raise KeyError("two\nlines")
 
-    monkeypatch.setattr(service.cli.identify_run, "identify", fail)
+    monkeypatch.setattr(tauscope.cli.identify_run, "identify", fail)
     ended = run("identify", files.robot, files.train[0])
     assert ended.status == 1
     assert len(ended.err.splitlines()) == 1
@@ -146,7 +146,7 @@ def test_interruption_is_130(files: SimulatedFiles, monkeypatch: pytest.MonkeyPa
     def interrupt(*_: object) -> None:
         signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(service.cli.identify_run, "identify", interrupt)
+    monkeypatch.setattr(tauscope.cli.identify_run, "identify", interrupt)
     before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a server tested earlier may have taken it
     try:
         status = main(["identify", str(files.robot), str(files.train[0])])
@@ -188,7 +188,7 @@ def test_a_reader_that_goes_away_is_no_bug(files: SimulatedFiles) -> None:
 
 def test_help_loads_nothing_that_computes() -> None:
     slow = {"numpy", "matplotlib", "rich.table", "mujoco", "fastapi"}
-    code = f"import sys; from service.cli import main; main(['--help']); print(sorted(set(sys.modules) & {slow}))"
+    code = f"import sys; from tauscope.cli import main; main(['--help']); print(sorted(set(sys.modules) & {slow}))"
     ended = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
     assert ended.stdout.splitlines()[-1] == "[]"
 

@@ -12,8 +12,8 @@ import typer
 
 from cli.conftest import Ended
 from cli.simulated_files import NOISE_STD, SimulatedFiles
-from service.cli.identify_command import parse_cutoff
-from service.robot import read_robot
+from tauscope.cli.identify_command import parse_cutoff
+from tauscope.robot import read_robot
 
 Run = Callable[..., Ended]
 

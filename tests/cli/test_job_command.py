@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from api.conftest import connected
 from cli.conftest import Ended
-from jobs.executors import InlineExecutor
-from service.api import Settings, create_app
+from server.http.conftest import connected
+from server.queue.executors import InlineExecutor
 from snapshots import SNAPSHOTS, unpacked
+from tauscope.server.http import Settings, create_app
 
 Run = Callable[..., Ended]
 
@@ -34,8 +34,8 @@ def data(tmp_path: Path) -> Path:
 def done_here(monkeypatch: pytest.MonkeyPatch) -> None:
     """Work is done in this process: what is tested here are not the workers."""
     for name in ("WorkerPool", "open_executor"):
-        monkeypatch.setattr(f"service.api.opening.{name}", lambda _: InlineExecutor())
-    monkeypatch.setattr("service.cli.job_run.POLL_S", 0.02)
+        monkeypatch.setattr(f"tauscope.server.http.assembly.{name}", lambda _: InlineExecutor())
+    monkeypatch.setattr("tauscope.cli.job_run.POLL_S", 0.02)
 
 
 @pytest.mark.usefixtures("done_here")
@@ -76,7 +76,7 @@ def test_a_service_that_is_there_does_it(run: Run, data: Path) -> None:
 
 @pytest.mark.usefixtures("done_here")
 def test_a_service_that_does_not_take_it_on(run: Run, data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("service.cli.job_run.PATIENCE_S", 0.1)
+    monkeypatch.setattr("tauscope.cli.job_run.PATIENCE_S", 0.1)
     with connected(create_app(Settings(data_folder=data, fires_schedules=False), InlineExecutor())):
         ended = run("job", "run", "nightly", "--data", data)
     assert ended.status == 1

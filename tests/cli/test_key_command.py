@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from service.api.access.keys import KeyFile, matching_key
-from service.cli.program import main
+from tauscope.cli.program import main
+from tauscope.server.auth.keys import KeyFile, matching_key
 
 
 def test_a_key_from_its_making_to_its_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -8,8 +8,11 @@ import pytest
 
 from cli.conftest import Ended
 from identified import NOON, candidate, identified
-from service.store import FolderLock
-from service.store.database import FILE_NAME, Database, Index, ItemFacts, ModelHistory
+from tauscope.server.history.model_history import ModelHistory
+from tauscope.server.store.database.database import FILE_NAME, Database
+from tauscope.server.store.database.facts import ItemMetadata
+from tauscope.server.store.database.index import Index
+from tauscope.server.store.folder_lock import FolderLock
 
 Run = Callable[..., Ended]
 
@@ -20,7 +23,7 @@ def data(tmp_path: Path) -> Path:
     database = Database(tmp_path / FILE_NAME)
     index = Index(database, "here")
     index.register("data", NOON)
-    index.put(ItemFacts("run", "20251103T110000Z-00000002", "finished", True, "9", NOON, robot="arm"))
+    index.put(ItemMetadata("run", "20251103T110000Z-00000002", "finished", True, "9", NOON, robot="arm"))
     history = ModelHistory(database)
     for day, viscous in ((1, 0.5), (22, 0.6), (43, 0.7)):
         given = candidate(day, identified({"viscous": viscous}, friction__0__std__viscous=0.01))

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 import typer
 
-from service.cli.output_files import STANDARD_OUTPUT, require_distinct, require_free, write_file
-from service.errors import ExportError
+from tauscope.cli.output_files import STANDARD_OUTPUT, require_distinct, require_free, write_file
+from tauscope.errors import ExportError
 
 
 def test_a_file_is_replaced_as_a_whole(tmp_path: Path) -> None:

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from cli.conftest import Ended
-from service.cli.prove_command import become_trials
-from service.errors import NotFoundError
+from tauscope.cli.prove_command import become_trials
+from tauscope.errors import NotFoundError
 
 Run = Callable[..., Ended]
 
@@ -30,7 +30,9 @@ def test_the_trials_run_in_its_place_and_are_found(tmp_path: Path) -> None:
         "print(json.dumps([sys.argv[1:], os.environ['PYTHONPATH'], os.getpid()]))\n"
         "raise SystemExit(3)\n"
     )
-    call = f"from service.cli.prove_command import *; become_trials(Path({str(tmp_path)!r}), ['--full', '--jobs', '2'])"
+    call = (
+        f"from tauscope.cli.prove_command import *; become_trials(Path({str(tmp_path)!r}), ['--full', '--jobs', '2'])"
+    )
     with subprocess.Popen([sys.executable, "-c", call], stdout=subprocess.PIPE, text=True) as process:
         told, _ = process.communicate()
     assert process.returncode == 3
@@ -43,6 +45,6 @@ def test_the_trials_run_in_its_place_and_are_found(tmp_path: Path) -> None:
 def test_its_options_reach_the_trials(run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     called: list[list[str]] = []
 
-    monkeypatch.setattr("service.cli.prove_command.become_trials", lambda repository, words: called.append(words))
+    monkeypatch.setattr("tauscope.cli.prove_command.become_trials", lambda repository, words: called.append(words))
     assert run("prove", "--full", "--first-seed", "7", "--out", tmp_path, "--page", tmp_path / "p.md").status == 0
     assert called == [["--out", str(tmp_path), "--first-seed", "7", "--full", "--page", str(tmp_path / "p.md")]]

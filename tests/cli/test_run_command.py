@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from cli.conftest import Ended
-from jobs.paper_files import PAPER_ROBOT
-from jobs.waiting import wait_until
-from service.recording import read_recording
-from service.trajectory import MoveSegment, Trajectory, write_trajectory
+from server.queue.paper_files import PAPER_ROBOT
+from server.queue.waiting import wait_until
 from shared_data import REPOSITORY
+from tauscope.recording import read_recording
+from tauscope.trajectory import MoveSegment, Trajectory, write_trajectory
 
 Run = Callable[..., Ended]
 
@@ -113,7 +113,7 @@ def test_what_is_refused(
 def test_ctrl_c_stops_the_arm_and_keeps_what_was_recorded(tmp_path: Path) -> None:
     long = motion(tmp_path / "long.json", 600.0)
     out = tmp_path / "out.csv"
-    command = [sys.executable, "-m", "service.cli", "run", PAPER_ROBOT, "--trajectory", long, "--out", out]
+    command = [sys.executable, "-m", "tauscope.cli", "run", PAPER_ROBOT, "--trajectory", long, "--out", out]
     with subprocess.Popen(
         [str(word) for word in [*command, "--rate", "200", START]],
         cwd=REPOSITORY,

@@ -5,12 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from api.conftest import connected
 from cli.conftest import Ended
-from jobs.executors import InlineExecutor
-from service.api import Settings, create_app
-from service.store import RECORDINGS, FolderLock, RecordingStore, item_stores
+from server.http.conftest import connected
+from server.queue.executors import InlineExecutor
 from snapshots import SNAPSHOTS, unpacked
+from tauscope.server.http import Settings, create_app
+from tauscope.server.store.folder_lock import FolderLock
+from tauscope.server.store.layout import RECORDINGS, item_stores
+from tauscope.server.store.recordings import RecordingStore
 
 Run = Callable[..., Ended]
 

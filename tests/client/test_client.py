@@ -6,19 +6,19 @@ from pathlib import Path
 
 import pytest
 
-from api.access.keyed import make_keys
-from api.contract.running import running
-from api.motions import ROBOT, ROBOT_FILE, move_document
-from jobs.controls import HandControls
-from jobs.executors import InlineExecutor
-from jobs.waiting import wait_until
-from service.acquisition import RunState
-from service.api import Settings, create_app
-from service.api.access.scopes import Scope
-from service.client import ApiError, Client, HeldLease
-from service.client.client import ENDS
-from service.client.transport import Transport, form_content
-from service.jobs import JobState
+from server.auth.keyed import make_keys
+from server.http.contract.running import running
+from server.http.motions import ROBOT, ROBOT_FILE, move_document
+from server.queue.controls import HandControls
+from server.queue.executors import InlineExecutor
+from server.queue.waiting import wait_until
+from tauscope.client import ApiError, Client, HeldLease
+from tauscope.client.client import ENDS
+from tauscope.client.transport import Transport, form_content
+from tauscope.runtime import RunState
+from tauscope.server.auth.scopes import Scope
+from tauscope.server.http import Settings, create_app
+from tauscope.server.queue.states import JobState
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import pytest
 
 from concealed import sets
 from concealed.generator.case import ARMS, SERIES, drawn
-from service.cli import prove_command
+from tauscope.cli import prove_command
 
 SOUND = [series for series, told in SERIES.items() if not told.count]
 

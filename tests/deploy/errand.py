@@ -7,8 +7,8 @@ import sys
 from pathlib import Path
 from urllib.request import urlopen
 
-from service.api.identifications.models import IdentificationAnswer
-from service.client import Client
+from tauscope.client import Client
+from tauscope.server.http.identifications.models import IdentificationAnswer
 
 FILES = Path("/errand")
 PAGES = ("", "docs", "docs/errors/recording", "docs/how-to/let-others-in", "healthz", "readyz")

@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 from ruamel.yaml import YAML
 
-from service.api.settings import Settings
-from service.cli.program import main
 from shared_data import REPOSITORY
+from tauscope.cli.program import main
+from tauscope.server.http.settings import Settings
 
 DEPLOY = REPOSITORY / "deploy"
 CONTAINER = DEPLOY / "container"
@@ -120,7 +120,7 @@ def test_the_program_understands_how_it_is_started(
     command: list[str], data_folder: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seen: list[Settings] = []
-    monkeypatch.setattr("service.cli.serving.serve", lambda settings, _: seen.append(settings))
+    monkeypatch.setattr("tauscope.cli.serving.serve", lambda settings, _: seen.append(settings))
     program, *words = command
     assert program == "tauscope"
     assert main(words) == 0

@@ -16,10 +16,10 @@ import pytest
 from ruamel.yaml import YAML
 
 from deploy.containers import Podman, absent, as_composed, podman
-from jobs.paper_files import PAPER_ROBOT, write_recording
 from patience import eventually
-from service.trajectory import MoveSegment, Trajectory, trajectory_json
+from server.queue.paper_files import PAPER_ROBOT, write_recording
 from shared_data import REPOSITORY
+from tauscope.trajectory import MoveSegment, Trajectory, trajectory_json
 
 DEPLOY = REPOSITORY / "deploy"
 CONTAINER = DEPLOY / "container"

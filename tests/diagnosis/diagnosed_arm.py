@@ -6,8 +6,8 @@ from functools import cache
 import numpy as np
 
 from identification.simulated import PAPER_NOISE, Array, SimulatedArm, paper_robot, simulate
-from service.recording import Recording
-from service.robot import FrictionCoefficients
+from tauscope.recording import Recording
+from tauscope.robot import FrictionCoefficients
 
 EffectTorque = Callable[[SimulatedArm, Array], Array]
 """From the exact motion and its rigid-body torque (N, n) to the effect's torque (N, n)."""

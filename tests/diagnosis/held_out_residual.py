@@ -4,13 +4,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from service.diagnosis import Diagnosis
-from service.diagnosis.model.extended import ExtendedModel
-from service.diagnosis.model.residual import residual_rows
-from service.diagnosis.observations.observations import Observations
-from service.recording import Recording
-from service.recording.conditioning import Conditioner
-from service.recording.recording import Array
+from tauscope.diagnosis import Diagnosis
+from tauscope.diagnosis.model.extended import ExtendedModel
+from tauscope.diagnosis.model.residual import residual_rows
+from tauscope.diagnosis.observations.observations import Observations
+from tauscope.recording import Recording
+from tauscope.recording.conditioning import Conditioner
+from tauscope.recording.recording import Array
 
 
 def squares(model: ExtendedModel, observations: Observations) -> tuple[Array, Array]:

@@ -6,8 +6,8 @@ import numpy as np
 
 from diagnosis.diagnosed_arm import POSITION_NOISE, motions
 from identification.simulated import PAPER_NOISE, Array, SimulatedArm, paper_robot, simulate
-from service.recording import Recording
-from service.robot import LinkInertia, Robot
+from tauscope.recording import Recording
+from tauscope.robot import LinkInertia, Robot
 
 
 def carrying(robot: Robot, mass: float, place: Array) -> Robot:

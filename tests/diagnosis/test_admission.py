@@ -6,7 +6,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from service.diagnosis.selection.admission import Admission
+from tauscope.diagnosis.selection.admission import Admission
 
 
 @pytest.mark.parametrize(("gain", "pure_error", "fitted"), [(0.9, False, False), (1.1, False, True), (0.9, True, True)])

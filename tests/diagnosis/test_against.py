@@ -8,11 +8,11 @@ import pytest
 
 from diagnosis.loaded_arm import carrying, exact_motion, noisy, torque_of_load
 from identification.simulated import paper_robot, simulate
-from service.diagnosis import Diagnosis, DiagnosisDocument, against_model, against_simulation, diagnose, document
-from service.errors import IdentificationError
-from service.identification import Options
-from service.recording import Recording
-from service.robot import FrictionCoefficients, Model, Robot
+from tauscope.diagnosis import Diagnosis, DiagnosisDocument, against_model, against_simulation, diagnose, document
+from tauscope.errors import IdentificationError
+from tauscope.identification import Options
+from tauscope.recording import Recording
+from tauscope.robot import FrictionCoefficients, Model, Robot
 
 SEEDS = (1, 2, 3)
 MASS, PLACE = 0.3, np.array([0.05, 0.02, 0.0])

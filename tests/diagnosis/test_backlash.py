@@ -9,15 +9,9 @@ from scipy.integrate import solve_ivp
 from concealed.generator.concealment import Concealed
 from concealed.generator.trial import recorded_trial
 from diagnosis.test_effect_columns import setting
-from service.diagnosis import diagnose, document
-from service.diagnosis.catalogue.backlash import (
-    DAMPING,
-    Backlash,
-    SpringyTeeth,
-    place_between_springs,
-    place_between_teeth,
-)
-from service.diagnosis.catalogue.deflection import FIRST_ORDER
+from tauscope.diagnosis import diagnose, document
+from tauscope.effects.backlash import DAMPING, Backlash, SpringyTeeth, place_between_springs, place_between_teeth
+from tauscope.effects.deflection import FIRST_ORDER
 
 RATE = 1000.0
 TIME = np.arange(4000) / RATE

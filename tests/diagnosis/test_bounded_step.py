@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
-from service.diagnosis.fitting.bounded_step import bounded_step
+from tauscope.diagnosis.fitting.bounded_step import bounded_step
 
 PARAMETERS, CURVED = 6, np.array([2, 4, 5])
 

@@ -2,8 +2,8 @@
 
 import threading
 
-from service.diagnosis.computation.last_few import LastFew
-from service.diagnosis.computation.side_by_side import THREADS, side_by_side
+from tauscope.effects.last_few import LastFew
+from tauscope.effects.side_by_side import THREADS, side_by_side
 
 WAIT_S = 30.0
 

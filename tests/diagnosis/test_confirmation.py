@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from service.diagnosis.fitting.prediction import log_likelihood
-from service.diagnosis.fitting.projection import JointColumns
-from service.diagnosis.selection.confirmation import Confirmation, likeness
-from service.recording.recording import Array
+from tauscope.diagnosis.fitting.prediction import log_likelihood
+from tauscope.diagnosis.fitting.projection import JointColumns
+from tauscope.diagnosis.selection.confirmation import Confirmation, likeness
+from tauscope.recording.recording import Array
 
 
 @pytest.mark.parametrize(

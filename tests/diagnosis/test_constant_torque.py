@@ -7,8 +7,8 @@ import pytest
 
 from diagnosis.diagnosed_arm import EffectTorque, at_joint, recordings
 from identification.simulated import Array, SimulatedArm, paper_robot
-from service.diagnosis import diagnose, document
-from service.robot import FrictionCoefficients, Robot
+from tauscope.diagnosis import diagnose, document
+from tauscope.robot import FrictionCoefficients, Robot
 
 
 def stating_friction() -> Robot:

@@ -10,18 +10,18 @@ from typer.testing import CliRunner
 
 from diagnosis.diagnosed_arm import recordings
 from diagnosis.test_diagnosis_of_simulated_arms import spring
-from service.cli.diagnose_command import diagnose
-from service.cli.values import SeveralValuesCommand
-from service.cli.verbs import add_verb
-from service.diagnosis import DiagnosisDocument
-from service.diagnosis.extended_model import read_model
-from service.errors import ExcitationError
-from service.excitation import require_within_limits
-from service.recording import Recording
-from service.robot import read_robot
-from service.trajectory import motion_limits, read_trajectory
-from sim_backend.examples import example_robot
-from sim_backend.scenario_file import read_scenario
+from tauscope.cli.diagnose_command import diagnose
+from tauscope.cli.values import SeveralValuesCommand
+from tauscope.cli.verbs import add_verb
+from tauscope.diagnosis import DiagnosisDocument
+from tauscope.diagnosis.extended_model.saved import read_model
+from tauscope.errors import ExcitationError
+from tauscope.excitation import require_within_limits
+from tauscope.recording import Recording
+from tauscope.robot import read_robot
+from tauscope.trajectory import motion_limits, read_trajectory
+from tauscope_sim.examples import example_robot
+from tauscope_sim.scenario_file import read_scenario
 
 app = typer.Typer()
 add_verb(app, diagnose, SeveralValuesCommand)
@@ -98,7 +98,7 @@ def test_limits_that_allow_no_next_experiment_cost_nobody_the_diagnosis(
     def refused(*_: object, **__: object) -> None:
         raise ExcitationError("joint1: no room; relax its limits")
 
-    monkeypatch.setattr("service.cli.diagnose_run.planned_experiment", refused)
+    monkeypatch.setattr("tauscope.cli.diagnose_run.planned_experiment", refused)
     out, motion = tmp_path / "out.json", tmp_path / "next.json"
     status, shown = run(*files, "--json", str(out), "--next-trajectory", str(motion))
     assert status == 1

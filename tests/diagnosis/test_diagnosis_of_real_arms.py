@@ -5,11 +5,11 @@ from functools import cache
 import pytest
 
 from diagnosis.held_out_residual import relative_error
-from service.diagnosis import Diagnosis, DiagnosisDocument, diagnose, document
-from service.identification import Options
-from service.recording import Recording, read_recording
-from service.robot import read_robot
 from shared_data import SHARED_DATA, needs_shared_data
+from tauscope.diagnosis import Diagnosis, DiagnosisDocument, diagnose, document
+from tauscope.identification import Options
+from tauscope.recording import Recording, read_recording
+from tauscope.robot import read_robot
 
 pytestmark = [needs_shared_data, pytest.mark.timeout(1200)]  # the LWR4+ takes 80 s on a quiet core
 

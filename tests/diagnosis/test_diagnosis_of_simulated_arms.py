@@ -11,8 +11,8 @@ import pytest
 from closing_time import is_over
 from diagnosis.diagnosed_arm import EffectTorque, at_joint, recordings
 from identification.simulated import Array, SimulatedArm, paper_robot
-from service.diagnosis import Diagnosis, DiagnosisDocument, Verdict, diagnose, document
-from service.identification import Identification, identify
+from tauscope.diagnosis import Diagnosis, DiagnosisDocument, Verdict, diagnose, document
+from tauscope.identification import Identification, identify
 
 TRAIN, HELD_OUT = (1, 2, 3), (11, 12)
 FEW, MANY = 4.2, 150.0
@@ -192,7 +192,7 @@ def test_where_physics_rejects_the_free_estimate_and_nothing_is_named_the_delive
         found = identify(*of)
         return replace(found, constrained=True, parameters=1.01 * found.free_parameters)
 
-    monkeypatch.setattr("service.diagnosis.diagnosis.identify", rejected)
+    monkeypatch.setattr("tauscope.diagnosis.diagnosis.identify", rejected)
     rng = np.random.default_rng(0)
     found = diagnose(paper_robot(), recordings(TRAIN, None, rng), recordings(HELD_OUT, None, rng))
     assert not found.findings

@@ -7,13 +7,13 @@ from hypothesis import strategies as st
 from scipy import signal
 
 from diagnosis.test_diagnosis_of_simulated_arms import diagnosed
-from service.diagnosis.documents.plots import BINS, TIME, VARIABLES, DiagnosisPlots, diagnosis_plots
-from service.diagnosis.documents.residual_spectrum import noise_density
-from service.diagnosis.documents.rounded import DIGITS, rounded
-from service.diagnosis.documents.torque_overlay import judging_observations
-from service.diagnosis.model.residual import predicted_rows
-from service.diagnosis.observations.whitening import JointNoise
-from service.identification.autocorrelation import Autoregression
+from tauscope.diagnosis.documents.plots import BINS, TIME, VARIABLES, DiagnosisPlots, diagnosis_plots
+from tauscope.diagnosis.documents.residual_spectrum import noise_density
+from tauscope.diagnosis.documents.rounded import DIGITS, rounded
+from tauscope.diagnosis.documents.torque_overlay import judging_observations
+from tauscope.diagnosis.model.residual import predicted_rows
+from tauscope.diagnosis.observations.whitening import JointNoise
+from tauscope.identification.autocorrelation import Autoregression
 
 RATE_HZ = 50.0
 

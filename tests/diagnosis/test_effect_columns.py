@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from arms import random_parameters, ur5_like
 from pinocchio_arm import pinocchio_model
-from service.diagnosis.catalogue import Effect, Setting, Signals, catalogue, possible_effects
-from service.diagnosis.catalogue.deflection import FIRST_ORDER, inertia_of_link, torque_of_deflection
-from service.diagnosis.catalogue.joint_elasticity import DAMPING, transmitted
-from service.diagnosis.catalogue.late_torque import Lag, Shift
-from service.robot import JointType, Robot
+from tauscope.effects import Effect, Setting, Signals, catalogue, possible_effects
+from tauscope.effects.deflection import FIRST_ORDER, inertia_of_link, torque_of_deflection
+from tauscope.effects.joint_elasticity import DAMPING, transmitted
+from tauscope.effects.late_torque import Lag, Shift
+from tauscope.robot import JointType, Robot
 
 Array = NDArray[np.float64]
 

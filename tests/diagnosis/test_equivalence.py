@@ -8,18 +8,18 @@ import pytest
 from diagnosis.diagnosed_arm import at_joint, recordings
 from diagnosis.test_effect_columns import setting
 from identification.simulated import Array, SimulatedArm, paper_robot
-from service.diagnosis import diagnose
-from service.diagnosis.catalogue import possible_effects
-from service.diagnosis.catalogue.nonlinear_viscous import NonlinearViscous
-from service.diagnosis.findings.diagnosed import Diagnosis
-from service.diagnosis.fitting.fit import Fit
-from service.diagnosis.model.extended import with_terms
-from service.diagnosis.screening.screen import Candidate
-from service.diagnosis.selection.choice import Choice, Option, driving, is_physical, outsized
-from service.diagnosis.selection.confirmation import Confirmation
-from service.diagnosis.selection.equivalence import doubt, equivalents, probability_among, with_rivals
-from service.diagnosis.selection.selector import Selector
-from service.diagnosis.selection.table import fitted_option, turned_negative
+from tauscope.diagnosis import diagnose
+from tauscope.diagnosis.findings.diagnosed import Diagnosis
+from tauscope.diagnosis.fitting.fit import Fit
+from tauscope.diagnosis.model.extended import with_terms
+from tauscope.diagnosis.screening.screen import Candidate
+from tauscope.diagnosis.selection.choice import Choice, Option, driving, is_physical, outsized
+from tauscope.diagnosis.selection.confirmation import Confirmation
+from tauscope.diagnosis.selection.equivalence import doubt, equivalents, probability_among, with_rivals
+from tauscope.diagnosis.selection.selector import Selector
+from tauscope.diagnosis.selection.table import fitted_option, turned_negative
+from tauscope.effects import possible_effects
+from tauscope.effects.nonlinear_viscous import NonlinearViscous
 
 JOINT = 0
 

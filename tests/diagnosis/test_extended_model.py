@@ -15,29 +15,20 @@ import pytest
 from diagnosis.diagnosed_arm import EffectTorque, at_joint, recordings
 from diagnosis.test_effect_columns import SIGNALS, setting
 from identification.simulated import Array, SimulatedArm, paper_robot
-from service.diagnosis import Diagnosis, against_saved, diagnose, document
-from service.diagnosis.catalogue import Effect, possible_effects
-from service.diagnosis.extended_model import (
-    ModelDocument,
-    compensation_code,
-    improved_robot,
-    model_document,
-    read_model,
-    restored,
-    scenario_text,
-)
-from service.diagnosis.extended_model.compensation_code import EXPRESSIONS
-from service.diagnosis.extended_model.saved import _entry, _term
-from service.diagnosis.extended_model.simulation_files import ENTRIES
-from service.diagnosis.model.extended import with_terms
-from service.diagnosis.model.residual import raw_squares
-from service.diagnosis.model.term import Term
-from service.errors import IdentificationError
-from service.recording import EffortKind
-from service.robot import read_robot
-from sim_backend.examples import example_robot
-from sim_backend.plant import Plant
-from sim_backend.scenario_file import read_scenario, scenario_from_yaml
+from tauscope.diagnosis import Diagnosis, against_saved, diagnose, document
+from tauscope.diagnosis.extended_model.saved import ModelDocument, _entry, _term, model_document, read_model, restored
+from tauscope.diagnosis.model.extended import with_terms
+from tauscope.diagnosis.model.residual import raw_squares
+from tauscope.diagnosis.model.term import Term
+from tauscope.effects import Effect, possible_effects
+from tauscope.errors import IdentificationError
+from tauscope.export.extended_compensation import EXPRESSIONS, compensation_code
+from tauscope.export.simulation_files import ENTRIES, improved_robot, scenario_text
+from tauscope.recording import EffortKind
+from tauscope.robot import read_robot
+from tauscope_sim.examples import example_robot
+from tauscope_sim.plant import Plant
+from tauscope_sim.scenario_file import read_scenario, scenario_from_yaml
 
 
 def pulled(arm: SimulatedArm, rigid: Array) -> Array:

@@ -6,15 +6,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service.diagnosis.catalogue import Effect
-from service.diagnosis.catalogue.backlash import SpringyTeeth
-from service.diagnosis.catalogue.base_tilt import BaseTilt
-from service.diagnosis.catalogue.joint_elasticity import JointElasticity
-from service.diagnosis.catalogue.periodic_torque import Cogging, TorqueRipple
-from service.diagnosis.catalogue.presliding_hysteresis import PreslidingHysteresis
-from service.diagnosis.screening.screen import Candidate
-from service.diagnosis.selection.choice import Choice, Option
-from service.diagnosis.selection.farther import explained, stands
+from tauscope.diagnosis.screening.screen import Candidate
+from tauscope.diagnosis.selection.choice import Choice, Option
+from tauscope.diagnosis.selection.farther import explained, stands
+from tauscope.effects import Effect
+from tauscope.effects.backlash import SpringyTeeth
+from tauscope.effects.base_tilt import BaseTilt
+from tauscope.effects.joint_elasticity import JointElasticity
+from tauscope.effects.periodic_torque import Cogging, TorqueRipple
+from tauscope.effects.presliding_hysteresis import PreslidingHysteresis
 
 
 def chosen(effect: Effect) -> Choice:

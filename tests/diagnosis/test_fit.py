@@ -7,10 +7,10 @@ import pytest
 
 from diagnosis.diagnosed_arm import at_joint, recordings
 from identification.simulated import Array, SimulatedArm, paper_robot
-from service.diagnosis import diagnose
-from service.diagnosis.findings.diagnosed import Diagnosis
-from service.diagnosis.model.extended import with_terms
-from service.diagnosis.model.term import Term
+from tauscope.diagnosis import diagnose
+from tauscope.diagnosis.findings.diagnosed import Diagnosis
+from tauscope.diagnosis.model.extended import with_terms
+from tauscope.diagnosis.model.term import Term
 
 JOINT, SIZE, SPEED = 1, 2.5, 0.3
 STEP = 1e-3

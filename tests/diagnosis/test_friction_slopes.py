@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 
 from identification.simulated import PAPER_NOISE, paper_robot, simulate, with_shapes
-from service.diagnosis.fitting.fit import Fitter
-from service.diagnosis.fitting.friction_slopes import open_slopes, with_fitting_slopes, with_fitting_stribeck
-from service.diagnosis.model.extended import ExtendedModel
-from service.diagnosis.model.nominal import nominal_model
-from service.diagnosis.noise.floor import with_noise
-from service.diagnosis.observations.observations import Observations
-from service.identification import identify
-from service.recording.conditioning import Conditioner
-from service.robot import FrictionCoefficients
+from tauscope.diagnosis.fitting.fit import Fitter
+from tauscope.diagnosis.fitting.friction_slopes import open_slopes, with_fitting_slopes, with_fitting_stribeck
+from tauscope.diagnosis.model.extended import ExtendedModel
+from tauscope.diagnosis.model.nominal import nominal_model
+from tauscope.diagnosis.noise.floor import with_noise
+from tauscope.diagnosis.observations.observations import Observations
+from tauscope.identification import identify
+from tauscope.recording.conditioning import Conditioner
+from tauscope.robot import FrictionCoefficients
 
 SPEED = np.full(3, 1.0)
 NO_STRIBECK = tuple(FrictionCoefficients(stiction, 0.0, 0.3) for stiction in (2.0, 1.0, 2.0))

@@ -4,13 +4,13 @@ import numpy as np
 
 from diagnosis.diagnosed_arm import at_joint, recordings
 from identification.simulated import paper_robot
-from service.diagnosis.findings.finding import without_nominal
-from service.diagnosis.fitting.fit import Fitter
-from service.diagnosis.model.nominal import nominal_model
-from service.diagnosis.noise.floor import with_noise
-from service.diagnosis.observations.observations import Observations
-from service.identification import identify
-from service.recording.conditioning import Conditioner
+from tauscope.diagnosis.findings.finding import without_nominal
+from tauscope.diagnosis.fitting.fit import Fitter
+from tauscope.diagnosis.model.nominal import nominal_model
+from tauscope.diagnosis.noise.floor import with_noise
+from tauscope.diagnosis.observations.observations import Observations
+from tauscope.identification import identify
+from tauscope.recording.conditioning import Conditioner
 
 
 def test_without_its_constant_a_joint_with_one_fits_worse_by_the_constants_share() -> None:

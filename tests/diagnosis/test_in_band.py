@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service.diagnosis.in_band import _predicts_better
+from tauscope.diagnosis.in_band import _predicts_better
 
 
 class _HeldOut:

@@ -9,17 +9,17 @@ import pytest
 from diagnosis.diagnosed_arm import recordings
 from diagnosis.test_fit import JOINT, SPEED, stribeck
 from identification.simulated import paper_robot
-from service.diagnosis import diagnose
-from service.diagnosis.catalogue import Quantity
-from service.diagnosis.findings.diagnosed import Diagnosis
-from service.diagnosis.findings.elsewhere import spread
-from service.diagnosis.findings.kind_spread import kinds_elsewhere
-from service.diagnosis.fitting.fit import FARTHEST, Fit
-from service.diagnosis.model.extended import with_terms
-from service.diagnosis.model.term import Term
-from service.diagnosis.selection.choice import Choice, Kind, Selection
-from service.diagnosis.selection.kinds import with_best_kinds
-from service.diagnosis.selection.selector import Selector
+from tauscope.diagnosis import diagnose
+from tauscope.diagnosis.findings.diagnosed import Diagnosis
+from tauscope.diagnosis.findings.elsewhere import spread
+from tauscope.diagnosis.findings.kind_spread import kinds_elsewhere
+from tauscope.diagnosis.fitting.fit import FARTHEST, Fit
+from tauscope.diagnosis.model.extended import with_terms
+from tauscope.diagnosis.model.term import Term
+from tauscope.diagnosis.selection.choice import Choice, Kind, Selection
+from tauscope.diagnosis.selection.kinds import with_best_kinds
+from tauscope.diagnosis.selection.selector import Selector
+from tauscope.effects import Quantity
 
 
 @pytest.fixture(scope="module")

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from diagnosis.test_repetitions import observed
-from service.diagnosis.findings.diagnosed import Diagnosis
-from service.diagnosis.fitting.fit import Fitter
-from service.diagnosis.fitting.lack_of_fit import LackOfFit, lack_of_fit
-from service.diagnosis.noise.floor import with_noise
-from service.diagnosis.observations.whitening import JointNoise
-from service.identification.autocorrelation import Autoregression
+from tauscope.diagnosis.findings.diagnosed import Diagnosis
+from tauscope.diagnosis.fitting.fit import Fitter
+from tauscope.diagnosis.fitting.lack_of_fit import LackOfFit, lack_of_fit
+from tauscope.diagnosis.noise.floor import with_noise
+from tauscope.diagnosis.observations.whitening import JointNoise
+from tauscope.identification.autocorrelation import Autoregression
 
 
 def test_a_test_that_fires_without_any_excess_is_no_mismatch() -> None:

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from diagnosis.test_repetitions import observed
-from service.diagnosis.catalogue.rotor_inertia import RotorInertia
-from service.diagnosis.fitting.fit import Fitter
-from service.diagnosis.model.extended import ExtendedModel
-from service.diagnosis.model.likely_accelerations import TRANSITION, acceleration_noise, with_likely_accelerations
-from service.diagnosis.model.residual import raw_squares
-from service.diagnosis.noise.floor import with_noise
-from service.diagnosis.observations.observations import BoolArray, Observations
-from service.diagnosis.screening.screen import Screen, model_signals
-from service.dynamics import mass_matrix
-from service.recording.recording import Array
+from tauscope.diagnosis.fitting.fit import Fitter
+from tauscope.diagnosis.model.extended import ExtendedModel
+from tauscope.diagnosis.model.likely_accelerations import TRANSITION, acceleration_noise, with_likely_accelerations
+from tauscope.diagnosis.model.residual import raw_squares
+from tauscope.diagnosis.noise.floor import with_noise
+from tauscope.diagnosis.observations.observations import BoolArray, Observations
+from tauscope.diagnosis.screening.screen import Screen, model_signals
+from tauscope.dynamics import mass_matrix
+from tauscope.effects.rotor_inertia import RotorInertia
+from tauscope.recording.recording import Array
 
 RATE_HZ, CUTOFF_HZ, SAMPLES = 200.0, 12.0, 8192
 DENSITY = np.array([2e-11, 5e-11])

@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 
 from identification.simulated import Array, paper_robot, simulate
-from service.acquisition import RunOptions, RunState, make_backend, run_trajectory
-from service.diagnosis import Diagnosis, diagnose, document
-from service.diagnosis.next_experiment import is_wanted, plan_experiment
-from service.diagnosis.next_experiment.bank import KINDS, Bank
-from service.diagnosis.next_experiment.plan import SETTLING, PlannedExperiment
-from service.diagnosis.next_experiment.separation import equations, log_variances, separations
-from service.diagnosis.next_experiment.sweeps import sweep
-from service.excitation import require_within_limits
-from service.identification import Identification, identify
-from service.recording import Recording, read_recording
-from service.trajectory import Trajectory, motion_limits, read_trajectory, write_trajectory
+from tauscope.diagnosis import Diagnosis, diagnose, document
+from tauscope.diagnosis.next_experiment import is_wanted, plan_experiment
+from tauscope.diagnosis.next_experiment.bank import KINDS, Bank
+from tauscope.diagnosis.next_experiment.plan import SETTLING, PlannedExperiment
+from tauscope.diagnosis.next_experiment.separation import equations, log_variances, separations
+from tauscope.diagnosis.next_experiment.sweeps import sweep
+from tauscope.excitation import require_within_limits
+from tauscope.identification import Identification, identify
+from tauscope.recording import Recording, read_recording
+from tauscope.runtime import RunOptions, RunState, make_backend, run_trajectory
+from tauscope.trajectory import Trajectory, motion_limits, read_trajectory, write_trajectory
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +60,7 @@ def test_motions_ask_for_no_more_torque_than_there_is(identification: Identifica
     joints = list(robot.joints)
     joints[1] = replace(joints[1], limits=replace(joints[1].limits, torque=12.0))
     tight = replace(identification, robot=replace(robot, joints=tuple(joints)))
-    from service.dynamics import inverse_dynamics
+    from tauscope.dynamics import inverse_dynamics
 
     links = paper_robot().model.links
     assert links is not None
@@ -113,7 +113,7 @@ class _Rows:
         return [self._torque - model.parameters @ self._columns]
 
     def columns(self, model: "_Flat") -> list:
-        from service.diagnosis.fitting.projection import JointColumns
+        from tauscope.diagnosis.fitting.projection import JointColumns
 
         used = np.flatnonzero(model.uses)
         return [JointColumns(np.arange(len(used)), self._columns[used])]

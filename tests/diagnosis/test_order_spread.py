@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from identification.simulated import Array
-from service.diagnosis.catalogue import Effect, Quantity
-from service.diagnosis.catalogue.periodic_torque import Cogging
-from service.diagnosis.catalogue.torque_sensing import Clipping
-from service.diagnosis.findings import order_spread
-from service.diagnosis.findings.elsewhere import Elsewhere, spread
-from service.diagnosis.findings.order_spread import orders_elsewhere
-from service.diagnosis.fitting.projection import Moments
-from service.diagnosis.model.term import Term
+from tauscope.diagnosis.findings import order_spread
+from tauscope.diagnosis.findings.elsewhere import Elsewhere, spread
+from tauscope.diagnosis.findings.order_spread import orders_elsewhere
+from tauscope.diagnosis.fitting.projection import Moments
+from tauscope.diagnosis.model.term import Term
+from tauscope.effects import Effect, Quantity
+from tauscope.effects.periodic_torque import Cogging
+from tauscope.effects.torque_sensing import Clipping
 
 ERROR = 0.2
 WITHOUT: Any = SimpleNamespace(model=None)

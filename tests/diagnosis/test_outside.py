@@ -5,8 +5,8 @@ import pytest
 
 from diagnosis.loaded_arm import exact_motion, noisy, seconds, torque_of_load
 from identification.simulated import paper_robot
-from service.diagnosis import diagnose, document
-from service.recording import Recording
+from tauscope.diagnosis import diagnose, document
+from tauscope.recording import Recording
 
 SEEDS = (1, 2, 11)
 MASS, PLACE = 0.3, np.array([0.05, 0.02, 0.0])

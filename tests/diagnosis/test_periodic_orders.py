@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagnosis.test_effect_columns import setting
-from service.diagnosis.catalogue.periodic_torque import FARTHER, farther_orders, possible_orders, waves
+from tauscope.effects.periodic_torque import FARTHER, farther_orders, possible_orders, waves
 
 CYCLES = 2.0 * np.pi
 

@@ -5,8 +5,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
-from service.diagnosis.fitting.projection import JointColumns, fitted_parameters, moments, project, statistics
-from service.diagnosis.screening.effective_number import effective_number
+from tauscope.diagnosis.fitting.projection import JointColumns, fitted_parameters, moments, project, statistics
+from tauscope.diagnosis.screening.effective_number import effective_number
 
 Array = NDArray[np.float64]
 

@@ -7,15 +7,15 @@ import pytest
 
 from diagnosis.diagnosed_arm import at_joint, recordings
 from identification.simulated import Array, SimulatedArm, paper_robot
-from service.diagnosis import diagnose
-from service.diagnosis.catalogue.external_contact import JointContact
-from service.diagnosis.findings.diagnosed import Diagnosis
-from service.diagnosis.fitting.lack_of_fit import lack_of_fit
-from service.diagnosis.selection.admission import Admission
-from service.diagnosis.selection.choice import Choice
-from service.diagnosis.selection.proxies import proxies
-from service.diagnosis.selection.pruning import without_proxies
-from service.diagnosis.selection.table import fitted_option
+from tauscope.diagnosis import diagnose
+from tauscope.diagnosis.findings.diagnosed import Diagnosis
+from tauscope.diagnosis.fitting.lack_of_fit import lack_of_fit
+from tauscope.diagnosis.selection.admission import Admission
+from tauscope.diagnosis.selection.choice import Choice
+from tauscope.diagnosis.selection.proxies import proxies
+from tauscope.diagnosis.selection.pruning import without_proxies
+from tauscope.diagnosis.selection.table import fitted_option
+from tauscope.effects.external_contact import JointContact
 
 pytestmark = pytest.mark.slow
 

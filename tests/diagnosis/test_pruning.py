@@ -8,15 +8,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.diagnosis.catalogue import Effect
-from service.diagnosis.catalogue.periodic_torque import Cogging, TorqueRipple
-from service.diagnosis.catalogue.presliding_hysteresis import PreslidingHysteresis
-from service.diagnosis.catalogue.rotor_inertia import RotorInertia
-from service.diagnosis.screening.screen import Candidate
-from service.diagnosis.selection import pruning
-from service.diagnosis.selection.choice import Choice, Option
-from service.diagnosis.selection.proxies import TELLING, endless, hopeless
-from service.diagnosis.selection.pruning import without_superfluous
+from tauscope.diagnosis.screening.screen import Candidate
+from tauscope.diagnosis.selection import pruning
+from tauscope.diagnosis.selection.choice import Choice, Option
+from tauscope.diagnosis.selection.proxies import TELLING, endless, hopeless
+from tauscope.diagnosis.selection.pruning import without_superfluous
+from tauscope.effects import Effect
+from tauscope.effects.periodic_torque import Cogging, TorqueRipple
+from tauscope.effects.presliding_hysteresis import PreslidingHysteresis
+from tauscope.effects.rotor_inertia import RotorInertia
 
 ADMISSION: Any = SimpleNamespace(level=1e-3, inflation=lambda fit: 1.0)
 

@@ -4,8 +4,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.diagnosis.noise.pursuit import BEYOND_CHANCE, MOST_TAKEN, ROWS_A_COLUMN, SAME_COLUMN, pursued
-from service.recording.recording import Array
+from tauscope.diagnosis.noise.pursuit import BEYOND_CHANCE, MOST_TAKEN, ROWS_A_COLUMN, SAME_COLUMN, pursued
+from tauscope.recording.recording import Array
 
 ROWS = 400
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagnosis.test_repetitions import observed
-from service.diagnosis.fitting.regressor_noise import (
+from tauscope.diagnosis.fitting.regressor_noise import (
     MOVED,
     ROUNDED,
     _shared_errors,
@@ -15,12 +15,12 @@ from service.diagnosis.fitting.regressor_noise import (
     row_weightings,
     weightings_of_motion,
 )
-from service.diagnosis.model.extended import ExtendedModel
-from service.diagnosis.noise.floor import with_noise
-from service.diagnosis.observations.observations import Observations
-from service.diagnosis.observations.whitening import JointNoise
-from service.identification.autocorrelation import Autoregression
-from service.recording.conditioning.filters import smooth
+from tauscope.diagnosis.model.extended import ExtendedModel
+from tauscope.diagnosis.noise.floor import with_noise
+from tauscope.diagnosis.observations.observations import Observations
+from tauscope.diagnosis.observations.whitening import JointNoise
+from tauscope.identification.autocorrelation import Autoregression
+from tauscope.recording.conditioning.filters import smooth
 
 
 def test_rows_far_from_reversals_count_fully_and_those_at_reversals_less() -> None:

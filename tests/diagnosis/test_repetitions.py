@@ -5,12 +5,12 @@ import pytest
 
 from diagnosis.diagnosed_arm import POSITION_NOISE, motions
 from identification.simulated import PAPER_NOISE, Array
-from service.diagnosis.model.extended import ExtendedModel
-from service.diagnosis.model.nominal import nominal_model
-from service.diagnosis.noise.floor import repeated_differences, with_noise
-from service.diagnosis.observations.observations import Observations
-from service.identification import identify
-from service.recording.conditioning import Conditioner
+from tauscope.diagnosis.model.extended import ExtendedModel
+from tauscope.diagnosis.model.nominal import nominal_model
+from tauscope.diagnosis.noise.floor import repeated_differences, with_noise
+from tauscope.diagnosis.observations.observations import Observations
+from tauscope.identification import identify
+from tauscope.recording.conditioning import Conditioner
 
 BAND_HZ = 8.0
 

@@ -7,11 +7,11 @@ import pytest
 
 from diagnosis.diagnosed_arm import recordings
 from identification.simulated import Array, paper_robot
-from service.diagnosis import diagnose
-from service.diagnosis.catalogue import Effect, Signals
-from service.diagnosis.findings.diagnosed import Diagnosis
-from service.diagnosis.fitting.fit import Fit
-from service.diagnosis.screening.screen import SAME_LOAD, Screen
+from tauscope.diagnosis import diagnose
+from tauscope.diagnosis.findings.diagnosed import Diagnosis
+from tauscope.diagnosis.fitting.fit import Fit
+from tauscope.diagnosis.screening.screen import SAME_LOAD, Screen
+from tauscope.effects import Effect, Signals
 
 SHAPED_BY_LOAD = ("backlash", "joint_elasticity", "torque_ripple")
 

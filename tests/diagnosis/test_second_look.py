@@ -9,14 +9,14 @@ import pytest
 from concealed.sealing.sealed import made
 from diagnosis.diagnosed_arm import EffectTorque, at_joint, recordings
 from identification.simulated import Array, SimulatedArm, paper_robot
-from service.diagnosis import Diagnosis, Verdict, diagnose
-from service.diagnosis.catalogue import Effect
-from service.diagnosis.catalogue.elastic_forces import JointSpring
-from service.diagnosis.in_band import selector_on
-from service.diagnosis.model.extended import with_terms
-from service.diagnosis.model.term import Term
-from service.diagnosis.second_look import agrees
-from service.diagnosis.selection.selector import Selector
+from tauscope.diagnosis import Diagnosis, Verdict, diagnose
+from tauscope.diagnosis.in_band import selector_on
+from tauscope.diagnosis.model.extended import with_terms
+from tauscope.diagnosis.model.term import Term
+from tauscope.diagnosis.second_look import agrees
+from tauscope.diagnosis.selection.selector import Selector
+from tauscope.effects import Effect
+from tauscope.effects.elastic_forces import JointSpring
 
 WIDER = "look again in a wider band"
 
@@ -54,8 +54,8 @@ def test_what_is_slow_or_within_frictions_step_is_not_looked_for_again(monkeypat
         asked.extend(rows[-1])
         return selector_on(*rows, **counted)
 
-    monkeypatch.setattr("service.diagnosis.second_look.selector_on", remembering)
-    monkeypatch.setattr("service.diagnosis.second_look.SPOKEN_FOR", 2.0)
+    monkeypatch.setattr("tauscope.diagnosis.second_look.selector_on", remembering)
+    monkeypatch.setattr("tauscope.diagnosis.second_look.SPOKEN_FOR", 2.0)
     _, trial = made("sound", 18000010)
     first = diagnose(trial.robot, trial.train, trial.held_out)
     fast = {each.id for each in first.screen.effects if each.repeats_with_motion}
@@ -96,7 +96,7 @@ def test_a_compliant_gear_too_weak_for_the_first_band_is_named_in_the_second(
     def one_look(first: Diagnosis, *rest: Any) -> Diagnosis:
         return first
 
-    monkeypatch.setattr("service.diagnosis.diagnosis.looked_again", one_look)
+    monkeypatch.setattr("tauscope.diagnosis.diagnosis.looked_again", one_look)
     first = diagnose(trial.robot, trial.train, trial.held_out)
     assert not first.findings
     assert seen.cutoff_hz > first.cutoff_hz

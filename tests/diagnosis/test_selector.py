@@ -7,18 +7,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service.diagnosis.catalogue import Effect
-from service.diagnosis.catalogue.elastic_forces import CableForce, JointSpring
-from service.diagnosis.catalogue.late_torque import Shift
-from service.diagnosis.catalogue.periodic_torque import Cogging
-from service.diagnosis.catalogue.rotor_inertia import RotorInertia
-from service.diagnosis.catalogue.time_delay import TimeDelay
-from service.diagnosis.screening.screen import Candidate
-from service.diagnosis.selection import selector
-from service.diagnosis.selection.choice import Choice, Option, Place, place_of
-from service.diagnosis.selection.confirmation import Confirmation
-from service.diagnosis.selection.selector import Selector
-from service.diagnosis.selection.table import Table
+from tauscope.diagnosis.screening.screen import Candidate
+from tauscope.diagnosis.selection import selector
+from tauscope.diagnosis.selection.choice import Choice, Option, Place, place_of
+from tauscope.diagnosis.selection.confirmation import Confirmation
+from tauscope.diagnosis.selection.selector import Selector
+from tauscope.diagnosis.selection.table import Table
+from tauscope.effects import Effect
+from tauscope.effects.elastic_forces import CableForce, JointSpring
+from tauscope.effects.late_torque import Shift
+from tauscope.effects.periodic_torque import Cogging
+from tauscope.effects.rotor_inertia import RotorInertia
+from tauscope.effects.time_delay import TimeDelay
 
 JOINTS = tuple(SimpleNamespace(name=f"joint{number}") for number in (1, 2, 3))
 FIT: Any = SimpleNamespace(model=SimpleNamespace(structure=SimpleNamespace(robot=SimpleNamespace(joints=JOINTS))))

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from concealed.sealing.sealed import made
-from service.diagnosis import diagnose, document
-from service.diagnosis.catalogue import Effect
-from service.diagnosis.catalogue.asymmetric_friction import AsymmetricCoulomb
-from service.diagnosis.catalogue.load_dependent_friction import LoadDependentFriction
-from service.diagnosis.catalogue.torque_sensing import TorqueGainError
-from service.diagnosis.selection import shape_error
-from service.diagnosis.selection.shape_error import EFFICIENCY, SHAPE_ERROR, Standing, standings
+from tauscope.diagnosis import diagnose, document
+from tauscope.diagnosis.selection import shape_error
+from tauscope.diagnosis.selection.shape_error import EFFICIENCY, SHAPE_ERROR, Standing, standings
+from tauscope.effects import Effect
+from tauscope.effects.asymmetric_friction import AsymmetricCoulomb
+from tauscope.effects.load_dependent_friction import LoadDependentFriction
+from tauscope.effects.torque_sensing import TorqueGainError
 
 EXPLAINED = 1000.0
 

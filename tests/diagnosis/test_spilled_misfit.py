@@ -9,14 +9,14 @@ import pytest
 from concealed.generator.trial import unknown_trial
 from diagnosis.diagnosed_arm import at_joint, recordings
 from identification.simulated import Array, SimulatedArm, paper_robot
-from service.diagnosis import diagnose, document
-from service.diagnosis.findings.diagnosed import Diagnosis
-from service.diagnosis.fitting.lack_of_fit import lack_of_fit
-from service.diagnosis.noise.floor import FAR_ABOVE
-from service.diagnosis.selection.admission import Admission
-from service.diagnosis.selection.choice import Choice
-from service.diagnosis.selection.pruning import without_proxies, without_superfluous
-from service.diagnosis.selection.table import fitted_option
+from tauscope.diagnosis import diagnose, document
+from tauscope.diagnosis.findings.diagnosed import Diagnosis
+from tauscope.diagnosis.fitting.lack_of_fit import lack_of_fit
+from tauscope.diagnosis.noise.floor import FAR_ABOVE
+from tauscope.diagnosis.selection.admission import Admission
+from tauscope.diagnosis.selection.choice import Choice
+from tauscope.diagnosis.selection.pruning import without_proxies, without_superfluous
+from tauscope.diagnosis.selection.table import fitted_option
 
 pytestmark = pytest.mark.slow
 

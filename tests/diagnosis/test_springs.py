@@ -5,7 +5,7 @@ import pytest
 
 from diagnosis.diagnosed_arm import at_joint, recordings
 from identification.simulated import Array, SimulatedArm, paper_robot
-from service.diagnosis import diagnose, document
+from tauscope.diagnosis import diagnose, document
 
 STIFFNESS, REST = -3.0, 0.3
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service.diagnosis.findings.stand_in import LEFT, certainty_as_law
+from tauscope.diagnosis.findings.stand_in import LEFT, certainty_as_law
 
 
 def certainty(effect: str, before: Sequence[float], without: Sequence[float], left: Sequence[float]) -> float:

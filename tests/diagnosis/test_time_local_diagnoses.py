@@ -9,9 +9,9 @@ import pytest
 from diagnosis.diagnosed_arm import at_joint
 from diagnosis.loaded_arm import exact_motion, noisy, seconds, torque_of_load
 from identification.simulated import Array, SimulatedArm, paper_robot
-from service.diagnosis import DiagnosisDocument, diagnose, document
-from service.diagnosis.catalogue.kinematic_error import displaced
-from service.dynamics import inverse_dynamics, smooth_sign
+from tauscope.diagnosis import DiagnosisDocument, diagnose, document
+from tauscope.dynamics import inverse_dynamics, smooth_sign
+from tauscope.effects.kinematic_error import displaced
 
 TRAIN, HELD_OUT = (1, 2, 3), (11, 12)
 PLACE = np.array([0.05, 0.02, 0.0])

@@ -8,14 +8,14 @@ import pytest
 
 from diagnosis.test_effect_columns import RATE, SIGNALS, Array, setting, torque
 from pinocchio_arm import pinocchio_model
-from service.diagnosis.catalogue import TimeLocalEffect, possible_effects
-from service.diagnosis.catalogue.external_contact import ExternalContact, JointContact
-from service.diagnosis.catalogue.kinematic_error import KinematicError
-from service.diagnosis.catalogue.payload import Payload
-from service.diagnosis.catalogue.payload_change import PayloadChange, carried
-from service.diagnosis.catalogue.plain_terms import CoulombFriction, TorqueOffset, ViscousFriction
-from service.diagnosis.catalogue.time_local import EVERY, HALF_SINE, OUTSIDE, open_samples, open_share, since
-from service.robot import LinkInertia
+from tauscope.effects import TimeLocalEffect, possible_effects
+from tauscope.effects.external_contact import ExternalContact, JointContact
+from tauscope.effects.kinematic_error import KinematicError
+from tauscope.effects.payload import Payload
+from tauscope.effects.payload_change import PayloadChange, carried
+from tauscope.effects.plain_terms import CoulombFriction, TorqueOffset, ViscousFriction
+from tauscope.effects.time_local import EVERY, HALF_SINE, OUTSIDE, open_samples, open_share, since
+from tauscope.robot import LinkInertia
 
 PICKED = slice(None, None, 200)
 

@@ -7,12 +7,12 @@ import pytest
 
 from diagnosis.diagnosed_arm import at_joint, recordings
 from identification.simulated import Array, SimulatedArm, paper_robot
-from service.diagnosis import Diagnosis, diagnose, document
-from service.diagnosis.findings.finding import Finding
-from service.diagnosis.model.extended import ExtendedModel, with_terms
-from service.diagnosis.model.residual import predicted_rows
-from service.diagnosis.model.term import Term
-from service.diagnosis.model.torque_scale import covariance_on_the_arm, on_the_arm
+from tauscope.diagnosis import Diagnosis, diagnose, document
+from tauscope.diagnosis.findings.finding import Finding
+from tauscope.diagnosis.model.extended import ExtendedModel, with_terms
+from tauscope.diagnosis.model.residual import predicted_rows
+from tauscope.diagnosis.model.term import Term
+from tauscope.diagnosis.model.torque_scale import covariance_on_the_arm, on_the_arm
 
 JOINT, GAIN, SIZE = 1, 1.3, 0.8
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from service.diagnosis.catalogue.elastic_forces import JointSpring
-from service.diagnosis.findings.detectability import detectable, needed_strength
-from service.diagnosis.findings.verdict import Evidence, Verdict, verdict
-from service.diagnosis.screening.screen import Candidate
+from tauscope.diagnosis.findings.detectability import detectable, needed_strength
+from tauscope.diagnosis.findings.verdict import Evidence, Verdict, verdict
+from tauscope.diagnosis.screening.screen import Candidate
+from tauscope.effects.elastic_forces import JointSpring
 
 
 @pytest.mark.parametrize(

@@ -7,13 +7,13 @@ import pytest
 
 from diagnosis.diagnosed_arm import recordings
 from identification.simulated import Array, paper_robot
-from service.diagnosis import diagnose
-from service.diagnosis.catalogue import Effect
-from service.diagnosis.findings.diagnosed import Diagnosis
-from service.diagnosis.fitting.white_columns import WhiteColumns
-from service.diagnosis.model.extended import ExtendedModel, with_terms
-from service.diagnosis.model.residual import residual_rows
-from service.diagnosis.model.term import Term
+from tauscope.diagnosis import diagnose
+from tauscope.diagnosis.findings.diagnosed import Diagnosis
+from tauscope.diagnosis.fitting.white_columns import WhiteColumns
+from tauscope.diagnosis.model.extended import ExtendedModel, with_terms
+from tauscope.diagnosis.model.residual import residual_rows
+from tauscope.diagnosis.model.term import Term
+from tauscope.effects import Effect
 
 IDS = ("stribeck_friction", "load_dependent_friction", "torque_gain_error", "time_delay", "joint_spring", "base_tilt")
 

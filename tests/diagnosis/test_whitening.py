@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from service.diagnosis.observations.whitening import fitted_noise
-from service.recording.conditioning.common_band import Decimator
+from tauscope.diagnosis.observations.whitening import fitted_noise
+from tauscope.recording.conditioning.common_band import Decimator
 
 
 def coloured(rng: np.random.Generator, rows: int) -> np.ndarray:

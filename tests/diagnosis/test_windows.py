@@ -6,16 +6,16 @@ from scipy import stats
 
 from diagnosis.diagnosed_arm import recordings
 from identification.simulated import paper_robot
-from service.diagnosis.catalogue import Signals, TimeLocalEffect, possible_effects
-from service.diagnosis.fitting.fit import Fit, Fitter
-from service.diagnosis.fitting.projection import moments, statistics
-from service.diagnosis.model.nominal import nominal_model, setting_of
-from service.diagnosis.noise.floor import with_noise
-from service.diagnosis.observations.observations import Observations
-from service.diagnosis.screening.screen import Screen, model_signals
-from service.diagnosis.screening.windows import white_torque, windowed_moments, windows_on_rows, windows_tried
-from service.identification import identify
-from service.recording.conditioning import Conditioner
+from tauscope.diagnosis.fitting.fit import Fit, Fitter
+from tauscope.diagnosis.fitting.projection import moments, statistics
+from tauscope.diagnosis.model.nominal import nominal_model, setting_of
+from tauscope.diagnosis.noise.floor import with_noise
+from tauscope.diagnosis.observations.observations import Observations
+from tauscope.diagnosis.screening.screen import Screen, model_signals
+from tauscope.diagnosis.screening.windows import white_torque, windowed_moments, windows_on_rows, windows_tried
+from tauscope.effects import Signals, TimeLocalEffect, possible_effects
+from tauscope.identification import identify
+from tauscope.recording.conditioning import Conditioner
 
 
 @pytest.fixture(scope="module")

@@ -24,7 +24,7 @@ the robot file declares friction and no constant (`torque_offset`).
 TAIL = """
 `unknown` is no effect but a verdict on one joint: significant, located (`mismatch`), and explained by nothing above.
 
-A plugin adds an effect: a subclass of `service.diagnosis.catalogue.Effect`, entry point group `tauscope.effects`.
+A plugin adds an effect: a subclass of `tauscope.effects.Effect`, entry point group `tauscope.effects`.
 """
 
 
@@ -34,7 +34,7 @@ def page_text() -> str:
 
 
 def _rows() -> Iterator[str]:
-    from service.diagnosis.catalogue import catalogue
+    from tauscope.effects import catalogue
 
     for effect in sorted(catalogue(), key=lambda each: each.id):
         found = "searched" if effect.screened else "compared"

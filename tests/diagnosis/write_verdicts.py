@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from service.diagnosis import Diagnosis, DiagnosisDocument
-    from service.recording import Recording
+    from tauscope.diagnosis import Diagnosis, DiagnosisDocument
+    from tauscope.recording import Recording
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "reference" / "verdicts.md"
@@ -60,8 +60,8 @@ def main() -> None:
 
 def _row(folder: Path) -> str:
     """What is said of one folder, everything at its default."""
-    from service.diagnosis import document
-    from service.errors import TauscopeError
+    from tauscope.diagnosis import document
+    from tauscope.errors import TauscopeError
 
     try:
         diagnosis, held_out = _diagnosed(folder)
@@ -81,7 +81,7 @@ def _row(folder: Path) -> str:
 def _row_in_band(folder: Path, cutoff_hz: float, plain: str, with_effect: str) -> str:
     """What is said of one folder in a band given, beside what its curators reached there."""
     from diagnosis.held_out_residual import relative_error
-    from service.diagnosis import document
+    from tauscope.diagnosis import document
 
     diagnosis, held_out = _diagnosed(folder, cutoff_hz)
     identified = diagnosis.identification.held_out
@@ -93,10 +93,10 @@ def _row_in_band(folder: Path, cutoff_hz: float, plain: str, with_effect: str) -
 
 def _diagnosed(folder: Path, cutoff_hz: float | None = None) -> "tuple[Diagnosis, Sequence[Recording]]":
     """The diagnosis of a folder, in the band that it chooses where none is given, and the held-out recordings."""
-    from service.diagnosis import diagnose
-    from service.identification import Options
-    from service.recording import read_recording
-    from service.robot import read_robot
+    from tauscope.diagnosis import diagnose
+    from tauscope.identification import Options
+    from tauscope.recording import read_recording
+    from tauscope.robot import read_robot
 
     train, held_out = (
         [read_recording(path) for path in sorted(folder.glob(f"{kind}-*.csv"))] for kind in ("train", "held-out")
@@ -140,5 +140,5 @@ def _rms(values: list[float]) -> float:
 
 
 if __name__ == "__main__":
-    sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+    sys.path[:0] = [str(ROOT / "tests")]
     main()

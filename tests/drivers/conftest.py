@@ -8,10 +8,10 @@ from functools import partial
 import pytest
 
 from arm_rigs import RIGS, Rig
-from drivers import StopPolicy
 from hardware_emulated.canopen_rig import canopen_rigs
 from hardware_emulated.dynamixel_rig import dynamixel_rigs
 from prompt_process import prompt_process
+from tauscope_drivers import StopPolicy
 
 ALL_RIGS = {
     **RIGS,

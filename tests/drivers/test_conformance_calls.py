@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from arm_rigs import START, Rig, ask, drive, enable, setpoint, slide, wide_limits
-from drivers import Backend, ControlMode, DriverError, Setpoint, StopPolicy
-from drivers.errors import DriverErrorKind
-from sim_backend.device import Disturbance, Injection
+from tauscope_drivers import Backend, ControlMode, DriverError, Setpoint, StopPolicy
+from tauscope_drivers.errors import DriverErrorKind
+from tauscope_sim.device import Disturbance, Injection
 
 
 def refusal(call, *arguments) -> DriverError:

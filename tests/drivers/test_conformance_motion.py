@@ -20,7 +20,7 @@ from arm_rigs import (
     slide,
     wide_limits,
 )
-from drivers import ArmState, ControlMode, StopPolicy
+from tauscope_drivers import ArmState, ControlMode, StopPolicy
 
 CAUGHT_WITHIN_S = 0.1
 """Time at its largest speed in which a falling joint has come as far as it ever will once it is caught [s]."""

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from arm_rigs import AT_REST, START, Rig, drive, enable, require_policy, setpoint, slide, wide_limits
-from drivers import ControlMode, DriverError, StopPolicy
-from drivers.errors import DriverErrorKind
+from tauscope_drivers import ControlMode, DriverError, StopPolicy
+from tauscope_drivers.errors import DriverErrorKind
 
 SPEED = 0.5
 READING_S = 0.01

@@ -2,7 +2,7 @@
 
 import pytest
 
-from drivers.inspection import Finding, Severity, failure
+from tauscope_drivers.inspection import Finding, Severity, failure
 
 PLACE = "joint 3 (node 9)"
 

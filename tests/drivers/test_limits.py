@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivers import DriveLimits, DriverError, Setpoint
-from drivers.limits import require_finite, require_sensible
+from tauscope_drivers import DriveLimits, DriverError, Setpoint
+from tauscope_drivers.limits import require_finite, require_sensible
 
 LOW, HIGH, SPEED, TORQUE = -1.0, 1.5, 0.8, 20.0
 BOUNDS = DriveLimits(*(np.full(2, value) for value in (LOW, HIGH, SPEED, TORQUE)))

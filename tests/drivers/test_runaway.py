@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from drivers import DriveLimits
-from drivers.limits import CATCH_S, PERSISTENCE, SPEED_MARGIN, RunawayWatch
+from tauscope_drivers import DriveLimits
+from tauscope_drivers.limits import CATCH_S, PERSISTENCE, SPEED_MARGIN, RunawayWatch
 
 LIMITS = DriveLimits(np.full(2, -1.0), np.full(2, 1.0), np.full(2, 2.0), np.full(2, 5.0))
 

@@ -20,10 +20,10 @@ from arms import (
     random_states,
     ur5_like,
 )
-from service.dynamics.base_parameters import RIGHT_ANGLE, base_parameters
-from service.dynamics.regressor import torque_regressor
-from service.robot.robot import STANDARD_PARAMETERS, JointType, Robot
-from service.robot.robot_file import read_robot
+from tauscope.dynamics.base_parameters import RIGHT_ANGLE, base_parameters
+from tauscope.dynamics.regressor import torque_regressor
+from tauscope.robot.robot import STANDARD_PARAMETERS, JointType, Robot
+from tauscope.robot.robot_file import read_robot
 
 TABLE_2 = {
     "Ixx2 - Iyy2 - 0.5*msx2": np.sqrt(2) / 24,

@@ -5,15 +5,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.dynamics.friction import (
+from tauscope.dynamics.friction import (
     FRICTION_COLUMNS,
     friction_columns,
     friction_torque,
     smooth_sign,
     smooth_sign_slope,
 )
-from service.errors import IdentificationError
-from service.robot.robot import FrictionCoefficients, FrictionShape
+from tauscope.errors import IdentificationError
+from tauscope.robot.robot import FrictionCoefficients, FrictionShape
 
 VELOCITY = np.array([-2.0, -0.3, -0.01, 0.0, 0.002, 0.1, 1.5])
 SHAPE = FrictionShape(k_v=500.0, delta=10.0)

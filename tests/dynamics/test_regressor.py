@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from arms import emps_like, panda_like, paper_arm, random_arm, random_parameters, random_states, ur5_like
 from pinocchio_arm import pinocchio_model, pinocchio_regressor
-from service.dynamics.regressor import CHUNK, TorqueRegressor, torque_regressor
+from tauscope.dynamics.regressor import CHUNK, TorqueRegressor, torque_regressor
 
 SEEDS = st.integers(0, 2**32 - 1)
 KNOWN_ARMS = {
@@ -160,5 +160,5 @@ def test_a_result_of_any_size_has_its_zeros(monkeypatch: pytest.MonkeyPatch) -> 
     robot = panda_like()
     states = random_states(np.random.default_rng(15), 30, 7)
     small = torque_regressor(robot, *states)
-    monkeypatch.setattr("service.dynamics.regressor._FRESH_MEMORY", 0)
+    monkeypatch.setattr("tauscope.dynamics.regressor._FRESH_MEMORY", 0)
     np.testing.assert_array_equal(torque_regressor(robot, *states), small)

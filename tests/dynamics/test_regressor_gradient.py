@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from arms import Array, panda_like, paper_arm, random_arm, random_states, ur5_like
-from service.dynamics import torque_regressor
-from service.dynamics.regressor_gradient import Columns, RegressorGradient
-from service.robot import Robot
+from tauscope.dynamics import torque_regressor
+from tauscope.dynamics.regressor_gradient import Columns, RegressorGradient
+from tauscope.robot import Robot
 
 STEP = 1e-3
 WEIGHTS = {1: 45.0 / 60.0, 2: -9.0 / 60.0, 3: 1.0 / 60.0}

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from arms import random_arm, random_parameters, random_states
 from pinocchio_arm import pinocchio_model
-from service.dynamics.regressor import CHUNK
-from service.dynamics.rigid_body import gravity_torque, inverse_dynamics, kinetic_energy, mass_matrix, potential_energy
-from service.robot.robot import Robot
+from tauscope.dynamics.regressor import CHUNK
+from tauscope.dynamics.rigid_body import gravity_torque, inverse_dynamics, kinetic_energy, mass_matrix, potential_energy
+from tauscope.robot.robot import Robot
 
 SAMPLES = 6
 ARMS = given(seed=st.integers(0, 2**32 - 1), joint_count=st.integers(1, 7))

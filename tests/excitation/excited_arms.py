@@ -7,18 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arms import panda_like, paper_arm, paper_parameters, random_arm, random_link, ur5_like
-from service.dynamics import inverse_dynamics
-from service.excitation import ExcitationDesign, ExcitationOptions
-from service.robot import (
-    FrictionCoefficients,
-    FrictionShape,
-    Joint,
-    JointLimits,
-    LinkInertia,
-    Model,
-    Robot,
-)
-from service.trajectory import FourierSeries, motion_limits
+from tauscope.dynamics import inverse_dynamics
+from tauscope.excitation import ExcitationDesign, ExcitationOptions
+from tauscope.robot import FrictionCoefficients, FrictionShape, Joint, JointLimits, LinkInertia, Model, Robot
+from tauscope.trajectory import FourierSeries, motion_limits
 
 Array = NDArray[np.float64]
 

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from arms import random_link, ur5_like
 from excitation.excited_arms import assert_within_limits, limited_paper_arm, modelled_arm, with_limits
-from service.dynamics import base_parameters
-from service.errors import ExcitationError
-from service.excitation import (
+from tauscope.dynamics import base_parameters
+from tauscope.errors import ExcitationError
+from tauscope.excitation import (
     Box,
     ColumnScaling,
     Criterion,
@@ -23,11 +23,11 @@ from service.excitation import (
     design_excitation,
     optimiser,
 )
-from service.excitation.information import ExcitationRegressor
-from service.excitation.workspace import WorkspaceUsage
-from service.robot import JointLimits, Model, Robot
-from service.robot.kinematics import link_placements
-from service.trajectory import trajectory_json
+from tauscope.excitation.information import ExcitationRegressor
+from tauscope.excitation.workspace import WorkspaceUsage
+from tauscope.robot import JointLimits, Model, Robot
+from tauscope.robot.kinematics import link_placements
+from tauscope.trajectory import trajectory_json
 
 QUICK = ExcitationOptions(starts=1, slow_postures=1)
 

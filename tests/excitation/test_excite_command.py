@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from service.cli.program import main
-from service.robot import read_robot
-from service.trajectory import read_trajectory, trajectory_json
-from service.trajectory.document import TrajectoryDocument, trajectory_of
-from sim_backend.examples import example_robot
+from tauscope.cli.program import main
+from tauscope.robot import read_robot
+from tauscope.trajectory import read_trajectory, trajectory_json
+from tauscope.trajectory.document import TrajectoryDocument, trajectory_of
+from tauscope_sim.examples import example_robot
 
 ROBOT = str(example_robot("paper_arm"))
 QUICK = ["--periods", "2", "--harmonics", "3", "--duration", "6", "--no-slow-reversals"]

@@ -14,18 +14,18 @@ from excitation.excited_arms import (
     resting_series,
 )
 from pinocchio_arm import pinocchio_model
-from service.dynamics import base_parameters, friction_columns, torque_regressor
-from service.excitation import Box, Criterion, Workspace
-from service.excitation.constraints import KinematicUsage, StateUsage, smooth_maximum
-from service.excitation.criteria import criterion_value
-from service.excitation.information import ExcitationRegressor, MotionGradient
-from service.excitation.problem import ExcitationProblem, Objective
-from service.excitation.series_space import SeriesSpace
-from service.excitation.torque_prediction import TorquePrediction
-from service.excitation.workspace import WorkspaceUsage
-from service.robot import Robot
-from service.robot.kinematics import link_placements
-from service.trajectory import MotionSamples, motion_limits
+from tauscope.dynamics import base_parameters, friction_columns, torque_regressor
+from tauscope.excitation import Box, Criterion, Workspace
+from tauscope.excitation.constraints import KinematicUsage, StateUsage, smooth_maximum
+from tauscope.excitation.criteria import criterion_value
+from tauscope.excitation.information import ExcitationRegressor, MotionGradient
+from tauscope.excitation.problem import ExcitationProblem, Objective
+from tauscope.excitation.series_space import SeriesSpace
+from tauscope.excitation.torque_prediction import TorquePrediction
+from tauscope.excitation.workspace import WorkspaceUsage
+from tauscope.robot import Robot
+from tauscope.robot.kinematics import link_placements
+from tauscope.trajectory import MotionSamples, motion_limits
 
 ARMS = gradient_arms()
 IDS = ["paper", "ur5", "panda", "random3", "random4"]

@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 
 from excitation.excited_arms import assert_within_limits, limited_paper_arm
-from service.dynamics import base_parameters
-from service.excitation import (
+from tauscope.dynamics import base_parameters
+from tauscope.excitation import (
     ExcitationDesign,
     ExcitationOptions,
     design_excitation,
     excitation_document,
     require_within_limits,
 )
-from service.excitation.information import ExcitationRegressor
-from service.robot import Robot
-from service.trajectory import FourierSegment, MotionSamples, motion_limits, parse_trajectory_json, trajectory_json
-from sim_backend.motion import random_fourier_motion
+from tauscope.excitation.information import ExcitationRegressor
+from tauscope.robot import Robot
+from tauscope.trajectory import FourierSegment, MotionSamples, motion_limits, parse_trajectory_json, trajectory_json
+from tauscope_sim.motion import random_fourier_motion
 
 TIME = np.arange(500.0) * 0.02
 

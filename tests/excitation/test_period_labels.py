@@ -3,10 +3,10 @@
 import numpy as np
 
 from excitation.excited_arms import Array, limited_paper_arm
-from service.dynamics import friction_torque, inverse_dynamics
-from service.excitation import ExcitationOptions, design_excitation
-from service.recording.conditioning import Conditioner
-from service.recording.recording import Recording
+from tauscope.dynamics import friction_torque, inverse_dynamics
+from tauscope.excitation import ExcitationOptions, design_excitation
+from tauscope.recording.conditioning import Conditioner
+from tauscope.recording.recording import Recording
 
 RATE_HZ = 100.0
 NOISE_STD = np.array([0.5, 0.3, 0.7])

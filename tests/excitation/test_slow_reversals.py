@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from excitation.excited_arms import limited_paper_arm, resting_series
-from service.excitation.constraints import StateUsage
-from service.excitation.slow_reversals import SlowPart, slow_part
-from service.trajectory import FourierSegment, FourierSeries, MotionSamples, MoveSegment, PathSegment, motion_limits
+from tauscope.excitation.constraints import StateUsage
+from tauscope.excitation.slow_reversals import SlowPart, slow_part
+from tauscope.trajectory import FourierSegment, FourierSeries, MotionSamples, MoveSegment, PathSegment, motion_limits
 
 ROBOT = limited_paper_arm()
 LIMITS = motion_limits(ROBOT).scaled(0.95)

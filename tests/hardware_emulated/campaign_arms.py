@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from arms import random_link
-from service.identification import IdentificationDocument
-from service.robot import Robot
+from tauscope.identification import IdentificationDocument
+from tauscope.robot import Robot
 
 MODEL = "PH54-200-S500"
 TORQUE_PER_MILLIAMPERE = 0.005

@@ -6,18 +6,18 @@ from pathlib import Path
 
 import numpy as np
 
-import sim_backend.examples
+import tauscope_sim.examples
 from arm_rigs import START, Rig, Watched
-from drivers import Backend
-from drivers.canopen.driver import CanopenArm
 from hardware_emulated.canopen_robot import COUNTS_PER_TURN, GEAR, RATED_TORQUE_MNM, drive_joints, write_canopen_robot
 from hardware_emulated.emulated_rig import FAULTS, EmulatedRig
 from hardware_emulated.stepped_clock import SteppedClock
-from service.robot import read_robot
-from sim_backend.canopen_bus.order import CanOrder
-from sim_backend.device import Injection
-from sim_backend.emulation.fault_kit import InjectedFault
-from sim_backend.emulation.process import EmulatorProcess
+from tauscope.robot import read_robot
+from tauscope_drivers import Backend
+from tauscope_drivers.canopen.driver import CanopenArm
+from tauscope_sim.canopen_bus.order import CanOrder
+from tauscope_sim.device import Injection
+from tauscope_sim.emulation.fault_kit import InjectedFault
+from tauscope_sim.emulation.process import EmulatorProcess
 
 ANSWER_PATIENCE_S = 0.03
 """The machine of a test may be busy."""
@@ -96,7 +96,7 @@ def canopen_rigs(
 
     They are behind a serial adapter, or on an interface of SocketCAN; time is the machine's, or stepped.
     """
-    robot = write_canopen_robot(Path(sim_backend.examples.__file__).with_name("paper_arm.yaml"), folder, interface)
+    robot = write_canopen_robot(Path(tauscope_sim.examples.__file__).with_name("paper_arm.yaml"), folder, interface)
     order = CanOrder(
         robot=str(robot),
         start=tuple(START.tolist()),

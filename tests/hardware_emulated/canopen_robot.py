@@ -6,8 +6,8 @@ from typing import Any
 
 from ruamel.yaml import YAML
 
-from drivers.canopen import DriveJoint
-from service.robot import Robot
+from tauscope.robot import Robot
+from tauscope_drivers.canopen import DriveJoint
 
 GEAR = 50.0
 COUNTS_PER_TURN = 65_536

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from service.cli import main
-from service.excitation import ExcitationOptions, design_excitation
-from service.robot import read_robot
-from service.trajectory import write_trajectory
+from tauscope.cli import main
+from tauscope.excitation import ExcitationOptions, design_excitation
+from tauscope.robot import read_robot
+from tauscope.trajectory import write_trajectory
 
 Tauscope = Callable[..., tuple[int, str, str]]
 """From arguments to exit status, standard output and standard error."""

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from service.acquisition import RunRecord, RunState
-from service.recording.journal_reading import read_journal
 from standstill import STANDSTILL_S, MachineStoodStillError
+from tauscope.recording.journal_reading import read_journal
+from tauscope.runtime import RunRecord, RunState
 
 MOST_UNKNOWN = 0.01
 """Part of the samples whose instant is not known, up to which a machine has kept time."""

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from drivers import ArmState, ControlMode, DriveLimits, Setpoint, StopPolicy
-from drivers.dynamixel import DynamixelArm, DynamixelJoint
 from prompt_process import prompt_process
-from sim_backend.dynamixel_bus import DynamixelOrder, ServoSpecification
-from sim_backend.emulation import EmulatorProcess
+from tauscope_drivers import ArmState, ControlMode, DriveLimits, Setpoint, StopPolicy
+from tauscope_drivers.dynamixel import DynamixelArm, DynamixelJoint
+from tauscope_sim.dynamixel_bus import DynamixelOrder, ServoSpecification
+from tauscope_sim.emulation import EmulatorProcess
 
 TORQUE_PER_MILLIAMPERE = 0.01
 SLACK_S = 0.03

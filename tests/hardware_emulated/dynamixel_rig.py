@@ -6,17 +6,17 @@ from pathlib import Path
 
 import numpy as np
 
-import sim_backend.examples
+import tauscope_sim.examples
 from arm_rigs import START, Rig
-from drivers import Backend
-from drivers.dynamixel import DynamixelArm, DynamixelJoint
 from hardware_emulated.emulated_rig import FAULTS, EmulatedRig
-from service.robot import read_robot
-from sim_backend.device import Disturbance, Injection
-from sim_backend.dynamixel_bus import DynamixelOrder, ServoSpecification
-from sim_backend.emulation import EmulatorProcess, FaultKind, InjectedFault
+from tauscope.robot import read_robot
+from tauscope_drivers import Backend
+from tauscope_drivers.dynamixel import DynamixelArm, DynamixelJoint
+from tauscope_sim.device import Disturbance, Injection
+from tauscope_sim.dynamixel_bus import DynamixelOrder, ServoSpecification
+from tauscope_sim.emulation import EmulatorProcess, FaultKind, InjectedFault
 
-ROBOT = Path(sim_backend.examples.__file__).with_name("paper_arm.yaml")
+ROBOT = Path(tauscope_sim.examples.__file__).with_name("paper_arm.yaml")
 TORQUE_PER_MILLIAMPERE = 0.005
 SLACK_S = 0.03
 

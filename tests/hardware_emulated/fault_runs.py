@@ -5,15 +5,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from drivers import ArmState, Backend, Capabilities, ControlMode, DriveLimits, Setpoint, StopPolicy
-from drivers.clock import Clock
-from service.acquisition import RunOptions, RunRecord, run_trajectory
-from service.acquisition.backends import Connection
-from service.excitation import ExcitationOptions, design_excitation
-from service.robot import Robot, read_robot
-from service.trajectory import Trajectory
-from sim_backend.emulation import EmulatorProcess
-from sim_backend.emulation.emulator import EmulatorOrder
+from tauscope.excitation import ExcitationOptions, design_excitation
+from tauscope.robot import Robot, read_robot
+from tauscope.runtime import RunOptions, RunRecord, run_trajectory
+from tauscope.runtime.backends import Connection
+from tauscope.trajectory import Trajectory
+from tauscope_drivers import ArmState, Backend, Capabilities, ControlMode, DriveLimits, Setpoint, StopPolicy
+from tauscope_drivers.clock import Clock
+from tauscope_sim.emulation import EmulatorProcess
+from tauscope_sim.emulation.emulator import EmulatorOrder
 
 PHASES = ("connect", "enable", "ramp", "run", "stop")
 _RAMP_CYCLES = 5

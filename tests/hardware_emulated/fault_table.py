@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from drivers import Backend
 from hardware_emulated.fault_runs import PHASES, Disturbed, Site
-from service.acquisition import RunRecord, RunState
-from service.recording.journal_reading import read_journal
 from shared_data import REPOSITORY
-from sim_backend.emulation import FaultKind, InjectedFault
+from tauscope.recording.journal_reading import read_journal
+from tauscope.runtime import RunRecord, RunState
+from tauscope_drivers import Backend
+from tauscope_sim.emulation import FaultKind, InjectedFault
 
 DEVICE = 2
 """Number of the device that has the fault."""

@@ -1,6 +1,6 @@
 """The clock of emulated servos whose time passes only when it is told to: no busy machine disturbs a run by it."""
 
-from sim_backend.emulation import EmulatorProcess
+from tauscope_sim.emulation import EmulatorProcess
 
 
 class SteppedClock:

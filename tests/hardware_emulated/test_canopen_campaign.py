@@ -11,18 +11,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.canopen import CanopenArm
 from hardware_emulated.campaign_arms import assert_within, deviations, six_joints, three_joints
 from hardware_emulated.canopen_robot import GEAR, drive_joints, write_canopen_arm
 from hardware_emulated.stepped_clock import SteppedClock
-from service.acquisition import RunOptions, RunRecord, RunState, run_trajectory
-from service.acquisition.backends import Connection
-from service.excitation import ExcitationOptions, design_excitation
-from service.identification import document, identify
-from service.recording import read_recording
-from service.robot import read_robot
-from sim_backend.canopen_bus.order import CanOrder
-from sim_backend.emulation import EmulatorProcess, FaultKind, InjectedFault
+from tauscope.excitation import ExcitationOptions, design_excitation
+from tauscope.identification import document, identify
+from tauscope.recording import read_recording
+from tauscope.robot import read_robot
+from tauscope.runtime import RunOptions, RunRecord, RunState, run_trajectory
+from tauscope.runtime.backends import Connection
+from tauscope_drivers.canopen import CanopenArm
+from tauscope_sim.canopen_bus.order import CanOrder
+from tauscope_sim.emulation import EmulatorProcess, FaultKind, InjectedFault
 
 TORQUE_NOISE = 0.5
 """As the seed paper has it [Nm]."""

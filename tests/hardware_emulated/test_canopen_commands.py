@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from drivers.inspection import PHASES
 from hardware_emulated.campaign_arms import three_joints
 from hardware_emulated.canopen_robot import write_canopen_arm
 from hardware_emulated.commands import Tauscope, write_short_motion
-from service.recording import read_recording
-from service.recording.recording import EffortKind
-from sim_backend.canopen_bus.order import CanOrder
-from sim_backend.emulation import EmulatorProcess, FaultKind, InjectedFault
+from tauscope.recording import read_recording
+from tauscope.recording.recording import EffortKind
+from tauscope_drivers.inspection import PHASES
+from tauscope_sim.canopen_bus.order import CanOrder
+from tauscope_sim.emulation import EmulatorProcess, FaultKind, InjectedFault
 
 pytestmark = pytest.mark.realtime
 

@@ -8,15 +8,15 @@ from collections.abc import Iterator
 
 import pytest
 
-from drivers.canopen import CanopenArm
 from hardware_emulated.campaign_arms import three_joints
 from hardware_emulated.canopen_robot import drive_joints, write_canopen_arm
 from hardware_emulated.fault_runs import Site, fault_site
 from hardware_emulated.fault_table import FaultTable
 from hardware_emulated.stepped_clock import SteppedClock
-from service.robot import Robot
-from sim_backend.canopen_bus.order import CanOrder
-from sim_backend.emulation import FaultKind
+from tauscope.robot import Robot
+from tauscope_drivers.canopen import CanopenArm
+from tauscope_sim.canopen_bus.order import CanOrder
+from tauscope_sim.emulation import FaultKind
 
 
 @pytest.fixture(scope="module")

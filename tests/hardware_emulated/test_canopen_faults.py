@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from arm_rigs import START, drive, setpoint, wide_limits
-from drivers import ControlMode, DriverError, StopPolicy
 from hardware_emulated.canopen_rig import CanopenRig, canopen_rigs
-from sim_backend.emulation.fault_kit import FaultKind, InjectedFault
+from tauscope_drivers import ControlMode, DriverError, StopPolicy
+from tauscope_sim.emulation.fault_kit import FaultKind, InjectedFault
 
 pytestmark = [pytest.mark.realtime, pytest.mark.timeout(1200)]
 

@@ -11,20 +11,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import sim_backend.examples
-from acquisition.control_runs import wait_for
-from acquisition.doubles import short_motion
+import tauscope_sim.examples
 from arm_rigs import START
-from drivers.canopen import CanopenArm
 from hardware_emulated.canopen_rig import ANSWER_PATIENCE_S
 from hardware_emulated.canopen_robot import RATED_TORQUE_MNM, drive_joints, write_canopen_robot
 from kills import killed_often
-from service.acquisition import BackendOrder, RunOptions, RunOrder, RunState, recover_runs
-from service.acquisition.run_process import RunProcess
-from service.robot import read_robot
-from service.trajectory import write_trajectory
-from sim_backend.canopen_bus.order import CanOrder
-from sim_backend.emulation.process import EmulatorProcess
+from runtime.control_runs import wait_for
+from runtime.doubles import short_motion
+from tauscope.robot import read_robot
+from tauscope.runtime import BackendOrder, RunOptions, RunOrder, RunState, recover_runs
+from tauscope.runtime.run_process import RunProcess
+from tauscope.trajectory import write_trajectory
+from tauscope_drivers.canopen import CanopenArm
+from tauscope_sim.canopen_bus.order import CanOrder
+from tauscope_sim.emulation.process import EmulatorProcess
 
 WATCHDOG_S = 0.25
 STANDSTILL_S = 0.4
@@ -71,7 +71,7 @@ class Site:
 def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     folder = tmp_path_factory.mktemp("can")
     (folder / "runs").mkdir()
-    robot = write_canopen_robot(Path(sim_backend.examples.__file__).with_name("paper_arm.yaml"), folder)
+    robot = write_canopen_robot(Path(tauscope_sim.examples.__file__).with_name("paper_arm.yaml"), folder)
     motion = short_motion(read_robot(robot), period_s=3.0, repeats=30, amplitude=0.15)
     write_trajectory(motion, folder / "motion.json")
     order = CanOrder(

@@ -15,14 +15,14 @@ from hardware_emulated.campaign_arms import assert_within, deviations, six_joint
 from hardware_emulated.canopen_rig import ANSWER_PATIENCE_S
 from hardware_emulated.canopen_robot import GEAR, write_canopen_arm
 from hardware_emulated.counted import against_the_clock, require_all_counted
-from service.acquisition import BackendOrder, RunOptions, RunOrder, RunProcess, RunRecord
-from service.excitation import ExcitationOptions, design_excitation
-from service.identification import document, identify
-from service.recording import read_recording
-from service.robot import read_robot
-from service.trajectory import Trajectory, write_trajectory
-from sim_backend.canopen_bus.order import CanOrder
-from sim_backend.emulation import EmulatorProcess
+from tauscope.excitation import ExcitationOptions, design_excitation
+from tauscope.identification import document, identify
+from tauscope.recording import read_recording
+from tauscope.robot import read_robot
+from tauscope.runtime import BackendOrder, RunOptions, RunOrder, RunProcess, RunRecord
+from tauscope.trajectory import Trajectory, write_trajectory
+from tauscope_sim.canopen_bus.order import CanOrder
+from tauscope_sim.emulation import EmulatorProcess
 
 RATE_HZ = 200.0
 TORQUE_NOISE = 0.5

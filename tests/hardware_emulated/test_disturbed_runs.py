@@ -12,17 +12,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers.canopen import CanopenArm
-from drivers.canopen.leap_filter import FASTEST, SLACK_S
 from hardware_emulated.campaign_arms import three_joints
 from hardware_emulated.canopen_robot import drive_joints, write_canopen_arm
 from hardware_emulated.fault_runs import Site, fault_site
 from hardware_emulated.fault_table import outcome
 from hardware_emulated.stepped_clock import SteppedClock
-from service.acquisition import RunState
-from service.recording.journal_reading import read_journal
-from service.robot import Robot
-from sim_backend.canopen_bus.order import CanOrder
+from tauscope.recording.journal_reading import read_journal
+from tauscope.robot import Robot
+from tauscope.runtime import RunState
+from tauscope_drivers.canopen import CanopenArm
+from tauscope_drivers.canopen.glitch_filter import FASTEST, SLACK_S
+from tauscope_sim.canopen_bus.order import CanOrder
 
 INTERFACE = os.environ.get("TAUSCOPE_SOCKETCAN", "")
 NETEM = os.environ.get("TAUSCOPE_NETEM", "")

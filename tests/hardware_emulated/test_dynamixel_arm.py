@@ -7,17 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers import ControlMode, DriverError, StopPolicy
-from drivers.errors import DriverErrorKind
-from hardware_emulated.dynamixel_bench import (
-    WATCHDOG_S,
-    Bench,
-    bench,
-    drive,
-    limits,
-    setpoint,
-)
-from sim_backend.dynamixel_bus import ServoSpecification
+from hardware_emulated.dynamixel_bench import WATCHDOG_S, Bench, bench, drive, limits, setpoint
+from tauscope_drivers import ControlMode, DriverError, StopPolicy
+from tauscope_drivers.errors import DriverErrorKind
+from tauscope_sim.dynamixel_bus import ServoSpecification
 
 ONE_COUNT = 2.0 * np.pi / 4096
 START = 0.2

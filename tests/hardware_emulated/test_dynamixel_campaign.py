@@ -13,8 +13,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers import ControlMode, StopPolicy
-from drivers.dynamixel import DynamixelArm
 from hardware_emulated.campaign_arms import (
     TORQUE_PER_MILLIAMPERE,
     assert_within,
@@ -24,16 +22,18 @@ from hardware_emulated.campaign_arms import (
     write_robot,
 )
 from hardware_emulated.stepped_clock import SteppedClock
-from service.acquisition import RunOptions, RunRecord, RunState, run_trajectory
-from service.acquisition.backends import Connection
-from service.acquisition.dynamixel_bus import dynamixel_joints
-from service.excitation import ExcitationOptions, design_excitation
-from service.identification import document, identify
-from service.recording import read_recording
-from service.robot import read_robot
-from sim_backend.dynamixel_bus import DynamixelOrder
-from sim_backend.dynamixel_bus.robot_servos import servos_of
-from sim_backend.emulation import EmulatorProcess, FaultKind, InjectedFault
+from tauscope.excitation import ExcitationOptions, design_excitation
+from tauscope.identification import document, identify
+from tauscope.recording import read_recording
+from tauscope.robot import read_robot
+from tauscope.runtime import RunOptions, RunRecord, RunState, run_trajectory
+from tauscope.runtime.backends import Connection
+from tauscope.runtime.dynamixel_bus import dynamixel_joints
+from tauscope_drivers import ControlMode, StopPolicy
+from tauscope_drivers.dynamixel import DynamixelArm
+from tauscope_sim.dynamixel_bus import DynamixelOrder
+from tauscope_sim.dynamixel_bus.robot_servos import servos_of
+from tauscope_sim.emulation import EmulatorProcess, FaultKind, InjectedFault
 
 NOISE_MA = 100.0
 """0.5 Nm, as the seed paper has it."""

@@ -5,16 +5,16 @@ from pathlib import Path
 
 import pytest
 
-from drivers.dynamixel.packets import FrameParser
-from drivers.inspection import PHASES
 from hardware_emulated.campaign_arms import three_joints, write_robot
 from hardware_emulated.commands import Tauscope, write_short_motion
-from service.recording import read_recording
-from service.recording.recording import EffortKind
-from service.robot import read_robot
-from sim_backend.dynamixel_bus import DynamixelOrder
-from sim_backend.dynamixel_bus.robot_servos import servos_of
-from sim_backend.emulation import EmulatorProcess, FaultKind, InjectedFault
+from tauscope.recording import read_recording
+from tauscope.recording.recording import EffortKind
+from tauscope.robot import read_robot
+from tauscope_drivers.dynamixel.packets import FrameParser
+from tauscope_drivers.inspection import PHASES
+from tauscope_sim.dynamixel_bus import DynamixelOrder
+from tauscope_sim.dynamixel_bus.robot_servos import servos_of
+from tauscope_sim.emulation import EmulatorProcess, FaultKind, InjectedFault
 
 pytestmark = pytest.mark.realtime
 

@@ -11,18 +11,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.dynamixel import DynamixelArm
 from hardware_emulated.campaign_arms import three_joints, write_robot
 from hardware_emulated.dynamixel_bench import SLACK_S, Bench
 from kills import killed_often
-from service.acquisition import BackendOrder, RunOptions, RunOrder, RunProcess, RunState
-from service.acquisition.dynamixel_bus import dynamixel_joints
-from service.excitation import ExcitationOptions, design_excitation
-from service.robot import Robot, read_robot
-from service.trajectory import write_trajectory
-from sim_backend.dynamixel_bus import DynamixelOrder
-from sim_backend.dynamixel_bus.robot_servos import servos_of
-from sim_backend.emulation import EmulatorProcess
+from tauscope.excitation import ExcitationOptions, design_excitation
+from tauscope.robot import Robot, read_robot
+from tauscope.runtime import BackendOrder, RunOptions, RunOrder, RunProcess, RunState
+from tauscope.runtime.dynamixel_bus import dynamixel_joints
+from tauscope.trajectory import write_trajectory
+from tauscope_drivers.dynamixel import DynamixelArm
+from tauscope_sim.dynamixel_bus import DynamixelOrder
+from tauscope_sim.dynamixel_bus.robot_servos import servos_of
+from tauscope_sim.emulation import EmulatorProcess
 
 pytestmark = pytest.mark.realtime
 

@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers import ControlMode, DriverError
-from drivers.dynamixel import DynamixelJoint, examine, plan_frames, scan_bus
-from drivers.dynamixel.packets import FrameParser
-from drivers.inspection import PHASES, FoundDevice, Severity
 from hardware_emulated.dynamixel_bench import SLACK_S, Bench, bench, limits
-from sim_backend.dynamixel_bus import ServoSpecification
-from sim_backend.emulation import FaultKind, InjectedFault
+from tauscope_drivers import ControlMode, DriverError
+from tauscope_drivers.dynamixel import DynamixelJoint, examine, plan_frames, scan_bus
+from tauscope_drivers.dynamixel.packets import FrameParser
+from tauscope_drivers.inspection import PHASES, FoundDevice, Severity
+from tauscope_sim.dynamixel_bus import ServoSpecification
+from tauscope_sim.emulation import FaultKind, InjectedFault
 
 
 def joints(one: Bench, torque_constant: float | None = 0.01) -> list[DynamixelJoint]:

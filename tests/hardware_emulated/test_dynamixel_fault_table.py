@@ -8,16 +8,16 @@ from collections.abc import Iterator
 
 import pytest
 
-from drivers.dynamixel import DynamixelArm
 from hardware_emulated.campaign_arms import three_joints, write_robot
 from hardware_emulated.fault_runs import Site, fault_site
 from hardware_emulated.fault_table import FaultTable
 from hardware_emulated.stepped_clock import SteppedClock
-from service.acquisition.dynamixel_bus import dynamixel_joints
-from service.robot import Robot
-from sim_backend.dynamixel_bus import DynamixelOrder
-from sim_backend.dynamixel_bus.robot_servos import servos_of
-from sim_backend.emulation import FaultKind
+from tauscope.robot import Robot
+from tauscope.runtime.dynamixel_bus import dynamixel_joints
+from tauscope_drivers.dynamixel import DynamixelArm
+from tauscope_sim.dynamixel_bus import DynamixelOrder
+from tauscope_sim.dynamixel_bus.robot_servos import servos_of
+from tauscope_sim.emulation import FaultKind
 
 
 @pytest.fixture(scope="module")

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivers import ArmState, ControlMode, DriverError, StopPolicy
-from drivers.dynamixel import DynamixelArm
 from hardware_emulated.dynamixel_bench import WATCHDOG_S, Bench, drive, limits, setpoint
-from sim_backend.emulation import FaultKind, InjectedFault
+from tauscope_drivers import ArmState, ControlMode, DriverError, StopPolicy
+from tauscope_drivers.dynamixel import DynamixelArm
+from tauscope_sim.emulation import FaultKind, InjectedFault
 
 pytestmark = pytest.mark.realtime
 

@@ -5,17 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers import ControlMode, DriverError, StopPolicy
-from hardware_emulated.dynamixel_bench import (
-    TORQUE_PER_MILLIAMPERE,
-    WATCHDOG_S,
-    Bench,
-    bench,
-    drive,
-    limits,
-    setpoint,
-)
-from sim_backend.dynamixel_bus import ServoSpecification
+from hardware_emulated.dynamixel_bench import TORQUE_PER_MILLIAMPERE, WATCHDOG_S, Bench, bench, drive, limits, setpoint
+from tauscope_drivers import ControlMode, DriverError, StopPolicy
+from tauscope_sim.dynamixel_bus import ServoSpecification
 
 pytestmark = pytest.mark.realtime
 

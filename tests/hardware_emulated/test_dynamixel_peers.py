@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from dynamixel_sdk import COMM_SUCCESS, GroupSyncRead, PacketHandler
 
-from drivers.dynamixel.port import SerialPort
 from hardware_emulated.dynamixel_bench import bench
-from sim_backend.dynamixel_bus import ServoSpecification
+from tauscope_drivers.dynamixel.port import SerialPort
+from tauscope_sim.dynamixel_bus import ServoSpecification
 
 pytestmark = pytest.mark.realtime  # other people's masters wait by the machine's clock
 

@@ -7,13 +7,13 @@ import pytest
 from hardware_emulated.campaign_arms import six_joints, write_robot
 from hardware_emulated.counted import against_the_clock, require_all_counted
 from hardware_emulated.dynamixel_bench import SLACK_S
-from service.acquisition import BackendOrder, RunOptions, RunOrder, RunProcess
-from service.excitation import ExcitationOptions, design_excitation
-from service.robot import read_robot
-from service.trajectory import write_trajectory
-from sim_backend.dynamixel_bus import DynamixelOrder
-from sim_backend.dynamixel_bus.robot_servos import servos_of
-from sim_backend.emulation import EmulatorProcess
+from tauscope.excitation import ExcitationOptions, design_excitation
+from tauscope.robot import read_robot
+from tauscope.runtime import BackendOrder, RunOptions, RunOrder, RunProcess
+from tauscope.trajectory import write_trajectory
+from tauscope_sim.dynamixel_bus import DynamixelOrder
+from tauscope_sim.dynamixel_bus.robot_servos import servos_of
+from tauscope_sim.emulation import EmulatorProcess
 
 pytestmark = pytest.mark.realtime
 

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers import ControlMode, DriverError, StopPolicy
-from drivers.dynamixel import DynamixelArm
-from drivers.errors import DriverErrorKind
 from hardware_emulated.dynamixel_bench import WATCHDOG_S, Bench, drive, limits, setpoint
+from tauscope_drivers import ControlMode, DriverError, StopPolicy
+from tauscope_drivers.dynamixel import DynamixelArm
+from tauscope_drivers.errors import DriverErrorKind
 
 pytestmark = pytest.mark.realtime
 
@@ -131,9 +131,9 @@ def test_impossible_time_is_refused(three: Bench, watchdog_s: float) -> None:
 CLIENT = """
 import sys
 import numpy as np
-sys.path[:0] = [{root!r}, {tests!r}]
-from drivers import ControlMode, StopPolicy
-from drivers.dynamixel import DynamixelArm, DynamixelJoint
+sys.path[:0] = [{tests!r}]
+from tauscope_drivers import ControlMode, StopPolicy
+from tauscope_drivers.dynamixel import DynamixelArm, DynamixelJoint
 from hardware_emulated.dynamixel_bench import drive, limits, setpoint
 joints = [DynamixelJoint(f"joint{{n}}", {{"id": n, "port": {port!r}}}, 0.01) for n in (1, 2, 3)]
 arm = DynamixelArm(joints, slack_s=0.03)
@@ -147,7 +147,7 @@ drive(arm, lambda t: setpoint(0.2 + 0.4 * np.sin(4.0 * t) * np.ones(3)), 60.0)
 def moving_client(one: Bench) -> subprocess.Popen[bytes]:
     """A host in a process of its own, once its arm moves."""
     tests = Path(__file__).parents[1]
-    script = CLIENT.format(root=str(tests.parent), tests=str(tests), port=one.emulator.order.port, watchdog=WATCHDOG_S)
+    script = CLIENT.format(tests=str(tests), port=one.emulator.order.port, watchdog=WATCHDOG_S)
     client = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE)
     assert client.stdout is not None
     assert client.stdout.readline() == b"moving\n"

@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers import ControlMode, DriverError, StopPolicy
-from drivers.dynamixel.control_table import find_model, model_names
-from drivers.dynamixel.models import gear_ratio_of
-from drivers.errors import DriverErrorKind
 from hardware_emulated.dynamixel_bench import WATCHDOG_S, bench, drive, limits, setpoint
-from sim_backend.dynamixel_bus import ServoSpecification
-from sim_backend.emulation import FaultKind, InjectedFault
+from tauscope_drivers import ControlMode, DriverError, StopPolicy
+from tauscope_drivers.dynamixel.control_table import find_model, model_names
+from tauscope_drivers.dynamixel.models import gear_ratio_of
+from tauscope_drivers.errors import DriverErrorKind
+from tauscope_sim.dynamixel_bus import ServoSpecification
+from tauscope_sim.emulation import FaultKind, InjectedFault
 
 YM070_R099 = 4030
 NUMERATOR = "Electronic GearRatio Numerator"

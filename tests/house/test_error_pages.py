@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.doubles import PointArm, connection, point_robot, short_motion
-from service.acquisition import make_backend, run_trajectory
-from service.errors import AcquisitionError, TauscopeError
-from service.excitation import ExcitationOptions, Workspace, design_excitation
-from service.identification.compensation.drive_units import drive_units
-from service.recording import EffortKind, read_recording
-from service.robot import Joint, read_robot
-from service.store import site_identifier
-from service.store.database import Database
-from service.trajectory import read_trajectory
+from runtime.doubles import PointArm, connection, point_robot, short_motion
 from shared_data import REPOSITORY
+from tauscope.errors import AcquisitionError, TauscopeError
+from tauscope.excitation import ExcitationOptions, Workspace, design_excitation
+from tauscope.export.compensation.drive_units import drive_units
+from tauscope.recording import EffortKind, read_recording
+from tauscope.robot import Joint, read_robot
+from tauscope.runtime import make_backend, run_trajectory
+from tauscope.server.store.database.database import Database
+from tauscope.server.store.site import site_identifier
+from tauscope.trajectory import read_trajectory
 
 ROBOT = """\
 name: two-joints
@@ -156,7 +156,7 @@ def test_run_examples(case: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("case", ["damaged", "locked", "newer", "site"])
 def test_store_examples(case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("service.store.database.engine.PATIENCE_S", 0.02)
+    monkeypatch.setattr("tauscope.server.store.database.engine.PATIENCE_S", 0.02)
     Path("data").mkdir()
     path = Path("data/tauscope.db")
     with closing(sqlite3.connect(path, isolation_level=None)) as other:

@@ -9,15 +9,19 @@ from pathlib import Path
 
 import pytest
 
-import service.errors
-from service.api.problems import KINDS
+import tauscope.errors
 from shared_data import REPOSITORY
+from tauscope.server.problems import KINDS
 
 PACKAGES = [
-    *(f"service/{name}" for name in ("robot", "recording", "dynamics", "excitation", "identification", "diagnosis")),
-    *(f"service/{name}" for name in ("acquisition", "report", "store", "jobs", "api", "client")),
-    "drivers",
-    "sim_backend",
+    *(f"service/tauscope/{name}" for name in ("robot", "recording", "dynamics", "trajectory", "excitation")),
+    *(f"service/tauscope/{name}" for name in ("identification", "effects", "diagnosis", "export", "report", "runtime")),
+    *(
+        f"service/tauscope/server/{name}"
+        for name in ("http", "auth", "queue", "control", "history", "schedules", "store")
+    ),
+    "drivers/tauscope_drivers",
+    "sim_backend/tauscope_sim",
 ]
 TOP_LEVEL = ["pyproject.toml", "Makefile", "README.md", "CHANGELOG.md", "CONTRIBUTING.md", "LICENSE", ".ci/run"]
 
@@ -54,13 +58,13 @@ def locked(file: str) -> set[tuple[str, str, str]]:
 
 
 def error_codes() -> list[str]:
-    def leaves(error: type[service.errors.TauscopeError]) -> Iterator[str]:
+    def leaves(error: type[tauscope.errors.TauscopeError]) -> Iterator[str]:
         for child in error.__subclasses__():
-            if child.__module__ == service.errors.__name__:
+            if child.__module__ == tauscope.errors.__name__:
                 yield child.code
                 yield from leaves(child)
 
-    return sorted(leaves(service.errors.TauscopeError))
+    return sorted(leaves(tauscope.errors.TauscopeError))
 
 
 @pytest.mark.parametrize("pattern", [MACHINE_PATH, REGISTRY], ids=["machine path", "registry address"])

@@ -16,20 +16,20 @@ from fastapi import FastAPI
 from httpx2 import Response
 from starlette.testclient import TestClient
 
-from api.access.keyed import client_with
-from api.conftest import HOST, RECORDINGS
-from api.motions import ROBOT, move_document
-from api.problem_check import assert_problem
-from jobs.controls import HandControls
-from jobs.executors import ManualExecutor
-from service.api import Settings, create_app
-from service.api.access.keys import KeyFile
-from service.api.access.rate_limit import RateLimit
-from service.api.access.scopes import Scope
-from service.api.problems import KINDS
-from service.api.services import Services
-from service.jobs.queued_job import MOST_ATTEMPTS
+from server.auth.keyed import client_with
+from server.http.conftest import HOST, RECORDINGS
+from server.http.motions import ROBOT, move_document
+from server.http.problem_check import assert_problem
+from server.queue.controls import HandControls
+from server.queue.executors import ManualExecutor
 from shared_data import REPOSITORY
+from tauscope.server.auth.keys import KeyFile
+from tauscope.server.auth.rate_limit import RateLimit
+from tauscope.server.auth.scopes import Scope
+from tauscope.server.http import Settings, create_app
+from tauscope.server.http.services import Services
+from tauscope.server.problems import KINDS
+from tauscope.server.queue.queued_job import MOST_ATTEMPTS
 
 RUNS, LEASES, IDENTIFICATIONS = (f"/api/v1/{name}" for name in ("runs", "leases", "identifications"))
 ARM = {"robot": "two-joint-arm", "backend": "sim"}
@@ -292,7 +292,7 @@ def a_fault_in_a_request(bench: Bench) -> Response:
     def fail(*_: object) -> None:
         raise KeyError("x")
 
-    bench.patch.setattr("service.store.ItemStore.identifiers", fail)
+    bench.patch.setattr("tauscope.server.store.ItemStore.identifiers", fail)
     return bench.client().get(RUNS)
 
 

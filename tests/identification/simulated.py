@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from service.identification import Identification
-from service.recording import Recording
-from service.robot import FrictionCoefficients, FrictionShape, JointLimits, LinkInertia, Model, Robot, read_robot
-from service.robot.robot import STANDARD_PARAMETERS
-from sim_backend.examples import example_robot
-from sim_backend.motion import FourierMotion, random_fourier_motion
-from sim_backend.recording import SimulatedRecording, simulate_recording
+from tauscope.identification import Identification
+from tauscope.recording import Recording
+from tauscope.robot import FrictionCoefficients, FrictionShape, JointLimits, LinkInertia, Model, Robot, read_robot
+from tauscope.robot.robot import STANDARD_PARAMETERS
+from tauscope_sim.examples import example_robot
+from tauscope_sim.motion import FourierMotion, random_fourier_motion
+from tauscope_sim.recording import SimulatedRecording, simulate_recording
 
 Array = NDArray[np.float64]
 

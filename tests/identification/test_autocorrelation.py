@@ -5,14 +5,14 @@ import pytest
 from numpy.typing import NDArray
 from scipy import linalg, signal, stats
 
-from service.identification.autocorrelation import (
+from tauscope.identification.autocorrelation import (
     FILTERED_LAGS,
     LARGEST_ORDER,
     AutocovarianceSum,
     Autoregression,
     LaggedProducts,
 )
-from service.recording.conditioning import Decimator
+from tauscope.recording.conditioning import Decimator
 
 Array = NDArray[np.float64]
 

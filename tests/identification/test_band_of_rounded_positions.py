@@ -5,9 +5,9 @@ import pytest
 from numpy.typing import NDArray
 
 from identification.simulated import SimulatedArm, paper_robot, simulate
-from service.dynamics.base_parameters import base_parameters
-from service.identification.band import choose_cutoff
-from service.recording.conditioning import Conditioner
+from tauscope.dynamics.base_parameters import base_parameters
+from tauscope.identification.band import choose_cutoff
+from tauscope.recording.conditioning import Conditioner
 
 TORQUE_NOISE = 0.02
 STEP = 2.0 * np.pi / 2**16

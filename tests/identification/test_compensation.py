@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
-from service.errors import ExportError
-from service.identification.compensation import (
+from tauscope.errors import ExportError
+from tauscope.export.compensation import (
     CompensationModel,
     DriveUnits,
     JointCompensation,
@@ -28,9 +28,9 @@ from service.identification.compensation import (
     to_python,
     to_yaml,
 )
-from service.identification.compensation.identifiers import c_string, comment_text, identifier
-from service.recording import EffortKind
-from service.robot import Joint, JointType
+from tauscope.export.compensation.identifiers import c_string, comment_text, identifier
+from tauscope.recording import EffortKind
+from tauscope.robot import Joint, JointType
 
 VELOCITIES = np.concatenate([[0.0], np.geomspace(1e-6, 30.0, 25), -np.geomspace(1e-6, 30.0, 25)])
 

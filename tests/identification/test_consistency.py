@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service.errors import IdentificationError
-from service.identification.consistency import (
+from tauscope.errors import IdentificationError
+from tauscope.identification.consistency import (
     FrictionColumns,
     LinearInequalities,
     Prior,
@@ -19,8 +19,8 @@ from service.identification.consistency import (
     program,
     total_mass_inequalities,
 )
-from service.identification.consistency.triangle import UPPER_TRIANGLE, triangle_of_parameters
-from service.robot import Joint, JointType, LinkInertia, Model, Placement, Robot, Segment, pseudo_inertia
+from tauscope.identification.consistency.triangle import UPPER_TRIANGLE, triangle_of_parameters
+from tauscope.robot import Joint, JointType, LinkInertia, Model, Placement, Robot, Segment, pseudo_inertia
 
 
 def ellipsoid(rng: np.random.Generator, thickness: float = 0.02) -> LinkInertia:

@@ -9,19 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.errors import ExportError
-from service.identification.compensation import JointFriction
-from service.identification.export import JointModel, joint_models, patch_urdf, to_mjcf
-from service.robot import (
-    Joint,
-    JointLimits,
-    JointType,
-    LinkInertia,
-    Placement,
-    Robot,
-    Segment,
-    read_urdf_chain,
-)
+from tauscope.errors import ExportError
+from tauscope.export import JointModel, joint_models, patch_urdf, to_mjcf
+from tauscope.export.compensation import JointFriction
+from tauscope.robot import Joint, JointLimits, JointType, LinkInertia, Placement, Robot, Segment, read_urdf_chain
 
 DATA = Path(os.environ.get("TAUSCOPE_DATA", Path(__file__).resolve().parents[2] / "../shared/data"))
 

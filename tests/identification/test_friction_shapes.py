@@ -17,9 +17,9 @@ from identification.simulated import (
     with_shapes,
     z_scores,
 )
-from service.identification import Identification, Options, document, identify
-from service.identification.friction_shape import shape_parameters
-from service.robot import FrictionCoefficients, FrictionShape, Model, Robot
+from tauscope.identification import Identification, Options, document, identify
+from tauscope.identification.friction_shape import shape_parameters
+from tauscope.robot import FrictionCoefficients, FrictionShape, Model, Robot
 
 WITHOUT_STRIBECK = [FrictionCoefficients(2.0, 0.0, 0.5), FrictionCoefficients(1.0, 0.0, 0.277)]
 WITHOUT_STRIBECK.append(FrictionCoefficients(2.0, 0.0, 0.03))

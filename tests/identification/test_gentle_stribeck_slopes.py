@@ -7,8 +7,8 @@ from scipy import stats
 from identification.simulated import PAPER_NOISE, SimulatedArm, paper_robot, rms, simulate, with_shapes, z_scores
 from identification.test_friction_shapes import identified, rms_speed, shape_scores
 from identification.test_real_data import identified as identified_set
-from service.robot import FrictionCoefficients
 from shared_data import needs_shared_data
+from tauscope.robot import FrictionCoefficients
 
 
 @pytest.fixture(scope="module", params=[3.0, 6.0])

@@ -7,17 +7,17 @@ import pytest
 
 from identification.simulated import PAPER_NOISE, Array, SimulatedArm, paper_robot, simulate, standard_errors, z_scores
 from pinocchio_arm import pinocchio_regressor
-from service.dynamics import TorqueRegressor
-from service.errors import IdentificationError, RecordingMismatchError
-from service.identification import Estimator, Identification, Options, dataset, document, identify, least_squares
-from service.identification.dataset import Dataset, PreparedMotion
-from service.identification.least_squares import JointFactor, condition_number, factorise, restricted, solve
-from service.identification.structure import JointTerms, ModelStructure
-from service.recording import Recording
-from service.recording.conditioning import Conditioner
-from service.robot import FrictionShape
-from service.robot.robot import STANDARD_PARAMETERS
-from sim_backend.motion import random_fourier_motion
+from tauscope.dynamics import TorqueRegressor
+from tauscope.errors import IdentificationError, RecordingMismatchError
+from tauscope.identification import Estimator, Identification, Options, dataset, document, identify, least_squares
+from tauscope.identification.dataset import Dataset, PreparedMotion
+from tauscope.identification.least_squares import JointFactor, condition_number, factorise, restricted, solve
+from tauscope.identification.structure import JointTerms, ModelStructure
+from tauscope.recording import Recording
+from tauscope.recording.conditioning import Conditioner
+from tauscope.robot import FrictionShape
+from tauscope.robot.robot import STANDARD_PARAMETERS
+from tauscope_sim.motion import random_fourier_motion
 
 
 @pytest.fixture(scope="module")

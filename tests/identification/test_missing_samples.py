@@ -19,14 +19,14 @@ from identification.simulated import (
     with_shapes,
     z_scores,
 )
-from service.identification import Identification, document, identify
-from service.identification.result import ConditioningEntry
-from service.recording import EffortKind, Recording
-from service.robot import FrictionCoefficients, Joint, Robot
-from sim_backend.friction import static_friction_torque
-from sim_backend.inverse_dynamics import rigid_body_torque
-from sim_backend.model import build_model
-from sim_backend.motion import random_fourier_motion
+from tauscope.identification import Identification, document, identify
+from tauscope.identification.result import ConditioningEntry
+from tauscope.recording import EffortKind, Recording
+from tauscope.robot import FrictionCoefficients, Joint, Robot
+from tauscope_sim.friction import static_friction_torque
+from tauscope_sim.inverse_dynamics import rigid_body_torque
+from tauscope_sim.model import build_model
+from tauscope_sim.motion import random_fourier_motion
 
 Mask = NDArray[np.bool_]
 

@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from identification.simulated import PAPER_NOISE, paper_robot, simulate
-from service.errors import TauscopeError
-from service.identification import document, identify
-from service.recording import read_recording
+from tauscope.errors import TauscopeError
+from tauscope.identification import document, identify
+from tauscope.recording import read_recording
 
 Rows = list[list[str]]
 ARM = simulate(paper_robot(), seed=1)

@@ -21,7 +21,7 @@ from identification.simulated import (
     z_scores,
 )
 from pinocchio_arm import pinocchio_regressor
-from service.identification import Estimator, Identification, Options, document, identify
+from tauscope.identification import Estimator, Identification, Options, document, identify
 
 STANDARD = ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz", "m", "msx", "msy", "msz")
 

@@ -5,8 +5,8 @@ import pytest
 from numpy.typing import NDArray
 
 from recording.conditioning.synthetic import Harmonics, harmonics, record, robot
-from service.identification.band import quiet_limit
-from service.recording.conditioning import Conditioner
+from tauscope.identification.band import quiet_limit
+from tauscope.recording.conditioning import Conditioner
 
 RATE = 200.0
 STD = 1e-5

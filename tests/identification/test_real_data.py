@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from pinocchio_arm import pinocchio_regressor
-from service.identification import Identification, IdentificationDocument, Options, document, identify
-from service.identification.dataset import Dataset
-from service.identification.residuals import evaluate
-from service.recording import Recording, read_recording
-from service.recording.conditioning import Conditioner
-from service.robot import LinkInertia, Robot, pseudo_inertia, read_robot
 from shared_data import SHARED_DATA, needs_shared_data
+from tauscope.identification import Identification, IdentificationDocument, Options, document, identify
+from tauscope.identification.dataset import Dataset
+from tauscope.identification.residuals import evaluate
+from tauscope.recording import Recording, read_recording
+from tauscope.recording.conditioning import Conditioner
+from tauscope.robot import LinkInertia, Robot, pseudo_inertia, read_robot
 
 pytestmark = needs_shared_data
 

@@ -10,8 +10,8 @@ import pytest
 from pydantic import ValidationError
 
 from identification.simulated import PAPER_NOISE, SimulatedArm, paper_robot, simulate, with_shapes
-from service.identification import Estimator, Identification, IdentificationDocument, Options, document, identify
-from sim_backend.motion import random_fourier_motion
+from tauscope.identification import Estimator, Identification, IdentificationDocument, Options, document, identify
+from tauscope_sim.motion import random_fourier_motion
 
 NUMBER = (int, float)
 

@@ -19,10 +19,10 @@ from identification.simulated import (
     z_scores,
 )
 from pinocchio_arm import pinocchio_regressor
-from service.dynamics import base_parameters
-from service.identification import Identification, Options, document, identify
-from service.identification.rotor import separable_rotors
-from service.robot import JointType, Robot
+from tauscope.dynamics import base_parameters
+from tauscope.identification import Identification, Options, document, identify
+from tauscope.identification.rotor import separable_rotors
+from tauscope.robot import JointType, Robot
 
 
 @pytest.fixture(scope="module")

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from excitation.excited_arms import modelled_arm, resting_series, with_limits
-from service.acquisition import RunOptions, RunState, make_backend, run_trajectory
-from service.identification import Identification, identify
-from service.recording import read_recording
-from service.robot import JointLimits, Model, Robot
-from service.robot.robot import STANDARD_PARAMETERS
-from service.trajectory import FourierSegment, Trajectory
-from sim_backend.model import build_model
+from tauscope.identification import Identification, identify
+from tauscope.recording import read_recording
+from tauscope.robot import JointLimits, Model, Robot
+from tauscope.robot.robot import STANDARD_PARAMETERS
+from tauscope.runtime import RunOptions, RunState, make_backend, run_trajectory
+from tauscope.trajectory import FourierSegment, Trajectory
+from tauscope_sim.model import build_model
 
 PERIODS = 3
 

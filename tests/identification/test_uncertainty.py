@@ -17,11 +17,11 @@ from identification.simulated import (
     true_parameters,
     z_scores,
 )
-from service.identification import Estimator, Identification, Options, identify
-from service.identification.dataset import Dataset
-from service.identification.least_squares import factorise, solve
-from service.recording import Recording
-from service.recording.conditioning import Conditioner
+from tauscope.identification import Estimator, Identification, Options, identify
+from tauscope.identification.dataset import Dataset
+from tauscope.identification.least_squares import factorise, solve
+from tauscope.recording import Recording
+from tauscope.recording.conditioning import Conditioner
 
 FALSE_ALARM = 1e-4
 

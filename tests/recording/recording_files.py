@@ -12,8 +12,8 @@ from mcap.writer import Writer as PlainWriter
 from mcap_ros2._dynamic import serialize_dynamic
 from mcap_ros2.writer import Writer
 
-from service.errors import RecordingError
-from service.recording import Recording
+from tauscope.errors import RecordingError
+from tauscope.recording import Recording
 
 JOINT_STATE = """\
 std_msgs/Header header

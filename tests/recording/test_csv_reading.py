@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from recording.recording_files import csv_text, message_of, rows_of, snapshot
-from service.errors import RecordingMismatchError
-from service.recording import EffortKind, read_recording
-from service.recording.csv_format import read_csv
+from tauscope.errors import RecordingMismatchError
+from tauscope.recording import EffortKind, read_recording
+from tauscope.recording.csv_format import read_csv
 
 LINES = csv_text().splitlines()
 ROWS = np.array([[float(field) for field in line.split(",")] for line in LINES[1:]])

@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
-from service.errors import RecordingError
-from service.recording import EffortKind, read_recording
-from service.recording.journal import JournalWriter
-from service.recording.journal_reading import Journal, journal_recording, read_journal
-from service.recording.journal_rows import JournalHeader, Phase, journal_row_type
 from shared_data import REPOSITORY
+from tauscope.errors import RecordingError
+from tauscope.recording import EffortKind, read_recording
+from tauscope.recording.journal import JournalWriter
+from tauscope.recording.journal_reading import Journal, journal_recording, read_journal
+from tauscope.recording.journal_rows import JournalHeader, Phase, journal_row_type
 
 RATE = 500.0
 RAMP = 100
@@ -215,10 +215,10 @@ def test_the_rows_before_a_kill_come_back(tmp_path: Path) -> None:
     """The writer kills itself in the middle of a chunk: what was flushed stands."""
     script = f"""
 import os, signal, sys
-sys.path[:0] = [{str(REPOSITORY)!r}, {str(REPOSITORY / "tests" / "recording")!r}]
+sys.path[:0] = [{str(REPOSITORY / "tests" / "recording")!r}]
 from pathlib import Path
 from test_journal import header, rows
-from service.recording.journal import JournalWriter
+from tauscope.recording.journal import JournalWriter
 writer = JournalWriter(Path({str(tmp_path / "journal.mcap")!r}), header())
 table = rows(1000)
 for k in range(983):

@@ -19,8 +19,8 @@ from recording.recording_files import (
     write_log,
     write_plain_log,
 )
-from service.errors import RecordingError, RecordingMismatchError
-from service.recording import convert_recording, read_recording
+from tauscope.errors import RecordingError, RecordingMismatchError
+from tauscope.recording import convert_recording, read_recording
 
 MOTION = arrays()
 

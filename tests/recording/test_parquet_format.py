@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from recording.recording_files import arrays, message_of, rows_of, snapshot
-from service.errors import RecordingMismatchError
-from service.recording import read_recording
-from service.recording.parquet_format import read_parquet
+from tauscope.errors import RecordingMismatchError
+from tauscope.recording import read_recording
+from tauscope.recording.parquet_format import read_parquet
 
 pyarrow = pytest.importorskip("pyarrow")
 parquet = pytest.importorskip("pyarrow.parquet")

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from recording.recording_files import rows_of
-from service.recording import EffortKind, check_recording, read_recording, write_recording
 from shared_data import SHARED_DATA, needs_shared_data
+from tauscope.recording import EffortKind, check_recording, read_recording, write_recording
 
 pytestmark = needs_shared_data
 

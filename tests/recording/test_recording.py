@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from recording.recording_files import arrays, message_of
-from service.errors import RecordingMismatchError
-from service.recording import EffortKind, Recording
-from service.robot.robot import Joint, Robot
+from tauscope.errors import RecordingMismatchError
+from tauscope.recording import EffortKind, Recording
+from tauscope.robot.robot import Joint, Robot
 
 
 def recording(**changes: Any):

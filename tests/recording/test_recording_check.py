@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from recording.recording_files import csv_text, message_of
-from service.recording import Recording, check_recording, measures, report_recording
-from service.robot.finding import Severity
+from tauscope.recording import Recording, check_recording, measures, report_recording
+from tauscope.robot.finding import Severity
 
 SAMPLES = 4000
 

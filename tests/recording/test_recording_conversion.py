@@ -6,7 +6,7 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
 from recording.recording_files import arrays, csv_text, message_of, messages, rows_of, snapshot, write_log
-from service.recording import EffortKind, Recording, convert_recording, read_recording, write_recording
+from tauscope.recording import EffortKind, Recording, convert_recording, read_recording, write_recording
 
 
 def full_recording(**changes):

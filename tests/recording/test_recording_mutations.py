@@ -20,7 +20,7 @@ from recording.recording_files import (
     write_log,
     write_plain_log,
 )
-from service.recording import check_recording, convert_recording, read_recording
+from tauscope.recording import check_recording, convert_recording, read_recording
 
 COLUMNS = ("t", "q1", "q2", "tau1", "tau2")
 CSV_LINES = csv_text(16).splitlines()

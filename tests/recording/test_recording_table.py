@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.errors import RecordingError
-from service.recording.table import MemoryTable, SpooledTable, TableBuilder
+from tauscope.errors import RecordingError
+from tauscope.recording.table import MemoryTable, SpooledTable, TableBuilder
 
 NAMES = ("t", "q1", "tau1")
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from recording.recording_files import arrays, message_of, messages, snapshot, write_database, write_log
-from service.recording import read_recording
+from tauscope.recording import read_recording
 
 MOTION = arrays()
 

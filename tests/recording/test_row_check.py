@@ -1,7 +1,7 @@
 import numpy as np
 
 from recording.recording_files import message_of
-from service.recording.row_check import RowCheck
+from tauscope.recording.row_check import RowCheck
 
 
 def place(row: int) -> str:

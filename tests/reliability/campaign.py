@@ -23,7 +23,7 @@ from pathlib import Path
 from reliability.damage import damage_something
 from reliability.ledger import Ledger
 from reliability.service_life import KILLED_ANY_TIME, Life, Plan, draw_plan
-from service.store.database import FILE_NAME, Database
+from tauscope.server.store.database.database import FILE_NAME, Database
 
 LIVES_OF_A_FOLDER = 10
 DAMAGED_WHILE_DOWN = "file damaged while down"

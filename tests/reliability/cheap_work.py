@@ -4,10 +4,12 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
-from service.errors import RecordingError, TauscopeError
-from service.jobs import IdentificationWorkspace, JobProblem
-from service.jobs.work import begin_step, do_work
-from service.store import hash_file, write_atomically
+from tauscope.errors import RecordingError, TauscopeError
+from tauscope.files import write_atomically
+from tauscope.server.queue.identification_workspace import IdentificationWorkspace
+from tauscope.server.queue.record import JobProblem
+from tauscope.server.queue.work import begin_step, do_work
+from tauscope.server.store.incoming import hash_file
 
 SCHEMA = "tauscope.identification/1"
 

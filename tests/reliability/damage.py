@@ -6,7 +6,8 @@ from pathlib import Path
 
 from reliability.ledger import Ledger
 from reliability.requests import Note
-from service.store import FOLDERS, RECORDINGS, hash_file
+from tauscope.server.store.incoming import hash_file
+from tauscope.server.store.layout import FOLDERS, RECORDINGS
 
 
 def damage_something(data: Path, ledger: Ledger, note: Note, chance: random.Random) -> bool:

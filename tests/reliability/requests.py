@@ -7,8 +7,8 @@ from typing import Any
 
 from starlette.testclient import TestClient
 
-from api.motions import ROBOT
 from reliability.ledger import Ledger
+from server.http.motions import ROBOT
 
 RECORDINGS = "/api/v1/recordings"
 IDENTIFICATIONS = "/api/v1/identifications"

@@ -14,18 +14,18 @@ from pathlib import Path
 from fastapi import FastAPI
 from sqlalchemy import Connection, event
 
-from api.conftest import connected
 from reliability.cheap_work import cheap_identification
 from reliability.damage import damage_something
 from reliability.faulty_disk import FaultyDisk, die, full
 from reliability.judgement import Judge
 from reliability.ledger import Ledger
 from reliability.requests import Note, Requests
-from service.api import Settings, create_app, opening
-from service.api.services import Services
-from service.jobs import WorkerPool
-from service.store.database import FILE_NAME
-from service.store.database import engine as database_engine
+from server.http.conftest import connected
+from tauscope.server.http import Settings, assembly, create_app
+from tauscope.server.http.services import Services
+from tauscope.server.queue.worker_pool import WorkerPool
+from tauscope.server.store.database import engine as database_engine
+from tauscope.server.store.database.database import FILE_NAME
 
 FULL, LOCKED, DAMAGED, WORKER = "disk full", "database locked", "file damaged", "worker killed"
 KILLED_STARTING, KILLED_WRITING, KILLED_ANY_TIME = "killed while starting", "killed at a write", "killed at any time"
@@ -98,7 +98,7 @@ class Life:
 
     def _application(self) -> FastAPI:
         """The service as it is, but for what takes time: cheap work, and no patience with a locked database."""
-        opening.run_identification = partial(cheap_identification, fate=_meet_fate)
+        assembly.run_identification = partial(cheap_identification, fate=_meet_fate)
         database_engine.PATIENCE_S = LOCK_PATIENCE_S
         event.listen(database_engine.Engine, "begin", self._bound_pages)
         settings = Settings(data_folder=self._folder, fires_schedules=False, max_waiting=50)

@@ -6,14 +6,14 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 
-from service.identification import Identification, identify
-from service.recording import Recording
-from service.report.identification_report import identification_report
-from service.report.provenance import InputFile, Provenance
-from service.robot import Model, read_robot
-from sim_backend.examples import example_robot
-from sim_backend.motion import random_fourier_motion
-from sim_backend.recording import simulate_recording
+from tauscope.identification import Identification, identify
+from tauscope.recording import Recording
+from tauscope.report.identification_report import identification_report
+from tauscope.report.provenance import InputFile, Provenance
+from tauscope.robot import Model, read_robot
+from tauscope_sim.examples import example_robot
+from tauscope_sim.motion import random_fourier_motion
+from tauscope_sim.recording import simulate_recording
 
 NOISE_STD = (0.5, 0.3, 0.7)
 HOSTILE = '"><script>alert(1)</script>'

@@ -11,14 +11,14 @@ from diagnosis.diagnosed_arm import recordings
 from diagnosis.test_diagnosis_of_simulated_arms import spring
 from report.conftest import HOSTILE, JOINTS
 from report.test_identification_report import LOADING, Reading
-from service.diagnosis import Diagnosis, DiagnosisDocument, diagnose, document
-from service.diagnosis.next_experiment import PlannedExperiment, plan_experiment
-from service.recording import read_recording
-from service.report.diagnosis_report import diagnosis_report
-from service.report.provenance import InputFile, Provenance
-from service.robot import Model, read_robot
 from shared_data import SHARED_DATA, needs_shared_data
-from sim_backend.examples import example_robot
+from tauscope.diagnosis import Diagnosis, DiagnosisDocument, diagnose, document
+from tauscope.diagnosis.next_experiment import PlannedExperiment, plan_experiment
+from tauscope.recording import read_recording
+from tauscope.report.diagnosis_report import diagnosis_report
+from tauscope.report.provenance import InputFile, Provenance
+from tauscope.robot import Model, read_robot
+from tauscope_sim.examples import example_robot
 
 STORY = ["where", "what", "how-much", "proof", "next", "detectable", "reproduce"]
 PROVENANCE = Provenance(

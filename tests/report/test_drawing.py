@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from matplotlib.figure import Figure
 
-from service.report.decimation import envelope_indices
-from service.report.svg import PREDICTED, draw_svg
-from service.report.torque_figure import worst_part
+from tauscope.report.decimation import envelope_indices
+from tauscope.report.svg import PREDICTED, draw_svg
+from tauscope.report.torque_figure import worst_part
 
 curves = arrays.arrays(np.float64, st.integers(1, 400), elements=st.floats(-1e6, 1e6) | st.just(np.nan))
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from report.conftest import NOISE_STD, Case
-from service.report.friction_curve import friction_curve
-from service.report.series import torque_series
-from service.robot import read_robot
-from sim_backend.examples import example_robot
-from sim_backend.friction import static_friction_torque
+from tauscope.report.friction_curve import friction_curve
+from tauscope.report.series import torque_series
+from tauscope.robot import read_robot
+from tauscope_sim.examples import example_robot
+from tauscope_sim.friction import static_friction_torque
 
 
 @pytest.fixture(scope="module", params=range(3))

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from service.errors import RecordingError
-from service.report.provenance import input_files, installed_version, record_provenance
-from service.robot import read_robot
-from sim_backend.examples import example_robot
+from tauscope.errors import RecordingError
+from tauscope.report.provenance import input_files, installed_version, record_provenance
+from tauscope.robot import read_robot
+from tauscope_sim.examples import example_robot
 
 
 def test_every_file_is_hashed(tmp_path: Path) -> None:

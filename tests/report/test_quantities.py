@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.report import quantities
-from service.report.quantities import (
+from tauscope.report import quantities
+from tauscope.report.quantities import (
     ABSENT,
     base_parameter_unit,
     counted,
@@ -17,7 +17,7 @@ from service.report.quantities import (
     velocity_unit,
     with_uncertainty,
 )
-from service.robot import JointType
+from tauscope.robot import JointType
 
 numbers = st.floats(-1e12, 1e12)
 

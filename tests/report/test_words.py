@@ -3,8 +3,8 @@
 import pytest
 
 from report.conftest import JOINTS, Case
-from service.identification import IdentificationDocument, document
-from service.report.words import band_words, cautions, fit_sentences, noise_ratio
+from tauscope.identification import IdentificationDocument, document
+from tauscope.report.words import band_words, cautions, fit_sentences, noise_ratio
 
 
 @pytest.fixture

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from robot.robot_texts import ROBOT_YAML, URDF, URDF_ROBOT_YAML, replaced, write_robot
-from service.errors import RobotFileError
-from service.robot import JointType, Severity, check_robot
+from tauscope.errors import RobotFileError
+from tauscope.robot import JointType, Severity, check_robot
 
 
 def test_report_sums_the_arm_up(tmp_path: Path) -> None:

@@ -5,14 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.errors import RecordingMismatchError
-from service.robot import (
-    DenavitHartenbergRow,
-    JointType,
-    link_placements,
-    modified_segments,
-    standard_segments,
-)
+from tauscope.errors import RecordingMismatchError
+from tauscope.robot import DenavitHartenbergRow, JointType, link_placements, modified_segments, standard_segments
 
 ANGLE = st.floats(-np.pi, np.pi)
 LENGTH = st.floats(-2.0, 2.0)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from service.robot import LinkInertia, Severity, find_defect, pseudo_inertia
+from tauscope.robot import LinkInertia, Severity, find_defect, pseudo_inertia
 
 COORDINATE = st.floats(-1.0, 1.0)
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from robot.robot_texts import ROBOT_YAML, URDF, URDF_ROBOT_YAML, write_robot
-from service.errors import RobotFileError, UnphysicalModelError
-from service.robot import Robot, link_placements, read_robot, robot_from_dict, robot_from_yaml, robot_to_dict
-from service.robot.yaml_text import read_yaml
+from tauscope.errors import RobotFileError, UnphysicalModelError
+from tauscope.robot import Robot, link_placements, read_robot, robot_from_dict, robot_from_yaml, robot_to_dict
+from tauscope.robot.yaml_text import read_yaml
 
 
 def _data(text: str = ROBOT_YAML) -> dict[str, Any]:

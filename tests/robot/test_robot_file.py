@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from robot.robot_texts import ROBOT_YAML, URDF, URDF_ROBOT_YAML, replaced, write_robot
-from service.robot import (
+from shared_data import needs_shared_data
+from tauscope.robot import (
     FrictionCoefficients,
     FrictionShape,
     Joint,
@@ -17,7 +18,6 @@ from service.robot import (
     link_placements,
     read_robot,
 )
-from shared_data import needs_shared_data
 
 
 def _read(folder: Path, text: str, urdf: str | None = None) -> Robot:

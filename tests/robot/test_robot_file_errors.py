@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from robot.robot_texts import ROBOT_YAML, URDF, URDF_ROBOT_YAML, replaced, write_robot
-from service.errors import RobotFileError, UnphysicalModelError
-from service.robot import read_robot
+from tauscope.errors import RobotFileError, UnphysicalModelError
+from tauscope.robot import read_robot
 
 LINK_2 = "{mass: 1.4, first_moment: [0.1, 0, 0], inertia: {xx: 0.02, yy: 0.03, zz: 0.03, xy: 0, xz: 0, yz: 0}}"
 

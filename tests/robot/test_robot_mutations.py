@@ -9,8 +9,8 @@ from hypothesis import HealthCheck, event, given, settings
 from hypothesis import strategies as st
 
 from robot.robot_texts import ROBOT_YAML, URDF, URDF_ROBOT_YAML, write_robot
-from service.errors import RobotFileError
-from service.robot import Severity, check_robot, link_placements, read_robot, robot_from_dict, robot_to_dict
+from tauscope.errors import RobotFileError
+from tauscope.robot import Severity, check_robot, link_placements, read_robot, robot_from_dict, robot_to_dict
 
 TOKEN = re.compile(r"\s+|[-+.\w]+|[^\s\w]")
 NUMBERS = [

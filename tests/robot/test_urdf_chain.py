@@ -7,9 +7,9 @@ import pinocchio  # pyright: ignore[reportMissingImports]
 import pytest
 
 from robot.robot_texts import URDF, replaced
-from service.errors import RobotFileError
-from service.robot import JointType, Severity, UrdfChain, link_placements, read_urdf_chain
-from service.robot.placement import rotation_of_z_to
+from tauscope.errors import RobotFileError
+from tauscope.robot import JointType, Severity, UrdfChain, link_placements, read_urdf_chain
+from tauscope.robot.placement import rotation_of_z_to
 
 
 @dataclass

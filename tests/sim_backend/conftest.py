@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from arms import paper_arm, paper_parameters
-from service.robot.robot import FrictionCoefficients, FrictionShape, JointLimits, LinkInertia, Model, Robot
+from tauscope.robot.robot import FrictionCoefficients, FrictionShape, JointLimits, LinkInertia, Model, Robot
 
 
 @pytest.fixture

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from service.errors import RecordingError, RobotFileError
-from service.robot.robot import Joint, JointLimits
-from sim_backend.motion import FourierMotion, random_fourier_motion
+from tauscope.errors import RecordingError, RobotFileError
+from tauscope.robot.robot import Joint, JointLimits
+from tauscope_sim.motion import FourierMotion, random_fourier_motion
 
 JOINTS = (
     Joint("base", limits=JointLimits(position=(-2.9, 2.9), velocity=2.0, acceleration=5.0)),

@@ -12,10 +12,10 @@ import pinocchio
 import pytest
 
 from arms import Array, arm, dh_segment, random_arm, random_link, random_states
-from service.errors import RobotFileError, UnphysicalModelError
-from service.robot.robot import JointType, LinkInertia, Model, Robot
-from sim_backend.inverse_dynamics import rigid_body_torque
-from sim_backend.model import build_model, build_spec
+from tauscope.errors import RobotFileError, UnphysicalModelError
+from tauscope.robot.robot import JointType, LinkInertia, Model, Robot
+from tauscope_sim.inverse_dynamics import rigid_body_torque
+from tauscope_sim.model import build_model, build_spec
 
 
 def with_links(robot: Robot, *links: LinkInertia) -> Robot:

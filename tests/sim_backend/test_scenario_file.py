@@ -10,15 +10,15 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from service.errors import ScenarioError
-from service.robot import read_robot
-from service.robot.robot import Robot
 from shared_data import REPOSITORY
-from sim_backend.effects import EFFECTS, Cogging, Effect, SensorEffect, TimeDelay
-from sim_backend.examples import example_robot
-from sim_backend.plant import Plant
-from sim_backend.scenario import Scenario
-from sim_backend.scenario_file import read_scenario, scenario_from_yaml
+from tauscope.errors import ScenarioError
+from tauscope.robot import read_robot
+from tauscope.robot.robot import Robot
+from tauscope_sim.effects import EFFECTS, Cogging, Effect, SensorEffect, TimeDelay
+from tauscope_sim.examples import example_robot
+from tauscope_sim.plant import Plant
+from tauscope_sim.scenario import Scenario
+from tauscope_sim.scenario_file import read_scenario, scenario_from_yaml
 
 ENTRIES: dict[str, str] = {
     "asymmetric_coulomb": "joint: 1, amplitude: 1",

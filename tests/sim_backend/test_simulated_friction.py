@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from service.errors import RobotFileError
-from service.robot.robot import FrictionCoefficients, FrictionShape
-from sim_backend.friction import static_friction_torque
+from tauscope.errors import RobotFileError
+from tauscope.robot.robot import FrictionCoefficients, FrictionShape
+from tauscope_sim.friction import static_friction_torque
 
 SHAPE = FrictionShape(k_v=500.0, delta=10.0)
 

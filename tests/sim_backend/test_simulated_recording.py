@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service.errors import RecordingError
-from service.robot.robot import FrictionCoefficients, Robot
-from sim_backend.friction import static_friction_torque
-from sim_backend.inverse_dynamics import rigid_body_torque
-from sim_backend.model import build_model
-from sim_backend.motion import random_fourier_motion
-from sim_backend.recording import SimulatedRecording, simulate_recording
-from sim_backend.recording_csv import write_recording_csv
+from tauscope.errors import RecordingError
+from tauscope.robot.robot import FrictionCoefficients, Robot
+from tauscope_sim.friction import static_friction_torque
+from tauscope_sim.inverse_dynamics import rigid_body_torque
+from tauscope_sim.model import build_model
+from tauscope_sim.motion import random_fourier_motion
+from tauscope_sim.recording import SimulatedRecording, simulate_recording
+from tauscope_sim.recording_csv import write_recording_csv
 
 
 def record(robot: Robot, seed: int = 1, **settings: Any) -> SimulatedRecording:

@@ -1,4 +1,4 @@
-"""``python -m sim_backend`` and the robot file that comes with it."""
+"""``python -m tauscope_sim`` and the robot file that comes with it."""
 
 from pathlib import Path
 
@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from arms import Array, rotation_z
-from service.errors import NotFoundError
-from service.robot import read_robot
-from service.robot.robot import Robot, Segment
-from sim_backend.__main__ import main
-from sim_backend.examples import example_robot
+from tauscope.errors import NotFoundError
+from tauscope.robot import read_robot
+from tauscope.robot.robot import Robot, Segment
+from tauscope_sim.__main__ import main
+from tauscope_sim.examples import example_robot
 
 
 def pose(segment: Segment, angle: float) -> Array:

@@ -9,9 +9,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from excitation.excited_arms import limited_paper_arm, resting_series
-from service.errors import ExcitationError
-from service.excitation import require_within_limits
-from service.trajectory import (
+from tauscope.errors import ExcitationError
+from tauscope.excitation import require_within_limits
+from tauscope.trajectory import (
     DesignRecord,
     FourierSegment,
     Trajectory,
@@ -21,7 +21,7 @@ from service.trajectory import (
     trajectory_json,
     write_trajectory,
 )
-from service.trajectory.csv_format import parse_trajectory_csv, trajectory_csv
+from tauscope.trajectory.csv_format import parse_trajectory_csv, trajectory_csv
 from trajectory.test_trajectory import whole_trajectory
 
 ROBOT = limited_paper_arm()

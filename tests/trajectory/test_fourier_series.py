@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from excitation.excited_arms import resting_series
-from service.errors import ExcitationError
-from service.trajectory import FourierSeries
-from service.trajectory.fourier_series import between_samples
+from tauscope.errors import ExcitationError
+from tauscope.trajectory import FourierSeries
+from tauscope.trajectory.fourier_series import between_samples
 
 
 def test_the_paper_s_formulas_term_by_term() -> None:

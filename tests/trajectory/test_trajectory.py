@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from excitation.excited_arms import limited_paper_arm, resting_series
-from service.errors import ExcitationError
-from service.trajectory import (
+from tauscope.errors import ExcitationError
+from tauscope.trajectory import (
     FourierSegment,
     MotionLimits,
     MotionSamples,
@@ -18,7 +18,7 @@ from service.trajectory import (
     motion_limits,
     ramp,
 )
-from service.trajectory.segments import minimum_jerk
+from tauscope.trajectory.segments import minimum_jerk
 
 LIMITS = motion_limits(limited_paper_arm())
 NAMES = ("joint1", "joint2", "joint3")

@@ -11,19 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from concealed.sealing.truth import label
-from service.diagnosis.catalogue import Effect, TimeLocalEffect, possible_effects
-from service.diagnosis.fitting.fit import Fit, Fitter
-from service.diagnosis.model.nominal import nominal_model, setting_of
-from service.diagnosis.model.residual import residual_rows
-from service.diagnosis.observations.band import diagnosis_cutoff
-from service.diagnosis.observations.observations import Observations
-from service.diagnosis.observations.whitening import JointNoise
-from service.diagnosis.screening.screen import SHAPES_AT_ONCE, Screen, model_signals
-from service.identification import identify
-from service.identification.autocorrelation import Autoregression
-from service.recording import Recording
-from service.recording.conditioning import Conditioner
-from service.robot import Robot
+from tauscope.diagnosis.fitting.fit import Fit, Fitter
+from tauscope.diagnosis.model.nominal import nominal_model, setting_of
+from tauscope.diagnosis.model.residual import residual_rows
+from tauscope.diagnosis.observations.band import diagnosis_cutoff
+from tauscope.diagnosis.observations.observations import Observations
+from tauscope.diagnosis.observations.whitening import JointNoise
+from tauscope.diagnosis.screening.screen import SHAPES_AT_ONCE, Screen, model_signals
+from tauscope.effects import Effect, TimeLocalEffect, possible_effects
+from tauscope.identification import identify
+from tauscope.identification.autocorrelation import Autoregression
+from tauscope.recording import Recording
+from tauscope.recording.conditioning import Conditioner
+from tauscope.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -5,16 +5,7 @@ from collections.abc import Callable, Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
-from concealed.baselines.claims import (
-    BASELINES,
-    NAMES,
-    Claim,
-    balanced,
-    claim,
-    claim_of_tauscope,
-    right,
-    thresholds,
-)
+from concealed.baselines.claims import BASELINES, NAMES, Claim, balanced, claim, claim_of_tauscope, right, thresholds
 from concealed.running.kept import Outcome
 from concealed.scoring.breakdown import Count, cell
 from concealed.scoring.figures import interval

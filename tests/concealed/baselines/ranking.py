@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from concealed.baselines.columns import Columns, Ground
-from service.diagnosis.fitting.projection import moments
+from tauscope.diagnosis.fitting.projection import moments
 
 Array = NDArray[np.float64]
 Ranking = list[tuple[str, float]]

@@ -12,10 +12,10 @@ from concealed.baselines.ranking import Best, rankings, sparse
 from concealed.baselines.tune import LOOKED_AT
 from concealed.generator.arms import arm_named, without_truth
 from concealed.generator.motions import campaign
-from service.diagnosis.fitting.projection import JointColumns, project
-from service.dynamics import inverse_dynamics
-from service.recording import Recording
-from sim_backend.friction import static_friction_torque
+from tauscope.diagnosis.fitting.projection import JointColumns, project
+from tauscope.dynamics import inverse_dynamics
+from tauscope.recording import Recording
+from tauscope_sim.friction import static_friction_torque
 
 ROWS = 600
 LIBRARY = ("cogging@joint1", "joint_spring@joint1", "rotor_inertia@joint2", "base_tilt")

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from ruamel.yaml import YAML
 
-from service.robot import FrictionShape, Model, Robot, read_robot
-from sim_backend.examples import example_robot
+from tauscope.robot import FrictionShape, Model, Robot, read_robot
+from tauscope_sim.examples import example_robot
 
 ROBOTS = Path(__file__).parent / "robots"
 

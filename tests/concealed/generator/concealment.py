@@ -15,7 +15,7 @@ from concealed.generator.motions import RATE_HZ, Asked, campaign
 from concealed.generator.sizing import sized, tuned
 from concealed.generator.strength import strength
 from concealed.generator.unknown import UNKNOWN
-from service.robot import Robot
+from tauscope.robot import Robot
 
 Array = NDArray[np.float64]
 

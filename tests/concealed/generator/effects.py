@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from concealed.generator.forward import Entry
-from service.robot import Robot
+from tauscope.robot import Robot
 
 Draw = Callable[["Ground", np.random.Generator], "Drawn"]
 

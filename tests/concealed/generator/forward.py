@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from concealed.generator.motions import RATE_HZ, Asked
-from drivers import ControlMode, DriveLimits, Setpoint, StopPolicy
-from service.robot import Robot, robot_to_dict
-from sim_backend.driver import SimulatedArm
-from sim_backend.effects import EFFECTS, Effect, SensorEffect
-from sim_backend.scenario import Scenario
+from tauscope.robot import Robot, robot_to_dict
+from tauscope_drivers import ControlMode, DriveLimits, Setpoint, StopPolicy
+from tauscope_sim.driver import SimulatedArm
+from tauscope_sim.effects import EFFECTS, Effect, SensorEffect
+from tauscope_sim.scenario import Scenario
 
 Array = NDArray[np.float64]
 Entry = dict[str, Any]

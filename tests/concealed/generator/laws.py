@@ -12,22 +12,22 @@ from numpy.typing import NDArray
 
 from concealed.generator.forward import FINE, Passage
 from concealed.generator.motions import RATE_HZ
-from service.robot import Robot
-from sim_backend.effects import Effect
-from sim_backend.effects.base_tilt import BaseTilt
-from sim_backend.effects.external_contact import ExternalContact
-from sim_backend.effects.friction_coupling import FrictionCoupling
-from sim_backend.effects.friction_drift import FrictionDrift
-from sim_backend.effects.joint_law import JointLaw
-from sim_backend.effects.kinematic_error import KinematicError
-from sim_backend.effects.load_dependent_friction import LoadDependentFriction
-from sim_backend.effects.payload import Payload
-from sim_backend.effects.payload_change import PayloadChange
-from sim_backend.effects.presliding_hysteresis import PreslidingHysteresis
-from sim_backend.effects.rotor_inertia import RotorInertia
-from sim_backend.effects.torque_ripple import TorqueRipple
-from sim_backend.inverse_dynamics import rigid_body_torque
-from sim_backend.model import build_model
+from tauscope.robot import Robot
+from tauscope_sim.effects import Effect
+from tauscope_sim.effects.base_tilt import BaseTilt
+from tauscope_sim.effects.external_contact import ExternalContact
+from tauscope_sim.effects.friction_coupling import FrictionCoupling
+from tauscope_sim.effects.friction_drift import FrictionDrift
+from tauscope_sim.effects.joint_law import JointLaw
+from tauscope_sim.effects.kinematic_error import KinematicError
+from tauscope_sim.effects.load_dependent_friction import LoadDependentFriction
+from tauscope_sim.effects.payload import Payload
+from tauscope_sim.effects.payload_change import PayloadChange
+from tauscope_sim.effects.presliding_hysteresis import PreslidingHysteresis
+from tauscope_sim.effects.rotor_inertia import RotorInertia
+from tauscope_sim.effects.torque_ripple import TorqueRipple
+from tauscope_sim.inverse_dynamics import rigid_body_torque
+from tauscope_sim.model import build_model
 
 Array = NDArray[np.float64]
 

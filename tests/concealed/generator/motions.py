@@ -6,9 +6,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from service.robot import Joint, JointLimits, Robot
-from service.trajectory import Trajectory
-from sim_backend.motion import FourierMotion, random_fourier_motion
+from tauscope.robot import Joint, JointLimits, Robot
+from tauscope.trajectory import Trajectory
+from tauscope_sim.motion import FourierMotion, random_fourier_motion
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from scipy import signal
 
 from concealed.generator.forward import Entry, Passage, sensory
 from concealed.generator.motions import RATE_HZ, Asked
-from service.recording import Recording
+from tauscope.recording import Recording
 
 Array = NDArray[np.float64]
 

@@ -15,11 +15,11 @@ from concealed.generator.forward import FINE, Entry, Passage, physical, sensory
 from concealed.generator.laws import law_torque
 from concealed.generator.motions import RATE_HZ
 from concealed.generator.sensing import sensed
-from service.dynamics import base_parameters, smooth_sign, smooth_sign_slope, torque_regressor
-from service.robot import Robot
-from sim_backend.friction import static_friction_torque
-from sim_backend.inverse_dynamics import rigid_body_torque
-from sim_backend.model import build_model
+from tauscope.dynamics import base_parameters, smooth_sign, smooth_sign_slope, torque_regressor
+from tauscope.robot import Robot
+from tauscope_sim.friction import static_friction_torque
+from tauscope_sim.inverse_dynamics import rigid_body_torque
+from tauscope_sim.model import build_model
 
 Array = NDArray[np.float64]
 

@@ -6,8 +6,8 @@ import pytest
 from concealed.generator.arms import arm_named
 from concealed.generator.effects import CATALOGUE, EVENTS, Ground
 from concealed.generator.forward import physical, sensory
-from sim_backend.driver import SimulatedArm
-from sim_backend.scenario import Scenario
+from tauscope_sim.driver import SimulatedArm
+from tauscope_sim.scenario import Scenario
 
 WITHOUT_BOUND = 100.0
 """A size that is tried where an effect may be as large as one likes."""

@@ -9,7 +9,7 @@ from concealed.generator.arms import arm_named
 from concealed.generator.forward import Entry, passage, physical
 from concealed.generator.laws import STEP_S, law_torque
 from concealed.generator.motions import Motion
-from sim_backend.motion import random_fourier_motion
+from tauscope_sim.motion import random_fourier_motion
 
 PUSH = {"effect": "external_contact", "joint": 2, "torque": 6.0, "start": 0.8, "duration": 1.0}
 LOAD = {"effect": "payload_change", "mass": 1.5, "offset": [0.05, 0.0, 0.1], "start": 0.9, "end": 2.1}

@@ -11,8 +11,8 @@ from concealed.generator.forward import FINE, Passage, physical
 from concealed.generator.laws import law_torque, with_law
 from concealed.generator.motions import RATE_HZ, campaign
 from concealed.generator.strength import foreseen_strength, strength
-from service.dynamics import inverse_dynamics
-from sim_backend.friction import static_friction_torque
+from tauscope.dynamics import inverse_dynamics
+from tauscope_sim.friction import static_friction_torque
 
 COGGING = {"effect": "cogging", "joint": 1, "amplitude": 0.3, "order": 17.0, "phase": 0.4}
 

@@ -11,8 +11,8 @@ from concealed.generator.concealment import Concealed, concealed_effects, concea
 from concealed.generator.effects import Drawn
 from concealed.generator.motions import Asked, campaign
 from concealed.generator.sensing import Noise, recording
-from service.recording import Recording
-from service.robot import Robot
+from tauscope.recording import Recording
+from tauscope.robot import Robot
 
 
 @dataclass(frozen=True, eq=False)

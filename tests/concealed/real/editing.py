@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
 
-from service.recording import Recording
-from service.robot import Model, Robot
-from service.robot.robot import LinkInertia
-from sim_backend.effects.payload import Payload
-from sim_backend.inverse_dynamics import rigid_body_torque
-from sim_backend.model import build_model
+from tauscope.recording import Recording
+from tauscope.robot import Model, Robot
+from tauscope.robot.robot import LinkInertia
+from tauscope_sim.effects.payload import Payload
+from tauscope_sim.inverse_dynamics import rigid_body_torque
+from tauscope_sim.model import build_model
 
 Array = NDArray[np.float64]
 Edit = Callable[[Robot, Recording], Recording]

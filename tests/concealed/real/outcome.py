@@ -13,8 +13,8 @@ from concealed.scoring.plain import plain
 from concealed.scoring.score import compared
 from concealed.sealing.sealed import diagnosis_apart
 from concealed.sealing.truth import Hidden, Truth, opened
-from service.recording import read_recording, write_recording
-from service.robot import read_robot
+from tauscope.recording import read_recording, write_recording
+from tauscope.robot import read_robot
 
 MODEL = "model.json"
 

@@ -8,10 +8,10 @@ from concealed.real.editing import carried, cogging_of, later, motion, point_mas
 from concealed.real.outcome import real_outcome
 from concealed.real.table import table
 from concealed.real.trials import QUICK, REAL, data
-from service.diagnosis.catalogue import catalogue
-from service.recording import Recording
-from service.robot import Robot, read_robot
 from shared_data import needs_shared_data
+from tauscope.effects import catalogue
+from tauscope.recording import Recording
+from tauscope.robot import Robot, read_robot
 
 
 @pytest.fixture

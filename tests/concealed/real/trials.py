@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from concealed.real.editing import Edit, carried, cogging_of, later, scaled
-from service.recording import read_recording
+from tauscope.recording import read_recording
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 

@@ -6,10 +6,10 @@ from unittest import mock
 import numpy as np
 
 from concealed.generator.trial import Trial
-from service.diagnosis import diagnosis as steps
-from service.diagnosis import document
-from service.diagnosis.catalogue import Effect, Setting, possible_effects
-from service.diagnosis.documents.document import DiagnosisDocument
+from tauscope.diagnosis import diagnosis as steps
+from tauscope.diagnosis import document
+from tauscope.diagnosis.documents.document import DiagnosisDocument
+from tauscope.effects import Effect, Setting, possible_effects
 
 
 def oracle(trial: Trial) -> DiagnosisDocument:

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from service.diagnosis.documents.document import DiagnosisDocument
+from tauscope.diagnosis.documents.document import DiagnosisDocument
 
 NOT_KEPT = {"detectable", "parameter_differences", "parameter_shifts"}
 """What of a diagnosis no figure needs."""

@@ -7,7 +7,7 @@ from concealed.running.kept import Outcome
 from concealed.scoring.plain import NOT_KEPT
 from concealed.scoring.score import compared
 from concealed.sealing.truth import Hidden, Truth
-from service.diagnosis.documents.document import DiagnosisDocument
+from tauscope.diagnosis.documents.document import DiagnosisDocument
 
 NEEDED_TO_READ: dict[str, list[Any]] = {name: [] for name in NOT_KEPT}
 

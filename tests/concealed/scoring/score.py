@@ -7,9 +7,9 @@ import numpy as np
 
 from concealed.generator.trial import Trial
 from concealed.sealing.truth import Hidden, Truth, label, truth_of
-from service.diagnosis import diagnose, document
-from service.diagnosis.documents.document import DiagnosisDocument
-from service.diagnosis.documents.result import FindingEntry
+from tauscope.diagnosis import diagnose, document
+from tauscope.diagnosis.documents.document import DiagnosisDocument
+from tauscope.diagnosis.documents.result import FindingEntry
 
 UNKNOWN = "unknown"
 FRAME = ("link", "axis")

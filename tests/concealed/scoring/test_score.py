@@ -7,7 +7,7 @@ import pytest
 from concealed.scoring.rescored import rescored
 from concealed.scoring.score import compared
 from concealed.sealing.truth import Hidden, Truth
-from service.diagnosis.documents.document import DiagnosisDocument
+from tauscope.diagnosis.documents.document import DiagnosisDocument
 
 
 def finding(effect: str, joint: str | None, probability: float = 0.95, **more: Any) -> dict[str, Any]:

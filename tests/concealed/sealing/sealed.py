@@ -13,16 +13,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-import service
+import tauscope
 from concealed.generator.arms import file_without_truth
 from concealed.generator.case import Case, drawn
 from concealed.generator.motions import Planned
 from concealed.generator.trial import Trial
 from concealed.sealing.truth import truth_of
-from service.diagnosis.documents.document import DiagnosisDocument
-from service.errors import ScenarioError
-from service.recording import EffortKind, Recording, write_recording
-from service.trajectory import read_trajectory
+from tauscope.diagnosis.documents.document import DiagnosisDocument
+from tauscope.errors import ScenarioError
+from tauscope.recording import EffortKind, Recording, write_recording
+from tauscope.trajectory import read_trajectory
 
 Array = NDArray[np.float64]
 
@@ -120,7 +120,7 @@ def diagnosis_apart(folder: Path, *, plans: bool = False, more: Sequence[str] = 
     It could not even import what draws the truth: its environment names the program's own source and no other.
     """
     train, held_out = (sorted(each.name for each in folder.glob(f"{kind}*.csv")) for kind in ("train", "held-out"))
-    command = [sys.executable, "-m", "service.cli", "diagnose", "robot.yaml", *train, "--json", RESULT]
+    command = [sys.executable, "-m", "tauscope.cli", "diagnose", "robot.yaml", *train, "--json", RESULT]
     command += [*more, *(["--next-trajectory", NEXT] if plans else []), "--held-out", *held_out]
     begin = time.perf_counter()
     done = subprocess.run(
@@ -135,7 +135,7 @@ def diagnosis_apart(folder: Path, *, plans: bool = False, more: Sequence[str] = 
 def apart() -> dict[str, str]:
     """Environment of the diagnosing process."""
     kept = {name: os.environ[name] for name in PASSED_ON if name in os.environ}
-    return {**kept, "PYTHONPATH": str(Path(service.__file__).resolve().parents[1])}
+    return {**kept, "PYTHONPATH": str(Path(tauscope.__file__).resolve().parents[1])}
 
 
 def with_recommended(these: Sealed) -> bool:

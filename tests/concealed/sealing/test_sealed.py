@@ -16,8 +16,8 @@ from concealed.generator.sensing import Noise
 from concealed.generator.trial import Trial
 from concealed.sealing.sealed import Sealed, apart, nominal_constants, sealed
 from concealed.sealing.truth import opened
-from service.recording import Recording, read_recording
-from service.robot import read_robot
+from tauscope.recording import Recording, read_recording
+from tauscope.robot import read_robot
 
 GAIN = 1.07
 
@@ -80,7 +80,7 @@ def test_the_diagnosing_process_cannot_draw_the_truth_itself(tmp_path: Path) -> 
         command = [sys.executable, "-c", f"import {package}"]
         return subprocess.run(command, cwd=tmp_path, env=apart(), capture_output=True, check=False).returncode
 
-    assert imports("service") == 0
+    assert imports("tauscope") == 0
     assert imports("concealed") == 1
 
 

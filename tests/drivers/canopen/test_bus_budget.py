@@ -2,7 +2,7 @@
 
 import pytest
 
-from drivers.canopen.bus_budget import CycleFrames, cycle_bits, frame_bits, largest_rate_hz, rate_limit
+from tauscope_drivers.canopen.bus_budget import CycleFrames, cycle_bits, frame_bits, largest_rate_hz, rate_limit
 
 TORQUE_CYCLE = CycleFrames((4,), (8, 4))
 

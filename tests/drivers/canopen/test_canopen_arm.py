@@ -5,13 +5,13 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from drivers import ArmState, ControlMode, DriveLimits, DriverError, Setpoint, StopPolicy
-from drivers.canopen.driver import CanopenArm
-from drivers.errors import DriverErrorKind
 from emulated_can_bus import GEAR, RATED_TORQUE_MNM, START, EmulatedBus
 from patience import eventually
-from sim_backend.canopen_bus.axis import AxisMode
-from sim_backend.canopen_bus.power_state import PowerState
+from tauscope_drivers import ArmState, ControlMode, DriveLimits, DriverError, Setpoint, StopPolicy
+from tauscope_drivers.canopen.driver import CanopenArm
+from tauscope_drivers.errors import DriverErrorKind
+from tauscope_sim.canopen_bus.axis import AxisMode
+from tauscope_sim.canopen_bus.power_state import PowerState
 
 PATIENCE_S = 0.1
 """The drives are a thread of this process: on a busy machine it answers when it gets its turn."""

@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from drivers.canopen.configuration import DriveJoint, read_configuration
-from drivers.errors import DriverError
+from tauscope_drivers.canopen.configuration import DriveJoint, read_configuration
+from tauscope_drivers.errors import DriverError
 
 
 def joints(first: dict[str, Any] | None = None, second: dict[str, Any] | None = None) -> list[DriveJoint]:

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.canopen.emergency import decode_emergency, describe_error
+from tauscope_drivers.canopen.emergency import decode_emergency, describe_error
 
 
 @pytest.mark.parametrize(

@@ -12,10 +12,10 @@ import can
 import numpy as np
 import pytest
 
-from drivers import ControlMode, DriveLimits, Setpoint, StopPolicy
-from drivers.canopen import CanopenArm, DriveJoint, scan_bus
 from patience import eventually
-from sim_backend.driver.virtual_clock import VirtualClock
+from tauscope_drivers import ControlMode, DriveLimits, Setpoint, StopPolicy
+from tauscope_drivers.canopen import CanopenArm, DriveJoint, scan_bus
+from tauscope_sim.driver.virtual_clock import VirtualClock
 
 durand = pytest.importorskip("durand")
 

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers import ControlMode, DriveLimits, DriverError
-from drivers.canopen import DriveJoint, can_interfaces, examine, plan_frames, scan_bus
-from drivers.inspection import PHASES, Finding, Severity
 from emulated_can_bus import COUNTS_PER_TURN, GEAR, EmulatedBus
+from tauscope_drivers import ControlMode, DriveLimits, DriverError
+from tauscope_drivers.canopen import DriveJoint, can_interfaces, examine, plan_frames, scan_bus
+from tauscope_drivers.inspection import PHASES, Finding, Severity
 
 LIMITS = DriveLimits(np.full(2, -1.0), np.full(2, 1.0), np.full(2, 2.0), np.full(2, 10.0))
 JOINTS = [
@@ -110,5 +110,5 @@ def test_can_interfaces_of_the_machine(
         (tmp_path / name).mkdir()
         (tmp_path / name / "type").write_text(f"{kind}\n")
         (tmp_path / name / "flags").write_text(f"{flags}\n")
-    monkeypatch.setattr("drivers.canopen.doctor._NETWORK", tmp_path)
+    monkeypatch.setattr("tauscope_drivers.canopen.doctor._NETWORK", tmp_path)
     assert can_interfaces() == [Finding(severity, "can7", words, remedy)]

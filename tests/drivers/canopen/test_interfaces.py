@@ -12,15 +12,15 @@ import can
 import numpy as np
 import pytest
 
-from drivers import ControlMode, DriveLimits, DriverError, Setpoint, StopPolicy
-from drivers.canopen import CanopenArm, DriveJoint, examine
-from drivers.canopen.bus import CanBus
-from drivers.canopen.configuration import BusConfiguration
-from drivers.canopen.interfaces import open_interface
-from drivers.errors import DriverErrorKind
-from drivers.inspection import Severity
 from emulated_can_bus import EmulatedBus
 from patience import eventually
+from tauscope_drivers import ControlMode, DriveLimits, DriverError, Setpoint, StopPolicy
+from tauscope_drivers.canopen import CanopenArm, DriveJoint, examine
+from tauscope_drivers.canopen.bus import CanBus
+from tauscope_drivers.canopen.configuration import BusConfiguration
+from tauscope_drivers.canopen.interfaces import open_interface
+from tauscope_drivers.errors import DriverErrorKind
+from tauscope_drivers.inspection import Severity
 
 _SEND = re.compile(r"< send ([0-9A-F]{3}) ([0-8]) ((?:[0-9a-f]{1,2} )*) ?>")
 CHANNEL = "can0"

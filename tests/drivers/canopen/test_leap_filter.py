@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.canopen.leap_filter import LeapFilter
+from tauscope_drivers.canopen.glitch_filter import LeapFilter
 
 CYCLE_NS = 5_000_000
 LIMIT = 2.0

@@ -6,11 +6,11 @@ import can
 import numpy as np
 import pytest
 
-from drivers import ArmState, ControlMode, DriveLimits, Setpoint, StopPolicy
-from drivers.canopen import CanopenArm
 from emulated_can_bus import START, EmulatedBus
 from patience import eventually
-from sim_backend.canopen_bus.power_state import PowerState
+from tauscope_drivers import ArmState, ControlMode, DriveLimits, Setpoint, StopPolicy
+from tauscope_drivers.canopen import CanopenArm
+from tauscope_sim.canopen_bus.power_state import PowerState
 
 LIMITS = DriveLimits(*(np.full(3, value) for value in (-3.0, 3.0, 2.0, 20.0)))
 HERE = Setpoint(np.array(START), np.zeros(3))

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from drivers.canopen.bus import CanBus
-from drivers.canopen.configuration import BusConfiguration, NodeConfiguration
-from drivers.canopen.node import DriveNode
-from drivers.canopen.state_machine import Goal, next_controlword
+from tauscope_drivers.canopen.bus import CanBus
+from tauscope_drivers.canopen.configuration import BusConfiguration, NodeConfiguration
+from tauscope_drivers.canopen.node import DriveNode
+from tauscope_drivers.canopen.state_machine import Goal, next_controlword
 
 NODE = 5
 OURS = [base + NODE for base in (0x080, 0x180, 0x280, 0x580, 0x700)]

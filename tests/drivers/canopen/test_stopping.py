@@ -2,19 +2,19 @@
 
 import pytest
 
-from drivers.backend import ControlMode
-from drivers.canopen import objects
-from drivers.canopen.configuration import NodeConfiguration
-from drivers.canopen.emergency import HEARTBEAT_LOST
-from drivers.canopen.node import DriveNode
-from drivers.canopen.objects import DriveObject
-from drivers.canopen.observation import arm_faults
-from drivers.canopen.process_data import MOTION_PDO, STATE_PDO
-from drivers.canopen.session import Session
-from drivers.canopen.state_machine import Goal
-from drivers.canopen.stopping import PROMPT_CYCLES, dropped_faults, has_stopped, stop_one_by_one, stop_promptly
-from drivers.errors import DriverError, DriverErrorKind, Fault
-from drivers.state import ArmState
+from tauscope_drivers.backend import ControlMode
+from tauscope_drivers.canopen import objects
+from tauscope_drivers.canopen.configuration import NodeConfiguration
+from tauscope_drivers.canopen.emergency import HEARTBEAT_LOST
+from tauscope_drivers.canopen.node import DriveNode
+from tauscope_drivers.canopen.objects import DriveObject
+from tauscope_drivers.canopen.observation import arm_faults
+from tauscope_drivers.canopen.process_data import MOTION_PDO, STATE_PDO
+from tauscope_drivers.canopen.session import Session
+from tauscope_drivers.canopen.state_machine import Goal
+from tauscope_drivers.canopen.stopping import PROMPT_CYCLES, dropped_faults, has_stopped, stop_one_by_one, stop_promptly
+from tauscope_drivers.errors import DriverError, DriverErrorKind, Fault
+from tauscope_drivers.state import ArmState
 
 # statuswords of CiA 402-2; voltage is there in all of them
 SWITCH_ON_DISABLED, READY, SWITCHED_ON, OPERATION_ENABLED = 0x0250, 0x0231, 0x0233, 0x0237

@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from drivers import DriveLimits, Setpoint
-from drivers.canopen.target_limiter import TargetLimiter
-from drivers.limits import SPEED_MARGIN
+from tauscope_drivers import DriveLimits, Setpoint
+from tauscope_drivers.canopen.target_limiter import TargetLimiter
+from tauscope_drivers.limits import SPEED_MARGIN
 
 LOW, HIGH, SPEED, TORQUE = -1.0, 1.5, 0.8, 20.0
 BOUNDS = DriveLimits(*(np.full(2, value) for value in (LOW, HIGH, SPEED, TORQUE)))

@@ -6,12 +6,12 @@ from types import SimpleNamespace
 
 import pytest
 
-from drivers.dynamixel import serial_adapters
-from drivers.dynamixel.adapters import latency_finding
-from drivers.dynamixel.configuration import DynamixelJoint, read_configuration
-from drivers.dynamixel.cycle_budget import planned_budget
-from drivers.dynamixel.port import read_latency_timer_ms
-from drivers.inspection import Severity
+from tauscope_drivers.dynamixel import serial_adapters
+from tauscope_drivers.dynamixel.adapters import latency_finding
+from tauscope_drivers.dynamixel.configuration import DynamixelJoint, read_configuration
+from tauscope_drivers.dynamixel.cycle_budget import planned_budget
+from tauscope_drivers.dynamixel.port import read_latency_timer_ms
+from tauscope_drivers.inspection import Severity
 
 
 @pytest.fixture
@@ -20,9 +20,9 @@ def adapter(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     device, link = tmp_path / "ttyUSB7", tmp_path / "dynamixel"
     device.touch()
     link.symlink_to(device)
-    monkeypatch.setattr("drivers.dynamixel.port._TTY_DEVICES", tmp_path / "sys")
+    monkeypatch.setattr("tauscope_drivers.dynamixel.port._TTY_DEVICES", tmp_path / "sys")
     one = SimpleNamespace(device=str(link), description="USB <-> Serial Converter")
-    monkeypatch.setattr("drivers.dynamixel.adapters.comports", lambda: [one])
+    monkeypatch.setattr("tauscope_drivers.dynamixel.adapters.comports", lambda: [one])
     return link
 
 

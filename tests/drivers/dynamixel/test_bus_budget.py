@@ -2,8 +2,8 @@
 
 import pytest
 
-from drivers.dynamixel.bus_budget import BusTiming, CycleTraffic, cycle_parts, largest_rate_hz, require_rate
-from drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.dynamixel.bus_budget import BusTiming, CycleTraffic, cycle_parts, largest_rate_hz, require_rate
+from tauscope_drivers.errors import DriverError, DriverErrorKind
 
 # Whole cycle of Sync Write of a current and (Fast) Sync Read of ten bytes: servos, baud, fast, return delay [s],
 # latency timer [s], cycles a second. Worked out from the frames' lengths in the protocol's description.

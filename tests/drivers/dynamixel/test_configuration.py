@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from drivers.dynamixel import DynamixelJoint, read_configuration
-from drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.dynamixel import DynamixelJoint, read_configuration
+from tauscope_drivers.errors import DriverError, DriverErrorKind
 
 
 def joints(*drives: dict[str, Any]) -> list[DynamixelJoint]:

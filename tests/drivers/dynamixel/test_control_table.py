@@ -4,9 +4,9 @@ import math
 
 import pytest
 
-from drivers.dynamixel.control_table import find_model, find_model_by_name, model_names
-from drivers.dynamixel.models import family_of
-from drivers.errors import DriverError
+from tauscope_drivers.dynamixel.control_table import find_model, find_model_by_name, model_names
+from tauscope_drivers.dynamixel.models import family_of
+from tauscope_drivers.errors import DriverError
 
 # ROBOTIS e-Manual: number, label, torque, goal current, present current, watchdog, counts a turn, mA a unit.
 E_MANUAL = [

@@ -6,16 +6,16 @@ from typing import cast
 import numpy as np
 import pytest
 
-from drivers.backend import ControlMode, DriveLimits
-from drivers.dynamixel.bus import ServoBus
-from drivers.dynamixel.configuration import ServoConfiguration
-from drivers.dynamixel.control_table import Block, Item
-from drivers.dynamixel.enabling import enable_servos
-from drivers.dynamixel.group import ServoGroup
-from drivers.dynamixel.health import Health
-from drivers.dynamixel.servo import make_servo
-from drivers.dynamixel.session import Session
-from drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.backend import ControlMode, DriveLimits
+from tauscope_drivers.dynamixel.bus import ServoBus
+from tauscope_drivers.dynamixel.configuration import ServoConfiguration
+from tauscope_drivers.dynamixel.control_table import Block, Item
+from tauscope_drivers.dynamixel.enabling import enable_servos
+from tauscope_drivers.dynamixel.group import ServoGroup
+from tauscope_drivers.dynamixel.health import Health
+from tauscope_drivers.dynamixel.servo import make_servo
+from tauscope_drivers.dynamixel.session import Session
+from tauscope_drivers.errors import DriverError, DriverErrorKind
 
 JOINTS = range(1, 7)
 BEGIN = 2048

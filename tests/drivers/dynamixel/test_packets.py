@@ -5,8 +5,8 @@ from dynamixel_sdk import Protocol2PacketHandler
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from drivers.dynamixel import packets
-from drivers.dynamixel.packets import FrameParser, Status, checksum, decode_fast, decode_status
+from tauscope_drivers.dynamixel import packets
+from tauscope_drivers.dynamixel.packets import FrameParser, Status, checksum, decode_fast, decode_status
 
 # ROBOTIS e-Manual, "Protocol 2.0", the examples of each instruction.
 INSTRUCTIONS = {

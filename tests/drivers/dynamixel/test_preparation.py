@@ -4,9 +4,9 @@ import math
 
 import pytest
 
-from drivers.backend import ControlMode
-from drivers.dynamixel.configuration import ServoConfiguration
-from drivers.dynamixel.preparation import (
+from tauscope_drivers.backend import ControlMode
+from tauscope_drivers.dynamixel.configuration import ServoConfiguration
+from tauscope_drivers.dynamixel.preparation import (
     RegisterWrite,
     ServoTask,
     commissioning_writes,
@@ -16,8 +16,8 @@ from drivers.dynamixel.preparation import (
     taking_writes,
     watchdog_steps,
 )
-from drivers.dynamixel.servo import JointServo, make_servo
-from drivers.errors import DriverError
+from tauscope_drivers.dynamixel.servo import JointServo, make_servo
+from tauscope_drivers.errors import DriverError
 
 SETTINGS = {
     "Return Delay Time": 250,

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arms import arm, dh_segment
-from service.recording.conditioning import Motion
-from service.recording.recording import Recording
-from service.robot.robot import JointType, Robot
+from tauscope.recording.conditioning import Motion
+from tauscope.recording.recording import Recording
+from tauscope.robot.robot import JointType, Robot
 
 Array = NDArray[np.float64]
 

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from recording.conditioning.synthetic import Harmonics, harmonics, own_samples, record, robot, torque_of
-from service.errors import RecordingError
-from service.recording.conditioning import Conditioner, Decimator, HarmonicBand, conditioner
-from service.recording.conditioning.uniform import Stretch, read_stretch
-from service.recording.recording import Recording
-from service.recording.table import SpooledTable
+from tauscope.errors import RecordingError
+from tauscope.recording.conditioning import Conditioner, Decimator, HarmonicBand, conditioner
+from tauscope.recording.conditioning.uniform import Stretch, read_stretch
+from tauscope.recording.recording import Recording
+from tauscope.recording.table import SpooledTable
 
 MOTION = harmonics()
 

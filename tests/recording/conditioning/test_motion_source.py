@@ -7,8 +7,8 @@ import pytest
 from scipy import signal
 
 from recording.conditioning.synthetic import harmonics, record, robot
-from service.recording.conditioning import Conditioner, Source
-from service.recording.recording import Recording
+from tauscope.recording.conditioning import Conditioner, Source
+from tauscope.recording.recording import Recording
 
 MOTION = harmonics(joints=2, fundamental_hz=0.2, count=8)
 RATE = 500.0

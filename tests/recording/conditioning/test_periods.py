@@ -8,11 +8,11 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from recording.conditioning.synthetic import harmonics, record, robot, torque_of
-from service.recording.conditioning import Conditioner, Stretch, split_periods
-from service.recording.conditioning.periods import fourier_derivatives, repeats, with_turns_removed
-from service.recording.conditioning.timing import find_stretches
-from service.recording.conditioning.uniform import read_stretch
-from service.robot.robot import JointType
+from tauscope.recording.conditioning import Conditioner, Stretch, split_periods
+from tauscope.recording.conditioning.periods import fourier_derivatives, repeats, with_turns_removed
+from tauscope.recording.conditioning.timing import find_stretches
+from tauscope.recording.conditioning.uniform import read_stretch
+from tauscope.robot.robot import JointType
 
 MOTION = harmonics(fundamental_hz=0.5)  # period 2 s
 RATE = 100.0

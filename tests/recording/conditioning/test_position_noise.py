@@ -5,13 +5,8 @@ import pytest
 from scipy import signal
 
 from recording.conditioning.synthetic import Harmonics, harmonics
-from service.recording.conditioning import Stretch
-from service.recording.conditioning.position_noise import (
-    NOISE_SHARE,
-    encoder_step,
-    position_noise,
-    segment_spectra,
-)
+from tauscope.recording.conditioning import Stretch
+from tauscope.recording.conditioning.position_noise import NOISE_SHARE, encoder_step, position_noise, segment_spectra
 
 MOTION = harmonics(joints=2, fundamental_hz=0.2)
 

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from service.recording import read_recording
-from service.recording.conditioning import Conditioner, Source
-from service.robot import read_robot
+from tauscope.recording import read_recording
+from tauscope.recording.conditioning import Conditioner, Source
+from tauscope.robot import read_robot
 
 
 def survey(folder: Path, file: str) -> Conditioner:

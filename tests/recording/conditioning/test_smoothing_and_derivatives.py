@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from service.recording.conditioning.filters import DIFFERENCE_MARGIN, derivative, smooth, smooth_each, smoothing_margin
+from tauscope.recording.conditioning.filters import DIFFERENCE_MARGIN, derivative, smooth, smooth_each, smoothing_margin
 
 
 @pytest.mark.parametrize(("fraction_of_nyquist", "bound"), [(0.1, 2e-7), (0.2, 4e-5), (0.4, 8e-3)])

@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from recording.conditioning.synthetic import harmonics, record, robot, torque_of
-from service.errors import RecordingError
-from service.recording.conditioning.timing import SHORTEST_STRETCH, find_stretches, row_at
-from service.recording.conditioning.uniform import Stretch, read_stretch, uniform_grid
-from service.recording.recording import Recording
+from tauscope.errors import RecordingError
+from tauscope.recording.conditioning.timing import SHORTEST_STRETCH, find_stretches, row_at
+from tauscope.recording.conditioning.uniform import Stretch, read_stretch, uniform_grid
+from tauscope.recording.recording import Recording
 
 MOTION = harmonics()
 

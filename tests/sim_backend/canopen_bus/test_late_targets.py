@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from hardware_emulated.campaign_arms import six_joints
-from service.robot import Robot, robot_from_dict
-from sim_backend.canopen_bus.axis import AxisDemand, AxisMeasurement, AxisMode
-from sim_backend.canopen_bus.drive import EmulatedDrive
-from sim_backend.canopen_bus.driven_arm import FASTEST, DrivenArm
-from sim_backend.emulation.device_clock import STEP_S
-from sim_backend.scenario import Scenario
+from tauscope.robot import Robot, robot_from_dict
+from tauscope_sim.canopen_bus.axis import AxisDemand, AxisMeasurement, AxisMode
+from tauscope_sim.canopen_bus.drive import EmulatedDrive
+from tauscope_sim.canopen_bus.driven_arm import FASTEST, DrivenArm
+from tauscope_sim.emulation.device_clock import STEP_S
+from tauscope_sim.scenario import Scenario
 
 CYCLE = 5
 """Steps between two targets."""

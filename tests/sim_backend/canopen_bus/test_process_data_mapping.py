@@ -2,9 +2,9 @@
 
 import pytest
 
-from sim_backend.canopen_bus.axis import AxisScale
-from sim_backend.canopen_bus.drive import EmulatedDrive
-from sim_backend.canopen_bus.object_dictionary import Abort
+from tauscope_sim.canopen_bus.axis import AxisScale
+from tauscope_sim.canopen_bus.drive import EmulatedDrive
+from tauscope_sim.canopen_bus.object_dictionary import Abort
 
 MAPPING = 0x1A00
 STATUSWORD, TORQUE, POSITION = 0x60410010, 0x60770010, 0x60640020

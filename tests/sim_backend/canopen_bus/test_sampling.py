@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from arm_rigs import START, bench_robot
-from sim_backend.canopen_bus.axis import AxisScale
-from sim_backend.canopen_bus.drive import EmulatedDrive
-from sim_backend.canopen_bus.driven_arm import DrivenArm
-from sim_backend.emulation.device_clock import STEP_S
-from sim_backend.scenario import Scenario
+from tauscope_sim.canopen_bus.axis import AxisScale
+from tauscope_sim.canopen_bus.drive import EmulatedDrive
+from tauscope_sim.canopen_bus.driven_arm import DrivenArm
+from tauscope_sim.emulation.device_clock import STEP_S
+from tauscope_sim.scenario import Scenario
 
 COUNTS_PER_RADIAN = 1e7
 POSITION, VELOCITY = 0x6064, 0x606C

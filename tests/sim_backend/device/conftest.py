@@ -8,7 +8,7 @@ import pytest
 
 from arm_rigs import bench_robot
 from arms import panda_like, random_link, ur5_like
-from service.robot.robot import FrictionCoefficients, FrictionShape, JointLimits, Model, Robot
+from tauscope.robot.robot import FrictionCoefficients, FrictionShape, JointLimits, Model, Robot
 
 _TORQUE = (150.0, 150.0, 100.0, 40.0, 30.0, 20.0, 15.0)
 

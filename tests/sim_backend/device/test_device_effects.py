@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from arm_rigs import START, VirtualRig, bench_robot, drive, enable, setpoint, wide_limits
-from drivers import ControlMode, StopPolicy
-from service.robot.robot import Robot
-from sim_backend.driver import SimulatedArm
-from sim_backend.motion import random_fourier_motion
-from sim_backend.scenario_file import scenario_from_yaml
+from tauscope.robot.robot import Robot
+from tauscope_drivers import ControlMode, StopPolicy
+from tauscope_sim.driver import SimulatedArm
+from tauscope_sim.motion import random_fourier_motion
+from tauscope_sim.scenario_file import scenario_from_yaml
 
 ENTRIES = {
     "elastic joint": "{effect: joint_elasticity, joint: 2, stiffness: 5000, damping: 1, rotor_inertia: 0.05}",

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers import ArmState, ControlMode, DriveLimits, DriverError, Fault, Setpoint, StopPolicy
-from drivers.errors import DriverErrorKind
-from sim_backend.device import Disturbance, Injection
-from sim_backend.device import messages as m
-from sim_backend.device.frames import LARGEST_BODY, BrokenFrameError, Frame, FrameBuffer, FrameKind
+from tauscope_drivers import ArmState, ControlMode, DriveLimits, DriverError, Fault, Setpoint, StopPolicy
+from tauscope_drivers.errors import DriverErrorKind
+from tauscope_sim.device import Disturbance, Injection
+from tauscope_sim.device import messages as m
+from tauscope_sim.device.frames import LARGEST_BODY, BrokenFrameError, Frame, FrameBuffer, FrameKind
 
 FAULT = Fault("overload", 2, "détail", "remedy")
 DECODERS = [m.decode_document, m.decode_state, m.decode_error, m.decode_enable, m.decode_injection, m.decode_stop]

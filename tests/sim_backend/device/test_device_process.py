@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 
 from arm_rigs import AT_REST, START, bench_robot, wide_limits
-from drivers import ControlMode, DriverError, StopPolicy
-from drivers.errors import DriverErrorKind
-from service.errors import RecordingError
 from shared_data import REPOSITORY
-from sim_backend.device import Activity
-from sim_backend.device.trace import DeviceTrace, read_trace
-from sim_backend.driver import DeviceProcess, RemoteSimulatedArm, start_device
+from tauscope.errors import RecordingError
+from tauscope_drivers import ControlMode, DriverError, StopPolicy
+from tauscope_drivers.errors import DriverErrorKind
+from tauscope_sim.device import Activity
+from tauscope_sim.device.trace import DeviceTrace, read_trace
+from tauscope_sim.driver import DeviceProcess, RemoteSimulatedArm, start_device
 
 PATIENCE_S = 30.0
 WATCHDOG_S = 0.3
@@ -29,10 +29,10 @@ HOST = """
 import sys
 from pathlib import Path
 import numpy as np
-sys.path[:0] = [{tree!r}, {tests!r}]
+sys.path[:0] = [{tests!r}]
 from arm_rigs import START, bench_robot, slide, wide_limits
-from drivers import ControlMode, StopPolicy
-from sim_backend.driver import RemoteSimulatedArm
+from tauscope_drivers import ControlMode, StopPolicy
+from tauscope_sim.driver import RemoteSimulatedArm
 arm = RemoteSimulatedArm(Path({socket!r}), 3, reply_timeout_s=5.0)
 arm.connect()
 arm.enable(ControlMode.POSITION, wide_limits(bench_robot()), StopPolicy.HOLD, {watchdog})
@@ -79,7 +79,7 @@ def device(process: DeviceProcess) -> DeviceProcess:
 def host(device: DeviceProcess) -> Iterator["subprocess.Popen[str]"]:
     """A host process that has the arm in motion."""
     script = HOST.format(
-        tree=str(REPOSITORY), tests=str(REPOSITORY / "tests"), socket=str(device.socket), watchdog=WATCHDOG_S
+        tests=str(REPOSITORY / "tests"), socket=str(device.socket), watchdog=WATCHDOG_S
     )
     with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from arm_rigs import START, bench_robot, wide_limits
-from drivers import ControlMode, DriverError, Setpoint, StopPolicy
-from sim_backend.device import HOTTEST, Activity, Disturbance, FaultCode, Injection, SimulatedDevice
-from sim_backend.device.activity import COMMANDED, POWERED, TRANSITIONS, commanded_by, stopped_by
-from sim_backend.device.faults import REMEDIES, FaultLatch, device_fault
-from sim_backend.device.posture import resting_posture
-from sim_backend.driver import SimulatedArm
-from sim_backend.scenario import Scenario
+from tauscope_drivers import ControlMode, DriverError, Setpoint, StopPolicy
+from tauscope_sim.device import HOTTEST, Activity, Disturbance, FaultCode, Injection, SimulatedDevice
+from tauscope_sim.device.activity import COMMANDED, POWERED, TRANSITIONS, commanded_by, stopped_by
+from tauscope_sim.device.faults import REMEDIES, FaultLatch, device_fault
+from tauscope_sim.device.posture import resting_posture
+from tauscope_sim.driver import SimulatedArm
+from tauscope_sim.scenario import Scenario
 
 MS = 1_000_000
 

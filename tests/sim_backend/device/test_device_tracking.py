@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from arm_rigs import bench_robot, wide_limits
-from drivers import ControlMode, Setpoint, StopPolicy
-from service.robot.robot import Robot
-from sim_backend.driver import SimulatedArm
-from sim_backend.friction import static_friction_torque
-from sim_backend.inverse_dynamics import rigid_body_torque
-from sim_backend.model import build_model
-from sim_backend.motion import random_fourier_motion
-from sim_backend.scenario import Scenario
+from tauscope.robot.robot import Robot
+from tauscope_drivers import ControlMode, Setpoint, StopPolicy
+from tauscope_sim.driver import SimulatedArm
+from tauscope_sim.friction import static_friction_torque
+from tauscope_sim.inverse_dynamics import rigid_body_torque
+from tauscope_sim.model import build_model
+from tauscope_sim.motion import random_fourier_motion
+from tauscope_sim.scenario import Scenario
 
 RATE_HZ = 500.0
 

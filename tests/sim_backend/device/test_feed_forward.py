@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sim_backend.device.target import Target
+from tauscope_sim.device.target import Target
 
 TICK_S = 0.0005
 OMEGA = 2.0 * np.pi * 0.5

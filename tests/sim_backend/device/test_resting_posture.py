@@ -8,10 +8,10 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 
-from service.robot import JointLimits, Robot, read_robot
-from sim_backend.device.posture import resting_posture
-from sim_backend.examples import example_robot
-from sim_backend.model import build_model
+from tauscope.robot import JointLimits, Robot, read_robot
+from tauscope_sim.device.posture import resting_posture
+from tauscope_sim.examples import example_robot
+from tauscope_sim.model import build_model
 
 
 def inertia(robot: Robot, position: np.ndarray) -> np.ndarray:

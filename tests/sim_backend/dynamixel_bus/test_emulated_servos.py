@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from drivers.dynamixel import packets
-from drivers.dynamixel.packets import FrameParser, Status, decode_fast, decode_status
-from sim_backend.dynamixel_bus import DynamixelEmulator, ServoSpecification
-from sim_backend.dynamixel_bus.arm import Pendulums
-from sim_backend.dynamixel_bus.bus import EmulatedBus
-from sim_backend.dynamixel_bus.servo import EmulatedServo
-from sim_backend.emulation import FaultKind, InjectedFault
+from tauscope_drivers.dynamixel import packets
+from tauscope_drivers.dynamixel.packets import FrameParser, Status, decode_fast, decode_status
+from tauscope_sim.dynamixel_bus import DynamixelEmulator, ServoSpecification
+from tauscope_sim.dynamixel_bus.arm import Pendulums
+from tauscope_sim.dynamixel_bus.bus import EmulatedBus
+from tauscope_sim.dynamixel_bus.servo import EmulatedServo
+from tauscope_sim.emulation import FaultKind, InjectedFault
 
 RETURN_DELAY, DRIVE_MODE, MODE, MAX_LIMIT = 9, 10, 11, 48
 TORQUE, HARDWARE_ERROR, WATCHDOG, GOAL_CURRENT, PROFILE_VELOCITY, GOAL_POSITION = 64, 70, 98, 102, 112, 116

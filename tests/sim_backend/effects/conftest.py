@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from arms import arm, dh_segment
-from service.robot.robot import FrictionCoefficients, FrictionShape, LinkInertia, Model, Robot
-from sim_backend.plant import Plant
+from tauscope.robot.robot import FrictionCoefficients, FrictionShape, LinkInertia, Model, Robot
+from tauscope_sim.plant import Plant
 
 Array = NDArray[np.float64]
 Rates = Callable[[float, Array, Array], Array]

@@ -8,14 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sim_backend.effects import (
-    BaseTilt,
-    ExternalContact,
-    FrictionCoupling,
-    KinematicError,
-    Payload,
-    PayloadChange,
-)
+from tauscope_sim.effects import BaseTilt, ExternalContact, FrictionCoupling, KinematicError, Payload, PayloadChange
 
 Array = NDArray[np.float64]
 Agree = Callable[..., dict[str, Array]]

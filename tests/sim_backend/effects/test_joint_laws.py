@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sim_backend.effects import (
+from tauscope_sim.effects import (
     AsymmetricCoulomb,
     AsymmetricViscous,
     CableForce,

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from service.robot.robot import Robot
-from sim_backend.effects import TimeDelay, TorqueGainError, TorqueSaturation
-from sim_backend.scenario import Scenario, measure_all
+from tauscope.robot.robot import Robot
+from tauscope_sim.effects import TimeDelay, TorqueGainError, TorqueSaturation
+from tauscope_sim.scenario import Scenario, measure_all
 
 Array = NDArray[np.float64]
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sim_backend.effects import FrictionDrift, PreslidingHysteresis
-from sim_backend.plant import Plant
+from tauscope_sim.effects import FrictionDrift, PreslidingHysteresis
+from tauscope_sim.plant import Plant
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sim_backend.effects import (
+from tauscope_sim.effects import (
     Backlash,
     Cogging,
     JointElasticity,
@@ -16,8 +16,8 @@ from sim_backend.effects import (
     RotorInertia,
     TorqueRipple,
 )
-from sim_backend.plant import Plant
-from sim_backend.plant.loads import loaded_accelerations
+from tauscope_sim.plant import Plant
+from tauscope_sim.plant.loads import loaded_accelerations
 
 Array = NDArray[np.float64]
 Agree = Callable[..., dict[str, Array]]

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from sim_backend.emulation.arrivals import Arrivals
-from sim_backend.emulation.pseudo_terminal import PseudoTerminal
+from tauscope_sim.emulation.arrivals import Arrivals
+from tauscope_sim.emulation.pseudo_terminal import PseudoTerminal
 
 BUSY_S = 0.2
 DEADLINE_S = 10.0

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import sim_backend.examples
+import tauscope_sim.examples
 from hardware_emulated.canopen_robot import RATED_TORQUE_MNM, write_canopen_robot
-from sim_backend.canopen_bus.order import CanOrder
-from sim_backend.dynamixel_bus import DynamixelOrder, ServoSpecification
-from sim_backend.emulation import EmulatorProcess, FaultKind, InjectedFault
+from tauscope_sim.canopen_bus.order import CanOrder
+from tauscope_sim.dynamixel_bus import DynamixelOrder, ServoSpecification
+from tauscope_sim.emulation import EmulatorProcess, FaultKind, InjectedFault
 
 START = (0.1, 0.2, 0.3)
 
@@ -22,7 +22,7 @@ def servo_order(folder: Path) -> DynamixelOrder:
 
 
 def drive_order(folder: Path) -> CanOrder:
-    robot = write_canopen_robot(Path(sim_backend.examples.__file__).with_name("paper_arm.yaml"), folder)
+    robot = write_canopen_robot(Path(tauscope_sim.examples.__file__).with_name("paper_arm.yaml"), folder)
     port, control, trace = (str(folder / name) for name in ("port", "control", "trace"))
     return CanOrder(str(robot), START, port, control, (RATED_TORQUE_MNM,) * 3, stepped=True, trace=trace)
 

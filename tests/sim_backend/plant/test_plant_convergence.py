@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from service.robot.robot import Robot
-from sim_backend.effects import (
+from tauscope.robot.robot import Robot
+from tauscope_sim.effects import (
     Backlash,
     ExternalContact,
     FrictionDrift,
@@ -18,7 +18,7 @@ from sim_backend.effects import (
     PayloadChange,
     PreslidingHysteresis,
 )
-from sim_backend.plant import Plant
+from tauscope_sim.plant import Plant
 
 Array = NDArray[np.float64]
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from arms import panda_like, random_arm, random_link, ur5_like
-from service.errors import RobotFileError, ScenarioError
-from service.robot.robot import FrictionCoefficients, FrictionShape, Model, Robot
-from sim_backend.effects import JointElasticity, JointSpring, PayloadChange
-from sim_backend.model import build_model
-from sim_backend.plant import AMBIENT, Plant
+from tauscope.errors import RobotFileError, ScenarioError
+from tauscope.robot.robot import FrictionCoefficients, FrictionShape, Model, Robot
+from tauscope_sim.effects import JointElasticity, JointSpring, PayloadChange
+from tauscope_sim.model import build_model
+from tauscope_sim.plant import AMBIENT, Plant
 
 
 def loaded(robot: Robot, rng: np.random.Generator, viscous: float = 0.0) -> Robot:

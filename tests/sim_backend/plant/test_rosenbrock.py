@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sim_backend.plant.coordinates import Coordinates
-from sim_backend.plant.equations import EquationsOfMotion
-from sim_backend.plant.rosenbrock import GAMMA, UNIT, RosenbrockStep
-from sim_backend.plant.term import Slopes
+from tauscope_sim.plant.coordinates import Coordinates
+from tauscope_sim.plant.equations import EquationsOfMotion
+from tauscope_sim.plant.rosenbrock import GAMMA, UNIT, RosenbrockStep
+from tauscope_sim.plant.term import Slopes
 
 Array = NDArray[np.float64]
 

@@ -8,18 +8,18 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from drivers import ControlMode
-from drivers.canopen.configuration import (
+from emulated_data_sheet import GAIN, LABEL, OFFSET, Sections, sections, text_of, write_file
+from tauscope_drivers import ControlMode
+from tauscope_drivers.canopen.configuration import (
     BusConfiguration,
     DriveJoint,
     NodeConfiguration,
     read_configuration,
     require_targets,
 )
-from drivers.canopen.data_sheet.device_file import DeviceFile, read_device_file
-from drivers.canopen.data_sheet.text import DataSheetError
-from drivers.errors import DriverError, DriverErrorKind
-from emulated_data_sheet import GAIN, LABEL, OFFSET, Sections, sections, text_of, write_file
+from tauscope_drivers.canopen.data_sheet.device_file import DeviceFile, read_device_file
+from tauscope_drivers.canopen.data_sheet.text import DataSheetError
+from tauscope_drivers.errors import DriverError, DriverErrorKind
 
 WHOLE = text_of(sections(VendorNumber="0x3A1", ProductNumber="", RevisionNumber="0x20005"))
 

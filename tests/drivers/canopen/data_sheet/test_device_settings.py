@@ -8,13 +8,13 @@ import can
 import numpy as np
 import pytest
 
-from drivers import ControlMode, DriveLimits, DriverError, StopPolicy
-from drivers.canopen import CanopenArm, DriveJoint, examine, plan_frames
-from drivers.errors import DriverErrorKind
-from drivers.inspection import Severity
 from emulated_can_bus import EmulatedBus
 from emulated_data_sheet import COMMAND, GAIN, OFFSET, PRODUCT, REVISION, VENDOR, Sections, sections, write_file
-from sim_backend.canopen_bus.object_dictionary import Abort, AbortError
+from tauscope_drivers import ControlMode, DriveLimits, DriverError, StopPolicy
+from tauscope_drivers.canopen import CanopenArm, DriveJoint, examine, plan_frames
+from tauscope_drivers.errors import DriverErrorKind
+from tauscope_drivers.inspection import Severity
+from tauscope_sim.canopen_bus.object_dictionary import Abort, AbortError
 
 FREE = np.full(3, np.inf)
 LIMITS = DriveLimits(-FREE, FREE, FREE, np.full(3, 20.0))
@@ -143,7 +143,7 @@ def test_what_a_drive_does_not_take_is_named(bus: EmulatedBus, tmp_path: Path) -
 def test_a_silent_drive_is_told_as_such(bus: EmulatedBus, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     arm = CanopenArm(joints(bus, write_file(tmp_path, dcf())), patience_s=0.1)
     arm.connect()
-    monkeypatch.setattr("drivers.canopen.service_data.SDO_TIMEOUT_S", 0.01)
+    monkeypatch.setattr("tauscope_drivers.canopen.sdo.SDO_TIMEOUT_S", 0.01)
     bus.swallows = lambda frame: frame.arbitration_id == 0x602
     with pytest.raises(DriverError, match=r"node 2: Gain \(0x2001:00\) cannot be read .*check node number") as caught:
         enable(arm)

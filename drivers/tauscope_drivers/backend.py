@@ -1,0 +1,204 @@
+"""The protocol that every backend implements, and what it declares of itself.
+
+The order of calls is fixed: ``connect``, ``enable``, any number of ``exchange``, ``stop``, ``disconnect``. ``stop`` and
+``disconnect`` are legal at any time and any number of times. Between ``enable`` and ``stop`` the device's own watchdog
+is armed: where no ``exchange`` reaches the device within its time, the device stops by itself and reports the fault
+``watchdog`` until it is acknowledged.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope_drivers.clock import Clock
+from tauscope_drivers.state import ArmState, Setpoint
+
+Array = NDArray[np.float64]
+
+
+class ControlMode(StrEnum):
+    """Who closes the loop."""
+
+    POSITION = "position"
+    """The drives track positions with a torque cap: Dynamixel current-based position, CiA 402 cyclic synchronous."""
+    TORQUE = "torque"
+    """The host commands torque: Dynamixel current, CiA 402 cyclic synchronous torque."""
+
+
+class StopPolicy(StrEnum):
+    """What the arm does when it is stopped."""
+
+    HOLD = "hold"
+    """Stay under power at the place of the stop."""
+    DAMP = "damp"
+    """Resist motion in proportion to speed: a falling arm sinks slowly."""
+    TORQUE_OFF = "torque_off"
+    """No torque: for arms that are balanced or braked."""
+
+
+@dataclass(frozen=True, eq=False)
+class DriveLimits:
+    """What the drives themselves enforce, set before torque is switched on; infinite where there is no limit.
+
+    position_low, position_high : (n,) float64
+        range of the joint [rad or m]
+    velocity : (n,) float64
+        largest speed [rad/s or m/s]
+    torque : (n,) float64
+        largest torque [Nm or N]
+    """
+
+    position_low: Array
+    position_high: Array
+    velocity: Array
+    torque: Array
+
+
+@dataclass(frozen=True)
+class Capabilities:
+    """What a backend can do, known without motion.
+
+    joint_count : int
+        number of joints n
+    modes : frozenset of ControlMode
+        ways of control
+    stop_policies : frozenset of StopPolicy
+        ways to stop that the device carries out itself, also when the host is gone, in one mode at least
+    largest_rate_hz : float
+        cycles a second that the bus allows [Hz]
+    watchdog_range_s : tuple of two float
+        shortest and longest time of the device's watchdog [s]
+    takes_feed_forward : bool
+        whether `Setpoint.torque` counts in `ControlMode.POSITION`
+    effort_unit : str
+        unit of `ArmState.effort`: ``Nm`` is joint torque (N on prismatic joints), anything else a drive unit (``mA``,
+        ``permille``) that the robot file's torque constant turns into torque
+    policies_by_mode : mapping of ControlMode to frozenset of StopPolicy, or None
+        ways to stop that the device carries out itself in each mode, where they differ; None where every mode has all
+    rate_limited_by : str
+        what limits the rate, and what to do about it; empty where nothing is known
+    holds_before_torque : bool
+        whether an arm that was enabled in torque mode is held until the first torque; else it is given none
+    """
+
+    joint_count: int
+    modes: frozenset[ControlMode]
+    stop_policies: frozenset[StopPolicy]
+    largest_rate_hz: float
+    watchdog_range_s: tuple[float, float]
+    takes_feed_forward: bool
+    effort_unit: str = "Nm"
+    policies_by_mode: Mapping[ControlMode, frozenset[StopPolicy]] | None = None
+    rate_limited_by: str = ""
+    holds_before_torque: bool = True
+
+    def policies_in(self, mode: ControlMode) -> frozenset[StopPolicy]:
+        """Ways to stop that the device carries out itself when its host is gone.
+
+        Parameters
+        ----------
+        mode : ControlMode
+            who closes the loop
+        """
+        return self.stop_policies if self.policies_by_mode is None else self.policies_by_mode.get(mode, frozenset())
+
+
+class Backend(Protocol):
+    """An arm that can be moved: real drives on a bus, or a simulation of them."""
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """What it can do."""
+        ...
+
+    @property
+    def clock(self) -> Clock:
+        """The clock that its control loop runs by."""
+        ...
+
+    def connect(self) -> ArmState:
+        """Reach every drive and read it; moves nothing and switches no torque on.
+
+        Raises
+        ------
+        DriverError
+            ``cannot-connect``: a device is missing, taken or of the wrong kind
+        """
+        ...
+
+    def acknowledge_faults(self) -> ArmState:
+        """Clear the faults that the drives have latched, on the operator's word; moves nothing.
+
+        Raises
+        ------
+        DriverError
+            ``not-connected``, or ``fault`` where a fault stays
+        """
+        ...
+
+    def enable(
+        self,
+        mode: ControlMode,
+        limits: DriveLimits,
+        stop_policy: StopPolicy,
+        watchdog_s: float,
+        cycle_s: float | None = None,
+    ) -> ArmState:
+        """Take the arm under power where it stands: targets := present, limits and watchdog read back, then torque.
+
+        Parameters
+        ----------
+        mode : ControlMode
+            who closes the loop
+        limits : DriveLimits
+            what the drives enforce
+        stop_policy : StopPolicy
+            what the device does by itself when its watchdog fires
+        watchdog_s : float
+            time without `exchange` after which it does [s]
+        cycle_s : float or None
+            time between two calls of `exchange`, for drives that interpolate between targets; None where it is not
+            known [s]
+
+        Raises
+        ------
+        DriverError
+            ``not-connected``, ``refused`` (a mode, policy or time that the backend cannot do), or ``fault`` (latched
+            and not acknowledged)
+        """
+        ...
+
+    def exchange(self, setpoint: Setpoint) -> ArmState:
+        """One cycle: write the setpoints, read the arm. Feeds the watchdog; never waits longer than the bus takes.
+
+        A drive that does not answer leaves NaN in the state; a fault that it reports stands in `ArmState.faults`.
+
+        Parameters
+        ----------
+        setpoint : Setpoint
+            finite targets for every joint
+
+        Raises
+        ------
+        DriverError
+            ``not-enabled``, ``refused`` (a target that is not finite: nothing is sent), or ``lost`` (the bus is gone)
+        """
+        ...
+
+    def stop(self, policy: StopPolicy) -> ArmState:
+        """Stop the arm; afterwards it needs no cycles and stays so until `enable`.
+
+        Parameters
+        ----------
+        policy : StopPolicy
+            how
+        """
+        ...
+
+    def disconnect(self) -> None:
+        """Let go of the bus; an arm that is still enabled is stopped by its own policy first."""
+        ...

@@ -1,0 +1,259 @@
+"""One CAN bus, owned by one thread: whoever waits for an answer takes the frames off the bus meanwhile.
+
+There is no receiving thread that could die unseen, and nothing that goes on sending when the control loop hangs: SYNC
+and the master's heartbeat are sent from the loop itself.
+"""
+
+import time
+from collections.abc import Callable, Iterable
+from contextlib import nullcontext
+
+import can
+import canopen
+
+from tauscope_drivers.canopen.claim import BusClaim, ClaimedError
+from tauscope_drivers.canopen.configuration import BusConfiguration
+from tauscope_drivers.canopen.interfaces import ONE_PROCESS, open_interface
+from tauscope_drivers.canopen.sdo import NodeDictionary, PumpedSdoClient
+from tauscope_drivers.canopen.serial_adapter import SerialAdapterBus
+from tauscope_drivers.clock import Clock, MonotonicClock
+from tauscope_drivers.errors import DriverError, DriverErrorKind
+
+SYNC_ID = 0x080
+EMERGENCY_ID = 0x080
+HEARTBEAT_ID = 0x700
+NMT_ID = 0x000
+MASTER_NODE = 127
+
+NMT_START = 0x01
+NMT_PRE_OPERATIONAL = 0x80
+NMT_OPERATIONAL_STATE = 0x05
+
+SEND_TIMEOUT_S = 0.5
+"""Time in which the bus has to take a frame; the drives' own watchdog is what stops the arm meanwhile."""
+
+_MOST_DRAINED = 1000
+
+FrameHandler = Callable[[int, bytes], None]
+"""Takes the identifier and the payload of a frame."""
+
+
+class CanBus:
+    """Sends frames, hands received ones to their subscribers, and reads and writes object dictionaries."""
+
+    def __init__(
+        self, configuration: BusConfiguration, bus: can.BusABC | None = None, clock: Clock | None = None
+    ) -> None:
+        """Open the bus.
+
+        Parameters
+        ----------
+        configuration : BusConfiguration
+            which bus
+        bus : can.BusABC or None
+            a bus that is open already, in place of the configured one
+        clock : Clock or None
+            by which heartbeats are due; the machine's where None
+
+        Raises
+        ------
+        DriverError
+            ``cannot-connect``: the interface is not there, or another program holds it
+        """
+        self._name = f"{configuration.interface} {configuration.channel}"
+        self._clock = clock or MonotonicClock()
+        self._network = canopen.Network()
+        self._handlers: dict[int, FrameHandler] = {}
+        self._heartbeat_period_ns = 0
+        self._next_heartbeat_ns = 0
+        self._claim: BusClaim | None = None
+        try:
+            self._claim = _claimed(configuration) if bus is None else None
+            self._bus = bus or open_interface(
+                configuration.interface, configuration.channel, configuration.bit_rate, configuration.options
+            )
+        # a missing option is a TypeError of python-can's
+        except (can.CanError, OSError, ValueError, NotImplementedError, ImportError, TypeError) as error:
+            self._release()
+            text = " ".join(str(error).split())
+            raise DriverError(
+                DriverErrorKind.CANNOT_CONNECT,
+                f"CAN bus {self._name} cannot be opened ({text}); check the adapter, its name, who else uses it, and "
+                "drive.options",
+            ) from error
+        self._network.bus = self._bus
+
+    def subscribe(self, identifier: int, handler: FrameHandler) -> None:
+        """Hand all frames of an identifier to a handler.
+
+        Parameters
+        ----------
+        identifier : int
+            11 bits
+        handler : callable
+            takes the identifier and the payload
+        """
+        self._handlers[identifier] = handler
+
+    def add_node(self, node_id: int) -> NodeDictionary:
+        """The object dictionary of a node.
+
+        Parameters
+        ----------
+        node_id : int
+            1 to 127
+        """
+        client = PumpedSdoClient(self, node_id)
+        client.network = self._network
+        self.subscribe(client.tx_cobid, lambda identifier, data: client.on_response(identifier, data, 0.0))
+        return NodeDictionary(client, node_id)
+
+    def send(self, identifier: int, data: bytes) -> None:
+        """Send a frame.
+
+        Parameters
+        ----------
+        identifier : int
+            11 bits
+        data : bytes
+            up to 8
+
+        Raises
+        ------
+        DriverError
+            ``lost``: the bus does not take it
+        """
+        try:
+            self._bus.send(
+                can.Message(arbitration_id=identifier, data=data, is_extended_id=False), timeout=SEND_TIMEOUT_S
+            )
+        except (can.CanError, OSError, ValueError) as error:
+            raise self._lost(error) from error
+
+    def send_together(self, frames: Iterable[tuple[int, bytes]]) -> None:
+        """Send frames one after the other, with one write where the adapter takes that.
+
+        Parameters
+        ----------
+        frames : iterable of (int, bytes)
+            identifier and payload of each, in their order
+
+        Raises
+        ------
+        DriverError
+            ``lost``: the bus does not take them
+        """
+        gathering = self._bus.gathering() if isinstance(self._bus, SerialAdapterBus) else nullcontext()
+        try:
+            with gathering:
+                for identifier, data in frames:
+                    self.send(identifier, data)
+        except (can.CanError, OSError, ValueError) as error:
+            raise self._lost(error) from error
+
+    def receive(self, deadline_ns: int) -> bool:
+        """Wait for one frame and hand it to its handler; the heartbeat is sent meanwhile when it is due.
+
+        Parameters
+        ----------
+        deadline_ns : int
+            monotonic instant until which to wait [ns]
+
+        Returns
+        -------
+        bool
+            False where none came
+
+        Raises
+        ------
+        DriverError
+            ``lost``: the bus is gone
+        """
+        self.beat()
+        wait_s = max(0.0, (deadline_ns - time.monotonic_ns()) * 1e-9)
+        if self._heartbeat_period_ns:
+            wait_s = min(wait_s, self._heartbeat_period_ns * 0.5e-9)
+        try:
+            message = self._bus.recv(wait_s)
+        except (can.CanError, OSError, ValueError) as error:
+            raise self._lost(error) from error
+        if message is None:
+            return False
+        if message.is_error_frame or message.is_extended_id or message.is_remote_frame:
+            return True
+        handler = self._handlers.get(message.arbitration_id)
+        if handler is not None:
+            handler(message.arbitration_id, bytes(message.data))
+        return True
+
+    def drain(self) -> None:
+        """Hand all frames that have come to their handlers: an answer that is late is not taken for the next."""
+        now = time.monotonic_ns()
+        for _ in range(_MOST_DRAINED):
+            if not self.receive(now):
+                return
+
+    def start_heartbeat(self, period_s: float) -> None:
+        """Be alive to the drives from now on, as long as `receive` or `beat` is called.
+
+        Parameters
+        ----------
+        period_s : float
+            time between heartbeats; 0 ends them [s]
+        """
+        self._heartbeat_period_ns = round(period_s * 1e9)
+        self._next_heartbeat_ns = self._clock.now_ns()
+        self.beat()
+
+    def beat(self) -> None:
+        """Send the master's heartbeat where it is due."""
+        now = self._clock.now_ns()
+        if self._heartbeat_period_ns and now >= self._next_heartbeat_ns:
+            self._next_heartbeat_ns = now + self._heartbeat_period_ns
+            self.send(HEARTBEAT_ID + MASTER_NODE, bytes([NMT_OPERATIONAL_STATE]))
+
+    def command_nodes(self, command: int, node_id: int = 0) -> None:
+        """Send a network-management command.
+
+        Parameters
+        ----------
+        command : int
+            `NMT_START`, `NMT_PRE_OPERATIONAL`
+        node_id : int
+            0 for all
+        """
+        self.send(NMT_ID, bytes([command, node_id]))
+
+    def close(self) -> None:
+        """Let go of the bus."""
+        self._heartbeat_period_ns = 0
+        self._bus.shutdown()
+        self._release()
+
+    def _release(self) -> None:
+        """Let another process have the bus."""
+        if self._claim is not None:
+            self._claim.release()
+            self._claim = None
+
+    def _lost(self, error: Exception) -> DriverError:
+        text = " ".join(str(error).split())
+        return DriverError(
+            DriverErrorKind.LOST, f"CAN bus {self._name} is gone ({text}); check the adapter and the cable"
+        )
+
+
+def _claimed(configuration: BusConfiguration) -> BusClaim | None:
+    """The claim on an interface that several programs may open; None where only one can."""
+    if configuration.interface in ONE_PROCESS:
+        return None
+    name = configuration.channel
+    if configuration.interface != "socketcan":
+        name = "-".join([configuration.interface, name, *(str(one) for one in configuration.options.values())])
+    try:
+        return BusClaim(name)
+    except ClaimedError as error:
+        raise DriverError(
+            DriverErrorKind.CANNOT_CONNECT,
+            f"CAN bus {configuration.channel} is driven by {error} already; end that first",
+        ) from error

@@ -1,0 +1,207 @@
+"""What the driver needs to know of each joint's drive, from the robot file's ``drive`` blocks.
+
+On each joint: ``{node_id: 3, counts_per_turn: 65536}`` and, where they differ from the defaults, the other keys of
+`NodeConfiguration`; ``eds`` is the path of the drive's EDS or DCF file. The bus is the same for all joints and stands
+on the first: ``interface`` and ``channel`` as python-can takes them, ``bit_rate``, and ``options`` for what the
+interface takes besides.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from tauscope_drivers.backend import ControlMode
+from tauscope_drivers.canopen.data_sheet.device_file import DeviceFile, read_device_file
+from tauscope_drivers.canopen.data_sheet.needs import require_needed, require_target
+from tauscope_drivers.canopen.data_sheet.settings import settings_of
+from tauscope_drivers.canopen.data_sheet.text import DataSheetError
+from tauscope_drivers.canopen.interfaces import OWN_OPTIONS
+from tauscope_drivers.drive_block import (
+    read_direction,
+    read_positive,
+    read_text,
+    read_whole,
+    refusal,
+    require_distinct,
+    require_known_keys,
+)
+from tauscope_drivers.errors import DriverError, DriverErrorKind
+
+_HIGHEST_NODE = 127
+_BUS_KEYS = ("interface", "channel", "bit_rate", "serial_baud", "options")
+_NODE_KEYS = ("node_id", "counts_per_turn", "zero_count", "direction", "rated_torque_nm", "eds")
+
+
+@dataclass(frozen=True)
+class DriveJoint:
+    """A joint as the driver sees it.
+
+    name : str
+        of the joint
+    gear_ratio : float
+        motor turns per joint turn; per metre of travel over 2π on a prismatic joint
+    drive : mapping
+        its ``drive`` block
+    """
+
+    name: str
+    gear_ratio: float
+    drive: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class NodeConfiguration:
+    """One drive.
+
+    node_id : int
+        1 to 127
+    counts_per_turn : float
+        position counts a motor turn
+    gear_ratio : float
+        motor turns per joint turn
+    zero_count : int
+        count at which the joint stands at zero
+    direction : int
+        -1 where the drive counts against the joint, else 1
+    rated_torque_nm : float or None
+        at the motor shaft, in place of what the drive states (0x6076): makers scale it differently [Nm]
+    device_file : DeviceFile or None
+        the drive's EDS or DCF file, which describes what the driver needs
+    """
+
+    node_id: int
+    counts_per_turn: float
+    gear_ratio: float
+    zero_count: int = 0
+    direction: int = 1
+    rated_torque_nm: float | None = None
+    device_file: DeviceFile | None = None
+
+
+@dataclass(frozen=True)
+class BusConfiguration:
+    """The bus and the drives on it, in the order of the joints.
+
+    nodes : tuple of NodeConfiguration
+        one a joint
+    interface : str
+        python-can's name: ``socketcan``, ``slcan``, ``pcan``, ``socketcand``, ``virtual`` …
+    channel : str
+        ``can0``, ``/dev/ttyACM0`` …
+    bit_rate : int
+        [bit/s]
+    serial_baud : float or None
+        of an adapter on a true serial line [bit/s]
+    options : mapping of str to str, number or bool
+        what python-can's interface takes besides
+    """
+
+    nodes: tuple[NodeConfiguration, ...]
+    interface: str
+    channel: str
+    bit_rate: int = 1_000_000
+    serial_baud: float | None = None
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+
+def read_configuration(joints: Sequence[DriveJoint]) -> BusConfiguration:
+    """Bus and drives of an arm.
+
+    Parameters
+    ----------
+    joints : sequence of DriveJoint
+        base first
+
+    Raises
+    ------
+    DriverError
+        ``refused``: a key is missing, unknown or not usable, or the EDS or DCF file describes no drive that the driver
+        can use; names the joint and the key
+    """
+    first = joints[0]
+    require_known_keys(joints, _BUS_KEYS, _NODE_KEYS)
+    nodes = tuple(_node(joint) for joint in joints)
+    require_distinct(joints, "node_id")
+    return BusConfiguration(
+        nodes=nodes,
+        interface=read_text(first, "interface", "name it as python-can does"),
+        channel=read_text(first, "channel", "name it as python-can does"),
+        bit_rate=read_whole(first, "bit_rate", 1_000_000, least=10_000, most=1_000_000),
+        serial_baud=read_positive(first, "serial_baud"),
+        options=_options(first),
+    )
+
+
+def require_targets(configuration: BusConfiguration, mode: ControlMode) -> None:
+    """Refuse a mode whose targets a drive does not take, by its EDS or DCF file.
+
+    Parameters
+    ----------
+    configuration : BusConfiguration
+        bus and drives
+    mode : ControlMode
+        who closes the loop
+
+    Raises
+    ------
+    DriverError
+        ``refused``: names joint, file and object
+    """
+    for joint, node in enumerate(configuration.nodes, 1):
+        if node.device_file is None:
+            continue
+        try:
+            require_target(node.device_file, mode)
+        except DataSheetError as error:
+            text = f"joint {joint} (node {node.node_id}): {node.device_file.name}: {error}"
+            raise DriverError(DriverErrorKind.REFUSED, text) from error
+
+
+def _node(joint: DriveJoint) -> NodeConfiguration:
+    """The drive of a joint."""
+    counts_per_turn = read_positive(joint, "counts_per_turn")
+    if counts_per_turn is None:
+        raise refusal(joint, "counts_per_turn", "is missing; give the position counts of a motor turn")
+    node_id = read_whole(joint, "node_id", None, least=1, most=_HIGHEST_NODE)
+    rated_torque_nm = read_positive(joint, "rated_torque_nm")
+    return NodeConfiguration(
+        node_id=node_id,
+        counts_per_turn=counts_per_turn,
+        gear_ratio=joint.gear_ratio,
+        zero_count=read_whole(joint, "zero_count", 0, least=-(2**31), most=2**31 - 1),
+        direction=read_direction(joint),
+        rated_torque_nm=rated_torque_nm,
+        device_file=_device_file(joint, node_id, reads_rated_torque=rated_torque_nm is None),
+    )
+
+
+def _options(joint: DriveJoint) -> Mapping[str, Any]:
+    """What python-can's interface is given besides."""
+    options = joint.drive.get("options", {})
+    if not isinstance(options, Mapping) or not all(isinstance(value, str | int | float) for value in options.values()):
+        raise refusal(joint, "options", f"= {options!r}; give what python-can takes, as in {{host: 192.168.1.5}}")
+    for name in options:
+        if name in OWN_OPTIONS:
+            raise refusal(joint, f"options.{name}", "has a key of its own: interface, channel, bit_rate")
+    return dict(options)
+
+
+def _device_file(joint: DriveJoint, node_id: int, *, reads_rated_torque: bool) -> DeviceFile | None:
+    """The EDS or DCF file of a joint's drive, which describes one that the driver can use; None where none is given."""
+    path = joint.drive.get("eds")
+    if path is None:
+        return None
+    if not isinstance(path, str) or not path:
+        raise refusal(joint, "eds", f"= {path!r}; give the path of the drive's EDS or DCF file")
+    try:
+        file = read_device_file(Path(path), node_id)
+        if file.node_id not in (None, node_id):
+            raise DataSheetError(
+                f"is made for node {file.node_id}; correct drive.node_id, or give the file of this node"
+            )
+        require_needed(file, reads_rated_torque=reads_rated_torque)
+        settings_of(file)
+    except DataSheetError as error:
+        raise refusal(joint, "eds", f"= {path!r}: {error}") from error
+    return file

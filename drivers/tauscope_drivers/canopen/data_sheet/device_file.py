@@ -1,0 +1,185 @@
+"""An EDS or DCF file: which objects its maker says a drive has, who it is, and the values that a DCF gives it."""
+
+import io
+import logging
+import struct
+from collections.abc import Iterator, Mapping
+from configparser import Error as SectionError
+from dataclasses import dataclass
+from pathlib import Path
+
+from canopen.objectdictionary import ObjectDictionary, ObjectDictionaryError, ODVariable, datatypes, eds
+
+from tauscope_drivers.canopen.data_sheet.text import DataSheetError, library_text, read_sections
+
+LARGEST_FILE = 8 * 1024 * 1024
+"""Makers' files of drives have some hundred kilobytes [bytes]."""
+
+_TYPE_NAMES = (
+    *("BOOLEAN", "INTEGER8", "INTEGER16", "INTEGER32", "UNSIGNED8", "UNSIGNED16", "UNSIGNED32", "REAL32"),
+    *("VISIBLE_STRING", "OCTET_STRING", "UNICODE_STRING", "DOMAIN", "REAL64", "INTEGER64", "UNSIGNED64"),
+)
+TYPE_NAMES: Mapping[int, str] = {getattr(datatypes, name): name for name in _TYPE_NAMES}
+"""Data types of CiA 301 by their number."""
+
+_LONGEST_NAME = 60
+
+# The library warns of each of a maker's own data types, on the terminal where nobody listens; the driver needs none.
+logging.getLogger(eds.__name__).setLevel(logging.ERROR)
+
+
+@dataclass(frozen=True)
+class DescribedObject:
+    """One entry of the object dictionary as a file describes it.
+
+    name : str
+        in the maker's words
+    index, subindex : int
+        its place
+    data_type : int
+        number of CiA 301
+    access : str
+        ``ro``, ``wo``, ``rw``, ``rwr``, ``rww`` or ``const``
+    is_mappable : bool
+        whether a PDO may hold it
+    value_text : str or None
+        value that a DCF gives it, as written there
+    value : bytes or None
+        the same as it is transferred, little end first; None where it is not of its type
+    """
+
+    name: str
+    index: int
+    subindex: int
+    data_type: int
+    access: str
+    is_mappable: bool
+    value_text: str | None = None
+    value: bytes | None = None
+
+    @property
+    def type_name(self) -> str:
+        """Name of its data type."""
+        return TYPE_NAMES.get(self.data_type, f"data type 0x{self.data_type:02X}")
+
+
+@dataclass(frozen=True)
+class DeviceFile:
+    """What a file says of a drive.
+
+    name : str
+        of the file, for messages
+    objects : mapping
+        of (index, subindex) to DescribedObject
+    vendor, product, revision : int or None
+        identity; None where it states none
+    node_id : int or None
+        that a DCF is made for; None where it states none
+    """
+
+    name: str
+    objects: Mapping[tuple[int, int], DescribedObject]
+    vendor: int | None = None
+    product: int | None = None
+    revision: int | None = None
+    node_id: int | None = None
+
+
+def read_device_file(path: Path, node_id: int) -> DeviceFile:
+    """Read a file.
+
+    Parameters
+    ----------
+    path : Path
+        of the EDS or DCF file
+    node_id : int
+        that values with ``$NODEID`` are meant for
+
+    Raises
+    ------
+    DataSheetError
+        it cannot be read, or is no such file
+    """
+    sections = read_sections(_content(path))
+    try:
+        dictionary = eds.import_eds(io.StringIO(library_text(sections)), node_id)
+    # All that the library's reader was seen to raise on files that are not whole.
+    except (SectionError, LookupError, ValueError, TypeError, AttributeError, OverflowError) as error:
+        reason = " ".join(str(error.args[0] if error.args else error).split())[:120]
+        raise DataSheetError(f"is no whole EDS or DCF file ({reason!a}); get it anew from the maker") from error
+    entries = {(variable.index, variable.subindex): _described(variable) for variable in _variables(dictionary)}
+    device = dictionary.device_information
+    made_for = sections.get("DeviceComissioning", {}).get("NodeID")
+    return DeviceFile(
+        name=_printable(path.name),
+        objects=entries,
+        vendor=device.vendor_number or _default(dictionary, 1),
+        product=device.product_number or _default(dictionary, 2),
+        revision=device.revision_number or _default(dictionary, 3),
+        node_id=None if made_for is None else int(made_for, 0),
+    )
+
+
+def _content(path: Path) -> str:
+    """Text of a file of sensible size; what is not Unicode is one of Europe's 8-bit codes, for makers' units."""
+    try:
+        if not path.is_file():
+            raise DataSheetError("there is no such file; give the path of the drive's EDS or DCF file")
+        if path.stat().st_size > LARGEST_FILE:
+            raise DataSheetError(f"is larger than {LARGEST_FILE // 1024**2} MiB; give an EDS or DCF file")
+        data = path.read_bytes()
+    except OSError as error:
+        raise DataSheetError(f"cannot be read ({error.strerror or error}); check its permissions") from error
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
+
+
+def _variables(dictionary: ObjectDictionary) -> Iterator[ODVariable]:
+    """All entries; subindices that a file does not list are not made up, as the library does of arrays."""
+    for entry in dictionary.indices.values():
+        if isinstance(entry, ODVariable):
+            yield entry
+        else:
+            yield from entry.subindices.values()
+
+
+def _described(variable: ODVariable) -> DescribedObject:
+    text = getattr(variable, "value_raw", None)
+    return DescribedObject(
+        name=_printable(variable.name),
+        index=variable.index,
+        subindex=variable.subindex,
+        data_type=variable.data_type or 0,
+        access=variable.access_type,
+        is_mappable=variable.pdo_mappable,
+        value_text=None if text is None else _printable(text),
+        value=None if text is None else _transferred(variable, text),
+    )
+
+
+def _printable(name: str) -> str:
+    """A name on one line of a terminal."""
+    return "".join(letter if letter.isprintable() else "?" for letter in name)[:_LONGEST_NAME]
+
+
+def _transferred(variable: ODVariable, text: str) -> bytes | None:
+    """A DCF's value as it goes over the bus; None where it is not of the object's type."""
+    value = variable.value
+    if value is None:
+        return None
+    if isinstance(value, int) and variable.data_type in datatypes.SIGNED_TYPES and "x" in text.lower():
+        bits = len(variable)
+        value -= (1 << bits) if 1 << bits - 1 <= value < 1 << bits else 0  # makers write -1 as 0xFFFF
+    try:
+        return bytes(variable.encode_raw(value))
+    except (ValueError, TypeError, OverflowError, struct.error, ObjectDictionaryError):
+        return None
+
+
+def _default(dictionary: ObjectDictionary, subindex: int) -> int | None:
+    """Part of the identity (0x1018) by its default; zero is how makers leave it open."""
+    variable = dictionary.get_variable(0x1018, subindex)
+    default = None if variable is None else variable.default
+    return default if isinstance(default, int) and default else None

@@ -1,0 +1,152 @@
+"""Looks at a CAN bus and the drives on it, moves nothing, writes nothing, and says what to do about what it finds."""
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from tauscope_drivers.canopen import objects
+from tauscope_drivers.canopen.bus import CanBus
+from tauscope_drivers.canopen.configuration import BusConfiguration, DriveJoint, read_configuration
+from tauscope_drivers.canopen.data_sheet.device_file import DescribedObject, DeviceFile
+from tauscope_drivers.canopen.data_sheet.settings import settings_of
+from tauscope_drivers.canopen.node import MODES, DriveNode
+from tauscope_drivers.canopen.session import possible_rate_hz
+from tauscope_drivers.canopen.state_machine import POWERED
+from tauscope_drivers.errors import DriverError
+from tauscope_drivers.inspection import Finding, Severity, failure
+
+MEASURED_READS = 50
+"""Reads by which the round trip is measured."""
+
+_NETWORK = Path("/sys/class/net")
+_CAN_DEVICE_TYPE = "280"
+
+
+def can_interfaces() -> list[Finding]:
+    """Every CAN interface that this system's network knows, and whether it is up."""
+    found: list[Finding] = []
+    if not _NETWORK.is_dir():
+        return found
+    for interface in sorted(_NETWORK.iterdir()):
+        if _read(interface / "type") != _CAN_DEVICE_TYPE:
+            continue
+        name = interface.name
+        if int(_read(interface / "flags") or "0", 16) & 1:
+            found.append(Finding(Severity.GOOD, name, "CAN interface, up"))
+        else:
+            remedy = f"ip link set {name} up type can bitrate 1000000"
+            found.append(Finding(Severity.WARNING, name, "CAN interface, down", remedy))
+    return found
+
+
+def examine(joints: Sequence[DriveJoint]) -> list[Finding]:
+    """Bus, and every drive that the robot file names.
+
+    Parameters
+    ----------
+    joints : sequence of DriveJoint
+        base first
+
+    Raises
+    ------
+    DriverError
+        ``refused``: a ``drive`` block is not valid
+    """
+    configuration = read_configuration(joints)
+    subject = f"{configuration.interface} {configuration.channel}"
+    try:
+        bus = CanBus(configuration)
+    except DriverError as error:
+        return [failure(subject, str(error))]
+    try:
+        findings = [Finding(Severity.GOOD, subject, f"open, {configuration.bit_rate / 1e3:g} kbit/s")]
+        return findings + _examine_drives(bus, configuration, subject)
+    except DriverError as error:
+        return [failure(subject, str(error))]
+    finally:
+        bus.close()
+
+
+def _examine_drives(bus: CanBus, configuration: BusConfiguration, subject: str) -> list[Finding]:
+    findings: list[Finding] = []
+    sound: list[DriveNode] = []
+    for joint, wanted in enumerate(configuration.nodes, 1):
+        node = DriveNode.on_bus(bus, wanted, joint)
+        try:
+            findings += _examine_drive(node)
+        except DriverError as error:
+            findings.append(failure(node.place, str(error), f"node {wanted.node_id}"))
+            continue
+        sound.append(node)
+    if len(sound) == len(configuration.nodes):
+        findings.append(_loop_rate(configuration, sound, subject))
+    return findings
+
+
+def _examine_drive(node: DriveNode) -> list[Finding]:
+    """Name, modes, units, and what stands in the way of a run."""
+    modes = node.identify()
+    dictionary = node.dictionary
+    name = dictionary.read_text(objects.DEVICE_NAME) or "a drive without a name"
+    version = dictionary.read_text(objects.SOFTWARE_VERSION) or "unknown"
+    torque = abs(node.units.torque_per_permille)
+    findings = [Finding(Severity.GOOD, node.place, f"{name}, firmware {version}, {torque:.4g} Nm a per mille")]
+    if node.configuration.device_file is not None:
+        findings += _examine_file(node.configuration.device_file, node.place)
+    missing = [str(mode) for mode in MODES if mode not in modes]
+    if missing:
+        detail = f"has no cyclic synchronous {' and '.join(missing)} mode (0x6502)"
+        severity = Severity.FAILURE if len(missing) == len(MODES) else Severity.WARNING
+        findings.append(Finding(severity, node.place, detail, "run the arm in the other mode, or update its firmware"))
+    node.read_now()
+    for fault in node.faults():
+        findings.append(Finding(Severity.FAILURE, node.place, fault.detail, fault.remedy))
+    if node.state in POWERED:
+        remedy = "none where it holds the arm; else support the arm and switch it off"
+        findings.append(Finding(Severity.WARNING, node.place, f"is under power: {node.state}", remedy))
+    if dictionary.read_optional(objects.ABORT_CONNECTION) is None:
+        detail = "has no abort connection option (0x6007): it does not stop by itself when the host is gone"
+        findings.append(Finding(Severity.FAILURE, node.place, detail, "use a drive that has one, or an emergency stop"))
+    return findings
+
+
+def _examine_file(file: DeviceFile, place: str) -> list[Finding]:
+    """What the EDS or DCF file is good for; that it describes the drive on the bus has been made sure of."""
+    stated = (("vendor", file.vendor), ("product", file.product), ("revision", file.revision))
+    identity = ", ".join(f"{name} 0x{number:X}" for name, number in stated if number is not None)
+    describes = f"{file.name} describes all that the driver needs; {identity or 'it states no identity'}"
+    findings = [Finding(Severity.GOOD, place, describes)]
+    settings = settings_of(file)
+    if settings.written:
+        given = ", ".join(f"{one.entry} = {one.text}" for one in settings.written)
+        findings.append(Finding(Severity.GOOD, place, f"{file.name} gives it, before each run: {given}"))
+    for reason, described in settings.left_out.items():
+        detail = f"{file.name} has values that are not written ({reason}): {_listed_places(described)}"
+        findings.append(Finding(Severity.GOOD, place, detail))
+    return findings
+
+
+def _listed_places(described: Sequence[DescribedObject]) -> str:
+    """Places in the object dictionary, the subindices of an index together."""
+    subindices: dict[int, list[str]] = {}
+    for one in described:
+        subindices.setdefault(one.index, []).append(f"{one.subindex:02X}")
+    return ", ".join(f"0x{index:04X}:{'/'.join(found)}" for index, found in subindices.items())
+
+
+def _loop_rate(configuration: BusConfiguration, nodes: Sequence[DriveNode], subject: str) -> Finding:
+    """How long a question takes, measured, beside what a whole cycle gets."""
+    begin_ns = time.monotonic_ns()
+    for read in range(MEASURED_READS):
+        nodes[read % len(nodes)].dictionary.read(objects.STATUSWORD)
+    round_trip_ms = (time.monotonic_ns() - begin_ns) * 1e-6 / MEASURED_READS
+    possible = possible_rate_hz(configuration)
+    detail = f"a question is answered in {round_trip_ms:.2f} ms; a whole cycle gets {possible:.0f} Hz at most"
+    return Finding(Severity.GOOD, subject, detail)
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text(encoding="ascii").strip()
+    except OSError:
+        return ""

@@ -1,0 +1,171 @@
+"""The frames that a run would send, without a bus: ``identifier#payload``, as can-utils write them."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope_drivers.backend import ControlMode, DriveLimits, StopPolicy
+from tauscope_drivers.canopen import objects
+from tauscope_drivers.canopen.bus import HEARTBEAT_ID, MASTER_NODE, NMT_ID, NMT_PRE_OPERATIONAL, NMT_START, SYNC_ID
+from tauscope_drivers.canopen.commissioning import commission_drive, write_settings
+from tauscope_drivers.canopen.configuration import DriveJoint, NodeConfiguration, read_configuration, require_targets
+from tauscope_drivers.canopen.node import DriveNode
+from tauscope_drivers.canopen.objects import DriveObject
+from tauscope_drivers.canopen.process_data import RECEIVED_ID
+from tauscope_drivers.canopen.state_machine import DriveState, Goal, next_controlword
+from tauscope_drivers.canopen.units import drive_units
+from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.inspection import PlannedFrame
+from tauscope_drivers.limits import require_sensible
+
+_TO_POWER = (DriveState.SWITCH_ON_DISABLED, DriveState.READY, DriveState.SWITCHED_ON)
+_DOWNLOAD, _LONG_DOWNLOAD, _UPLOAD = 0x23, 0x21, 0x40
+_AS_DELIVERED = {
+    objects.LARGEST_TORQUE: 0xFFFF,
+    objects.INTERPOLATION_VALUE: 1,
+    objects.INTERPOLATION_EXPONENT: -3,
+}
+
+
+class _PlannedDictionary:
+    """Stands in for a node's object dictionary: keeps what is written and turns it into frames."""
+
+    def __init__(self, configuration: NodeConfiguration, label: str) -> None:
+        self.frames: list[PlannedFrame] = []
+        self.node_id = configuration.node_id
+        self._label = label
+        self._values = dict(_AS_DELIVERED)
+        self._data: dict[DriveObject, bytes] = {}
+
+    def read(self, entry: DriveObject) -> int:
+        """What was written, or what drives have as delivered."""
+        request = bytes([_UPLOAD]) + _place(entry) + bytes(4)
+        self._add(f"{entry}?", request)
+        return self._values.get(entry, 0)
+
+    def read_data(self, entry: DriveObject) -> bytes:
+        """Nothing that a drive was not given yet."""
+        self.read(entry)
+        return self._data.get(entry, b"")
+
+    def read_optional(self, entry: DriveObject) -> int:
+        """As `read`: the drive has everything."""
+        return self.read(entry)
+
+    def write(self, entry: DriveObject, value: int) -> None:
+        """Keep a value, and read it back as the driver does."""
+        self.send(entry, value)
+        self.read(entry)
+
+    def send(self, entry: DriveObject, value: int) -> None:
+        """Keep a value."""
+        self._values[entry] = value
+        self.send_data(entry, value.to_bytes(entry.bits // 8, "little", signed=entry.signed), str(value))
+
+    def send_data(self, entry: DriveObject, data: bytes, text: str) -> None:
+        """Keep a value as transferred; a long one is announced by its size, and follows in segments."""
+        self._data[entry] = data
+        if len(data) > 4:
+            payload = bytes([_LONG_DOWNLOAD]) + _place(entry) + len(data).to_bytes(4, "little")
+            self._add(f"{entry} := {text}, {len(data)} bytes in segments", payload)
+            return
+        command = _DOWNLOAD | (4 - len(data)) << 2
+        self._add(f"{entry} := {text}", bytes([command]) + _place(entry) + data.ljust(4, b"\0"))
+
+    def _add(self, meaning: str, payload: bytes) -> None:
+        self.frames.append(_frame("enable", f"{self._label}: {meaning}", 0x600 + self.node_id, payload))
+
+
+def plan_frames(
+    joints: Sequence[DriveJoint],
+    mode: ControlMode,
+    limits: DriveLimits,
+    watchdog_s: float,
+    targets: NDArray[np.float64],
+    cycle_s: float | None = None,
+) -> Iterator[PlannedFrame]:
+    """Frames of a connection, of enabling, of some cycles and of a stop, for drives that answer as they should.
+
+    Service data is shown as expedited transfers, and of more than four bytes by its first frame alone; heartbeats,
+    which are sent as time passes, are shown once.
+
+    Parameters
+    ----------
+    joints : sequence of DriveJoint
+        base first; each ``drive`` block has to state ``rated_torque_nm``
+    mode : ControlMode
+        who closes the loop; in torque mode the torque is the host's loop's to say, and 0 is shown
+    limits : DriveLimits
+        of the joints
+    watchdog_s : float
+        time of silence after which the drives stop [s]
+    targets : (K, n) float64
+        positions of the first K cycles; the arm is supposed to stand at the first of them [rad or m]
+    cycle_s : float or None
+        time between them, which drives are told; None where it is not known [s]
+
+    Yields
+    ------
+    PlannedFrame
+        in the order of sending
+
+    Raises
+    ------
+    DriverError
+        ``refused``: a ``drive`` block or a limit is not possible
+    """
+    configuration = read_configuration(joints)
+    require_targets(configuration, mode)
+    nodes = [_planned_node(number, wanted) for number, wanted in enumerate(configuration.nodes, 1)]
+    require_sensible(limits, targets[0], [node.place for node, _ in nodes])
+    yield _frame("connect", "all nodes: pre-operational", NMT_ID, bytes([NMT_PRE_OPERATIONAL, 0]))
+    for node, _ in nodes:
+        write_settings(node)
+    for node, dictionary in nodes:
+        commission_drive(node, mode, limits, StopPolicy.HOLD, watchdog_s, cycle_s)
+        yield from dictionary.frames
+    yield _frame("enable", "master: alive", HEARTBEAT_ID + MASTER_NODE, bytes([0x05]))
+    yield _frame("enable", "all nodes: operational", NMT_ID, bytes([NMT_START, 0]))
+    for state in _TO_POWER:
+        word = next_controlword(state, Goal.OPERATION_ENABLED)
+        yield from _cycle([node for node, _ in nodes], mode, "enable", word, targets[0])
+    word = next_controlword(DriveState.OPERATION_ENABLED, Goal.OPERATION_ENABLED)
+    for position in targets:
+        yield from _cycle([node for node, _ in nodes], mode, "cycle", word, position)
+    word = next_controlword(DriveState.OPERATION_ENABLED, Goal.QUICK_STOP)
+    yield from _cycle([node for node, _ in nodes], mode, "stop", word, targets[-1])
+
+
+def _planned_node(joint: int, configuration: NodeConfiguration) -> tuple[DriveNode, _PlannedDictionary]:
+    """A drive that nobody has asked, in the units that the robot file states."""
+    label = f"joint {joint} (node {configuration.node_id})"
+    if configuration.rated_torque_nm is None:
+        raise DriverError(
+            DriverErrorKind.REFUSED,
+            f"{label}: only the drive knows its rated torque (0x6076); state drive.rated_torque_nm for a dry run",
+        )
+    dictionary = _PlannedDictionary(configuration, label)
+    node = DriveNode(configuration, joint, dictionary)  # pyright: ignore[reportArgumentType]
+    node.units = drive_units(configuration, configuration.rated_torque_nm)
+    return node, dictionary
+
+
+def _cycle(
+    nodes: Sequence[DriveNode], mode: ControlMode, phase: str, word: int, position: NDArray[np.float64]
+) -> Iterator[PlannedFrame]:
+    """Targets of all nodes, then SYNC."""
+    for node, place in zip(nodes, position, strict=True):
+        payload = node.target(mode, word, float(place), 0.0)
+        what = f"{place:.4f}" if mode is ControlMode.POSITION else "0"
+        identifier = RECEIVED_ID + node.configuration.node_id
+        yield _frame(phase, f"{node.place}: controlword 0x{word:04X}, target {mode} {what}", identifier, payload)
+    yield _frame(phase, "all nodes: SYNC", SYNC_ID, b"")
+
+
+def _place(entry: DriveObject) -> bytes:
+    return entry.index.to_bytes(2, "little") + bytes([entry.subindex])
+
+
+def _frame(phase: str, meaning: str, identifier: int, payload: bytes) -> PlannedFrame:
+    return PlannedFrame(phase, meaning, f"{identifier:03X}#{payload.hex().upper()}")

@@ -1,0 +1,87 @@
+"""Process data: several objects packed into one frame, little end first."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from tauscope_drivers.canopen.objects import DriveObject
+
+
+@dataclass(frozen=True)
+class PdoLayout:
+    """Which objects a process data object holds, in their order.
+
+    objects : tuple of DriveObject
+        together at most 64 bits
+    """
+
+    objects: tuple[DriveObject, ...]
+
+    def __post_init__(self) -> None:
+        """A CAN frame holds eight bytes, and all entries here are whole ones."""
+        bits = sum(entry.bits for entry in self.objects)
+        if bits > 64 or any(entry.bits % 8 for entry in self.objects):
+            raise ValueError(f"a PDO of {bits} bits does not fit into a frame of whole bytes up to 64 bits")
+
+    @cached_property
+    def size(self) -> int:
+        """Payload of the frame [bytes]."""
+        return sum(entry.bits for entry in self.objects) // 8
+
+
+def encode_pdo(layout: PdoLayout, values: Mapping[DriveObject, int]) -> bytes:
+    """Payload of a frame.
+
+    A value that its object cannot hold is an error and never cut to size: a target that wraps round or saturates is
+    full torque.
+
+    Parameters
+    ----------
+    layout : PdoLayout
+        what the frame holds
+    values : mapping of DriveObject to int
+        a value for each object
+
+    Raises
+    ------
+    OverflowError
+        a value does not fit its object; names the object
+    """
+    payload = bytearray()
+    for entry in layout.objects:
+        try:
+            payload += values[entry].to_bytes(entry.bits // 8, "little", signed=entry.signed)
+        except OverflowError:
+            raise OverflowError(f"{entry}: {values[entry]} does not fit {entry.bits} bits") from None
+    return bytes(payload)
+
+
+def decode_pdo(layout: PdoLayout, payload: bytes) -> dict[DriveObject, int] | None:
+    """Values of a frame; None where its length is not the layout's, which a wrongly mapped drive sends.
+
+    Parameters
+    ----------
+    layout : PdoLayout
+        what the frame holds
+    payload : bytes
+        of the frame
+    """
+    if len(payload) != layout.size:
+        return None
+    values, start = {}, 0
+    for entry in layout.objects:
+        stop = start + entry.bits // 8
+        values[entry] = int.from_bytes(payload[start:stop], "little", signed=entry.signed)
+        start = stop
+    return values
+
+
+def mapping_entries(objects: Sequence[DriveObject]) -> list[int]:
+    """What the mapping parameter's subindices 1, 2, … hold.
+
+    Parameters
+    ----------
+    objects : sequence of DriveObject
+        in their order
+    """
+    return [entry.mapping for entry in objects]

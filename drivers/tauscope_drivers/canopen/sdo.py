@@ -1,0 +1,291 @@
+"""Service data: a node's object dictionary, read and written; lost, late and doubled answers are made up for."""
+
+import time
+from collections.abc import Callable
+from typing import Protocol, TypeVar
+
+import can
+from canopen.objectdictionary import ObjectDictionary
+from canopen.sdo.client import SdoClient
+from canopen.sdo.exceptions import SdoCommunicationError, SdoError
+
+from tauscope_drivers.canopen.objects import DriveObject
+from tauscope_drivers.errors import DriverError, DriverErrorKind
+
+SDO_TIMEOUT_S = 0.3
+ATTEMPTS = 2
+"""A question is asked so many times in a transfer; each answer is waited for as long as `SDO_TIMEOUT_S`."""
+
+TRANSFERS = 2
+"""A transfer that does not succeed is begun so many times: a request or an answer may have been altered on its way."""
+
+_INITIATE = {1: 3, 2: 2}
+"""Command of a request that begins a download or an upload, and of its answer (CiA 301)."""
+
+_ABORT = 4
+_WRITES = 2
+_READINGS = 3
+
+
+_Answer = TypeVar("_Answer")
+
+
+class Pump(Protocol):
+    """What takes frames off the bus and hands them to whoever waits for them."""
+
+    def receive(self, deadline_ns: int) -> bool:
+        """Wait for one frame; False where none came.
+
+        Parameters
+        ----------
+        deadline_ns : int
+            monotonic instant until which to wait [ns]
+        """
+        ...
+
+
+class NodeDictionary:
+    """The object dictionary of one node, read and written by service data."""
+
+    def __init__(self, client: SdoClient, node_id: int) -> None:
+        """Reach a node; nothing is sent yet.
+
+        Parameters
+        ----------
+        client : SdoClient
+            of the node
+        node_id : int
+            1 to 127
+        """
+        self._client = client
+        self.node_id = node_id
+
+    def read(self, entry: DriveObject) -> int:
+        """Value of an entry.
+
+        Parameters
+        ----------
+        entry : DriveObject
+            what to read
+
+        Raises
+        ------
+        DriverError
+            ``cannot-connect``: the node does not answer, or has no such entry
+        """
+        return int.from_bytes(self.read_data(entry), "little", signed=entry.signed)
+
+    def read_surely(self, entry: DriveObject) -> int:
+        """Value of an entry that every measurement hangs on: as two readings in a row have it.
+
+        Parameters
+        ----------
+        entry : DriveObject
+            what to read
+
+        Raises
+        ------
+        DriverError
+            ``cannot-connect``: the node does not answer, has no such entry, or gives another value each time
+        """
+        values = [self.read(entry)]
+        for _ in range(_READINGS):
+            values.append(self.read(entry))
+            if values[-1] == values[-2]:
+                return values[-1]
+        raise DriverError(
+            DriverErrorKind.CANNOT_CONNECT,
+            f"node {self.node_id}: {entry} reads {', '.join(map(str, values))}; check the wiring and the adapter",
+        )
+
+    def read_data(self, entry: DriveObject) -> bytes:
+        """Value of an entry as transferred, cut to its size; of a text without the zeros that end it.
+
+        Parameters
+        ----------
+        entry : DriveObject
+            what to read
+
+        Raises
+        ------
+        DriverError
+            ``cannot-connect``: the node does not answer, or has no such entry
+        """
+        try:
+            data = bytes(_transferred(lambda: self._client.upload(entry.index, entry.subindex)))
+        except (SdoError, can.CanError, OSError) as error:
+            raise self._failure(f"{entry} cannot be read", error) from error
+        return data[: entry.bits // 8] if entry.bits else data.rstrip(b"\0")
+
+    def read_optional(self, entry: DriveObject) -> int | None:
+        """Value of an entry that not every drive has; None where the drive has none.
+
+        Parameters
+        ----------
+        entry : DriveObject
+            what to read
+        """
+        try:
+            return self.read(entry)
+        except DriverError as error:
+            if isinstance(error.__cause__, SdoCommunicationError):
+                raise
+            return None
+
+    def read_text(self, entry: DriveObject) -> str:
+        """A text; empty where the node has none.
+
+        Parameters
+        ----------
+        entry : DriveObject
+            what to read
+        """
+        try:
+            return self._client.upload(entry.index, entry.subindex).decode("ascii", "replace").strip("\0 ")
+        except (SdoError, can.CanError, OSError):
+            return ""
+
+    def write(self, entry: DriveObject, value: int) -> None:
+        """Write an entry and read it back.
+
+        Parameters
+        ----------
+        entry : DriveObject
+            what to write
+        value : int
+            that fits the entry
+
+        Raises
+        ------
+        DriverError
+            ``refused``: the drive keeps another value; ``cannot-connect``: it does not answer or forbids the write
+        """
+        kept = None
+        for _ in range(_WRITES):
+            self.send(entry, value)
+            kept = self.read(entry)
+            if kept == value:
+                return
+        raise DriverError(
+            DriverErrorKind.REFUSED,
+            f"node {self.node_id}: {entry} was written as {value} and reads {kept}; the drive limits or forbids it",
+        )
+
+    def send(self, entry: DriveObject, value: int) -> None:
+        """Write an entry that cannot be read back yet.
+
+        Parameters
+        ----------
+        entry : DriveObject
+            what to write
+        value : int
+            that fits the entry
+
+        Raises
+        ------
+        DriverError
+            ``cannot-connect``: the drive does not answer or forbids the write
+        """
+        self.send_data(entry, value.to_bytes(entry.bits // 8, "little", signed=entry.signed), str(value))
+
+    def send_data(self, entry: DriveObject, data: bytes, text: str) -> None:
+        """Write an entry as transferred.
+
+        Parameters
+        ----------
+        entry : DriveObject
+            what to write
+        data : bytes
+            little end first
+        text : str
+            the value, for messages
+
+        Raises
+        ------
+        DriverError
+            ``cannot-connect``: the drive does not answer or forbids the write
+        """
+        try:
+            _transferred(lambda: self._client.download(entry.index, entry.subindex, data))
+        except (SdoError, can.CanError, OSError) as error:
+            raise self._failure(f"{entry} = {text} cannot be written", error) from error
+
+    def _failure(self, what: str, error: Exception) -> DriverError:
+        return DriverError(
+            DriverErrorKind.CANNOT_CONNECT,
+            f"node {self.node_id}: {what} ({' '.join(str(error).split())}); check node number, power and wiring",
+        )
+
+
+def _transferred(transfer: Callable[[], _Answer]) -> _Answer:
+    """What a transfer comes to, which is begun again where it fails."""
+    for _ in range(TRANSFERS - 1):
+        try:
+            return transfer()
+        except SdoError:
+            continue
+    return transfer()
+
+
+class PumpedSdoClient(SdoClient):
+    """The library's SDO client, taking its answers off the bus itself instead of from a receiving thread.
+
+    What does not answer the last question is dropped: an answer that came too late would else be taken for the next.
+    """
+
+    RESPONSE_TIMEOUT = SDO_TIMEOUT_S
+    MAX_RETRIES = ATTEMPTS
+
+    def __init__(self, pump: Pump, node_id: int) -> None:
+        """Reach a node; nothing is sent yet.
+
+        Parameters
+        ----------
+        pump : Pump
+            takes frames off the bus
+        node_id : int
+            1 to 127
+        """
+        super().__init__(0x600 + node_id, 0x580 + node_id, ObjectDictionary())
+        self._pump = pump
+        self._asked: bytes | None = None
+
+    def send_request(self, request: bytes) -> None:
+        """Send a frame, and remember what it asks for.
+
+        Parameters
+        ----------
+        request : bytes
+            eight of them
+        """
+        if request[0] >> 5 in _INITIATE:
+            self._asked = bytes(request[:4])
+        super().send_request(request)
+
+    def on_response(self, can_id: int, data: bytes, timestamp: float) -> None:
+        """Take a frame of the node.
+
+        Parameters
+        ----------
+        can_id : int
+            identifier
+        data : bytes
+            payload
+        timestamp : float
+            of no matter
+        """
+        command = data[0] >> 5 if len(data) == 8 else None
+        if command is None or self._asked is None:
+            return
+        begins = command in (*_INITIATE.values(), _ABORT)
+        fits = data[1:4] == self._asked[1:4] and command in (_INITIATE[self._asked[0] >> 5], _ABORT)
+        if fits or not begins:
+            super().on_response(can_id, data, timestamp)
+
+    def read_response(self) -> bytes:
+        """Answer of the node, as the library reads it, after frames were taken off the bus until there is one."""
+        deadline = time.monotonic_ns() + round(SDO_TIMEOUT_S * 1e9)
+        while self.responses.empty():
+            if not self._pump.receive(deadline) and time.monotonic_ns() >= deadline:
+                raise SdoCommunicationError("no answer to a service data request")
+        return super().read_response()

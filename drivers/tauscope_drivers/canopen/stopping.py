@@ -1,0 +1,163 @@
+"""Stopping an arm of drives, and clearing what stopped it. A drive that holds the arm goes on holding it."""
+
+from collections.abc import Sequence
+
+from tauscope_drivers.backend import ControlMode, StopPolicy
+from tauscope_drivers.canopen import objects
+from tauscope_drivers.canopen.node import DriveNode
+from tauscope_drivers.canopen.session import Session
+from tauscope_drivers.canopen.state_machine import DISABLE_VOLTAGE, FAULT_RESET, DriveState, Goal, next_controlword
+from tauscope_drivers.errors import DriverError, DriverErrorKind, Fault
+from tauscope_drivers.state import ArmState
+
+POLICY_GOALS = {StopPolicy.HOLD: Goal.QUICK_STOP, StopPolicy.TORQUE_OFF: Goal.SWITCH_ON_DISABLED}
+"""What drives can do by themselves, and where that takes them."""
+
+STOP_S = 0.5
+"""Time for a stop by process data; drives that are not there by then are told one by one."""
+
+RESET_S = 0.1
+"""Time in which a drive leaves its fault, or is back in it because the cause persists."""
+
+PROMPT_CYCLES = 3
+"""A frame that tells a drive to stop may be lost, and the answer that it has stopped comes a cycle later."""
+
+_SILENT_REMEDY = "support the arm, check the drive's cable and power, then acknowledge"
+_RESTART_REMEDY = "support the arm, look for a dip of its supply, then acknowledge"
+
+
+def stop_in_cycle(session: Session, mode: ControlMode, goal: Goal) -> bool:
+    """Stop by process data, all drives together; False where not all got there.
+
+    Nobody waits for a drive that takes no process data any more: it has stopped by itself.
+
+    Parameters
+    ----------
+    session : Session
+        of drives that take process data
+    mode : ControlMode
+        that they are enabled in
+    goal : Goal
+        where the stop takes them
+    """
+    still = session.standstill()
+
+    def is_nothing_left_to_wait_for() -> bool:
+        return all(has_stopped(node, goal) or node.is_deaf for node in session.nodes)
+
+    def cycle() -> ArmState:
+        return session.cycle(mode, goal, still, session.unhurried_ns)
+
+    session.step_until(is_nothing_left_to_wait_for, cycle, STOP_S)
+    return all(has_stopped(node, goal) for node in session.nodes)
+
+
+def stop_promptly(session: Session, mode: ControlMode, goal: Goal) -> ArmState:
+    """Tell all drives to stop within a cycle of the control loop, and again where one may not have heard it.
+
+    Those that missed the master have stopped by themselves and answer no SYNC: they are asked by service data, for
+    what they told last is from before.
+
+    Parameters
+    ----------
+    session : Session
+        of drives that take process data
+    mode : ControlMode
+        that they are enabled in
+    goal : Goal
+        where the stop takes them
+    """
+    still = session.standstill()
+    for _ in range(PROMPT_CYCLES):
+        state = session.cycle(mode, goal, still, session.answer_ns)
+        if all(has_stopped(node, goal) for node in session.nodes):
+            return state
+        if all(node.is_deaf for node in session.nodes):
+            break
+    return session.read_by_service_data() if any(node.is_deaf for node in session.nodes) else state
+
+
+def stop_one_by_one(nodes: Sequence[DriveNode], goal: Goal, *, is_stopped: bool) -> list[Fault]:
+    """Stop drives that no longer take process data, let all forget the master, and read them.
+
+    One that holds already stays as it is. A fault for each drive that does not answer: the others are stopped all the
+    same.
+
+    Parameters
+    ----------
+    nodes : sequence of DriveNode
+        in the order of the joints
+    goal : Goal
+        where the stop takes them
+    is_stopped : bool
+        whether they are there already
+
+    Raises
+    ------
+    DriverError
+        ``lost``: the bus is gone
+    """
+    silent: list[Fault] = []
+    for node in nodes:
+        try:
+            node.read_now()
+            if not is_stopped and (goal is not Goal.QUICK_STOP or node.state is DriveState.OPERATION_ENABLED):
+                node.dictionary.write(objects.CONTROLWORD, next_controlword(node.state, goal))
+            node.dictionary.write(objects.CONSUMER_HEARTBEAT, 0)
+            node.read_now()
+        except DriverError as error:
+            if error.kind is DriverErrorKind.LOST:
+                raise
+            node.values = {}
+            silent.append(Fault("silent", node.joint, "did not answer while it was stopped", _SILENT_REMEDY))
+    return silent
+
+
+def has_stopped(node: DriveNode, goal: Goal) -> bool:
+    """Whether a drive is where a stop takes it; one in fault has stopped by itself.
+
+    Parameters
+    ----------
+    node : DriveNode
+        which has answered, or not
+    goal : Goal
+        where the stop takes it
+    """
+    if goal is Goal.QUICK_STOP:
+        return node.state in (DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT)
+    return node.state not in (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE, None)
+
+
+def dropped_faults(nodes: Sequence[DriveNode]) -> list[Fault]:
+    """Drives that should hold and have no power, and do not say why: they were restarted.
+
+    Parameters
+    ----------
+    nodes : sequence of DriveNode
+        just read, after a stop that holds
+    """
+    return [
+        Fault("not-held", node.joint, f"is without power ({node.state}) after a stop that holds", _RESTART_REMEDY)
+        for node in nodes
+        if node.state in (DriveState.SWITCH_ON_DISABLED, DriveState.READY, DriveState.SWITCHED_ON)
+    ]
+
+
+def reset_faults(session: Session) -> ArmState:
+    """Reset drives in fault, once, and forget emergencies; what persists is in the state that is returned.
+
+    Parameters
+    ----------
+    session : Session
+        of drives outside the cycle
+    """
+    session.caught = None
+    for node in session.nodes:
+        node.read_now()
+        if node.state is DriveState.FAULT:
+            for word in (DISABLE_VOLTAGE, FAULT_RESET, DISABLE_VOLTAGE):
+                node.dictionary.write(objects.CONTROLWORD, word)
+        node.error_code, node.acknowledged_code = 0, node.values[objects.ERROR_CODE]
+    # a drive whose cause persists needs a moment to be back in its fault
+    session.clock.wait_until_ns(session.clock.now_ns() + session.settling_ns)
+    return session.step_until(lambda: not session.faults, session.read_by_service_data, RESET_S)

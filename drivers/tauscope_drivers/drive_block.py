@@ -1,0 +1,177 @@
+"""Reading the ``drive`` blocks of a robot file's joints: what is missing, unknown or wrong is refused by name."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
+
+from tauscope_drivers.errors import DriverError, DriverErrorKind
+
+_KEYS_OF_ANY_BUS = ("stop_policy",)
+
+
+class JointWithDrive(Protocol):
+    """A joint as a driver sees it."""
+
+    @property
+    def name(self) -> str:
+        """Of the joint."""
+        ...
+
+    @property
+    def drive(self) -> Mapping[str, Any]:
+        """Its ``drive`` block."""
+        ...
+
+
+def require_known_keys(joints: Sequence[JointWithDrive], bus_keys: Sequence[str], own_keys: Sequence[str]) -> None:
+    """Refuse keys that nobody knows, and several buses.
+
+    Parameters
+    ----------
+    joints : sequence of JointWithDrive
+        base first; what they say of the bus stands on the first
+    bus_keys : sequence of str
+        of the bus
+    own_keys : sequence of str
+        of each joint, beside those that any bus has
+
+    Raises
+    ------
+    DriverError
+        ``refused``: names the joint and the key
+    """
+    first = joints[0]
+    known = sorted({*bus_keys, *own_keys, *_KEYS_OF_ANY_BUS})
+    for joint in joints:
+        for key in joint.drive:
+            if key not in known:
+                raise refusal(joint, key, f"is not known; known keys: {', '.join(known)}")
+        for key in bus_keys:
+            if joint.drive.get(key, first.drive.get(key)) != first.drive.get(key):
+                raise refusal(joint, key, f"differs from that of {first.name}; all drives are on one bus")
+
+
+def require_distinct(joints: Sequence[JointWithDrive], key: str) -> None:
+    """Refuse an address that is there twice.
+
+    Parameters
+    ----------
+    joints : sequence of JointWithDrive
+        with that key
+    key : str
+        whose value is the address
+
+    Raises
+    ------
+    DriverError
+        ``refused``: names the joint
+    """
+    addresses = [joint.drive[key] for joint in joints]
+    for joint, address in zip(joints, addresses, strict=True):
+        if addresses.count(address) > 1:
+            raise refusal(joint, key, f"= {address} is there twice; each drive has its own")
+
+
+def read_whole(joint: JointWithDrive, key: str, default: int | None, *, least: int, most: int) -> int:
+    """A whole number.
+
+    Parameters
+    ----------
+    joint : JointWithDrive
+        whose
+    key : str
+        of its block
+    default : int or None
+        where the key is missing; None where it has to be there
+    least, most : int
+        its range
+
+    Raises
+    ------
+    DriverError
+        ``refused``: it is none, or out of range
+    """
+    value = joint.drive.get(key, default)
+    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+        raise refusal(joint, key, f"= {value!r}; give a whole number from {least} to {most}")
+    return value
+
+
+def read_direction(joint: JointWithDrive) -> int:
+    """Which way a drive turns: -1 where it is against the joint, else 1.
+
+    Parameters
+    ----------
+    joint : JointWithDrive
+        whose
+
+    Raises
+    ------
+    DriverError
+        ``refused``: another number
+    """
+    direction = read_whole(joint, "direction", 1, least=-1, most=1)
+    if direction == 0:
+        raise refusal(joint, "direction", "= 0; give 1 or -1")
+    return direction
+
+
+def read_positive(joint: JointWithDrive, key: str) -> float | None:
+    """A positive number; None where the key is missing.
+
+    Parameters
+    ----------
+    joint : JointWithDrive
+        whose
+    key : str
+        of its block
+
+    Raises
+    ------
+    DriverError
+        ``refused``: it is none
+    """
+    value = joint.drive.get(key)
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value) or value <= 0:
+        raise refusal(joint, key, f"= {value!r}; give a positive number")
+    return float(value)
+
+
+def read_text(joint: JointWithDrive, key: str, what: str) -> str:
+    """A text that has to be there.
+
+    Parameters
+    ----------
+    joint : JointWithDrive
+        whose
+    key : str
+        of its block
+    what : str
+        to give, where it is missing
+
+    Raises
+    ------
+    DriverError
+        ``refused``: it is missing
+    """
+    value = joint.drive.get(key)
+    if not isinstance(value, str) or not value:
+        raise refusal(joint, key, f"is missing; {what}")
+    return value
+
+
+def refusal(joint: JointWithDrive, key: str, reason: str) -> DriverError:
+    """Why a block is not usable.
+
+    Parameters
+    ----------
+    joint : JointWithDrive
+        whose
+    key : str
+        of its block
+    reason : str
+        one line, with what to do
+    """
+    return DriverError(DriverErrorKind.REFUSED, f"joint {joint.name}: drive.{key} {reason}")

@@ -1,0 +1,342 @@
+"""Instructions and their answers on one bus, each with its error byte."""
+
+import struct
+import time
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from tauscope_drivers.clock import Clock, MonotonicClock
+from tauscope_drivers.dynamixel import packets
+from tauscope_drivers.dynamixel.control_table import Block, Item, encode_items
+from tauscope_drivers.dynamixel.packets import FrameParser, Status
+from tauscope_drivers.dynamixel.port import BITS_PER_BYTE, SerialPort
+from tauscope_drivers.dynamixel.turns import Turns
+from tauscope_drivers.errors import DriverError, DriverErrorKind
+
+FACTORY_RETURN_DELAY_S = 500e-6
+"""Return Delay Time of a servo as delivered [s]."""
+
+ATTEMPTS = 3
+"""How often a single servo is asked outside the control loop."""
+
+PATIENCE_S = 0.02
+"""How much longer a single servo is waited for there [s]."""
+
+_LATEST_ANSWER_NS = 500_000_000
+"""Answers have come 133 ms late where a machine stood still; a control loop gives an arm up long before this."""
+
+_AFTERTHOUGHT_NS = 2_000_000
+_STATUS_BYTES = 11
+_PING_ANSWER_BYTES = 14
+_BROADCAST_PING_SLOT_S = 0.003
+_FAST_BYTES = 8
+_FAST_SERVO_BYTES = 4
+
+
+@dataclass(frozen=True)
+class Answers:
+    """What came of one question to many servos.
+
+    asked_ns : int
+        instant at which the question had left [ns, by the bus' clock]
+    late_ns : int
+        how much later than bus and adapter take the last answer came [ns]
+    statuses : dict of int to Status
+        whole answers by ID; a servo that did not answer is not in it
+    """
+
+    asked_ns: int
+    late_ns: int
+    statuses: dict[int, Status]
+
+
+class ServoBus:
+    """Speaks to the servos of one port; one thread's own."""
+
+    def __init__(self, port: SerialPort, clock: Clock | None = None) -> None:
+        """Use a port, open or not yet.
+
+        Parameters
+        ----------
+        port : SerialPort
+            that this process owns
+        clock : Clock or None
+            by which readings are stamped; the machine's where None
+        """
+        self.port = port
+        self._clock = MonotonicClock() if clock is None else clock
+        self.return_delay_s = FACTORY_RETURN_DELAY_S
+        self.discarded_bytes = 0
+        self._missed_ns: dict[tuple[int, int], int] = {}
+        self._answered_ns = 0
+
+    def ping(self, servo: int) -> tuple[int, int] | None:
+        """Model number and firmware of a servo; None where it does not answer.
+
+        Parameters
+        ----------
+        servo : int
+            ID
+        """
+        for _ in range(ATTEMPTS):
+            answer = self._ask(servo, packets.encode_ping(servo), 3, PATIENCE_S)
+            if answer is not None and len(answer.data) == 3:
+                return struct.unpack("<HB", answer.data)
+        return None
+
+    def ping_all(self) -> dict[int, tuple[int, int]]:
+        """Model number and firmware of every servo that answers a ping to all, by ID."""
+        slots = packets.HIGHEST_ID + 1
+        self.port.send(packets.encode_ping())
+        deadline = self.port.reply_deadline_ns(_PING_ANSWER_BYTES * slots, slots * _BROADCAST_PING_SLOT_S)
+        parser = FrameParser()
+        found: dict[int, tuple[int, int]] = {}
+        while received := self.port.receive(deadline):
+            for frame in parser.feed(received):
+                status = packets.decode_status(frame)
+                if status is not None and len(status.data) == 3:
+                    found[status.servo] = struct.unpack("<HB", status.data)
+        return dict(sorted(found.items()))
+
+    def read_once(self, servo: int, address: int, length: int, patience_s: float = 0.0) -> Status | None:
+        """A stretch of a control table, asked for once; None where no whole answer came.
+
+        Parameters
+        ----------
+        servo : int
+            ID
+        address : int
+            of the first byte
+        length : int
+            number of bytes
+        patience_s : float
+            how much longer to wait than in the control loop [s]
+        """
+        return self._ask(servo, packets.encode_read(servo, address, length), length, patience_s)
+
+    def read_block(self, servo: int, block: Block) -> dict[str, int]:
+        """Values of a block by their names.
+
+        Parameters
+        ----------
+        servo : int
+            ID
+        block : Block
+            what to read
+
+        Raises
+        ------
+        DriverError
+            ``cannot-connect``: the servo does not answer; ``refused``: it has no such block
+        """
+        answer = None
+        for _ in range(ATTEMPTS):
+            answer = self.read_once(servo, block.address, block.length, PATIENCE_S)
+            if answer is not None and not answer.refusal and len(answer.data) == block.length:
+                return block.decode(answer.data)
+        raise _failure(servo, f"{block.items[0].name} cannot be read", answer)
+
+    def read(self, servo: int, item: Item) -> int:
+        """Value of an item.
+
+        Parameters
+        ----------
+        servo : int
+            ID
+        item : Item
+            what to read
+
+        Raises
+        ------
+        DriverError
+            ``cannot-connect``: the servo does not answer; ``refused``: it has no such item
+        """
+        return self.read_block(servo, Block(item.address, item.size, (item,)))[item.name]
+
+    def write(self, servo: int, item: Item, value: int) -> None:
+        """Write an item and read it back.
+
+        Parameters
+        ----------
+        servo : int
+            ID
+        item : Item
+            what to write
+        value : int
+            that fits it
+
+        Raises
+        ------
+        DriverError
+            ``cannot-connect``: the servo does not answer; ``refused``: it does not take the value
+        """
+        answer = None
+        for _ in range(ATTEMPTS):
+            request = packets.encode_write(servo, item.address, item.encode(value))
+            answer = self._ask(servo, request, 0, PATIENCE_S)
+            if answer is not None and answer.refusal:
+                raise _failure(servo, f"{item.name} = {value} is refused", answer)
+            # A write whose answer was lost may have arrived: what counts is what the servo holds now.
+            if self.read(servo, item) == value:
+                return
+        raise DriverError(
+            DriverErrorKind.REFUSED, f"servo {servo}: {item.name} was written as {value} and reads otherwise; check it"
+        )
+
+    def clear_error(self, servo: int) -> None:
+        """Let a servo of the Y series forget its error; whether it did is what its Error Code says.
+
+        Parameters
+        ----------
+        servo : int
+            ID
+        """
+        for _ in range(ATTEMPTS):
+            if self._ask(servo, packets.encode_clear_error(servo), 0, PATIENCE_S) is not None:
+                return
+
+    def sync_write(self, items: Sequence[Item], values: Mapping[int, Sequence[int]]) -> None:
+        """Write items of many servos at once; no servo answers.
+
+        Parameters
+        ----------
+        items : sequence of Item
+            what to write, each where the one before ends
+        values : mapping of int to sequence of int
+            values for each ID
+        """
+        encoded = {servo: encode_items(items, own) for servo, own in values.items()}
+        self.port.send(packets.encode_sync_write(encoded, items[0].address))
+
+    def sync_read(
+        self, servos: Sequence[int], block: Block, *, fast: bool = False, patience_s: float = 0.0, spare: int = 0
+    ) -> Answers:
+        """Read the same block of many servos.
+
+        Nothing in an answer says to which question it belongs. Where an earlier one was not answered in time, as many
+        bytes before the block as make another length are read with it, so that what comes late has the wrong length.
+
+        Parameters
+        ----------
+        servos : sequence of int
+            IDs
+        block : Block
+            what to read
+        fast : bool
+            ask for one packet for all
+        patience_s : float
+            how much longer to wait than in the control loop [s]
+        spare : int
+            bytes before the block that can be read as well
+        """
+        if any(self._owed(servos, block.length + surplus) for surplus in range(spare + 1)):
+            self.port.drain()
+        surplus = min(range(spare + 1), key=lambda surplus: self._last_missed_ns(servos, block.length + surplus))
+        length = block.length + surplus
+        owed = self._owed(servos, length)
+        request = packets.encode_sync_read(servos, block.address - surplus, length, fast=fast)
+        # Taken before: who is woken by the bytes may run before this process does again.
+        asked_ns = self._clock.now_ns() + round(len(request) * BITS_PER_BYTE * 1e9 / self.port.baudrate)
+        self.port.send(request)
+        self._answered_ns = asked_ns
+        receive = self._receive_fast if fast else self._receive_each
+        waits_s = len(servos) * self.return_delay_s + patience_s
+        found = receive(servos, length, len(request), waits_s, owed)
+        answer_bytes = _fast_bytes(servos, length) if fast else len(servos) * (_STATUS_BYTES + length)
+        usual_s = answer_bytes * BITS_PER_BYTE / self.port.baudrate + len(servos) * self.return_delay_s
+        late_ns = self._answered_ns - asked_ns - round((usual_s + self.port.latency_s) * 1e9)
+        wanted = {servo: replace(status, data=status.data[surplus:]) for servo, status in found.items()}
+        return Answers(asked_ns, max(0, late_ns), wanted)
+
+    def _owed(self, servos: Sequence[int], length: int) -> set[int]:
+        """Servos whose answer of this length to an earlier question may still be under way."""
+        since_ns = time.monotonic_ns() - _LATEST_ANSWER_NS
+        return {servo for servo in servos if self._missed_ns.get((servo, length), 0) > since_ns}
+
+    def _last_missed_ns(self, servos: Sequence[int], length: int) -> int:
+        """When the last answer of this length was missed that may still be under way; zero where none is."""
+        return max((self._missed_ns[servo, length] for servo in self._owed(servos, length)), default=0)
+
+    def _miss(self, servos: Collection[int], length: int) -> None:
+        """Note who has not answered at all: that answer may come yet."""
+        now_ns = time.monotonic_ns()
+        self._missed_ns |= {(servo, length): now_ns for servo in servos}
+
+    def _receive_each(
+        self, servos: Sequence[int], length: int, sent: int, waits_s: float, owed: set[int]
+    ) -> dict[int, Status]:
+        """One status packet of each servo, in their order; where answers are owed, also what comes after the last."""
+        answer_bytes = _STATUS_BYTES + length
+        deadline = self.port.reply_deadline_ns(sent + len(servos) * answer_bytes, waits_s)
+        # Stuffing lengthens an answer by a third at most.
+        parser = FrameParser(longest=answer_bytes + length // 3 + 1)
+        turns = Turns(servos, owed)
+        while received := self.port.receive(deadline):
+            for frame in parser.feed(received):
+                status = packets.decode_status(frame)
+                if status is not None and len(status.data) == length and not status.refusal:
+                    turns.take(status)
+                    self._answered_ns = self._clock.now_ns()
+            if turns.complete:
+                if not owed:
+                    break
+                deadline = min(deadline, time.monotonic_ns() + _AFTERTHOUGHT_NS)
+        self.discarded_bytes += parser.discarded
+        self._miss(turns.unheard, length)
+        return turns.answers
+
+    def _receive_fast(
+        self, servos: Sequence[int], length: int, sent: int, waits_s: float, owed: set[int]
+    ) -> dict[int, Status]:
+        """One packet of all servos, or what is whole of one that breaks off; none where there are two that differ."""
+        answer_bytes = _fast_bytes(servos, length)
+        deadline = self.port.reply_deadline_ns(sent + answer_bytes, waits_s)
+        parser = FrameParser(longest=answer_bytes)
+        packets_found: list[list[Status]] = []
+        while received := self.port.receive(deadline):
+            decoded = [packets.decode_fast(frame, servos, length) for frame in parser.feed(received)]
+            packets_found += [statuses for statuses in decoded if statuses and statuses not in packets_found]
+            if packets_found:
+                self._answered_ns = self._clock.now_ns()
+                if not owed:
+                    break
+                deadline = min(deadline, time.monotonic_ns() + _AFTERTHOUGHT_NS)
+        self.discarded_bytes += parser.discarded
+        if not packets_found:
+            packets_found = [packets.decode_fast(parser.pending, servos, length)]
+        answers = {status.servo: status for status in packets_found[0]} if len(packets_found) == 1 else {}
+        self._miss(set(servos) - answers.keys(), length)
+        return answers
+
+    def _ask(self, servo: int, request: bytes, length: int, patience_s: float) -> Status | None:
+        """Send an instruction to one servo and wait for its answer."""
+        if self._owed([servo], length):
+            self.port.drain()
+        self.port.send(request)
+        delay_s = self.return_delay_s + patience_s
+        deadline = self.port.reply_deadline_ns(len(request) + _STATUS_BYTES + length, delay_s)
+        parser = FrameParser()
+        while received := self.port.receive(deadline):
+            for frame in parser.feed(received):
+                status = packets.decode_status(frame)
+                if status is not None and status.servo == servo and (len(status.data) == length or status.refusal):
+                    return status
+        self.discarded_bytes += parser.discarded
+        self._miss([servo], length)
+        return None
+
+
+def _fast_bytes(servos: Sequence[int], length: int) -> int:
+    """Length of the packet with which all answer at once, each with so many bytes."""
+    return _FAST_BYTES + len(servos) * (length + _FAST_SERVO_BYTES)
+
+
+def _failure(servo: int, what: str, answer: Status | None) -> DriverError:
+    """Error of an instruction that was not carried out."""
+    if answer is None:
+        return DriverError(
+            DriverErrorKind.CANNOT_CONNECT,
+            f"servo {servo} does not answer ({what}); check its power, cable, ID and baud rate",
+        )
+    reason = packets.describe_refusal(answer.refusal)
+    return DriverError(DriverErrorKind.REFUSED, f"servo {servo}: {what}: {reason}; check the servo with its wizard")

@@ -1,0 +1,325 @@
+"""Control tables of the servos, from the ``.model`` files that dynamixel-sdk brings along: no address is typed here."""
+
+import math
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from importlib.resources.abc import Traversable
+
+from tauscope_drivers.dynamixel.models import MISSING_ITEMS, CurrentUnit, FamilyFacts, current_unit_of, family_of
+from tauscope_drivers.errors import DriverError, DriverErrorKind
+
+_SIGNED = re.compile(
+    r"(Present|Goal) (Current|Velocity|Position|PWM)|(Homing|Current|Velocity|PWM) Offset"
+    r"|(Position|Velocity) Trajectory|(Max|Min) Position Limit"
+)
+
+STATE_ITEMS = ("Present Current", "Present Velocity", "Present Position")
+"""What every cycle reads; one contiguous block on every family."""
+
+BYTES_BEFORE_STATE = 3
+"""Bytes of other items right before that block, on every family."""
+
+
+@dataclass(frozen=True)
+class Item:
+    """An entry of a control table.
+
+    name : str
+        as ROBOTIS calls it
+    address : int
+        of its first byte
+    size : int
+        [bytes]
+    signed : bool
+        whether it is a two's complement
+    """
+
+    name: str
+    address: int
+    size: int
+    signed: bool
+
+    def encode(self, value: int) -> bytes:
+        """Its bytes.
+
+        Parameters
+        ----------
+        value : int
+            that fits it
+        """
+        return value.to_bytes(self.size, "little", signed=self.signed)
+
+    def decode(self, block: bytes, start: int) -> int:
+        """Its value in a block of bytes.
+
+        Parameters
+        ----------
+        block : bytes
+            a stretch of the control table
+        start : int
+            address of the block's first byte
+        """
+        offset = self.address - start
+        return int.from_bytes(block[offset : offset + self.size], "little", signed=self.signed)
+
+
+def encode_items(items: Iterable[Item], values: Iterable[int]) -> bytes:
+    """Bytes of neighbours in a control table.
+
+    Parameters
+    ----------
+    items : iterable of Item
+        each where the one before ends
+    values : iterable of int
+        one of each
+    """
+    return b"".join(item.encode(value) for item, value in zip(items, values, strict=True))
+
+
+@dataclass(frozen=True)
+class Block:
+    """A stretch of a control table that is read at once.
+
+    address : int
+        of its first byte
+    length : int
+        [bytes]
+    items : tuple of Item
+        what is in it
+    """
+
+    address: int
+    length: int
+    items: tuple[Item, ...]
+
+    def decode(self, data: bytes) -> dict[str, int]:
+        """Values of its items by name; empty where the data are not as long as the block.
+
+        Parameters
+        ----------
+        data : bytes
+            as read
+        """
+        if len(data) != self.length:
+            return {}
+        return {item.name: item.decode(data, self.address) for item in self.items}
+
+
+@dataclass(frozen=True)
+class ServoModel:
+    """A model of servo.
+
+    number : int
+        model number, as the servo states it
+    name : str
+        as the library's file is called: ``xm430_w350``
+    family : FamilyFacts
+        what its family has in common
+    items : mapping of str to Item
+        control table
+    counts_per_radian : float
+        of the horn [1/rad]
+    zero_count : int
+        count at which the horn is at zero
+    velocity_unit : float
+        one unit of Present Velocity [rad/s]
+    current_unit : CurrentUnit or None
+        one unit of Present Current; None where no source states it
+    """
+
+    number: int
+    name: str
+    family: FamilyFacts
+    items: Mapping[str, Item]
+    counts_per_radian: float
+    zero_count: int
+    velocity_unit: float
+    current_unit: CurrentUnit | None
+
+    @property
+    def label(self) -> str:
+        """The model as printed on its case: ``XM430-W350``."""
+        return self.name.upper().replace("_", "-")
+
+    @property
+    def senses_current(self) -> bool:
+        """Whether it measures and controls current; without that nothing can be identified."""
+        return "Present Current" in self.items and "Goal Current" in self.items
+
+    @property
+    def paces_goals(self) -> bool:
+        """Whether Profile Velocity and Goal Position are neighbours, so that one write carries both."""
+        speed = self.items["Profile Velocity"]
+        return speed.address + speed.size == self.items["Goal Position"].address
+
+    @property
+    def temperature_item(self) -> Item:
+        """Temperature of the motor, or the only one it has."""
+        return self.items.get("Present Motor Temperature") or self.items["Present Temperature"]
+
+    @property
+    def error_item(self) -> Item:
+        """Where hardware errors stand."""
+        return self.items.get("Hardware Error Status") or self.items["Error Code"]
+
+    @property
+    def state_block(self) -> Block:
+        """Current, velocity and position."""
+        return _block([self.items[name] for name in STATE_ITEMS])
+
+    @property
+    def health_blocks(self) -> tuple[Block, ...]:
+        """Torque Enable, errors, watchdog, voltage and temperature."""
+        others = ("Torque Enable", "Bus Watchdog", "Present Input Voltage")
+        return self.blocks((self.error_item.name, self.temperature_item.name, *others))
+
+    @property
+    def watched_blocks(self) -> tuple[Block, ...]:
+        """What is read in turn while the arm moves, each a short read: watchdog, errors, voltage and temperature.
+
+        Each has a length of its own, reached with the items before it, so that a late answer to one question is never
+        taken for the answer to another.
+        """
+        blocks: list[Block] = []
+        for names in (
+            ("Bus Watchdog",),
+            (self.error_item.name,),
+            ("Present Input Voltage", self.temperature_item.name),
+        ):
+            block = _block([self.items[name] for name in names if name in self.items])
+            while any(block.length == other.length for other in blocks):
+                block = _block([self._item_before(block.address), *block.items])
+            blocks.append(block)
+        return tuple(blocks)
+
+    def blocks(self, names: Iterable[str], longest: int = 48) -> tuple[Block, ...]:
+        """Items in as few stretches as are worth one read; those that the model lacks are left out.
+
+        Parameters
+        ----------
+        names : iterable of str
+            as ROBOTIS calls them
+        longest : int
+            most bytes of a stretch with more than one item
+        """
+        wanted = sorted((self.items[name] for name in names if name in self.items), key=lambda item: item.address)
+        stretches: list[list[Item]] = []
+        for item in wanted:
+            if stretches and item.address + item.size - stretches[-1][0].address <= longest:
+                stretches[-1].append(item)
+            else:
+                stretches.append([item])
+        return tuple(_block(items) for items in stretches)
+
+    def _item_before(self, address: int) -> Item:
+        """The item that ends where another begins."""
+        return next(item for item in self.items.values() if item.address + item.size == address)
+
+
+def _block(items: Iterable[Item]) -> Block:
+    ordered = sorted(items, key=lambda item: item.address)
+    start = ordered[0].address
+    return Block(start, ordered[-1].address + ordered[-1].size - start, tuple(ordered))
+
+
+@cache
+def model_names() -> Mapping[int, str]:
+    """Model numbers and names of every servo that the library has a table of."""
+    rows = (line.split("\t") for line in _folder().joinpath("dynamixel.model").read_text("utf-8").splitlines())
+    return {int(row[0]): row[1].strip().removesuffix(".model") for row in rows if row[0].strip().isdigit()}
+
+
+@cache
+def find_model(number: int, firmware: int = 0) -> ServoModel:
+    """The model of a number, with the table of its firmware.
+
+    Parameters
+    ----------
+    number : int
+        as the servo states it
+    firmware : int
+        version, as the servo states it
+
+    Raises
+    ------
+    DriverError
+        ``cannot-connect``: no table is known for it
+    """
+    name = model_names().get(number)
+    family = None if name is None else family_of(name)
+    if name is None or family is None:
+        raise DriverError(
+            DriverErrorKind.CANNOT_CONNECT,
+            f"a servo states the model number {number}, of which no control table is known; "
+            "use a servo of the X, MX(2.0), P, PRO(A) or Y series, or a newer dynamixel-sdk",
+        )
+    sections = _sections(_table_text(name, firmware))
+    items = {row[2]: _item(row) for row in sections["control table"] if row[0].isdigit()}
+    for missing, (address, size) in MISSING_ITEMS.get(name, {}).items():
+        items.setdefault(missing, Item(missing, address, size, signed=False))
+    shape = {row[0]: float(row[1]) for row in sections["type info"][1:]}
+    units = {row[0]: float(row[1]) for row in sections["unit info"][1:]}
+    zero, lowest = shape["value_of_zero_radian_position"], shape["value_of_min_radian_position"]
+    return ServoModel(
+        number=number,
+        name=name,
+        family=family,
+        items=items,
+        # From the lower half: the files give 4095, not 4096, for half a turn upwards, and six digits of π.
+        counts_per_radian=(zero - lowest) / math.pi,
+        zero_count=round(zero),
+        velocity_unit=units.get("Present Velocity", math.nan),
+        current_unit=current_unit_of(name),
+    )
+
+
+def find_model_by_name(name: str) -> ServoModel:
+    """The model of a name, with the table of its oldest firmware.
+
+    Parameters
+    ----------
+    name : str
+        ``XM430-W350``, with or without what follows it on the case
+
+    Raises
+    ------
+    DriverError
+        ``refused``: there is no such model
+    """
+    wanted = name.lower().replace("-", "_")
+    for number, known in model_names().items():
+        if wanted == known or wanted.startswith(f"{known}_"):
+            return find_model(number)
+    raise DriverError(DriverErrorKind.REFUSED, f"model {name!r} is not known; write it as on the case, like XM430-W350")
+
+
+def _folder() -> Traversable:
+    return files("dynamixel_easy_sdk") / "control_table"
+
+
+def _table_text(name: str, firmware: int) -> str:
+    """Text of a model's table; some models have another from firmware 52 on."""
+    newer = _folder().joinpath(f"{name}_fw52.model")
+    if firmware >= 52 and newer.is_file():
+        return newer.read_text("utf-8")
+    return _folder().joinpath(f"{name}.model").read_text("utf-8")
+
+
+def _sections(text: str) -> dict[str, list[list[str]]]:
+    """Rows of each section of a ``.model`` file, its head line first."""
+    sections: dict[str, list[list[str]]] = {"type info": [], "unit info": [], "control table": []}
+    rows: list[list[str]] = []
+    for line in text.splitlines():
+        stripped = line.strip()
+        if stripped.startswith("["):
+            rows = sections.setdefault(stripped.strip("[]"), [])
+        elif stripped:
+            rows.append([cell.strip() for cell in line.split("\t")])
+    return sections
+
+
+def _item(row: list[str]) -> Item:
+    return Item(row[2], int(row[0]), int(row[1]), signed=_SIGNED.fullmatch(row[2]) is not None)

@@ -1,0 +1,132 @@
+"""Looks at a port and the servos on it, moves nothing, writes nothing, and says what to do about what it finds."""
+
+import time
+from collections.abc import Sequence
+
+from tauscope_drivers.dynamixel.adapters import latency_finding
+from tauscope_drivers.dynamixel.bus import ServoBus
+from tauscope_drivers.dynamixel.bus_budget import BusTiming, CycleTraffic, largest_rate_hz
+from tauscope_drivers.dynamixel.configuration import BusConfiguration, DynamixelJoint, read_configuration
+from tauscope_drivers.dynamixel.faults import hardware_faults, watchdog_fault
+from tauscope_drivers.dynamixel.models import WATCHDOG_MOST
+from tauscope_drivers.dynamixel.port import SerialPort
+from tauscope_drivers.dynamixel.preparation import drive_mode
+from tauscope_drivers.dynamixel.servo import JointServo, make_servo
+from tauscope_drivers.dynamixel.session import read_items
+from tauscope_drivers.errors import DriverError
+from tauscope_drivers.inspection import Finding, Severity, failure
+
+MEASURED_CYCLES = 50
+"""Reads of which the loop rate is measured."""
+
+_EXAMINED = ("Return Delay Time", "Drive Mode", "Current Limit", "Torque Enable", "Bus Watchdog")
+_LEAST_FIRMWARE = 45
+"""Of the X series for Fast Sync Read and all bits of Drive Mode."""
+
+
+def examine(joints: Sequence[DynamixelJoint], *, slack_s: float = 0.002) -> list[Finding]:
+    """Port, adapter, and every servo that the robot file names.
+
+    Parameters
+    ----------
+    joints : sequence of DynamixelJoint
+        base first
+    slack_s : float
+        how much longer than the bus takes an answer is waited for [s]
+
+    Raises
+    ------
+    DriverError
+        ``refused``: a ``drive`` block is not valid
+    """
+    configuration = read_configuration(joints)
+    port = SerialPort(configuration.port, configuration.baud, slack_s)
+    try:
+        port.open()
+    except DriverError as error:
+        return [failure(configuration.port, str(error))]
+    try:
+        findings = [Finding(Severity.GOOD, port.path, f"open at {port.baudrate} baud, locked for this program")]
+        findings.append(latency_finding(port.path))
+        return findings + _examine_servos(ServoBus(port), configuration)
+    except DriverError as error:
+        return [failure(configuration.port, str(error))]
+    finally:
+        port.close()
+
+
+def _examine_servos(bus: ServoBus, configuration: BusConfiguration) -> list[Finding]:
+    findings: list[Finding] = []
+    servos: list[JointServo] = []
+    delays: list[int] = []
+    for number, wanted in enumerate(configuration.servos, 1):
+        subject = f"joint {wanted.joint} (servo {wanted.servo})"
+        identity = bus.ping(wanted.servo)
+        if identity is None:
+            remedy = "check its power, cable, ID and baud rate; scan the bus to see who answers"
+            findings.append(Finding(Severity.FAILURE, subject, "does not answer", remedy))
+            continue
+        try:
+            servo = make_servo(number, wanted, identity)
+            settings = read_items(bus, servo, (*_EXAMINED, servo.model.error_item.name))
+        except DriverError as error:
+            findings.append(failure(subject, str(error)))
+            continue
+        findings += _examine_servo(servo, settings)
+        servos.append(servo)
+        delays.append(settings["Return Delay Time"])
+    if len(servos) == len(configuration.servos):
+        findings.append(_loop_rate(bus, servos, max(delays) * 2e-6))
+    return findings
+
+
+def _examine_servo(servo: JointServo, settings: dict[str, int]) -> list[Finding]:
+    """Model, firmware, and what stands in the way of a run."""
+    unit = f"{abs(servo.units.milliampere):g} mA a unit ({servo.units.source})"
+    findings = [Finding(Severity.GOOD, servo.label, f"answers, firmware {servo.firmware}, {unit}")]
+
+    def find(severity: Severity, detail: str, remedy: str) -> None:
+        findings.append(Finding(severity, servo.label, detail, remedy))
+
+    if servo.model.family.torque_on_by_goal and servo.firmware < _LEAST_FIRMWARE:
+        find(Severity.WARNING, f"firmware {servo.firmware} is old", "update it with the DYNAMIXEL Wizard")
+    if settings["Return Delay Time"]:
+        delay = f"Return Delay Time {settings['Return Delay Time'] * 2} µs"
+        find(Severity.WARNING, delay, "none: the driver sets it to 0 when it connects")
+    if settings["Drive Mode"] != drive_mode(servo, settings["Drive Mode"]):
+        mode = f"Drive Mode {settings['Drive Mode']}: profiles by time, or torque that a goal switches on"
+        find(Severity.WARNING, mode, "none: the driver clears these bits when it connects")
+    if not settings["Current Limit"]:
+        find(Severity.FAILURE, "Current Limit is 0: it cannot exert any torque", "raise it with the DYNAMIXEL Wizard")
+    if settings["Torque Enable"]:
+        find(
+            Severity.WARNING,
+            "is under torque",
+            "none where it holds the arm; else support the arm and switch torque off",
+        )
+    if not 0 <= settings["Bus Watchdog"] <= WATCHDOG_MOST:
+        fault = watchdog_fault(servo.number)
+        find(Severity.FAILURE, fault.detail, fault.remedy)
+    for fault in hardware_faults(servo.model, settings[servo.model.error_item.name], servo.number):
+        find(Severity.FAILURE, fault.detail, fault.remedy)
+    if servo.units.torque_per_milliampere is None:
+        remedy = "state joints[].torque_constant, or take results in mA"
+        find(Severity.WARNING, "no torque constant: what is found is in units of current", remedy)
+    return findings
+
+
+def _loop_rate(bus: ServoBus, servos: Sequence[JointServo], return_delay_s: float) -> Finding:
+    """How often all servos can be read, measured, beside what a whole cycle will allow once delays are set."""
+    bus.return_delay_s = return_delay_s
+    identifiers, block = [servo.servo for servo in servos], servos[0].model.state_block
+    begin_ns = time.monotonic_ns()
+    missed = sum(len(identifiers) - len(bus.sync_read(identifiers, block).statuses) for _ in range(MEASURED_CYCLES))
+    rate_hz = MEASURED_CYCLES / ((time.monotonic_ns() - begin_ns) * 1e-9)
+    timing = BusTiming(bus.port.baudrate, 2e-6, bus.port.latency_s)
+    possible = largest_rate_hz(CycleTraffic(len(servos)), timing)
+    detail = f"all servos read {rate_hz:.0f} times a second now; a whole cycle gets {possible:.0f} Hz at most"
+    if missed:
+        answers = MEASURED_CYCLES * len(identifiers)
+        remedy = "check cables, termination, supply and the adapter"
+        return Finding(Severity.WARNING, bus.port.path, f"{missed} of {answers} answers were missed; {detail}", remedy)
+    return Finding(Severity.GOOD, bus.port.path, detail)

@@ -1,0 +1,196 @@
+"""The frames that a run would send, without a port."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope_drivers.backend import ControlMode, DriveLimits
+from tauscope_drivers.dynamixel import packets
+from tauscope_drivers.dynamixel.bounds import Bounds, goals_of
+from tauscope_drivers.dynamixel.configuration import DynamixelJoint, read_configuration
+from tauscope_drivers.dynamixel.control_table import Block, Item, encode_items
+from tauscope_drivers.dynamixel.cycle_budget import has_room_for_speeds, planned_budget
+from tauscope_drivers.dynamixel.group import health_turns, paced_goals, servo_families
+from tauscope_drivers.dynamixel.pacing import GoalPace
+from tauscope_drivers.dynamixel.preparation import (
+    SETTINGS,
+    ServoTask,
+    commissioning_writes,
+    current_cap,
+    preparing_writes,
+    taking_writes,
+    watchdog_steps,
+)
+from tauscope_drivers.dynamixel.servo import JointServo, make_servo
+from tauscope_drivers.inspection import PlannedFrame
+from tauscope_drivers.limits import require_sensible
+from tauscope_drivers.state import Setpoint
+
+_DELIVERED = {
+    **dict.fromkeys(SETTINGS, 0),
+    "Return Delay Time": 250,
+    "Operating Mode": 3,
+    "Status Return Level": 2,
+    "PWM Limit": 885,
+    "Current Limit": 0x7FFF,
+}
+"""Settings of a servo of the X series as delivered, but for a Current Limit that limits nothing."""
+
+
+def plan_frames(
+    joints: Sequence[DynamixelJoint],
+    mode: ControlMode,
+    limits: DriveLimits,
+    watchdog_s: float,
+    targets: NDArray[np.float64],
+    cycle_s: float | None = None,
+) -> Iterator[PlannedFrame]:
+    """Frames of a connection, of enabling, of some cycles and of a stop, for servos as delivered.
+
+    What only the servos themselves know is missing or assumed: their own current and PWM limits are those of an X
+    series servo, a status packet is never lost, and every servo knows Fast Sync Read.
+
+    Parameters
+    ----------
+    joints : sequence of DynamixelJoint
+        base first; each ``drive`` block has to name its model
+    mode : ControlMode
+        who closes the loop; in torque mode the current is the host's loop's to say, and 0 is shown
+    limits : DriveLimits
+        of the joints
+    watchdog_s : float
+        time of silence after which the servos stop [s]
+    targets : (K, n) float64
+        positions of the first K cycles; the arm is supposed to stand at the first of them [rad or m]
+    cycle_s : float or None
+        time between them, over which servos go from one to the next; None where it is not known [s]
+
+    Yields
+    ------
+    PlannedFrame
+        in the order of sending
+
+    Raises
+    ------
+    DriverError
+        ``refused``: a ``drive`` block, a limit or the watchdog's time is not possible
+    """
+    configuration = read_configuration(joints)
+    servos = [make_servo(number, servo, None) for number, servo in enumerate(configuration.servos, 1)]
+    require_sensible(limits, targets[0], [servo.label for servo in servos])
+    tasks = [
+        ServoTask(
+            mode,
+            current_cap(servo, _DELIVERED, float(limits.torque[joint])),
+            servo.units.velocity_cap(float(limits.velocity[joint])),
+            servo.units.counts(float(targets[0, joint])),
+            watchdog_steps(watchdog_s),
+        )
+        for joint, servo in enumerate(servos)
+    ]
+    yield from _connection(servos)
+    yield from _enabling(servos, tasks)
+    if cycle_s is not None and not has_room_for_speeds(*planned_budget(configuration), cycle_s):
+        cycle_s = None
+    yield from _cycles(servos, mode, _bounds(servos, limits, tasks), targets, cycle_s)
+    yield from _stop(servos, mode)
+
+
+def _connection(servos: Sequence[JointServo]) -> Iterator[PlannedFrame]:
+    """A ping each, and what is put in order before anything moves."""
+    for servo in servos:
+        yield _frame("connect", f"{servo.label}: who are you?", packets.encode_ping(servo.servo))
+        for write in commissioning_writes(servo, _DELIVERED, holds=False):
+            yield _write(servo, "connect", write.item.name, write.value, write.reason)
+
+
+def _enabling(servos: Sequence[JointServo], tasks: Sequence[ServoTask]) -> Iterator[PlannedFrame]:
+    """Mode and limits of all servos; then, one servo after the other, its place for a goal, watchdog, torque."""
+    for servo, task in zip(servos, tasks, strict=True):
+        for write in preparing_writes(servo, _DELIVERED, task, holds=False):
+            yield _write(servo, "enable", write.item.name, write.value, write.reason)
+    for servo, task in zip(servos, tasks, strict=True):
+        for write in taking_writes(servo, task, holds=False):
+            yield _write(servo, "enable", write.item.name, write.value, write.reason)
+
+
+def _bounds(servos: Sequence[JointServo], limits: DriveLimits, tasks: Sequence[ServoTask]) -> Bounds:
+    """Ranges of the goals; the servos' own Position Limits are not known."""
+    ends = [
+        servo.units.counts_within(float(limits.position_low[joint]), float(limits.position_high[joint]))
+        for joint, servo in enumerate(servos)
+    ]
+    lows, highs = zip(*ends, strict=True)
+    caps = tuple(task.current_cap for task in tasks)
+    return Bounds(lows, highs, caps, tuple(task.velocity_cap for task in tasks))
+
+
+def _cycles(
+    servos: Sequence[JointServo],
+    mode: ControlMode,
+    bounds: Bounds,
+    targets: NDArray[np.float64],
+    cycle_s: float | None,
+) -> Iterator[PlannedFrame]:
+    """Goals out, states in, and one servo's health in turn."""
+    turns = health_turns(servos)
+    pace = None
+    for cycle, position in enumerate(targets):
+        name, goals = goals_of(servos, mode, bounds, Setpoint(position, np.zeros(len(servos))))
+        if mode is ControlMode.TORQUE or cycle_s is None:
+            yield from _goals(servos, name, goals)
+        else:
+            pace = pace or GoalPace(servos, goals, bounds.velocity, cycle_s, 0)
+            yield from _paced_goals(servos, goals, pace.speeds(goals, round(cycle * cycle_s * 1e9)))
+        yield from _questions(servos, *turns[cycle % len(turns)])
+
+
+def _stop(servos: Sequence[JointServo], mode: ControlMode) -> Iterator[PlannedFrame]:
+    """Servos that track positions hold the last one; those that are given current are let go."""
+    for servo in servos:
+        if mode is ControlMode.TORQUE:
+            yield _write(servo, "stop", "Torque Enable", 0, "torque off")
+        yield _write(servo, "stop", "Bus Watchdog", 0, "stays so without cycles")
+
+
+def _goals(servos: Sequence[JointServo], name: str, goals: Sequence[int]) -> Iterator[PlannedFrame]:
+    """Goals of a cycle, one frame a family."""
+    for _, members in servo_families(servos):
+        items = [servos[members[0]].model.items[name]]
+        yield _sync_write(items, {servos[index].servo: [goals[index]] for index in members})
+
+
+def _paced_goals(servos: Sequence[JointServo], goals: Sequence[int], speeds: Sequence[int]) -> Iterator[PlannedFrame]:
+    """Goals of a cycle with the speeds towards them."""
+    for items, values in paced_goals(servos, goals, speeds):
+        yield _sync_write(items, values)
+
+
+def _sync_write(items: Sequence[Item], values: Mapping[int, Sequence[int]]) -> PlannedFrame:
+    names = ", ".join(item.name for item in items)
+    told = ", ".join(f"{servo} := {', '.join(map(str, own))}" for servo, own in values.items())
+    encoded = {servo: encode_items(items, own) for servo, own in values.items()}
+    return _frame("cycle", f"{names}: servo {told}", packets.encode_sync_write(encoded, items[0].address))
+
+
+def _questions(servos: Sequence[JointServo], turn: int, health: Block) -> Iterator[PlannedFrame]:
+    """Reads of a cycle: the state of all, then a piece of one servo's health."""
+    for block, members in servo_families(servos):
+        identifiers = [servos[index].servo for index in members]
+        asked = ", ".join(map(str, identifiers))
+        frame = packets.encode_sync_read(identifiers, block.address, block.length, fast=True)
+        yield _frame("cycle", f"servos {asked}: current, velocity, position?", frame)
+    names = ", ".join(item.name for item in health.items)
+    frame = packets.encode_read(servos[turn].servo, health.address, health.length)
+    yield _frame("cycle", f"{servos[turn].label}: {names}?", frame)
+
+
+def _write(servo: JointServo, phase: str, name: str, value: int, reason: str) -> PlannedFrame:
+    item = servo.model.items[name]
+    frame = packets.encode_write(servo.servo, item.address, item.encode(value))
+    return _frame(phase, f"{servo.label}: {name} := {value}, {reason}", frame)
+
+
+def _frame(phase: str, meaning: str, frame: bytes) -> PlannedFrame:
+    return PlannedFrame(phase, meaning, frame.hex(" ").upper())

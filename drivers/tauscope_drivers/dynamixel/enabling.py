@@ -1,0 +1,151 @@
+"""Taking an arm under power where it is: everything is checked before anything is written."""
+
+import contextlib
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from tauscope_drivers.backend import ControlMode, DriveLimits
+from tauscope_drivers.dynamixel.bounds import Bounds
+from tauscope_drivers.dynamixel.preparation import (
+    ServoTask,
+    current_cap,
+    drive_mode,
+    operating_mode,
+    position_counts,
+    preparing_writes,
+    taking_writes,
+    watchdog_steps,
+)
+from tauscope_drivers.dynamixel.session import Session
+from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.limits import require_sensible
+
+
+def enable_servos(
+    session: Session, mode: ControlMode, limits: DriveLimits, watchdog_s: float
+) -> tuple[Bounds, list[int]]:
+    """Prepare every servo, then give each its place for a goal, its watchdog and torque, one servo at a time.
+
+    An arm may fall meanwhile: each servo is asked where it is at the last moment, and catches its joint there. A servo
+    that holds its joint already, in the mode that is asked for, is taken over without letting go.
+
+    Parameters
+    ----------
+    session : Session
+        with sound servos
+    mode : ControlMode
+        who closes the loop
+    limits : DriveLimits
+        of the joints
+    watchdog_s : float
+        time of silence after which the servos stop [s]
+
+    Returns
+    -------
+    Bounds
+        for the cyclic exchange
+    list of int
+        Goal Position that each servo was given where positions are tracked [counts]
+
+    Raises
+    ------
+    DriverError
+        ``refused`` or ``cannot-connect``: no servo has torque that had none before
+    """
+    steps = watchdog_steps(watchdog_s)
+    present = [_present_position(session, joint) for joint in range(len(session.servos))]
+    places = np.array([servo.units.position(count) for servo, count in zip(session.servos, present, strict=True)])
+    require_sensible(limits, places, [servo.label for servo in session.servos])
+    tasks: list[ServoTask] = []
+    ranges: list[tuple[int, int]] = []
+    for joint, servo in enumerate(session.servos):
+        settings = session.settings[joint]
+        cap = current_cap(servo, settings, float(limits.torque[joint]))
+        _require_in_own_range(session, joint, mode, present[joint])
+        ranges.append(_range(session, joint, limits, mode))
+        velocity_cap = servo.units.velocity_cap(float(limits.velocity[joint]))
+        tasks.append(ServoTask(mode, cap, velocity_cap, present[joint], steps))
+        if session.health.has_torque[joint]:
+            _require_adoptable(session, joint, mode)
+    taken = _give_torque(session, tasks)
+    lows, highs = zip(*ranges, strict=True)
+    caps = tuple(task.current_cap for task in tasks)
+    return Bounds(tuple(lows), tuple(highs), caps, tuple(task.velocity_cap for task in tasks)), taken
+
+
+def _give_torque(session: Session, tasks: list[ServoTask]) -> list[int]:
+    """Carry out the tasks; where one fails, those that had no torque before are let go again. The servos' places."""
+    held_before = session.health.has_torque.copy()
+    reached: list[int] = []
+    taken: list[int] = []
+    try:
+        for joint, task in enumerate(tasks):
+            servo, settings, holds = session.servos[joint], session.settings[joint], bool(held_before[joint])
+            session.carry_out(joint, preparing_writes(servo, settings, task, holds=holds))
+        for joint, task in enumerate(tasks):
+            reached.append(joint)
+            taken.append(_take(session, joint, task))
+    except DriverError:
+        for joint in reached:
+            with contextlib.suppress(DriverError):
+                if not held_before[joint]:
+                    session.write(joint, "Torque Enable", 0)
+                session.write(joint, "Bus Watchdog", 0)
+        raise
+    return taken
+
+
+def _take(session: Session, joint: int, task: ServoTask) -> int:
+    """Take a prepared servo under power where it is now; that place [counts]."""
+    holds = bool(session.health.has_torque[joint])
+    if not holds:
+        task = replace(task, present=_present_position(session, joint))
+        _require_in_own_range(session, joint, task.mode, task.present)
+    session.carry_out(joint, taking_writes(session.servos[joint], task, holds=holds))
+    session.health.has_torque[joint] = True
+    return task.present
+
+
+def _present_position(session: Session, joint: int) -> int:
+    """Present Position of a servo [counts]; one that does not answer is asked again."""
+    return session.read(joint, ["Present Position"])["Present Position"]
+
+
+def _range(session: Session, joint: int, limits: DriveLimits, mode: ControlMode) -> tuple[int, int]:
+    """Goal Positions that are allowed by the joint's limits and, where it applies them, the servo's own."""
+    low, high = float(limits.position_low[joint]), float(limits.position_high[joint])
+    servo = session.servos[joint]
+    lowest, highest = position_counts(servo, session.settings[joint], low, high, mode)
+    if lowest >= highest:
+        raise DriverError(
+            DriverErrorKind.REFUSED,
+            f"{servo.label}: its own Position Limits leave nothing of the range {low:.4g} to {high:.4g}; widen them",
+        )
+    return lowest, highest
+
+
+def _require_in_own_range(session: Session, joint: int, mode: ControlMode, present: int) -> None:
+    """A servo that stands beyond Position Limits that it applies would not stay where it is."""
+    servo = session.servos[joint]
+    lowest, highest = position_counts(servo, session.settings[joint], -math.inf, math.inf, mode)
+    if not lowest <= present <= highest:
+        place = servo.units.position(present)
+        ends = sorted((servo.units.position(lowest), servo.units.position(highest)))
+        raise DriverError(
+            DriverErrorKind.REFUSED,
+            f"{servo.label} stands at {place:.4g}, its own Position Limits are {ends[0]:.4g} to {ends[1]:.4g}; move it "
+            "back by hand, or widen them",
+        )
+
+
+def _require_adoptable(session: Session, joint: int, mode: ControlMode) -> None:
+    """A servo under torque can only go on as it is: its modes are locked, and letting go would drop the arm."""
+    servo, settings = session.servos[joint], session.settings[joint]
+    wrong_mode = settings["Operating Mode"] != operating_mode(servo, mode)
+    if wrong_mode or settings["Drive Mode"] != drive_mode(servo, settings["Drive Mode"]):
+        raise DriverError(
+            DriverErrorKind.REFUSED,
+            f"{servo.label} is under torque in another mode; support the arm, stop it with torque_off, then enable",
+        )

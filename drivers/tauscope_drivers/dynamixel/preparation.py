@@ -1,0 +1,252 @@
+"""Which registers are written before a servo is given torque, in which order, and why: plain data, no port."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from tauscope_drivers.backend import ControlMode
+from tauscope_drivers.dynamixel.control_table import Item
+from tauscope_drivers.dynamixel.models import CURRENT_MODE, WATCHDOG_MOST, WATCHDOG_STEP_S
+from tauscope_drivers.dynamixel.servo import JointServo
+from tauscope_drivers.errors import DriverError, DriverErrorKind
+
+SETTINGS = (
+    "Return Delay Time",
+    "Drive Mode",
+    "Operating Mode",
+    "PWM Limit",
+    "Current Limit",
+    "Max Position Limit",
+    "Min Position Limit",
+    "Status Return Level",
+)
+"""Items that are read of each servo when it is reached."""
+
+_TIME_BASED_PROFILE = 0x04
+_TORQUE_ON_BY_GOAL = 0x08
+_ROUNDING = 1e-6
+
+
+@dataclass(frozen=True)
+class RegisterWrite:
+    """A value for an item of a servo.
+
+    item : Item
+        what is written
+    value : int
+        what it becomes
+    reason : str
+        why, in a few words
+    """
+
+    item: Item
+    value: int
+    reason: str
+
+
+@dataclass(frozen=True)
+class ServoTask:
+    """What a servo shall do once it has torque.
+
+    mode : ControlMode
+        who closes the loop
+    current_cap : int
+        most current [units]
+    velocity_cap : int
+        largest speed of its target while it tracks positions, 0 for none [units]
+    present : int
+        Present Position [counts]
+    watchdog_steps : int
+        Bus Watchdog
+    """
+
+    mode: ControlMode
+    current_cap: int
+    velocity_cap: int
+    present: int
+    watchdog_steps: int
+
+
+def operating_mode(servo: JointServo, mode: ControlMode) -> int:
+    """Operating Mode of a servo for a way of control.
+
+    Parameters
+    ----------
+    servo : JointServo
+        of which
+    mode : ControlMode
+        who closes the loop
+    """
+    return CURRENT_MODE if mode is ControlMode.TORQUE else servo.model.family.position_mode
+
+
+def drive_mode(servo: JointServo, present: int) -> int:
+    """Drive Mode without time-based profiles, and without torque that a goal switches on.
+
+    Parameters
+    ----------
+    servo : JointServo
+        of which
+    present : int
+        Drive Mode now
+    """
+    unwanted = _TIME_BASED_PROFILE | (_TORQUE_ON_BY_GOAL if servo.model.family.torque_on_by_goal else 0)
+    return present & ~unwanted
+
+
+def commissioning_writes(servo: JointServo, settings: Mapping[str, int], *, holds: bool) -> list[RegisterWrite]:
+    """What is written when a servo is reached; nothing that moves it, and EEPROM only where it differs.
+
+    Parameters
+    ----------
+    servo : JointServo
+        of which
+    settings : mapping of str to int
+        values of `SETTINGS`
+    holds : bool
+        whether it has torque: then its EEPROM is locked
+    """
+    wanted = [("Status Return Level", 2, "every instruction is answered")]
+    if not holds:
+        wanted.append(("Return Delay Time", 0, "no wait before an answer"))
+        wanted.append(
+            ("Drive Mode", drive_mode(servo, settings["Drive Mode"]), "no profiles by time, no torque by goals")
+        )
+    items = servo.model.items
+    return [RegisterWrite(items[name], value, why) for name, value, why in wanted if settings[name] != value]
+
+
+def preparing_writes(
+    servo: JointServo, settings: Mapping[str, int], task: ServoTask, *, holds: bool
+) -> list[RegisterWrite]:
+    """What is written to a servo long before it is taken under power: all that does not depend on where it is then.
+
+    Parameters
+    ----------
+    servo : JointServo
+        of which
+    settings : mapping of str to int
+        values of `SETTINGS`
+    task : ServoTask
+        what it shall do
+    holds : bool
+        whether it has torque already, in the right mode: then it stays where it is from the first write on
+    """
+    items = servo.model.items
+    tracks = task.mode is ControlMode.POSITION
+    wanted: list[tuple[str, int, str]] = []
+    if holds and tracks:
+        wanted.append(("Goal Position", task.present, "stay where it is"))
+    if not holds and settings["Operating Mode"] != (mode := operating_mode(servo, task.mode)):
+        wanted.append(("Operating Mode", mode, "position under a cap of current" if tracks else "current"))
+    wanted.append(("Goal PWM", settings["PWM Limit"], "current is the cap, not voltage"))
+    if tracks:
+        wanted.append(("Profile Acceleration", 0, "follow each goal at once"))
+        wanted.append(("Profile Velocity", task.velocity_cap, "largest speed"))
+    current = task.current_cap if tracks else 0
+    wanted.append(("Goal Current", current, "cap of current" if tracks else "no current yet"))
+    return [RegisterWrite(items[name], value, why) for name, value, why in wanted]
+
+
+def taking_writes(servo: JointServo, task: ServoTask, *, holds: bool) -> list[RegisterWrite]:
+    """What is written to take a prepared servo under power, at once after it has told where it is.
+
+    Parameters
+    ----------
+    servo : JointServo
+        of which
+    task : ServoTask
+        what it shall do, with the Present Position of this moment: a joint that falls is caught here, not carried back
+    holds : bool
+        whether it has torque already
+    """
+    items = servo.model.items
+    seconds = task.watchdog_steps * WATCHDOG_STEP_S
+    wanted = [("Bus Watchdog", task.watchdog_steps, f"stop after {seconds:g} s of silence")]
+    if not holds:
+        if task.mode is ControlMode.POSITION:
+            wanted.insert(0, ("Goal Position", task.present, "stay where it is"))
+        wanted.append(("Torque Enable", 1, "torque on"))
+    return [RegisterWrite(items[name], value, why) for name, value, why in wanted]
+
+
+def watchdog_steps(watchdog_s: float) -> int:
+    """Bus Watchdog for a time, at most that time.
+
+    Parameters
+    ----------
+    watchdog_s : float
+        [s]
+
+    Raises
+    ------
+    DriverError
+        ``refused``: shorter or longer than the servos can
+    """
+    steps = math.floor(watchdog_s / WATCHDOG_STEP_S + _ROUNDING) if math.isfinite(watchdog_s) else 0
+    if not 1 <= steps <= WATCHDOG_MOST:
+        raise DriverError(
+            DriverErrorKind.REFUSED,
+            f"a watchdog of {watchdog_s:g} s is not possible; the servos take {WATCHDOG_STEP_S:g} s to "
+            f"{WATCHDOG_MOST * WATCHDOG_STEP_S:g} s",
+        )
+    return steps
+
+
+def current_cap(servo: JointServo, settings: Mapping[str, int], torque: float) -> int:
+    """Most current within a torque limit, the robot file's limit and the servo's own Current Limit [units].
+
+    Parameters
+    ----------
+    servo : JointServo
+        of which
+    settings : mapping of str to int
+        values of `SETTINGS`
+    torque : float
+        limit of the joint, infinite where there is none [Nm or N]
+
+    Raises
+    ------
+    DriverError
+        ``refused``: the limit cannot be turned into current, or leaves none
+    """
+    cap = settings["Current Limit"]
+    if servo.current_limit_ma is not None:
+        cap = min(cap, math.floor(servo.current_limit_ma / abs(servo.units.milliampere) + _ROUNDING))
+    if torque != math.inf:
+        if servo.units.torque_per_milliampere is not None:
+            cap = min(cap, servo.units.current_cap(torque))
+        elif servo.current_limit_ma is None:
+            raise DriverError(
+                DriverErrorKind.REFUSED,
+                f"{servo.label}: a torque limit of {torque:g} Nm is no current without a torque constant; state "
+                "torque_constant, or drive.current_limit_ma",
+            )
+    if cap <= 0:
+        raise DriverError(DriverErrorKind.REFUSED, f"{servo.label}: its limits leave no current at all; raise them")
+    return cap
+
+
+def position_counts(
+    servo: JointServo, settings: Mapping[str, int], low: float, high: float, mode: ControlMode
+) -> tuple[int, int]:
+    """Lowest and highest Goal Position within the joint's limits, and the servo's own where it applies them.
+
+    Parameters
+    ----------
+    servo : JointServo
+        of which
+    settings : mapping of str to int
+        values of `SETTINGS`
+    low, high : float
+        limits of the joint, infinite where there are none [rad or m]
+    mode : ControlMode
+        who closes the loop
+    """
+    lowest, highest = servo.units.counts_within(low, high)
+    if mode is ControlMode.POSITION and servo.model.family.position_mode not in _MULTI_TURN_MODES:
+        return max(lowest, settings["Min Position Limit"]), min(highest, settings["Max Position Limit"])
+    return lowest, highest
+
+
+_MULTI_TURN_MODES = (4, 5)

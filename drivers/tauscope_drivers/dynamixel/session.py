@@ -1,0 +1,183 @@
+"""The servos of an arm as they were found on the bus, and what is done to one of them at a time."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope_drivers.dynamixel.bus import FACTORY_RETURN_DELAY_S, ServoBus
+from tauscope_drivers.dynamixel.configuration import ServoConfiguration
+from tauscope_drivers.dynamixel.group import ServoGroup
+from tauscope_drivers.dynamixel.health import Health
+from tauscope_drivers.dynamixel.models import CURRENT_MODE, gear_ratio_of
+from tauscope_drivers.dynamixel.preparation import SETTINGS, RegisterWrite, commissioning_writes
+from tauscope_drivers.dynamixel.servo import JointServo, make_servo
+from tauscope_drivers.errors import DriverError, DriverErrorKind
+
+SHORTEST_RETURN_DELAY_S = 2e-6
+"""Of a servo whose Return Delay Time is 0 [s]."""
+
+ELECTRONIC_GEAR = ("Electronic GearRatio Numerator", "Electronic GearRatio Denominator")
+
+_RETURN_DELAY_UNIT_S = 2e-6
+
+
+@dataclass
+class Session:
+    """An arm's servos, reached.
+
+    bus : ServoBus
+        that they are on
+    servos : tuple of JointServo
+        in the order of the joints
+    settings : list of dict
+        values of `SETTINGS` of each
+    group : ServoGroup
+        the cyclic exchange
+    health : Health
+        faults and torque
+    """
+
+    bus: ServoBus
+    servos: tuple[JointServo, ...]
+    settings: list[dict[str, int]]
+    group: ServoGroup
+    health: Health
+
+    def read(self, joint: int, names: Iterable[str]) -> dict[str, int]:
+        """Items of one servo.
+
+        Parameters
+        ----------
+        joint : int
+            index of the joint, from 0
+        names : iterable of str
+            as ROBOTIS calls them
+        """
+        return read_items(self.bus, self.servos[joint], names)
+
+    def write(self, joint: int, name: str, value: int) -> None:
+        """Write an item of one servo and read it back.
+
+        Parameters
+        ----------
+        joint : int
+            index of the joint, from 0
+        name : str
+            as ROBOTIS calls it
+        value : int
+            that fits it
+        """
+        servo = self.servos[joint]
+        try:
+            self.bus.write(servo.servo, servo.model.items[name], value)
+        except DriverError as error:
+            raise DriverError(error.kind, f"{servo.label}: {error}") from error
+        if name in self.settings[joint]:
+            self.settings[joint][name] = value
+
+    def carry_out(self, joint: int, writes: Iterable[RegisterWrite]) -> None:
+        """Write what a plan says, one after the other, each read back.
+
+        Parameters
+        ----------
+        joint : int
+            index of the joint, from 0
+        writes : iterable of RegisterWrite
+            the plan
+        """
+        for write in writes:
+            self.write(joint, write.item.name, write.value)
+
+    @property
+    def enabled(self) -> NDArray[np.bool_]:
+        """Whether each servo holds or drives its joint, (n,): not where it has stopped in current mode."""
+        in_current_mode = np.array([settings["Operating Mode"] == CURRENT_MODE for settings in self.settings])
+        return self.health.has_torque & ~(self.health.is_latched & in_current_mode)
+
+    def read_health(self) -> None:
+        """Read the health of all servos, all of it."""
+        for joint, servo in enumerate(self.servos):
+            for block in servo.model.health_blocks:
+                self.health.take(joint, self.bus.read_block(servo.servo, block))
+
+
+def open_session(bus: ServoBus, configurations: Sequence[ServoConfiguration]) -> Session:
+    """Reach every servo, set what moves nothing, and read its health.
+
+    Parameters
+    ----------
+    bus : ServoBus
+        with an open port
+    configurations : sequence of ServoConfiguration
+        in the order of the joints
+
+    Raises
+    ------
+    DriverError
+        ``cannot-connect``: a servo is missing or of the wrong kind
+    """
+    bus.return_delay_s = FACTORY_RETURN_DELAY_S
+    servos = tuple(_reach(bus, number, servo) for number, servo in enumerate(configurations, 1))
+    settings = [read_items(bus, servo, SETTINGS) for servo in servos]
+    for servo in servos:
+        _require_delivered_gear(bus, servo)
+    session = Session(bus, servos, settings, ServoGroup(bus, servos), Health(servos))
+    session.read_health()
+    for joint, servo in enumerate(servos):
+        holds = bool(session.health.has_torque[joint])
+        session.carry_out(joint, commissioning_writes(servo, settings[joint], holds=holds))
+    slowest = max(values["Return Delay Time"] for values in settings) * _RETURN_DELAY_UNIT_S
+    bus.return_delay_s = max(SHORTEST_RETURN_DELAY_S, slowest)
+    session.group.probe_fast()
+    return session
+
+
+def _require_delivered_gear(bus: ServoBus, servo: JointServo) -> None:
+    """Refuse a servo whose counts and speeds are not those of its model's table."""
+    gear = read_items(bus, servo, ELECTRONIC_GEAR)
+    if not gear:
+        return
+    numerator, denominator = (gear[name] for name in ELECTRONIC_GEAR)
+    ratio = gear_ratio_of(servo.model.name)
+    if numerator != ratio * denominator:
+        raise DriverError(
+            DriverErrorKind.CANNOT_CONNECT,
+            f"{servo.label}: its Electronic GearRatio is {numerator}:{denominator}, its counts are right at {ratio}:1; "
+            "set it back with the wizard, and state a reduction of your own as drive.reduction",
+        )
+
+
+def read_items(bus: ServoBus, servo: JointServo, names: Iterable[str]) -> dict[str, int]:
+    """Items of a servo by name.
+
+    Parameters
+    ----------
+    bus : ServoBus
+        that it is on
+    servo : JointServo
+        of which
+    names : iterable of str
+        as ROBOTIS calls them
+    """
+    wanted = tuple(names)
+    try:
+        return {
+            name: value
+            for block in servo.model.blocks(wanted)
+            for name, value in bus.read_block(servo.servo, block).items()
+        }
+    except DriverError as error:
+        raise DriverError(error.kind, f"{servo.label}: {error}") from error
+
+
+def _reach(bus: ServoBus, number: int, configuration: ServoConfiguration) -> JointServo:
+    identity = bus.ping(configuration.servo)
+    if identity is None:
+        raise DriverError(
+            DriverErrorKind.CANNOT_CONNECT,
+            f"joint {configuration.joint}: servo {configuration.servo} does not answer on {bus.port.path} at "
+            f"{bus.port.baudrate} baud; check its power, cable, ID and baud rate",
+        )
+    return make_servo(number, configuration, identity)

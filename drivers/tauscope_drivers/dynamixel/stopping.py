@@ -1,0 +1,202 @@
+"""Stopping an arm, and clearing what stopped it. Nothing here restarts a servo, and nothing lets go unasked."""
+
+from collections.abc import Callable, Sequence
+
+from tauscope_drivers.backend import ControlMode, StopPolicy
+from tauscope_drivers.dynamixel.group import GroupReading
+from tauscope_drivers.dynamixel.models import CURRENT_MODE
+from tauscope_drivers.dynamixel.preparation import operating_mode
+from tauscope_drivers.dynamixel.session import Session
+from tauscope_drivers.errors import DriverError, DriverErrorKind
+
+NEAR_GOAL_RAD = 0.1
+"""A servo that is no further than this from its goal only lags behind it, or gives way to a load [rad of the horn]."""
+
+_SLOWEST = 1
+
+
+def stop_servos(
+    session: Session, policy: StopPolicy, caps: Sequence[int], last_goals: Sequence[int | None] | None
+) -> None:
+    """Stop every servo, then end its watchdog, so that it stays so without cycles.
+
+    Holding goes by position; servos in current mode are changed over, which lets go of the arm for the few milliseconds
+    that the change takes. These servos cannot damp: for `StopPolicy.DAMP` they hold, which gives way less.
+
+    Parameters
+    ----------
+    session : Session
+        in whatever state
+    policy : StopPolicy
+        how
+    caps : sequence of int
+        most current with which each servo may hold [units]
+    last_goals : sequence of int or None
+        Goal Position of each servo where positions were tracked until now: one that is near it keeps it. With a goal
+        where it is, a moving one would spring back, and one that gives way to a load would sink once more
+
+    Raises
+    ------
+    DriverError
+        a servo could not be reached; the others are stopped
+    """
+    everybody = range(len(session.servos))
+    session.health.expect_torque(False)
+    if policy is StopPolicy.TORQUE_OFF:
+        session.group.write("Torque Enable", [0] * len(everybody))
+        _each(session, everybody, _let_go)
+        return
+    in_current_mode = [joint for joint in everybody if session.settings[joint]["Operating Mode"] == CURRENT_MODE]
+    holding = [joint for joint in everybody if session.health.has_torque[joint]]
+    if change := [joint for joint in holding if joint in in_current_mode]:
+        silent = _change_to_holding(session, change, caps)
+    else:
+        silent = _hold_in_place(session, last_goals)
+    # Those that do not answer come last: while they are waited for, the others' watchdogs would fire.
+    _each(session, sorted(everybody, key=silent.__contains__), _confirm_hold)
+
+
+def clear_watchdogs(session: Session) -> None:
+    """Clear latched watchdogs without moving the arm.
+
+    The clear lets a servo follow its old goal again, and while it is latched no new goal is taken. So the old goal has
+    to be where the servo stands, but for a following error; it is approached at the slowest speed, and replaced by the
+    present position at once. A servo in current mode exerts nothing while it is latched, and is let go first.
+
+    Parameters
+    ----------
+    session : Session
+        whose health was just read
+
+    Raises
+    ------
+    DriverError
+        ``fault``: a servo's old goal is too far away; nothing was cleared
+    """
+    latched = [joint for joint in range(len(session.servos)) if session.health.is_latched[joint]]
+    _clear(session, latched, lambda joint: session.write(joint, "Bus Watchdog", 0))
+
+
+def clear_errors(session: Session) -> None:
+    """Clear errors of servos that forget them without a restart (Y), just as `clear_watchdogs` does.
+
+    What cannot be cleared, or comes back at once, stays in the servo's Error Code.
+
+    Parameters
+    ----------
+    session : Session
+        whose health was just read
+
+    Raises
+    ------
+    DriverError
+        ``fault``: a servo holds, and its old goal is too far away; nothing was cleared
+    """
+    stating = [
+        joint
+        for joint, servo in enumerate(session.servos)
+        if servo.model.family.error_is_code and session.health.states_error(joint)
+    ]
+    _clear(session, stating, lambda joint: session.bus.clear_error(session.servos[joint].servo))
+
+
+def _clear(session: Session, joints: Sequence[int], clear: Callable[[int], None]) -> None:
+    """Clear what keeps servos from taking goals, without moving the arm."""
+    in_current_mode = [joint for joint in joints if session.settings[joint]["Operating Mode"] == CURRENT_MODE]
+    holding = [joint for joint in joints if session.health.has_torque[joint] and joint not in in_current_mode]
+    for joint in holding:
+        _require_near_goal(session, joint)
+    for joint in in_current_mode:
+        session.write(joint, "Torque Enable", 0)
+    for joint in holding:
+        session.write(joint, "Profile Velocity", _SLOWEST)
+    for joint in joints:
+        clear(joint)
+        if joint in holding:
+            session.write(joint, "Goal Position", session.read(joint, ["Present Position"])["Present Position"])
+
+
+def _require_near_goal(session: Session, joint: int) -> None:
+    """Refuse to let a servo go where it no longer belongs."""
+    servo = session.servos[joint]
+    values = session.read(joint, ["Present Position", "Goal Position"])
+    distance = abs(values["Present Position"] - values["Goal Position"]) / servo.model.counts_per_radian
+    if distance > NEAR_GOAL_RAD:
+        raise DriverError(
+            DriverErrorKind.FAULT,
+            f"{servo.label} holds {distance:.2f} rad from its old goal and would go there; support the arm, "
+            "stop it with torque_off, then acknowledge",
+            session.health.faults,
+        )
+
+
+def _hold_in_place(session: Session, last_goals: Sequence[int | None] | None) -> set[int]:
+    """Goals := where the servos stand; who is near its goal keeps it. Returns those that are silent."""
+    present = _present_counts(session, session.group.read())
+    goals: list[int | None] = []
+    for joint, servo in enumerate(session.servos):
+        place, last = present[joint], None if last_goals is None else last_goals[joint]
+        near = NEAR_GOAL_RAD * servo.model.counts_per_radian
+        is_near = place is not None and last is not None and abs(last - place) < near
+        goals.append(None if is_near else place)
+    session.group.write("Goal Position", goals)
+    return {joint for joint, place in enumerate(present) if place is None}
+
+
+def _change_to_holding(session: Session, joints: Sequence[int], caps: Sequence[int]) -> set[int]:
+    """From current mode to position mode, all servos at once. Returns those that are silent.
+
+    Where they stand is read before they let go of the arm, so that they do so for as short as can be. A servo whose
+    place is not known would go after an old goal: it is let go.
+    """
+    present = _present_counts(session, session.group.read_patiently())
+    known = [joint for joint in joints if present[joint] is not None]
+
+    def write(name: str, values: Sequence[int | None], to: Sequence[int]) -> None:
+        session.group.write(name, [values[joint] if joint in to else None for joint in range(len(values))])
+
+    count = len(session.servos)
+    write("Torque Enable", [0] * count, joints)
+    write("Operating Mode", [operating_mode(servo, ControlMode.POSITION) for servo in session.servos], known)
+    write("Goal Current", caps, known)
+    write("Goal Position", present, known)
+    write("Torque Enable", [1] * count, known)
+    return {joint for joint, place in enumerate(present) if place is None}
+
+
+def _present_counts(session: Session, reading: GroupReading) -> list[int | None]:
+    """Where each servo stands [counts]; None for who did not answer."""
+    return [
+        None if reading.alerts[joint] is None else servo.units.counts(float(reading.position[joint]))
+        for joint, servo in enumerate(session.servos)
+    ]
+
+
+def _let_go(session: Session, joint: int) -> None:
+    session.write(joint, "Torque Enable", 0)
+    _end_watchdog(session, joint)
+
+
+def _confirm_hold(session: Session, joint: int) -> None:
+    """Make sure of what was written without an answer."""
+    session.settings[joint] |= session.read(joint, ["Operating Mode"])
+    _end_watchdog(session, joint)
+
+
+def _end_watchdog(session: Session, joint: int) -> None:
+    """Let a servo be without cycles; one whose watchdog has fired keeps that until it is acknowledged."""
+    session.health.take(joint, session.read(joint, ["Torque Enable", "Bus Watchdog"]))
+    if not session.health.is_latched[joint]:
+        session.write(joint, "Bus Watchdog", 0)
+
+
+def _each(session: Session, joints: Sequence[int], act: Callable[[Session, int], None]) -> None:
+    """Do something to every servo, also after one that failed; the first failure is raised at the end."""
+    failure: DriverError | None = None
+    for joint in joints:
+        try:
+            act(session, joint)
+        except DriverError as error:
+            failure = failure or error
+    if failure is not None:
+        raise failure

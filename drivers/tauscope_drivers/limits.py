@@ -1,0 +1,130 @@
+"""Limits that drives on a bus do not keep by themselves: what is refused, what is held back, what is a runaway."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope_drivers.backend import DriveLimits
+from tauscope_drivers.errors import DriverError, DriverErrorKind, Fault
+from tauscope_drivers.state import Setpoint
+
+Array = NDArray[np.float64]
+
+ENABLE_MARGIN = 0.05
+"""How far outside its range a joint may stand when it is enabled: as far as a stop can carry it [rad or m]."""
+
+CATCH_S = 0.05
+"""Time that stopping a joint takes, a change of mode included: it is stopped where it would be by then."""
+
+SPEED_MARGIN = 1.1
+"""Measured speed, and that of targets, may be this many times the limit."""
+
+PERSISTENCE = 2
+"""Cycles in a row after which a speed counts: one noisy reading is no runaway."""
+
+_REMEDY = "the arm was stopped; correct the commanded torque, then acknowledge"
+
+
+def require_sensible(limits: DriveLimits, position: Array, labels: Sequence[str]) -> None:
+    """Refuse limits that leave no motion, are no numbers, or are those of another place.
+
+    Parameters
+    ----------
+    limits : DriveLimits
+        of the joints
+    position : (n,) float64
+        where the arm stands [rad or m]
+    labels : sequence of str
+        what the joints are called, with the drives behind them
+
+    Raises
+    ------
+    DriverError
+        ``refused``: names the joint and the limit
+    """
+    joint_count = len(position)
+    for name in ("position_low", "position_high", "velocity", "torque"):
+        if np.shape(getattr(limits, name)) != (joint_count,):
+            raise _senseless(f"limits.{name} is not one number for each of {joint_count} joints")
+    for joint, label in enumerate(labels):
+        low, high = float(limits.position_low[joint]), float(limits.position_high[joint])
+        if not low < high:
+            raise _senseless(f"{label}: position limits {low:g} to {high:g} leave no motion")
+        if not low - ENABLE_MARGIN <= position[joint] <= high + ENABLE_MARGIN:
+            raise DriverError(
+                DriverErrorKind.REFUSED,
+                f"{label} stands at {position[joint]:.4g}, outside its limits {low:g} to {high:g}; "
+                "move it into its range by hand, or widen the limits",
+            )
+        for name in ("velocity", "torque"):
+            value = float(getattr(limits, name)[joint])
+            if not value > 0.0:
+                raise _senseless(f"{label}: a {name} limit of {value:g} leaves no motion")
+
+
+def require_finite(setpoint: Setpoint, joint_count: int) -> None:
+    """Refuse targets that are missing or no numbers.
+
+    Parameters
+    ----------
+    setpoint : Setpoint
+        targets
+    joint_count : int
+        number of joints n
+
+    Raises
+    ------
+    DriverError
+        ``refused``
+    """
+    for targets in (setpoint.position, setpoint.torque):
+        if np.shape(targets) != (joint_count,) or not np.isfinite(targets).all():
+            raise DriverError(
+                DriverErrorKind.REFUSED, "a target is missing or not a finite number; nothing was sent to the drives"
+            )
+
+
+class RunawayWatch:
+    """Looks at every reading of an arm that is given torque."""
+
+    def __init__(self, limits: DriveLimits) -> None:
+        """Begin with a sound arm.
+
+        Parameters
+        ----------
+        limits : DriveLimits
+            of the joints
+        """
+        self._limits = limits
+        self._fast = np.zeros(len(limits.velocity), dtype=np.int64)
+
+    def look(self, position: Array, velocity: Array) -> Fault | None:
+        """The first joint that leaves its limits; NaN leaves none.
+
+        Parameters
+        ----------
+        position : (n,) float64
+            [rad or m]
+        velocity : (n,) float64
+            [rad/s or m/s]
+        """
+        limits = self._limits
+        with np.errstate(invalid="ignore"):
+            ahead = position + CATCH_S * velocity
+            low = (ahead < limits.position_low) & (velocity <= 0.0)
+            high = (ahead > limits.position_high) & (velocity >= 0.0)
+            fast = np.abs(velocity) > SPEED_MARGIN * limits.velocity
+        self._fast = np.where(fast, self._fast + 1, 0)
+        for joint in np.flatnonzero(low | high):
+            end = limits.position_low[joint] if low[joint] else limits.position_high[joint]
+            detail = f"at {position[joint]:.4g} and moving towards its limit {end:.4g}"
+            return Fault("position-limit", int(joint) + 1, detail, _REMEDY)
+        for joint in np.flatnonzero(self._fast >= PERSISTENCE):
+            detail = f"moves at {velocity[joint]:.4g}, its limit is {limits.velocity[joint]:.4g}"
+            return Fault("over-speed", int(joint) + 1, detail, _REMEDY)
+        return None
+
+
+def _senseless(what: str) -> DriverError:
+    return DriverError(DriverErrorKind.REFUSED, f"{what}; correct them")

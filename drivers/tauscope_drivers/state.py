@@ -1,0 +1,64 @@
+"""What passes between a control loop and an arm in each cycle."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope_drivers.errors import Fault
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class ArmState:
+    """What the arm's drives measured in one cycle, in joint units.
+
+    A value that was not received in this cycle is NaN, never the one before.
+
+    time_ns : int
+        instant of the reading by the backend's clock [ns]
+    position : (n,) float64
+        q [rad or m]
+    velocity : (n,) float64
+        q̇ as the drive reports it, NaN where it reports none [rad/s or m/s]
+    effort : (n,) float64
+        measured effort as `Capabilities.effort_unit` says: joint torque [Nm or N], or what the drive reports instead
+    temperature : (n,) float64
+        of the motor, NaN where it is not reported [°C]
+    enabled : (n,) bool
+        whether the joint's drive holds or drives the joint
+    faults : tuple of Fault
+        what the drives report now; empty on a sound arm
+    late_ns : int
+        how much later than the bus takes the answers came: the instant of the reading is not known any better [ns]
+    """
+
+    time_ns: int
+    position: Array
+    velocity: Array
+    effort: Array
+    temperature: Array
+    enabled: NDArray[np.bool_]
+    faults: tuple[Fault, ...] = ()
+    late_ns: int = 0
+
+    @property
+    def fresh(self) -> NDArray[np.bool_]:
+        """Whether each joint's position was received in this cycle, shape (n,)."""
+        return np.isfinite(self.position)
+
+
+@dataclass(frozen=True, eq=False)
+class Setpoint:
+    """What the drives shall do until the next cycle, in joint units; which field counts is the control mode's matter.
+
+    position : (n,) float64
+        target position in `ControlMode.POSITION` [rad or m]
+    torque : (n,) float64
+        target torque in `ControlMode.TORQUE`; feed-forward in `ControlMode.POSITION` where the backend takes one, else
+        unused [Nm or N]
+    """
+
+    position: Array
+    torque: Array

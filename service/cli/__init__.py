@@ -1,9 +1,0 @@
-"""The command line: ``tauscope identify``, ``run``, ``robot``, ``recording``, ``serve``, ``demo`` and more.
-
-Modules named ``*_command`` only declare arguments, and import what does the work when they are called: ``--help``
-answers at once.
-"""
-
-from service.cli.program import main
-
-__all__ = ["main"]

@@ -1,1 +1,0 @@
-"""How the same work is not done twice, and independent work is done side by side."""

@@ -1,5 +1,0 @@
-"""The motion that decides what a diagnosis leaves open."""
-
-from service.diagnosis.next_experiment.plan import PlannedExperiment, is_wanted, plan_experiment, planned_experiment
-
-__all__ = ["PlannedExperiment", "is_wanted", "plan_experiment", "planned_experiment"]

@@ -1,0 +1,36 @@
+"""``tauscope audit``: the log checked."""
+
+from pathlib import Path
+
+import typer
+
+from tauscope.errors import TauscopeError
+from tauscope.server.auth.audit.log import AuditLog
+from tauscope.server.http.settings import default_data_folder
+
+
+def verify_audit(data: Path | None, head: str | None, file: Path | None) -> None:
+    """Check the log, and print the hash of its last entry.
+
+    Parameters
+    ----------
+    data : Path or None
+        data folder of the service; the user's own where None
+    head : str or None
+        hash of an entry that has to be there
+    file : Path or None
+        a copy of the log, in place of a data folder
+
+    Raises
+    ------
+    TauscopeError
+        if anything is wrong with it
+    """
+    log = AuditLog(data or default_data_folder())
+    if file is not None:
+        log.path = file
+    found = log.verify(head)
+    if found.fault is not None:
+        hint = f"the {found.entries} entries before it are whole; compare the file with a backup"
+        raise TauscopeError(f"{log.path}: {found.fault}; {hint}")
+    typer.echo(f"{found.entries} entries, none changed, moved or missing; the last one's hash is {found.head}")

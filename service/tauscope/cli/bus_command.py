@@ -1,0 +1,47 @@
+"""``tauscope bus``: its arguments."""
+
+from typing import Annotated, Literal
+
+import typer
+
+from tauscope.cli.verbs import add_verb
+
+bus = typer.Typer(help="Look at field buses.", no_args_is_help=True, rich_markup_mode=None)
+
+
+@bus.callback()
+def _bus() -> None:
+    """Make `scan` a verb of its own, as a second one will be."""
+
+
+def scan(
+    backend: Annotated[Literal["dynamixel", "canopen"], typer.Argument(metavar="BUS", help="dynamixel or canopen.")],
+    port: Annotated[
+        str,
+        typer.Argument(metavar="PORT", help="Serial device (dynamixel), INTERFACE:CHANNEL of python-can (canopen)."),
+    ],
+    *,
+    bit_rate: Annotated[
+        list[int] | None,
+        typer.Option(metavar="RATE", min=1, help="Bit rate to try; may be repeated. The usual ones by default."),
+    ] = None,
+) -> None:
+    """Show every device that answers on a bus.
+
+    Moves nothing and writes nothing. Exit status 1 where nobody answers.
+
+    Parameters
+    ----------
+    backend : str
+        ``dynamixel`` or ``canopen``
+    port : str
+        where the bus hangs
+    bit_rate : list of int or None
+        to try [bit/s]
+    """
+    from tauscope.cli.bus_summary import show_devices
+
+    show_devices(backend, port, bit_rate)
+
+
+add_verb(bus, scan)

@@ -1,0 +1,99 @@
+"""The demo's second part: a campaign through the service, on an arm that conceals something, for the page to show."""
+
+import asyncio
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from tauscope.cli.terminal import Told
+from tauscope.diagnosis import DiagnosisDocument
+from tauscope.errors import TauscopeError
+from tauscope.robot import read_robot
+from tauscope.runtime import RunOptions
+from tauscope.server.control.campaign_order import CampaignOrder, HeldOutMotion
+from tauscope.server.control.campaign_workspace import CampaignWorkspace
+from tauscope.server.control.run_order import BackendChoice
+from tauscope.server.http.assembly import open_services
+from tauscope.server.http.campaigns.status import describe, result_of
+from tauscope.server.http.services import Services
+from tauscope.server.http.settings import Settings
+from tauscope.server.queue.diagnosis_order import DiagnosisOptions
+from tauscope.server.queue.excitation_order import ExcitationDesignOptions
+from tauscope.server.queue.states import JobState
+
+ROOT = "/api/v1"
+POLL_S = 0.2
+RATE_HZ = 200.0
+MOTION = ExcitationDesignOptions(starts=1, periods=2, slow_postures=1, closing_period=False)
+
+
+def run_campaign(data: Path, robot_file: Path, scenario: Mapping[str, Any], told: Told) -> DiagnosisDocument:
+    """Run a campaign on a simulated arm, and diagnose it.
+
+    Parameters
+    ----------
+    data : Path
+        the service's data folder; what was made stays there
+    robot_file : Path
+        of the arm, its true model included: the simulation needs it, nobody else reads it
+    scenario : mapping
+        what the simulated arm conceals
+    told : callable
+        told the step and the percentage
+
+    Returns
+    -------
+    DiagnosisDocument
+        what was found
+
+    Raises
+    ------
+    TauscopeError
+        if the campaign does not succeed
+    """
+    with open_services(Settings(data_folder=data)) as services:
+        identifier = _begun(services, robot_file, scenario)
+        asyncio.run(_ended(services, identifier, told))
+        found = result_of(services, identifier, ROOT).diagnosis
+    if found is None:
+        raise TauscopeError("the demo's campaign made no diagnosis; run the demo again")
+    return found
+
+
+def _begun(services: Services, robot_file: Path, scenario: Mapping[str, Any]) -> str:
+    """Hand the campaign in."""
+    items = services.campaigns.items
+    staged = items.stage()
+    try:
+        workspace = CampaignWorkspace(staged)
+        workspace.prepare()
+        shutil.copy(robot_file, workspace.robot)
+        workspace.write_order(
+            CampaignOrder(
+                robot_file=robot_file.name,
+                robot_name=read_robot(robot_file).name,
+                backend=BackendChoice(name="sim", time="virtual", scenario=dict(scenario)),
+                excitation=MOTION,
+                held_out=HeldOutMotion(periods=1),
+                run=RunOptions(rate_hz=RATE_HZ, feed_forward=False),
+                diagnosis=DiagnosisOptions(),
+            )
+        )
+        return services.campaigns.submit(staged)
+    finally:
+        items.discard(staged)
+
+
+async def _ended(services: Services, identifier: str, told: Told) -> None:
+    """Wait for the end, the service's pulse beating: no run goes on without it."""
+    async with services.pulse.beating():
+        while True:
+            answer = describe(services, identifier, ROOT)
+            if answer.state == "damaged" or JobState(answer.state).is_end:
+                break
+            going = [step.name for step in answer.steps if step.state not in ("waiting", "succeeded", "finished")]
+            told(f"concealed effect: {going[0] if going else 'begin'}", None)
+            await asyncio.sleep(POLL_S)
+    if answer.problem is not None:
+        raise TauscopeError(f"the demo's campaign did not succeed: {answer.problem.detail}")

@@ -1,0 +1,156 @@
+"""The page after the demo: here until Ctrl-C, or in a process of its own for a while.
+
+The second is ``python -m tauscope.cli.demo_page FOLDER SECONDS``; it ends sooner where the folder goes, or another demo
+begins in it.
+"""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from dataclasses import dataclass
+from enum import Enum, auto
+from pathlib import Path
+from typing import IO, cast
+
+import typer
+
+from tauscope.cli.demo_folder import MARK
+from tauscope.cli.serving import run_server
+from tauscope.errors import StoreError, TauscopeError
+from tauscope.server.http.server import serve
+from tauscope.server.http.settings import Settings
+
+DATA = "service"
+"""Data folder of a service within the demo's, which holds a campaign on an arm that conceals an effect."""
+
+PORT = 8000
+"""Where the page is, unless something else is there already."""
+
+LEFT_FOR_S = 900.0
+"""How long a page that nobody waits for stays [s]."""
+
+_LOOK_S = 0.5
+
+
+class PageShown(Enum):
+    """Who shows the page after the demo."""
+
+    HERE = auto()
+    """The demo itself, until interrupted."""
+    LEFT = auto()
+    """A process that the demo leaves behind, for a while."""
+    NOT = auto()
+    """Nobody."""
+
+
+def show_page(folder: Path) -> None:
+    """Serve the page until interrupted.
+
+    Parameters
+    ----------
+    folder : Path
+        the demo's
+    """
+    run_server(folder / DATA, port=_free_port())
+
+
+@dataclass(frozen=True)
+class LeftPage:
+    """A page that another process serves.
+
+    address : str
+        where it answers
+    process : Popen
+        which ends by itself
+    """
+
+    address: str
+    process: subprocess.Popen[str]
+
+
+def leave_page(folder: Path, seconds: float = LEFT_FOR_S) -> LeftPage:
+    """Serve the page from a process of its own.
+
+    Parameters
+    ----------
+    folder : Path
+        the demo's
+    seconds : float
+        after which it ends [s]
+
+    Returns
+    -------
+    LeftPage
+        which answers already
+
+    Raises
+    ------
+    StoreError
+        if that process ends instead, with what it said
+    """
+    process = subprocess.Popen(  # noqa: S603 - this program
+        [sys.executable, "-m", __name__, str(folder.resolve()), str(seconds)],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,  # a Ctrl-C that comes later is not meant for it
+    )
+    first = cast(IO[str], process.stdout).readline().strip()
+    if first.startswith("http"):
+        return LeftPage(first, process)
+    said = [first, *process.communicate()[0].strip().splitlines()]
+    raise StoreError(f"the page did not come up ({said[-1]}); try: tauscope serve --data {folder / DATA}")
+
+
+def _serve_for_a_while(folder: Path, seconds: float) -> None:
+    """Serve the page until the time is over, the folder goes or another demo begins in it."""
+    threading.Thread(target=_end_in_time, args=(folder / MARK, seconds), daemon=True).start()
+    serve(Settings(data_folder=folder / DATA, port=_free_port()), _announce)
+
+
+def _end_in_time(mark: Path, seconds: float) -> None:
+    """Ask this process to end, as Ctrl-C would."""
+    begun, last = _identity(mark), time.monotonic() + seconds
+    while time.monotonic() < last and _identity(mark) == begun:
+        time.sleep(_LOOK_S)
+    os.kill(os.getpid(), signal.SIGINT)
+
+
+def _identity(mark: Path) -> tuple[int, int] | None:
+    """What differs once another demo has written the file; None where it is gone."""
+    try:
+        state = mark.stat()
+    except OSError:
+        return None
+    return state.st_ino, state.st_mtime_ns
+
+
+def _announce(address: str) -> None:
+    """Tell the demo, and nobody from then on: it will not be there to listen."""
+    typer.echo(address)
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 1)
+    os.dup2(nowhere, 2)
+
+
+def _free_port() -> int:
+    """`PORT`, or none in particular where that is taken."""
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(("127.0.0.1", PORT))
+        except OSError:
+            return 0
+    return PORT
+
+
+if __name__ == "__main__":
+    try:
+        _serve_for_a_while(Path(sys.argv[1]), float(sys.argv[2]))
+    except TauscopeError as error:
+        sys.exit(str(error))

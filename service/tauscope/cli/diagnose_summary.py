@@ -1,0 +1,48 @@
+"""The result of a diagnosis as tables and sentences on a terminal."""
+
+from rich.console import Console
+
+from tauscope.cli.terminal import plain, table
+from tauscope.diagnosis import DiagnosisDocument
+from tauscope.report.diagnosis_tables import difference_table, residual_table, shift_table
+from tauscope.report.diagnosis_words import VERDICTS
+from tauscope.report.quantities import significant
+from tauscope.report.table import Table
+
+
+def show_diagnosis(console: Console, document: DiagnosisDocument) -> None:
+    """Show the verdict, the findings, and what they change.
+
+    Parameters
+    ----------
+    console : Console
+        where to
+    document : DiagnosisDocument
+        the result
+    """
+    console.print(plain(f"Robot {document.robot}: {document.verdict}: {VERDICTS[document.verdict]}"), soft_wrap=True)
+    console.print()
+    for finding in document.findings:
+        console.print(plain(f"* {finding.statement}"), soft_wrap=True)
+    if document.findings:
+        console.print()
+    console.print(table("Mismatch with the nominal model", _mismatch(document)))
+    console.print(table("Residual at the recorded rate [Nm or N]", residual_table(document)))
+    if document.parameter_differences:
+        console.print(table("What the simulation has wrong", difference_table(document)))
+    if document.parameter_shifts:
+        console.print(table("What the left-out effects had done to the parameters", shift_table(document)))
+    invisible = sorted({e.effect + (f"@{e.joint}" if e.joint else "") for e in document.detectable if not e.visible})
+    if invisible:
+        console.print(plain(f"No such data can show: {', '.join(invisible)}"), soft_wrap=True)
+    if document.next_experiment is not None:
+        console.print(plain(f"Next: {document.next_experiment.why}"), soft_wrap=True)
+
+
+def _mismatch(document: DiagnosisDocument) -> Table:
+    rows = []
+    for entry in document.mismatch:
+        place = entry.where or entry.time
+        where = "" if place is None else f"{place.variable} {place.range[0]:.3g} … {place.range[1]:.3g}"
+        rows.append((entry.joint, "yes" if entry.significant else "no", where, significant(entry.excess_rms, 3)))
+    return Table(("joint", "significant", "mostly at", "excess rms"), rows, words=3)

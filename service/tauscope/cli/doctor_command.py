@@ -1,0 +1,41 @@
+"""``tauscope doctor``: its arguments."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+RobotFile = Annotated[
+    Path | None,
+    typer.Argument(
+        metavar="ROBOT",
+        exists=True,
+        dir_okay=False,
+        help="Robot file (YAML) whose drives are looked at; without one, the adapters of this machine.",
+        show_default=False,
+    ),
+]
+
+
+def doctor(
+    robot: RobotFile = None,
+    *,
+    backend: Annotated[
+        Literal["dynamixel", "canopen"] | None,
+        typer.Option(help="Field bus; the one that the robot file's drives speak of by default."),
+    ] = None,
+) -> None:
+    """Look at adapters and drives, and say what keeps an arm from running well, each with its remedy.
+
+    Moves nothing and writes nothing. Exit status 1 where something keeps the arm from running.
+
+    Parameters
+    ----------
+    robot : Path or None
+        robot file
+    backend : str or None
+        ``dynamixel`` or ``canopen``
+    """
+    from tauscope.cli.doctor_summary import show_findings
+
+    show_findings(robot, backend)

@@ -1,0 +1,67 @@
+"""``tauscope doctor``: findings on a terminal, one a line, each with its remedy."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+from tauscope.cli.terminal import output, plain, shown_progress
+from tauscope.errors import AcquisitionError
+from tauscope.report.quantities import counted
+from tauscope.robot import read_robot
+from tauscope.runtime.field_bus import Finding, Severity
+from tauscope.runtime.field_buses import FIELD_BUSES, bus_of, find_bus
+
+_MARKS = {Severity.GOOD: "ok", Severity.WARNING: "warning", Severity.FAILURE: "failure"}
+
+
+def show_findings(robot: Path | None, backend: str | None) -> None:
+    """Look, and show what was found.
+
+    Parameters
+    ----------
+    robot : Path or None
+        robot file whose drives are looked at; the adapters of this machine where None
+    backend : str or None
+        name of the field bus; as the robot file says where None
+
+    Raises
+    ------
+    AcquisitionError
+        something keeps the arm from running, or the robot file speaks of no bus
+    """
+    with shown_progress() as told:
+        told("look at the adapters" if robot is None else "ask the drives")
+        findings = _adapters(backend) if robot is None else _drives(robot, backend)
+    console = output()
+    for finding in findings:
+        _show(console, finding)
+    failures = [finding for finding in findings if finding.severity is Severity.FAILURE]
+    if failures:
+        first = failures[0]
+        raise AcquisitionError(
+            f"{counted(len(failures), 'finding')} of {len(findings)} to mend first: {first.subject}: {first.detail}; "
+            f"{first.remedy}"
+        )
+
+
+def _adapters(backend: str | None) -> list[Finding]:
+    """Adapters of one bus, or of all."""
+    buses = FIELD_BUSES.values() if backend is None else [find_bus(backend)]
+    found: list[Finding] = []
+    for bus in buses:
+        adapters = bus.adapters()
+        found += adapters or [Finding(Severity.WARNING, bus.name, "no adapter is there", "plug one in")]
+    return found
+
+
+def _drives(path: Path, backend: str | None) -> Sequence[Finding]:
+    robot = read_robot(path)
+    bus = bus_of(robot) if backend is None else find_bus(backend)
+    return bus.examine(robot)
+
+
+def _show(console: Console, finding: Finding) -> None:
+    remedy = f"; {finding.remedy}" if finding.remedy else ""
+    line = f"{_MARKS[finding.severity]}: {finding.subject}: {finding.detail}{remedy}"
+    console.print(plain(line), soft_wrap=True)

@@ -1,0 +1,169 @@
+"""``tauscope excite``: its arguments."""
+
+import math
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from tauscope.cli.arguments import RobotFile
+
+Json = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="OUT", dir_okay=False, help="Write the design, trajectory included, as JSON; - is standard output."
+    ),
+]
+Csv = Annotated[
+    Path | None,
+    typer.Option(metavar="OUT", dir_okay=False, help="Write the trajectory's samples as CSV for other controllers."),
+]
+Boxes = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--box",
+        metavar="X0,Y0,Z0,X1,Y1,Z1",
+        help="Forbidden box in the base frame [m], lower corner first; joint origins and tool stay outside."
+        " May be repeated.",
+    ),
+]
+NoiseStd = Annotated[
+    str | None,
+    typer.Option(
+        metavar="S1,S2,...", help="Expected torque noise of each joint [Nm or N], which weights its equations."
+    ),
+]
+
+
+def excite(
+    robot: RobotFile,
+    *,
+    duration: Annotated[
+        float, typer.Option(metavar="S", min=0.1, max=600.0, help="Length of one period [s]; the period is repeated.")
+    ] = 10.0,
+    harmonics: Annotated[int, typer.Option(metavar="M", min=2, max=30, help="Harmonics of the Fourier series.")] = 5,
+    periods: Annotated[int, typer.Option(metavar="P", min=1, max=100, help="How often the period is repeated.")] = 5,
+    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Of the optimiser's random starts.")] = 0,
+    criterion: Annotated[
+        Literal["cond-f", "log-det", "cond-2"],
+        typer.Option(help="What is minimised: Cond_F or -ln det of the normal matrix, or the condition number."),
+    ] = "cond-f",
+    floor: Annotated[
+        float | None,
+        typer.Option(
+            metavar="Z", help="Height in the base frame [m] below which no joint origin and no tool may come."
+        ),
+    ] = None,
+    box: Boxes = None,
+    tool: Annotated[str, typer.Option(metavar="X,Y,Z", help="Tool point in the last link's frame [m].")] = "0,0,0",
+    torque_margin: Annotated[
+        float, typer.Option(min=0.0, max=0.99, help="Part of each torque limit kept free for what the model lacks.")
+    ] = 0.2,
+    limit_fraction: Annotated[
+        float, typer.Option(min=0.01, max=1.0, help="Part of the other limits that is used.")
+    ] = 0.95,
+    noise_std: NoiseStd = None,
+    slow_reversals: Annotated[
+        bool, typer.Option("--slow-reversals/--no-slow-reversals", help="Add slow reversals at several postures.")
+    ] = True,
+    closing_period: Annotated[
+        bool, typer.Option("--closing-period/--no-closing-period", help="Repeat the first period at the end.")
+    ] = True,
+    json: Json = None,
+    csv: Csv = None,
+    rate: Annotated[
+        float, typer.Option(metavar="HZ", min=1.0, max=10_000.0, help="Samples a second of the CSV.")
+    ] = 500.0,
+) -> None:
+    """Design the motion that tells most about an arm.
+
+    A finite Fourier series for every joint within the limits of position, velocity, acceleration, torque (predicted
+    with the robot file's model) and space; repeated, then slow reversals, and the first period again.
+
+    Parameters
+    ----------
+    robot : Path
+        robot file
+    duration : float
+        length of one period [s]
+    harmonics : int
+        of the Fourier series
+    periods : int
+        how often the period is repeated
+    seed : int
+        of the optimiser's starts
+    criterion : str
+        what is minimised
+    floor : float or None
+        lowest height [m]
+    box : list of str or None
+        forbidden boxes
+    tool : str
+        tool point [m]
+    torque_margin : float
+        part of the torque limits that is kept free
+    limit_fraction : float
+        part of the other limits that is used
+    noise_std : str or None
+        expected torque noise
+    slow_reversals : bool
+        whether slow reversals are added
+    closing_period : bool
+        whether the first period is repeated at the end
+    json : Path or None
+        where the design goes
+    csv : Path or None
+        where the samples go
+    rate : float
+        samples a second of the CSV [Hz]
+    """
+    corners = [parse_numbers(text, "--box", 6) for text in box or ()]
+    tool_m = parse_numbers(tool, "--tool", 3)
+    noise = None if noise_std is None else parse_numbers(noise_std, "--noise-std", None)
+    import numpy as np
+
+    from tauscope.cli.excite_run import Request, run_excite
+    from tauscope.excitation import Box, Criterion, ExcitationOptions, Workspace
+
+    boxes = tuple(Box(np.array(numbers[:3]), np.array(numbers[3:])) for numbers in corners)
+    options = ExcitationOptions(
+        period_s=duration,
+        harmonics=harmonics,
+        periods=periods,
+        criterion=Criterion(criterion),
+        noise_std=None if noise is None else np.array(noise),
+        limit_fraction=limit_fraction,
+        torque_margin=torque_margin,
+        workspace=Workspace(floor, boxes, np.array(tool_m)),
+        slow_postures=ExcitationOptions.slow_postures if slow_reversals else 0,
+        closing_period=closing_period,
+        seed=seed,
+    )
+    run_excite(Request(robot, options, json, csv, rate))
+
+
+def parse_numbers(text: str, option: str, count: int | None) -> list[float]:
+    """Numbers separated by commas.
+
+    Parameters
+    ----------
+    text : str
+        what the user wrote
+    option : str
+        name of the option, for the message
+    count : int or None
+        how many are expected; any number where None
+
+    Raises
+    ------
+    typer.BadParameter
+        for anything else
+    """
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if not numbers or not all(map(math.isfinite, numbers)) or (count is not None and len(numbers) != count):
+        wanted = "numbers" if count is None else f"{count} numbers"
+        raise typer.BadParameter(f"{text!r} is not {wanted} separated by commas", param_hint=f"'{option}'")
+    return numbers

@@ -1,0 +1,84 @@
+"""``tauscope fleet``: the manifest read, the work handed out, the table written row by row."""
+
+import csv
+from pathlib import Path
+from typing import Literal
+
+from tauscope.cli.output_files import require_new
+from tauscope.cli.terminal import output, plain, shown_percent
+from tauscope.errors import ExportError, IdentificationError
+from tauscope.report.quantities import counted
+from tauscope.server.queue.cluster_executor import ClusterExecutor
+from tauscope.server.queue.executors import open_executor
+from tauscope.server.queue.fleet import FleetResult, analyse_fleet, read_manifest
+from tauscope.server.queue.fleet_work import DIAGNOSIS_COLUMNS, IDENTIFICATION_COLUMNS, diagnose_robot, identify_robot
+
+TABLE = "table.csv"
+
+CLUSTER_PATIENCE_S = 60.0
+"""How long a robot waits for a cluster that is away, as when its scheduler is started anew [s]."""
+
+
+def run_fleet(verb: Literal["identify", "diagnose"], manifest: Path, out: Path, workers: int) -> None:
+    """Analyse every robot of a manifest.
+
+    Parameters
+    ----------
+    verb : str
+        ``identify`` or ``diagnose``
+    manifest : Path
+        which robots
+    out : Path
+        folder of the results; made where it is missing, and has no table yet
+    workers : int
+        processes
+
+    Raises
+    ------
+    RecordingError
+        if the manifest is not valid: nothing is begun then
+    ExportError
+        if the results cannot be written
+    IdentificationError
+        if any robot failed
+    """
+    total = sum(1 for _ in read_manifest(manifest))
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ExportError(f"{out}: cannot be made ({error.strerror}); choose another --out") from error
+    require_new(out / TABLE)
+    failed = _run(verb, manifest, out.resolve(), workers, total)
+    output().print(plain(f"wrote {out / TABLE}: {counted(total, 'robot')}, {failed} failed"), soft_wrap=True)
+    if failed:
+        text = f"{manifest}: {failed} of {counted(total, 'robot')} failed; see the column error of {out / TABLE}"
+        raise IdentificationError(text)
+
+
+def _run(verb: str, manifest: Path, out: Path, workers: int, total: int) -> int:
+    """Do the work, and write each row as it comes; how many failed."""
+    columns, work = (
+        (IDENTIFICATION_COLUMNS, identify_robot) if verb == "identify" else (DIAGNOSIS_COLUMNS, diagnose_robot)
+    )
+    executor = open_executor(workers, CLUSTER_PATIENCE_S)
+    width = executor.width if isinstance(executor, ClusterExecutor) else workers
+    failed = done = 0
+    try:
+        with shown_percent() as tell, (out / TABLE).open("x", newline="", encoding="utf-8") as file:
+            table = csv.writer(file, lineterminator="\n")
+            table.writerow(("line", "name", "state", *columns, "seconds", "error"))
+            for result in analyse_fleet(read_manifest(manifest.resolve()), work, out, executor, width):
+                table.writerow(_row(result, columns))
+                file.flush()
+                done, failed = done + 1, failed + (result.error is not None)
+                tell(f"{verb} {result.entry.name}", 100.0 * done / total)
+    finally:
+        executor.shutdown(wait=True, cancel_futures=True)
+    return failed
+
+
+def _row(result: FleetResult, columns: tuple[str, ...]) -> list[str]:
+    """A row of the table."""
+    state = "succeeded" if result.error is None else "failed"
+    figures = (result.figures.get(column, "") for column in columns)
+    return [str(result.entry.row), result.entry.name, state, *figures, f"{result.seconds:.2f}", result.error or ""]

@@ -1,0 +1,130 @@
+"""``tauscope identify``: its arguments."""
+
+import math
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from tauscope.cli.arguments import RobotFile
+
+Recordings = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="RECORDING",
+        exists=True,
+        help="Recordings that the model is made from: CSV, Parquet, MCAP or rosbag2.",
+        show_default=False,
+    ),
+]
+HeldOut = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--held-out",
+        metavar="RECORDING...",
+        exists=True,
+        help="Recordings that the model is judged by, never made from. All files up to the next option, or up to --,"
+        " belong to it.",
+    ),
+]
+Cutoff = Annotated[
+    str, typer.Option(metavar="auto|none|HZ", help="Band that torque and model share; chosen from the data by default.")
+]
+Export = Annotated[
+    list[Path] | None,
+    typer.Option(
+        metavar="FILE",
+        dir_okay=False,
+        help="Write the model for a controller or a simulator, by suffix: .json .yaml .h .py (friction compensation),"
+        " .urdf, .xml (MJCF). May be repeated.",
+    ),
+]
+
+
+def identify(
+    robot: RobotFile,
+    recordings: Recordings,
+    *,
+    held_out: HeldOut = None,
+    estimator: Annotated[Literal["ls", "wls"], typer.Option(help="How the joints' equations are weighted.")] = "wls",
+    cutoff: Cutoff = "auto",
+    rotor_inertia: Annotated[
+        bool, typer.Option("--rotor-inertia/--no-rotor-inertia", help="Add rotors where the data ask for them.")
+    ] = True,
+    json: Annotated[
+        Path | None, typer.Option(metavar="OUT", dir_okay=False, help="Write the result as JSON; - is standard output.")
+    ] = None,
+    report: Annotated[
+        Path | None, typer.Option(metavar="OUT.html", dir_okay=False, help="Write a page to read, figures included.")
+    ] = None,
+    export: Export = None,
+) -> None:
+    """Find an arm's parameters from recordings.
+
+    Base parameters, friction and their uncertainty, the nearest physically consistent links, and how well all of it
+    explains recordings that were held out.
+
+    Parameters
+    ----------
+    robot : Path
+        robot file
+    recordings : list of Path
+        what the model is made from
+    held_out : list of Path or None
+        what it is judged by
+    estimator : str
+        ``ls`` or ``wls``
+    cutoff : str
+        ``auto``, ``none`` or a frequency [Hz]
+    rotor_inertia : bool
+        whether rotors are added where the data ask for them
+    json : Path or None
+        where the result goes
+    report : Path or None
+        where the page goes
+    export : list of Path or None
+        where the model goes
+    """
+    cutoff_hz = parse_cutoff(cutoff)
+    from tauscope.cli.identify_run import Request, run_identify
+    from tauscope.identification import Estimator, Options
+
+    run_identify(
+        Request(
+            robot=robot,
+            recordings=tuple(recordings),
+            held_out=tuple(held_out or ()),
+            options=Options(Estimator(estimator), cutoff_hz, rotor_inertia),
+            json=json,
+            report=report,
+            exports=tuple(export or ()),
+        )
+    )
+
+
+def parse_cutoff(text: str) -> float | Literal["auto"] | None:
+    """Read the value of ``--cutoff``.
+
+    Parameters
+    ----------
+    text : str
+        ``auto``, ``none`` or a positive number [Hz]
+
+    Raises
+    ------
+    typer.BadParameter
+        for anything else
+    """
+    if text.lower() == "auto":
+        return "auto"
+    if text.lower() == "none":
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not (math.isfinite(value) and value > 0.0):
+        raise typer.BadParameter(
+            f"{text!r} is neither auto, none nor a positive frequency in Hz", param_hint="'--cutoff'"
+        )
+    return value

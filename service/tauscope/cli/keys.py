@@ -1,0 +1,86 @@
+"""``tauscope key``: keys made, listed and taken back."""
+
+import os
+from datetime import timedelta
+from pathlib import Path
+
+import typer
+
+from tauscope.server.auth.audit.log import AuditLog
+from tauscope.server.auth.keys import ApiKey, KeyFile, utc_now
+from tauscope.server.auth.scopes import parse_scope
+from tauscope.server.http.settings import default_data_folder
+
+
+def add_key(name: str, scope: str, days: int, data: Path | None) -> None:
+    """Make a key, and print it on standard output.
+
+    Parameters
+    ----------
+    name : str
+        who gets it
+    scope : str
+        what it may do
+    days : int
+        how long it holds, for good where 0 [days]
+    data : Path or None
+        data folder of the service; the user's own where None
+
+    Raises
+    ------
+    TauscopeError
+        if the name is in use, or the file cannot be worked with
+    """
+    folder = data or default_data_folder()
+    folder.mkdir(parents=True, exist_ok=True)
+    life = timedelta(days=days) if days else None
+    key, text = KeyFile(folder).add(name, parse_scope(scope), utc_now(), life)
+    until = "for good" if key.expires is None else f"until {key.expires:%Y-%m-%d}"
+    _note(folder, "key add", key)
+    typer.echo(f"key {key.id} of {name}: scope {key.scope}, {until}; this is the only time that it is shown", err=True)
+    typer.echo(text)
+
+
+def list_keys(data: Path | None) -> None:
+    """Print all keys, one a line.
+
+    Parameters
+    ----------
+    data : Path or None
+        data folder of the service; the user's own where None
+
+    Raises
+    ------
+    TauscopeError
+        if the file is damaged
+    """
+    now = utc_now()
+    for key in KeyFile(data or default_data_folder()).read():
+        expires = "never" if key.expires is None else f"{key.expires:%Y-%m-%d}"
+        typer.echo(f"{key.id}  {key.scope:<8} {key.state(now):<8} expires {expires:<11} {key.name}")
+
+
+def revoke_key(name: str, data: Path | None) -> None:
+    """Take a key back.
+
+    Parameters
+    ----------
+    name : str
+        name or identifier of the key
+    data : Path or None
+        data folder of the service; the user's own where None
+
+    Raises
+    ------
+    TauscopeError
+        if there is no such key
+    """
+    folder = data or default_data_folder()
+    key = KeyFile(folder).revoke(name, utc_now())
+    _note(folder, "key revoke", key)
+    typer.echo(f"key {key.id} of {key.name} is revoked")
+
+
+def _note(folder: Path, action: str, key: ApiKey) -> None:
+    """Leave an entry in the audit log, in the name of whoever is logged in."""
+    AuditLog(folder).append(f"user {os.getuid()}", action, subject=key.name, key=key.id, scope=key.scope.value)

@@ -1,0 +1,158 @@
+"""Files that the program writes: complete or not at all, and never over a file that it read."""
+
+import os
+import secrets
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import typer
+
+from tauscope.errors import ExportError
+
+STANDARD_OUTPUT = Path("-")
+"""Stands for standard output where a file to write is asked for."""
+
+
+def require_distinct(inputs: Sequence[Path]) -> None:
+    """Refuse a file that is given twice: it would count twice, or be judged by what it taught.
+
+    Parameters
+    ----------
+    inputs : sequence of Path
+        all recordings, held-out ones included
+
+    Raises
+    ------
+    typer.BadParameter
+        naming the file
+    """
+    seen: set[Path] = set()
+    for path in inputs:
+        real = path.resolve()
+        if real in seen:
+            raise typer.BadParameter(f"recording {str(path)!r} is given twice; name each recording once")
+        seen.add(real)
+
+
+def require_free(outputs: Sequence[Path], inputs: Iterable[Path]) -> None:
+    """Refuse, before any work is done, to write where it cannot be done or would destroy an input.
+
+    Parameters
+    ----------
+    outputs : sequence of Path
+        files to write; `STANDARD_OUTPUT` is always free
+    inputs : iterable of Path
+        files and folders that are read
+
+    Raises
+    ------
+    typer.BadParameter
+        naming the file
+    """
+    read = {path.resolve() for path in inputs}
+    written: set[Path] = set()
+    for path in outputs:
+        if path == STANDARD_OUTPUT:
+            continue
+        real = path.resolve()
+        if not read.isdisjoint((real, *real.parents)) or any(_is_same_file(real, other) for other in read):
+            raise typer.BadParameter(f"output {str(path)!r} is an input of this command; inputs are never written to")
+        if real in written:
+            raise typer.BadParameter(f"output {str(path)!r} is asked for twice; name each output once")
+        if real.is_dir():
+            raise typer.BadParameter(f"output {str(path)!r} is a folder; name a file")
+        if not real.parent.is_dir():
+            raise typer.BadParameter(f"output {str(path)!r}: folder {str(path.parent)!r} does not exist; make it first")
+        written.add(real)
+
+
+def require_new(path: Path) -> None:
+    """Refuse, before any work is done, to make a file that is there already or whose folder is not.
+
+    Parameters
+    ----------
+    path : Path
+        file to make
+
+    Raises
+    ------
+    typer.BadParameter
+        where its folder does not exist
+    ExportError
+        where it exists
+    """
+    if not path.resolve().parent.is_dir():
+        raise typer.BadParameter(f"output {str(path)!r}: folder {str(path.parent)!r} does not exist; make it first")
+    if path.exists() or path.is_symlink():
+        raise ExportError(f"{path}: exists, and is not replaced; name another file")
+
+
+def keep_file(source: Path, target: Path) -> None:
+    """Give a finished file its place; a file that is there already stays as it is.
+
+    Parameters
+    ----------
+    source : Path
+        on the same disk
+    target : Path
+        its place
+
+    Raises
+    ------
+    ExportError
+        where there is a file by now, or it cannot be written
+    """
+    try:
+        os.link(source, target)
+    except FileExistsError:
+        raise ExportError(f"{target}: was made meanwhile, and is not replaced; the file is kept as {source}") from None
+    except OSError as error:
+        reason = error.strerror or error
+        raise ExportError(f"{target}: cannot be written ({reason}); the file is kept as {source}") from error
+    source.unlink()
+
+
+def write_file(path: Path, content: bytes) -> None:
+    """Write a file that appears under its name only when it is complete.
+
+    Parameters
+    ----------
+    path : Path
+        the file; replaced where it exists; `STANDARD_OUTPUT` is standard output
+    content : bytes
+        what to write
+
+    Raises
+    ------
+    ExportError
+        where it cannot be written
+    """
+    if path == STANDARD_OUTPUT:
+        typer.echo(content, nl=False)
+        return
+    real = path.resolve()
+    try:
+        if real.exists() and not real.is_file():  # a device or a pipe: there is nothing to replace
+            real.write_bytes(content)
+        else:
+            _replace(real, content)
+    except OSError as error:
+        raise ExportError(f"{path}: cannot be written ({error.strerror or error}); choose another place") from error
+
+
+def _replace(path: Path, content: bytes) -> None:
+    """Write beside the file and move into place."""
+    partial = path.with_name(f".tauscope-{secrets.token_hex(6)}.partial")
+    try:
+        with partial.open("xb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def _is_same_file(path: Path, other: Path) -> bool:
+    """Whether two names lead to one file, as hard links do."""
+    return path.exists() and other.exists() and path.samefile(other)

@@ -1,0 +1,82 @@
+"""``tauscope prove``: its arguments, and the way to the trials, which only a clone of the repository has."""
+
+import os
+import sys
+from pathlib import Path
+from typing import Annotated, NoReturn
+
+import typer
+
+from tauscope.errors import NotFoundError
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+REPORTING = 1_000_000
+"""First seed of reports: seeds below 10,000 were looked at while the diagnosis was made."""
+
+
+def prove(
+    *,
+    full: Annotated[bool, typer.Option("--full", help="The full set instead of the quick one; takes hours.")] = False,
+    first_seed: Annotated[
+        int, typer.Option(metavar="N", min=0, help="First seed; below 10000 is for development.")
+    ] = REPORTING,
+    jobs: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Trials at the same time; one a core by default.")
+    ] = None,
+    out: Annotated[Path, typer.Option(metavar="DIR", file_okay=False, help="Folder for outcomes and page.")] = Path(
+        "proof-output"
+    ),
+    page: Annotated[
+        Path | None, typer.Option(metavar="PAGE.md", dir_okay=False, help="Write the page here instead of into DIR.")
+    ] = None,
+) -> None:
+    """Put the diagnosis to the test: conceal effects, seal the truth, diagnose, open it, count.
+
+    Works in a clone of the repository. Outcomes are kept one by one, so that an interrupted set goes on. Uses all
+    cores, or the Dask cluster whose scheduler DASK_SCHEDULER_ADDRESS names.
+
+    Parameters
+    ----------
+    full : bool
+        whether the full set is tried
+    first_seed : int
+        of every series
+    jobs : int or None
+        trials at the same time
+    out : Path
+        folder for outcomes, and for the page and its pictures
+    page : Path or None
+        where the page goes instead
+    """
+    words = ["--out", str(out), "--first-seed", str(first_seed)]
+    words += ["--full"] if full else []
+    words += [] if jobs is None else ["--jobs", str(jobs)]
+    words += [] if page is None else ["--page", str(page)]
+    become_trials(REPOSITORY, words)
+
+
+def become_trials(repository: Path, words: list[str]) -> NoReturn:
+    """Run the trials of a clone in the place of this program: what ends it ends them, and their exit status is its own.
+
+    Parameters
+    ----------
+    repository : Path
+        the clone
+    words : list of str
+        arguments of `concealed.proof`
+
+    Raises
+    ------
+    NotFoundError
+        where the program was installed without its tests
+    """
+    tests = repository / "tests"
+    if not (tests / "concealed").is_dir():
+        raise NotFoundError(
+            "tauscope prove: the trials (tests/concealed) are not installed with the program: clone the repository and"
+            " run `make prove` there"
+        )
+    path = os.pathsep.join([str(repository), str(tests), *filter(None, [os.environ.get("PYTHONPATH")])])
+    sys.stdout.flush()
+    command = [sys.executable, "-m", "concealed.proof", *words]
+    os.execve(sys.executable, command, {**os.environ, "PYTHONPATH": path})  # noqa: S606 - our own

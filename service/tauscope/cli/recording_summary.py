@@ -1,0 +1,105 @@
+"""``tauscope recording check|convert``: what is in a recording, and what became of it."""
+
+from pathlib import Path
+
+import typer
+
+from tauscope.cli.terminal import output, plain, shown_progress, table
+from tauscope.recording import EffortKind, RecordingReport, check_recording, convert_recording
+from tauscope.recording.convert import FORMATS
+from tauscope.report.quantities import ABSENT, counted, significant
+from tauscope.report.table import Table
+
+
+def show_recording(path: Path, joint_count: int | None) -> None:
+    """Show what a recording holds, and what to look at before trusting it.
+
+    Parameters
+    ----------
+    path : Path
+        recording
+    joint_count : int or None
+        number of joints that it has to have
+
+    Raises
+    ------
+    RecordingError
+        if the recording cannot be read or breaks a rule
+    """
+    with shown_progress() as progress:
+        progress(f"read {path}")
+        report = check_recording(path, joint_count)
+    console = output()
+    console.print(
+        plain(f"{report.name}: {counted(len(report.joints), 'joint')}, {counted(report.samples, 'sample')}"),
+        soft_wrap=True,
+    )
+    console.print(table("Recording", _clock(report)))
+    console.print(table("Joints", _joints(report)))
+    for finding in report.findings:
+        console.print(plain(f"{finding.severity}: {finding.where}: {finding.text}"), soft_wrap=True)
+    console.print(plain(f"{path}: valid"), soft_wrap=True)
+
+
+def convert_file(source: Path, target: Path, *, recover: bool, overwrite: bool) -> None:
+    """Write a recording in another format and say what was left out.
+
+    Parameters
+    ----------
+    source : Path
+        recording
+    target : Path
+        file to make
+    recover : bool
+        keep what comes before the damage of a truncated MCAP file
+    overwrite : bool
+        replace the target where it exists
+
+    Raises
+    ------
+    typer.BadParameter
+        if the target's suffix names no format
+    RecordingError
+        if the source cannot be read or the target cannot be written
+    """
+    if target.suffix.lower() not in FORMATS:
+        raise typer.BadParameter(
+            f"{str(target)!r}: the suffix names no format; use {', '.join(FORMATS)}", param_hint="'TARGET'"
+        )
+    with shown_progress() as progress:
+        progress(f"convert {source}")
+        done = convert_recording(source, target, recover=recover, overwrite=overwrite)
+    console = output()
+    console.print(plain(f"wrote {done.target}: {counted(done.samples, 'sample')}"), soft_wrap=True)
+    if done.dropped_columns:
+        console.print(plain(f"left out: {', '.join(done.dropped_columns)}"), soft_wrap=True)
+    if done.damage is not None:
+        console.print(plain(f"damage passed over: {done.damage}"), soft_wrap=True)
+
+
+def _clock(report: RecordingReport) -> Table:
+    """Duration, rate, gaps, periods, columns."""
+    periods = report.periods
+    rows = [
+        ("duration", f"{significant(report.duration_s, 6)} s"),
+        ("rate", f"{significant(report.rate_hz, 5)} Hz"),
+        ("steps", f"{significant(1e3 * report.steps.minimum)} … {significant(1e3 * report.steps.maximum)} ms"),
+        ("gaps", str(report.gaps.count)),
+        (
+            "periods",
+            ABSENT if periods is None else f"{periods.count} of {periods.shortest} … {periods.longest} samples",
+        ),
+        ("missed values (NaN)", str(sum(report.missed.values()))),
+        ("effort", "drive units" if report.effort_kind is EffortKind.CURRENT else "torque"),
+        ("columns", " ".join(report.columns)),
+    ]
+    return Table(("figure", "value"), rows, words=2)
+
+
+def _joints(report: RecordingReport) -> Table:
+    """Range of every joint's channels."""
+    rows = []
+    for number, joint in enumerate(report.joints, start=1):
+        ranges = (" … ".join(significant(value) for value in pair) for pair in (joint.position, joint.effort))
+        rows.append([str(number), *ranges, significant(joint.position_step, 3)])
+    return Table(("joint", "position [rad, m]", "effort", "position step"), rows)

@@ -1,0 +1,70 @@
+"""``tauscope robot check``: a robot file at a glance."""
+
+from pathlib import Path
+
+from tauscope.cli.terminal import output, plain, table
+from tauscope.errors import RobotFileError
+from tauscope.report.quantities import ABSENT, counted, given
+from tauscope.report.table import Table
+from tauscope.robot import JointSummary, RobotReport, Severity, check_robot
+
+
+def show_robot(path: Path) -> None:
+    """Show what a robot file says, and everything doubtful in it.
+
+    Parameters
+    ----------
+    path : Path
+        robot file
+
+    Raises
+    ------
+    RobotFileError
+        if the file is not valid, or its model describes bodies that cannot be
+    """
+    report = check_robot(path)
+    console = output()
+    gravity = ", ".join(given(value) for value in report.gravity)
+    console.print(
+        plain(f"Robot {report.name}: {counted(len(report.joints), 'joint')}, gravity [{gravity}] m/s²{_mass(report)}")
+    )
+    columns = (
+        "joint",
+        "name",
+        "type",
+        "position",
+        "velocity",
+        "acceleration",
+        "torque",
+        "gear",
+        "per unit",
+        "mass [kg]",
+    )
+    console.print(table("Joints", Table(columns, [_row(joint) for joint in report.joints], words=3)))
+    for finding in report.findings:
+        console.print(plain(f"{finding.severity}: {finding.where}: {finding.text}"), soft_wrap=True)
+    if report.passed:
+        console.print(plain(f"{path}: valid"), soft_wrap=True)
+        return
+    first = next(finding for finding in report.findings if finding.severity is Severity.ERROR)
+    raise RobotFileError(f"{first.where}: {first.text}")
+
+
+def _mass(report: RobotReport) -> str:
+    """What the model weighs, where there is one."""
+    return "" if report.total_mass is None else f", model of {given(report.total_mass)} kg"
+
+
+def _row(joint: JointSummary) -> list[str]:
+    """One joint."""
+    limits = joint.limits
+    reach = ABSENT if limits.position is None else " … ".join(given(value) for value in limits.position)
+    return [
+        str(joint.number),
+        joint.name,
+        joint.type.value,
+        reach,
+        *(given(value) for value in (limits.velocity, limits.acceleration, limits.torque, joint.gear_ratio)),
+        given(joint.sign * joint.torque_constant),
+        given(joint.mass),
+    ]

@@ -1,0 +1,105 @@
+"""What is shown on a terminal: names as they are, tables that do not wrap in a pipe, progress where it is watched."""
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from rich import box
+from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table as RichTable
+from rich.text import Text
+
+from tauscope.report.table import Table
+from tauscope.robot.messages import one_line
+
+PIPE_WIDTH = 240
+"""Columns where nobody looks: wide enough for every table."""
+
+
+def output() -> Console:
+    """Standard output."""
+    if sys.stdout.isatty():
+        return Console(highlight=False, emoji=False)
+    return Console(highlight=False, emoji=False, width=PIPE_WIDTH)
+
+
+def plain(text: str) -> Text:
+    """Text of a user's file: one line, and none of it taken for markup or for a terminal's command.
+
+    Parameters
+    ----------
+    text : str
+        any text
+    """
+    return Text(one_line(text))
+
+
+def table(title: str, view: Table) -> RichTable:
+    """A table of plain text, numbers to the right.
+
+    Parameters
+    ----------
+    title : str
+        stands above it
+    view : Table
+        cells
+    """
+    made = RichTable(title=plain(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
+    for place, column in enumerate(view.columns):
+        is_word = place < view.words
+        made.add_column(plain(column), justify="left" if is_word else "right", no_wrap=not is_word)
+    for row in view.rows:
+        made.add_row(*(plain(cell) for cell in row))
+    return made
+
+
+Told = Callable[[str, float | None], None]
+"""Told the step that goes on, and how much of it is done in percent, or None where that is not known."""
+
+
+@contextmanager
+def shown_percent() -> Iterator[Told]:
+    """A bar on standard error, where that is a terminal.
+
+    Yields
+    ------
+    callable
+        to be told the step and the percentage whenever they change
+    """
+    if not sys.stderr.isatty():
+        yield lambda step, percent: None
+        return
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("", total=None)
+
+        def show(step: str, percent: float | None) -> None:
+            total = None if percent is None else 100.0
+            progress.update(task, description=one_line(step), total=total, completed=percent or 0.0)
+
+        yield show
+
+
+@contextmanager
+def shown_progress() -> Iterator[Callable[[str], None]]:
+    """Steps of long work on standard error, where that is a terminal.
+
+    Yields
+    ------
+    callable
+        to be told the name of each step as it begins
+    """
+    if not sys.stderr.isatty():
+        yield lambda step: None
+        return
+    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("", total=None)
+        yield lambda step: progress.update(task, description=one_line(step))

@@ -1,0 +1,300 @@
+"""The verbs of the service, one method each; answers are the models that the service itself makes them from."""
+
+import time
+import uuid
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+from urllib.parse import quote
+
+from pydantic import BaseModel
+
+from tauscope.client.held_lease import HeldLease
+from tauscope.client.transport import Answer, ApiError, Content, Transport, form_content, json_content
+from tauscope.server.http.campaigns.models import CampaignAnswer
+from tauscope.server.http.diagnoses.models import DiagnosisAnswer
+from tauscope.server.http.excitations.models import ExcitationAnswer
+from tauscope.server.http.identifications.models import IdentificationAnswer
+from tauscope.server.http.leases.models import LeaseAnswer, StopAllAnswer
+from tauscope.server.http.recordings.models import RecordingAnswer
+from tauscope.server.http.robots.models import RobotReportAnswer
+from tauscope.server.http.runs.models import RunAnswer, StopAnswer
+
+PREFIX = "/api/v1"
+ENDS = frozenset(
+    {"finished", "stopped", "failed", "interrupted", "succeeded", "cancelled", "damaged"},
+)
+"""States after which nothing happens any more."""
+
+POLL_S = 0.2
+"""How often the service is asked again [s]."""
+
+SETTLING_S = 10.0
+"""How long what has ended may take until its files can be fetched [s]."""
+
+Model = TypeVar("Model", bound=BaseModel)
+Followed = TypeVar(
+    "Followed", RunAnswer, CampaignAnswer, IdentificationAnswer, DiagnosisAnswer, ExcitationAnswer
+)  # what has a state
+
+
+class Client:
+    """One service. Methods may be called from several threads at once; each raises `ApiError` where it is refused."""
+
+    def __init__(
+        self, url: str = "http://127.0.0.1:8000", key: str | None = None, *, timeout_s: float = 30.0,
+        ca_file: Path | None = None,
+    ) -> None:  # fmt: skip
+        """Name the service; nothing is sent yet.
+
+        Parameters
+        ----------
+        url : str
+            its address
+        key : str or None
+            API key, if it asks for one
+        timeout_s : float
+            how long each step of a request may take [s]
+        ca_file : Path or None
+            certificate that vouches for it; the system's where None
+        """
+        self._transport = Transport(url, key, timeout_s, ca_file)
+
+    def is_ready(self) -> bool:
+        """Whether the service is there and can work."""
+        try:
+            self._transport.send("GET", "/readyz")
+        except ApiError:
+            return False
+        return True
+
+    def check_robot(self, robot: Path, urdf: Path | None = None) -> RobotReportAnswer:
+        """Have a robot file checked.
+
+        Parameters
+        ----------
+        robot : Path
+            robot file
+        urdf : Path or None
+            the URDF that it names
+        """
+        files = [("robot", robot), *([("urdf", urdf)] if urdf else [])]
+        return self._post("robots/check", RobotReportAnswer, form_content(None, files))
+
+    def keep_recording(self, recording: Path) -> RecordingAnswer:
+        """Send a recording, to be named by later requests.
+
+        Parameters
+        ----------
+        recording : Path
+            CSV, Parquet, MCAP or rosbag2 database
+        """
+        return self._create("recordings", RecordingAnswer, form_content(None, [("file", recording)]))
+
+    def identify(self, robot: Path, recordings: Sequence[Path], **request: Any) -> IdentificationAnswer:
+        """Hand in an identification.
+
+        Parameters
+        ----------
+        robot : Path
+            robot file
+        recordings : sequence of Path
+            recordings that are sent along; none where `request` names ones on the server
+        **request : object
+            further fields of the request
+        """
+        files = [("robot", robot), *(("recordings", path) for path in recordings)]
+        return self._create("identifications", IdentificationAnswer, form_content(request, files))
+
+    def diagnose(self, robot: Path, recordings: Sequence[Path], **request: Any) -> DiagnosisAnswer:
+        """Hand in a diagnosis.
+
+        Parameters
+        ----------
+        robot : Path
+            robot file
+        recordings : sequence of Path
+            recordings that are sent along
+        **request : object
+            further fields of the request
+        """
+        files = [("robot", robot), *(("recordings", path) for path in recordings)]
+        return self._create("diagnoses", DiagnosisAnswer, form_content(request, files))
+
+    def excite(self, robot: Path, **request: Any) -> ExcitationAnswer:
+        """Have a motion designed.
+
+        Parameters
+        ----------
+        robot : Path
+            robot file
+        **request : object
+            further fields of the request
+        """
+        return self._create("excitations", ExcitationAnswer, form_content(request, [("robot", robot)]))
+
+    def run(
+        self, robot: Path, lease: HeldLease | None = None, trajectory: Path | None = None, **request: Any
+    ) -> RunAnswer:
+        """Begin a run: the arm moves.
+
+        Parameters
+        ----------
+        robot : Path
+            robot file
+        lease : HeldLease or None
+            of the arm; needed where the service asks for keys
+        trajectory : Path or None
+            the motion; designed first where there is none
+        **request : object
+            further fields of the request
+        """
+        files = [("robot", robot), *([("trajectory", trajectory)] if trajectory else [])]
+        return self._create("runs", RunAnswer, form_content(request, files), _lease_header(lease))
+
+    def campaign(self, robot: Path, lease: HeldLease | None = None, **request: Any) -> CampaignAnswer:
+        """Begin a campaign: the arm moves.
+
+        Parameters
+        ----------
+        robot : Path
+            robot file
+        lease : HeldLease or None
+            of the arm; needed where the service asks for keys
+        **request : object
+            further fields of the request
+        """
+        content = form_content(request, [("robot", robot)])
+        return self._create("campaigns", CampaignAnswer, content, _lease_header(lease))
+
+    def wait(self, item: Followed, timeout_s: float | None = None, lease: HeldLease | None = None) -> Followed:
+        """Wait until a job, run or campaign has ended.
+
+        Parameters
+        ----------
+        item : answer
+            as it was handed in
+        timeout_s : float or None
+            how long; for good where None [s]
+        lease : HeldLease or None
+            ends the waiting where it is lost
+
+        Returns
+        -------
+        answer
+            its last state
+
+        Raises
+        ------
+        TimeoutError
+            if it has not ended by then
+        """
+        last = None if timeout_s is None else time.monotonic() + timeout_s
+        while True:
+            item = _parsed(self._transport.send("GET", item.links.self_), type(item))
+            if str(item.state) in ENDS:
+                return item
+            if lease is not None:
+                lease.require()
+            if last is not None and time.monotonic() > last:
+                raise TimeoutError(f"{item.id} is {item.state} after {timeout_s:g} s")
+            time.sleep(POLL_S)
+
+    def fetch(self, link: str, to: Path) -> Path:
+        """Fetch a file, as links in answers name it; waits a moment where the service still puts it in its place.
+
+        Parameters
+        ----------
+        link : str
+            path of the resource
+        to : Path
+            where it is written
+        """
+        last = time.monotonic() + SETTLING_S
+        while True:
+            try:
+                to.write_bytes(self._transport.send("GET", link).body)
+                return to
+            except ApiError as error:
+                if error.problem_code != "not-finished" or time.monotonic() > last:
+                    raise
+            time.sleep(POLL_S)
+
+    def lease(self, robot: str, *, backend: str | None = None, ttl_s: float = 10.0, take: bool = False) -> HeldLease:
+        """Take an arm; use the result as a context, within which it is kept.
+
+        Parameters
+        ----------
+        robot : str
+            what the robot file calls the robot
+        backend : str or None
+            what moves it; the service's own where None
+        ttl_s : float
+            time after which the arm stops when this program is gone [s]
+        take : bool
+            take it from somebody else
+        """
+        wanted = {"robot": robot, "backend": backend, "ttl_s": ttl_s, "take": take}
+        taken = self._create("leases", LeaseAnswer, json_content(wanted))
+        headers = {"Lease-Token": taken.token or ""}
+        return HeldLease(
+            taken,
+            lambda: self._transport.send("POST", taken.links.heartbeat, headers=headers),
+            lambda: self._transport.send("DELETE", taken.links.self_, headers=headers),
+        )
+
+    def arm(self, lease: HeldLease) -> None:
+        """Let the arm move.
+
+        Parameters
+        ----------
+        lease : HeldLease
+            of the arm
+        """
+        self._transport.send("POST", lease.lease.links.arm, headers=_lease_header(lease))
+
+    def stop(self, run: RunAnswer) -> StopAnswer:
+        """Stop a run.
+
+        Parameters
+        ----------
+        run : RunAnswer
+            the run
+        """
+        return _parsed(self._transport.send("POST", run.links.stop), StopAnswer)
+
+    def stop_everything(self) -> StopAllAnswer:
+        """Stop every arm; needs no lease."""
+        return self._post("stop", StopAllAnswer, Content("", (), 0))
+
+    def _create(
+        self, path: str, kind: type[Model], content: Content, headers: Mapping[str, str] | None = None
+    ) -> Model:
+        """A POST that is done once, also where its answer gets lost and it is sent again."""
+        once = {"Idempotency-Key": uuid.uuid4().hex, **(headers or {})}
+        send: Callable[[], Answer] = lambda: self._transport.send(  # noqa: E731
+            "POST", f"{PREFIX}/{path}", headers=once, content=content
+        )
+        try:
+            return _parsed(send(), kind)
+        except ApiError as error:
+            if error.problem_code != "unreachable":
+                raise
+        return _parsed(send(), kind)
+
+    def _post(self, path: str, kind: type[Model], content: Content) -> Model:
+        """A POST that is sent once."""
+        return _parsed(self._transport.send("POST", f"{PREFIX}/{quote(path)}", content=content), kind)
+
+
+def _parsed(answer: Answer, kind: type[Model]) -> Model:
+    """An answer as its model; one of a newer service may hold more than we know."""
+    try:
+        return kind.model_validate_json(answer.body, extra="ignore")
+    except ValueError:
+        raise ApiError("unknown", answer.status, "the answer is not as documented; are both of one version?") from None
+
+
+def _lease_header(lease: HeldLease | None) -> dict[str, str]:
+    """The header by which an arm moves."""
+    return {} if lease is None else {"Lease-Token": lease.token}

@@ -1,0 +1,107 @@
+"""The final model fitted to what a simulator records: which of its parts the simulator has, and of which size."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tauscope.diagnosis.findings.diagnosed import Diagnosis, ParameterDifference
+from tauscope.diagnosis.fitting.fit import Fit, Fitter
+from tauscope.diagnosis.fitting.regressor_noise import row_weightings
+from tauscope.diagnosis.model.extended import ExtendedModel, with_terms
+from tauscope.diagnosis.model.nominal import nominal_model
+from tauscope.diagnosis.model.term import Term
+from tauscope.diagnosis.noise.floor import with_noise
+from tauscope.diagnosis.observations.observations import Observations
+from tauscope.effects import TimeLocalEffect
+from tauscope.identification import Options, identify
+from tauscope.recording.conditioning import Conditioner
+from tauscope.recording.recording import Array, Recording
+
+PRESENT = 5.0
+"""Standard errors from which an effect is in the simulator's recordings…"""
+
+OF_REAL = 0.1
+"""…and the part of its size on the arm that it has at least."""
+
+Place = tuple[str, int | None]
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedFit:
+    """What the simulator has.
+
+    values, std : (p,) float64
+        nominal parameters in the columns of the final model, and their standard errors
+    shared : mapping of (str, int or None) to tuple of ParameterDifference
+        effects and places that the simulator shows too, with their coefficients in the simulator and on the arm
+    """
+
+    values: Array
+    std: Array
+    shared: dict[Place, tuple[ParameterDifference, ...]]
+
+
+def fit_to_simulation(diagnosis: Diagnosis, simulated: Sequence[Recording], options: Options) -> SimulatedFit:
+    """Fit the final model of a diagnosis to a simulator's recordings.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        of real recordings
+    simulated : sequence of Recording
+        what the simulator records
+    options : Options
+        of the identification
+    """
+    found = identify(diagnosis.robot, simulated, (), options)
+    final = diagnosis.selection.fit
+    lasting = [term for term in final.model.terms if not isinstance(term.effect, TimeLocalEffect)]
+    start = _in_columns_of(final.model, nominal_model(found), lasting)
+    conditioners = [Conditioner.survey(recording, diagnosis.robot) for recording in simulated]
+    base, cutoff = start.structure.base, diagnosis.cutoff_hz
+    rows = Observations.prepare(conditioners, diagnosis.robot, base, cutoff, start.steepness)
+    rows, pure_error = with_noise(rows, with_terms(start, ()), [term.effect for term in lasting])
+    rows = rows.with_weightings(row_weightings(rows, start))
+    fit = Fitter(rows).fit(start)
+    inflation = 1.0 if pure_error else fit.inflation()
+    variance = np.maximum(np.diag(fit.covariance), 0.0) * inflation
+    std = np.sqrt(variance[: start.structure.size])
+    return SimulatedFit(fit.model.parameters, std, _shared(diagnosis, fit, inflation))
+
+
+def _in_columns_of(final: ExtendedModel, simulated: ExtendedModel, terms: Sequence[Term]) -> ExtendedModel:
+    """The simulator's model in the columns of the final one: terms that it has not begin at zero."""
+    known = dict(zip(simulated.structure.names, simulated.parameters, strict=True))
+    parameters = np.array([known.get(name, 0.0) for name in final.structure.names])
+    kept = replace(final, parameters=parameters, stated=(None,) * len(final.constants))
+    return with_terms(kept, terms)
+
+
+def _shared(diagnosis: Diagnosis, fit: Fit, inflation: float) -> dict[Place, tuple[ParameterDifference, ...]]:
+    """Effects of the final model that the simulator's recordings show too."""
+    real = diagnosis.selection.fit
+    pairs = zip(real.model.terms, real.model.term_places(), strict=True)
+    lasting = [(term, place) for term, place in pairs if not isinstance(term.effect, TimeLocalEffect)]
+    names = [joint.name for joint in diagnosis.robot.joints]
+    found: dict[Place, tuple[ParameterDifference, ...]] = {}
+    simulated = zip(fit.model.terms, fit.model.term_places(), strict=True)
+    for (term, place), (own, at) in zip(lasting, simulated, strict=True):
+        count = len(own.coefficients)
+        spread = fit.covariance[at, at][:count, :count] * inflation
+        strength = float(own.coefficients @ np.linalg.pinv(spread, hermitian=True) @ own.coefficients)
+        of_real = float(np.linalg.norm(own.coefficients) / max(np.linalg.norm(term.coefficients), 1e-300))
+        if strength > PRESENT**2 and of_real > OF_REAL:
+            errors = np.diag(spread) + np.diag(real.covariance[place, place])[:count] * diagnosis.inflation
+            differences = tuple(
+                ParameterDifference(
+                    f"{coefficient.name} of {term.effect.name(names)}",
+                    float(own.coefficients[number]),
+                    float(term.coefficients[number]),
+                    float(np.sqrt(errors[number])),
+                )
+                for number, coefficient in enumerate(term.effect.coefficients)
+            )
+            key = (term.effect.id, term.effect.joint)
+            found[key] = (*found.get(key, ()), *differences)
+    return found

@@ -1,0 +1,84 @@
+"""From a robot and recordings to what its model leaves out: the whole way, in the order of the steps."""
+
+from collections.abc import Sequence
+
+from threadpoolctl import ThreadpoolController
+
+from tauscope.diagnosis.findings.diagnosed import Diagnosis
+from tauscope.diagnosis.findings.finding import Finding, FitSizes
+from tauscope.diagnosis.findings.plain import undeclared_offsets, with_plain_terms
+from tauscope.diagnosis.fitting.friction_slopes import (
+    open_slopes,
+    open_stribeck,
+    with_fitting_slopes,
+    with_fitting_stribeck,
+)
+from tauscope.diagnosis.in_band import Progress, concluded, confirming_rows, selected, selector_on
+from tauscope.diagnosis.model.nominal import nominal_model, setting_of
+from tauscope.diagnosis.observations.band import diagnosis_cutoff
+from tauscope.diagnosis.observations.observations import Observations
+from tauscope.diagnosis.second_look import looked_again
+from tauscope.effects import possible_effects
+from tauscope.identification import Options, identify
+from tauscope.recording.conditioning import Conditioner
+from tauscope.recording.recording import Recording
+from tauscope.robot import Robot
+
+__all__ = ["Diagnosis", "Finding", "FitSizes", "diagnose"]
+
+DEFAULT = Options()
+"""An identification as nobody asked otherwise."""
+
+
+@ThreadpoolController().wrap(limits=1, user_api="blas")  # many small factors: threads cost more than they bring
+def diagnose(
+    robot: Robot,
+    recordings: Sequence[Recording],
+    held_out: Sequence[Recording] = (),
+    options: Options = DEFAULT,
+    progress: Progress = lambda step: None,
+) -> Diagnosis:
+    """Say what the best rigid-body and friction model of an arm leaves out.
+
+    Parameters
+    ----------
+    robot : Robot
+        the arm
+    recordings : sequence of Recording
+        what is explained; each one continuous motion
+    held_out : sequence of Recording
+        what findings are confirmed by
+    options : Options
+        of the identification of the nominal model
+    progress : callable
+        told the name of each step as it begins
+
+    Returns
+    -------
+    Diagnosis
+        findings with their evidence, and what could not have been seen
+
+    Raises
+    ------
+    TauscopeError
+        where the recordings cannot even answer what the parameters are
+    """
+    identification = identify(robot, recordings, held_out, options, progress)
+    progress("prepare observations")
+    surveyed = [Conditioner.survey(recording, robot) for recording in recordings]
+    unseen = [Conditioner.survey(recording, robot) for recording in held_out]
+    model = nominal_model(identification)
+    cutoff = diagnosis_cutoff(surveyed, identification, model.steepness)
+    rows = Observations.prepare(surveyed, robot, identification.structure.base, cutoff, model.steepness)
+    confirming = confirming_rows(unseen, identification, cutoff, model.steepness)
+    setting = setting_of(model, rows, surveyed, cutoff)
+    progress("estimate noise")
+    selector = selector_on(rows, confirming, model, possible_effects(setting))
+    progress("compare effects")
+    model = with_fitting_slopes(model, selector.fitter, open_slopes(identification), setting.speed)
+    model = with_fitting_stribeck(model, selector.fitter, open_stribeck(identification), setting.speed)
+    selection, selector = selected(selector, model, identification, setting, progress)
+    progress("weigh the evidence")
+    found = concluded(identification, setting, selector, selection, cutoff)
+    found = looked_again(found, surveyed, unseen, progress)
+    return with_plain_terms(found, undeclared_offsets(found))

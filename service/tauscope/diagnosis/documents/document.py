@@ -1,0 +1,315 @@
+"""A diagnosis turned into its document."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tauscope.diagnosis.documents.result import (
+    ConstancyEntry,
+    DetectableEntry,
+    DiagnosisDocument,
+    DifferenceEntry,
+    FindingEntry,
+    FitChangeEntry,
+    FitChangesEntry,
+    MismatchEntry,
+    MovedEntry,
+    NextExperimentEntry,
+    QuantityEntry,
+    ShiftEntry,
+    WhereEntry,
+)
+from tauscope.diagnosis.findings.diagnosed import Diagnosis
+from tauscope.diagnosis.findings.elsewhere import spread
+from tauscope.diagnosis.findings.finding import Finding
+from tauscope.diagnosis.findings.location import JointMismatch, Place
+from tauscope.diagnosis.findings.stand_in import DOUBTED
+from tauscope.diagnosis.findings.verdict import Verdict
+from tauscope.diagnosis.model.term import Term
+from tauscope.diagnosis.model.torque_scale import on_the_arm
+from tauscope.diagnosis.next_experiment import PlannedExperiment
+from tauscope.diagnosis.selection.shape_error import GAIN, LOAD_FRICTION
+from tauscope.effects import Effect, Quantity, TimeLocalEffect, catalogue
+from tauscope.recording.recording import Array
+
+SHIFTS_FROM = 3.0
+"""Standard errors from which a parameter's shift is told."""
+
+UNKNOWN = "unknown"
+
+
+def document(
+    diagnosis: Diagnosis, planned: PlannedExperiment | None = None, trajectory: str | None = None
+) -> DiagnosisDocument:
+    """The document of a diagnosis.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        the result of `diagnose`, or of its comparison with a given model
+    planned : PlannedExperiment or None
+        the next motion, where one was planned
+    trajectory : str or None
+        file that holds it
+
+    Returns
+    -------
+    DiagnosisDocument
+        plain data; `model_dump_json(by_alias=True)` writes it
+    """
+    names = [joint.name for joint in diagnosis.robot.joints]
+    return DiagnosisDocument(
+        robot=diagnosis.robot.name,
+        joints=names,
+        against=diagnosis.against,
+        verdict=diagnosis.verdict.value,
+        noise_std=_floats(diagnosis.noise_std),
+        noise_method="periods" if diagnosis.pure_error else "residual",
+        cutoff_hz=diagnosis.cutoff_hz,
+        mismatch=[
+            _mismatch(each, names, significant=significant)
+            for each, significant in zip(diagnosis.mismatch, diagnosis.mismatched, strict=True)
+        ],
+        findings=[*(_finding(each, diagnosis, names) for each in diagnosis.findings), *_unknown(diagnosis, names)],
+        fit=_fit_changes(diagnosis),
+        constancy=_constancy(diagnosis),
+        detectable=_detectable(diagnosis, names),
+        parameter_differences=_differences(diagnosis),
+        parameter_shifts=_shifts(diagnosis),
+        next_experiment=_next_experiment(diagnosis, names, planned, trajectory),
+    )
+
+
+def parameter_names(diagnosis: Diagnosis) -> list[str]:
+    """Readable names of all parameters of the final model, in their order.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        the result
+    """
+    model = diagnosis.selection.fit.model
+    joints = [joint.name for joint in diagnosis.robot.joints]
+    names = [*model.structure.names, *(f"log {name} {joints[joint]}" for joint, name in model.constants)]
+    for term in model.terms:
+        own = [each.name for each in term.effect.coefficients]
+        own += [term.effect.shapes[place].name for place in term.free_shapes]
+        names += [f"{name} of {term.effect.name(joints)}" for name in own]
+    return names
+
+
+def _floats(values: np.ndarray) -> list[float]:
+    return [float(value) for value in values]
+
+
+def _fit_changes(diagnosis: Diagnosis) -> FitChangesEntry:
+    before, after = diagnosis.before, diagnosis.after
+    held_out = None
+    if before.held_out is not None and after.held_out is not None:
+        held_out = FitChangeEntry(rms_before=_floats(before.held_out), rms_after=_floats(after.held_out))
+    train = FitChangeEntry(rms_before=_floats(before.train), rms_after=_floats(after.train))
+    return FitChangesEntry(train=train, held_out=held_out)
+
+
+def _constancy(diagnosis: Diagnosis) -> ConstancyEntry:
+    names = parameter_names(diagnosis)
+    moved = [
+        MovedEntry(parameter=names[move.parameter], between=list(move.between), shift_in_std=move.shift_in_std)
+        for move in diagnosis.constancy.moves
+    ]
+    return ConstancyEntry(p_value=diagnosis.constancy.p_value, moved=moved)
+
+
+def _detectable(diagnosis: Diagnosis, names: Sequence[str]) -> list[DetectableEntry]:
+    return [
+        DetectableEntry(
+            effect=each.effect,
+            joint=None if each.joint is None else names[each.joint],
+            minimum=each.minimum,
+            unit=_of(each.effect).unit_at(each.unit, diagnosis.setting, each.joint),
+            visible=each.visible,
+        )
+        for each in diagnosis.detectable
+    ]
+
+
+def _differences(diagnosis: Diagnosis) -> list[DifferenceEntry]:
+    return [
+        DifferenceEntry(
+            parameter=each.parameter,
+            simulation=each.simulation,
+            real=each.real,
+            std=each.std,
+            difference_in_std=each.in_std,
+        )
+        for each in diagnosis.differences
+    ]
+
+
+def _of(effect_id: str) -> type[Effect]:
+    return next(effect for effect in catalogue() if effect.id == effect_id)
+
+
+def _where(place: Place | None) -> WhereEntry | None:
+    if place is None:
+        return None
+    return WhereEntry(
+        variable=place.variable, range=[place.low, place.high], share=place.share, recording=place.recording
+    )
+
+
+def _mismatch(found: JointMismatch, names: Sequence[str], *, significant: bool) -> MismatchEntry:
+    return MismatchEntry(
+        joint=names[found.joint],
+        excess_rms=found.excess_rms,
+        significant=significant,
+        where=_where(found.place) if significant else None,
+        time=_where(found.time) if significant else None,
+    )
+
+
+def _finding(finding: Finding, diagnosis: Diagnosis, names: Sequence[str]) -> FindingEntry:
+    effect = finding.terms[0].effect
+    quantities = _quantities(finding, diagnosis)
+    others = list({option.candidate.effect.name(names): None for option in finding.alternatives})
+    before, after = finding.before, finding.after
+    return FindingEntry(
+        effect=effect.id,
+        joint=None if effect.joint is None else names[effect.joint],
+        probability=finding.probability,
+        equivalent=others,
+        equation=effect.equation,
+        parameters=[QuantityEntry(name=q.name, value=q.value, std=q.std, unit=q.unit) for q in quantities],
+        statement=_statement(finding, quantities, others, diagnosis),
+        gain=finding.gain,
+        confirmed=finding.confirmed,
+        rms_before=_floats(before.train),
+        rms_after=_floats(after.train),
+        held_out_rms_before=None if before.held_out is None else _floats(before.held_out),
+        held_out_rms_after=None if after.held_out is None else _floats(after.held_out),
+    )
+
+
+def _quantities(finding: Finding, diagnosis: Diagnosis) -> list[Quantity]:
+    """Parameters of all terms; those after the first are numbered."""
+    found: list[Quantity] = []
+    for number, (term, covariance) in enumerate(zip(finding.terms, finding.covariances, strict=True), start=1):
+        sized = on_the_arm(diagnosis.selection.fit.model, term)
+        own = _told(sized, diagnosis, covariance)
+        own = spread(own, [(each.chance, _told(each.term, diagnosis)) for each in finding.elsewhere])
+        suffix = "" if number == 1 else f"_{number}"
+        found += [Quantity(f"{each.name}{suffix}", each.value, each.std, each.unit) for each in own]
+    return found
+
+
+def _told(term: Term, diagnosis: Diagnosis, covariance: Array | None = None) -> tuple[Quantity, ...]:
+    """The parameters of one term; without standard errors where their covariance is not given."""
+    if covariance is None:
+        covariance = np.zeros((len(term.coefficients) + len(term.shape),) * 2)
+    return term.effect.quantities(diagnosis.setting, term.coefficients, term.shape, covariance)
+
+
+def _why_behind(finding: Finding) -> str:
+    """Why a finding may be none beside the one that it is behind."""
+    if finding.terms[0].effect.id == GAIN and finding.behind is not None and finding.behind.id == LOAD_FRICTION:
+        return "it may be none: a gear's efficiency, and load friction of another formula, show as both"
+    return "it is so small that it may be an error of that effect's formula"
+
+
+def _statement(finding: Finding, quantities: Sequence[Quantity], others: Sequence[str], diagnosis: Diagnosis) -> str:
+    term = finding.terms[0]
+    names = [joint.name for joint in diagnosis.robot.joints]
+    sizes = ", ".join(f"{q.name} = {q.value:.4g} ± {q.std:.2g} {q.unit}" for q in quantities[:4])
+    when = ""
+    if isinstance(term.effect, TimeLocalEffect):
+        names_of_recordings = diagnosis.fitter.observations.names
+        when = f", {term.effect.when(term.coefficients, term.shape, names_of_recordings, diagnosis.setting.durations)}"
+    doubt = f"; these data cannot tell it from {', '.join(others)}" if others else ""
+    if finding.behind is not None:
+        doubt += f"; beside {finding.behind.name(names)} {_why_behind(finding)}"
+    if finding.as_law < DOUBTED:
+        doubt += "; so much is left beside it that it may stand in for something that the catalogue does not have"
+    return f"{term.effect.where(names)}: {term.effect.meaning}{when} ({sizes}){doubt}; {term.effect.remedy}"
+
+
+def _unknown(diagnosis: Diagnosis, names: Sequence[str]) -> list[FindingEntry]:
+    """What is significant and not explained, joint by joint, most of all first, where nothing could be named at all."""
+    if diagnosis.verdict is not Verdict.UNEXPLAINED:
+        return []
+    before = diagnosis.before
+    held_out = None if before.held_out is None else _floats(before.held_out)
+    entries = [
+        FindingEntry(
+            effect=UNKNOWN,
+            joint=names[found.joint],
+            probability=1.0,
+            equivalent=[],
+            equation="",
+            parameters=[],
+            statement=f"{names[found.joint]}: a significant mismatch of {found.excess_rms:.3g} rms that nothing in the"
+            " catalogue explains: look at the residual where it concentrates",
+            gain=float(diagnosis.misfit_before.excess[found.joint]),
+            confirmed=None,
+            rms_before=_floats(before.train),
+            rms_after=_floats(diagnosis.after.train),
+            held_out_rms_before=held_out,
+            held_out_rms_after=held_out,
+        )
+        for found, significant in zip(diagnosis.mismatch, diagnosis.mismatched, strict=True)
+        if significant
+    ]
+    return sorted(entries, key=lambda each: -each.gain)
+
+
+def _shifts(diagnosis: Diagnosis) -> list[ShiftEntry]:
+    """Nominal parameters that moved when the findings were added."""
+    before, after = diagnosis.selection.nominal, diagnosis.selection.fit
+    if not diagnosis.findings:
+        return []
+    inflation = 1.0 if diagnosis.pure_error else after.inflation()
+    size = before.model.structure.size
+    std = np.sqrt(np.maximum(np.diag(before.covariance)[:size] * inflation, 1e-300))
+    shifts = (after.model.parameters - before.model.parameters) / std
+    order = np.argsort(-np.abs(shifts))
+    return [
+        ShiftEntry(
+            parameter=before.model.structure.names[place],
+            before=float(before.model.parameters[place]),
+            after=float(after.model.parameters[place]),
+            shift_in_std=float(shifts[place]),
+        )
+        for place in order
+        if abs(shifts[place]) > SHIFTS_FROM
+    ]
+
+
+def _next_experiment(
+    diagnosis: Diagnosis, names: Sequence[str], planned: PlannedExperiment | None, trajectory: str | None
+) -> NextExperimentEntry | None:
+    """The motion that would tell equivalents apart, or show what an inconclusive motion hides."""
+    separates, why = _open_question(diagnosis, names)
+    if planned is not None:
+        why = f"{why}; planned: {planned.words}" if why else planned.words
+    return NextExperimentEntry(separates=separates, trajectory=trajectory, why=why) if why else None
+
+
+def _open_question(diagnosis: Diagnosis, names: Sequence[str]) -> tuple[list[str], str]:
+    """What is to be told apart, and the motion for it in words; empty where nothing is open."""
+    for finding in diagnosis.findings:
+        if finding.alternatives:
+            effects = [finding.terms[0].effect, *(option.candidate.effect for option in finding.alternatives)]
+            motions = dict.fromkeys(effect.revealing_motion for effect in effects)
+            return [effect.name(names) for effect in effects], "record " + "; and ".join(motions)
+    if diagnosis.verdict is Verdict.INCONCLUSIVE:
+        moved = sorted({parameter_names(diagnosis)[move.parameter] for move in diagnosis.constancy.moves})
+        if diagnosis.constancy.holds:
+            why = "the training motion does not say what held-out motion asks for"
+        else:
+            why = "the parameters do not hold from one recording to the next"
+        why += f" ({', '.join(moved[:4])})" if moved else ""
+        why += ": record one motion through the whole range of positions and speeds, slow reversals included"
+        return [], why
+    if diagnosis.verdict is Verdict.UNEXPLAINED:
+        why = "repeat the same motion several times and slower: what repeats with time, angle or speed shows its kind"
+        return [UNKNOWN], why
+    return [], ""

@@ -1,0 +1,32 @@
+"""Links that bodies can have, nearest to what the final model says of them."""
+
+import numpy as np
+
+from tauscope.diagnosis.findings.diagnosed import Diagnosis
+from tauscope.identification.least_squares import Solution
+from tauscope.identification.physical_estimate import consistent_estimate
+from tauscope.robot import LinkInertia
+
+SMALLEST = 1e-12
+"""Eigenvalues of the scaled covariance below this share of the largest are no direction."""
+
+
+def consistent_links(diagnosis: Diagnosis) -> tuple[LinkInertia, ...]:
+    """The nearest physically consistent links to the final model, in the metric of its covariance.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        the result
+    """
+    fit = diagnosis.selection.fit
+    structure, size = fit.model.structure, fit.model.structure.size
+    covariance = fit.covariance[:size, :size] * diagnosis.inflation
+    scale = np.sqrt(np.maximum(np.diag(covariance), np.finfo(float).tiny))
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    known = values > SMALLEST * values[-1]
+    factor = (vectors[:, known] / np.sqrt(values[known])).T / scale
+    spread = scale[:, None] * vectors[:, known] * np.sqrt(values[known])
+    parameters = fit.model.parameters
+    solution = Solution(parameters, factor, factor @ parameters, spread, np.zeros(size, dtype=bool))
+    return consistent_estimate(structure, solution).links

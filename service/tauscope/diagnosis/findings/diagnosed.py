@@ -1,0 +1,162 @@
+"""What a diagnosis comes to, with the fits that it rests on."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal
+
+from tauscope.diagnosis.findings.constancy import Constancy
+from tauscope.diagnosis.findings.detectability import Detectable
+from tauscope.diagnosis.findings.finding import Finding, FitSizes, in_order
+from tauscope.diagnosis.findings.location import JointMismatch
+from tauscope.diagnosis.findings.verdict import Evidence, Verdict, verdict
+from tauscope.diagnosis.fitting.fit import Fitter
+from tauscope.diagnosis.fitting.lack_of_fit import LackOfFit
+from tauscope.diagnosis.screening.screen import Screen
+from tauscope.diagnosis.selection.choice import Selection
+from tauscope.diagnosis.selection.confirmation import HeldOut
+from tauscope.effects import Setting
+from tauscope.identification import Identification
+from tauscope.recording.recording import Array
+from tauscope.robot import Robot
+
+EXPLAINED = 20.0
+"""Energy that findings take off a joint's residual, in noise variances, from which there was something to explain."""
+
+
+@dataclass(frozen=True)
+class ParameterDifference:
+    """One parameter that a simulation has wrong.
+
+    parameter : str
+        its name
+    simulation, real : float
+        its values [SI]
+    std : float
+        standard error of the difference
+    """
+
+    parameter: str
+    simulation: float
+    real: float
+    std: float
+
+    @property
+    def in_std(self) -> float:
+        """Real less simulation in standard errors."""
+        return (self.real - self.simulation) / max(self.std, 1e-300)
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """What was found.
+
+    identification : Identification
+        the nominal model
+    setting : Setting
+        the arm and the ranges of its motion
+    selection : Selection
+        nominal and final model, and what was tried
+    findings : tuple of Finding
+        most explained energy first
+    mismatch : tuple of JointMismatch
+        one a joint
+    misfit_before, misfit_after : LackOfFit
+        what nominal and final model leave
+    constancy : Constancy
+        of the final model's parameters
+    detectable : tuple of Detectable
+        one an effect and place
+    before, after : FitSizes
+        residuals of the model that the recordings are compared with, and of the final one
+    noise_std : (n,) float64
+        torque noise a sample at the recorded rate [Nm or N]
+    pure_error : bool
+        whether the noise is known from repetitions
+    level : float
+        chance of a false name that each form was given
+    cutoff_hz : float
+        band of the comparison [Hz]
+    screen : Screen
+        of the training recordings
+    fitter : Fitter
+        of the same
+    held_out : HeldOut or None
+        the others
+    against : str
+        ``identified``, ``model`` or ``simulation``
+    differences : tuple of ParameterDifference
+        what the given model has wrong
+    """
+
+    identification: Identification
+    setting: Setting
+    selection: Selection
+    findings: tuple[Finding, ...]
+    mismatch: tuple[JointMismatch, ...]
+    misfit_before: LackOfFit
+    misfit_after: LackOfFit
+    constancy: Constancy
+    detectable: tuple[Detectable, ...]
+    before: FitSizes
+    after: FitSizes
+    noise_std: Array
+    pure_error: bool
+    level: float
+    cutoff_hz: float
+    screen: Screen
+    fitter: Fitter
+    held_out: HeldOut | None
+    against: Literal["identified", "model", "simulation"] = "identified"
+    differences: tuple[ParameterDifference, ...] = ()
+
+    @property
+    def robot(self) -> Robot:
+        """The arm."""
+        return self.identification.robot
+
+    @property
+    def verdict(self) -> Verdict:
+        """As a whole."""
+        return verdict(
+            Evidence(
+                len(self.findings),
+                any(self.mismatched),
+                any(self.misfit_after.significant),
+                self.constancy.holds,
+                self.predicts,
+            )
+        )
+
+    @property
+    def mismatched(self) -> list[bool]:
+        """Per joint, whether there is something to explain: what cannot be measured counts where predictions fail.
+
+        What findings explain was there, also where the residual's power alone would not have told.
+        """
+        agreed = self.constancy.holds and self.predicts
+        tested = self.misfit_before.mismatch if agreed else self.misfit_before.significant
+        terms = [term for finding in self.findings for term in finding.terms]
+        touched = {joint for term in terms for joint in term.effect.touched(len(tested))}
+        explained = [each.explained > EXPLAINED * self.inflation for each in self.mismatch]
+        return [told or (explained[joint] and joint in touched) for joint, told in enumerate(tested)]
+
+    @cached_property
+    def predicts(self) -> bool:
+        """Whether the final model predicts the held-out recordings, where there are any."""
+        return self.held_out is None or self.held_out.predicted_by(self.selection.fit.model)
+
+    @property
+    def inflation(self) -> float:
+        """Factor by which the residual exceeds the modelled noise; 1 where that is known from repetitions."""
+        return 1.0 if self.pure_error else self.selection.fit.inflation()
+
+    def with_findings(self, added: Sequence[Finding]) -> "Diagnosis":
+        """The same with more findings.
+
+        Parameters
+        ----------
+        added : sequence of Finding
+            in any order
+        """
+        return replace(self, findings=in_order([*self.findings, *added]))

@@ -1,0 +1,149 @@
+"""Where the mismatch is: at which joint, and in which part of its motion.
+
+Without findings it is what the residual's power exceeds the noise's by. Where findings explain it, the noise need not
+be known: it is in the residual without them and in that with them, and their difference is free of it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tauscope.diagnosis.fitting.fit import Fit
+from tauscope.diagnosis.model.residual import residual_rows
+from tauscope.diagnosis.observations.observations import BoolArray, Observations
+from tauscope.diagnosis.selection.choice import Selection
+from tauscope.recording.recording import Array
+
+BINS = 12
+WINDOW = 3
+"""Neighbouring bins that make a place."""
+
+CONCENTRATED = 0.45
+"""Share of the excess within `WINDOW` of `BINS` equally full bins from which it has a place."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """A range of a variable in which excess residual concentrates.
+
+    variable : str
+        ``velocity``, ``position``, ``load``, ``acceleration``, ``time`` or ``motor_position``
+    low, high : float
+        the range [SI]
+    share : float
+        of the excess that lies within it
+    recording : str or None
+        for ``time``, in which recording
+    """
+
+    variable: str
+    low: float
+    high: float
+    share: float
+    recording: str | None = None
+
+
+@dataclass(frozen=True)
+class JointMismatch:
+    """Excess residual of one joint.
+
+    joint : int
+        joint index, from 0
+    excess_rms : float
+        root of what the residual's power exceeds the noise's by, in the common band [Nm or N]
+    explained : float
+        what the findings take off the whitened residual's energy [noise variances]
+    place : Place or None
+        where it concentrates, most of all but in time
+    time : Place or None
+        when it concentrates, where it does
+    """
+
+    joint: int
+    excess_rms: float
+    explained: float
+    place: Place | None
+    time: Place | None
+
+
+def locate(selection: Selection, observations: Observations, left: Sequence[bool]) -> tuple[JointMismatch, ...]:
+    """Excess residual of every joint.
+
+    Parameters
+    ----------
+    selection : Selection
+        models without and with findings
+    observations : Observations
+        the rows that both were fitted to
+    left : sequence of bool, length n
+        whether more than noise is left with the findings
+    """
+    nominal, fit = selection.nominal, selection.fit
+    before = residual_rows(nominal.model, observations)
+    after = residual_rows(fit.model, observations) if selection.choices else None
+    signals = [nominal.model.signals(piece) for piece in observations]
+    found = []
+    for joint, pieces in enumerate(before):
+        used = np.concatenate([piece.used[joint].ravel() for piece in observations])
+        noise: Array | float = observations.noise[joint].model.variance
+        if after is not None and not left[joint]:
+            noise = np.concatenate([rows[0] for rows in after[joint]])[used] ** 2
+        power = np.concatenate([rows[0] for rows in pieces])[used] ** 2 - noise
+        places = []
+        kinds = {"velocity": "velocity", "position": "position", "load": "load", "acceleration": "acceleration"}
+        for variable, name in kinds.items():
+            own = [p.reduced(getattr(s, name)[joint][None])[0] for p, s in zip(observations, signals, strict=True)]
+            places.append(_concentration(variable, np.concatenate(own)[used], power))
+        ratio = observations.robot.joints[joint].gear_ratio
+        if ratio is not None and abs(ratio) > 1.0:
+            angle = [
+                p.reduced(np.mod(s.position[joint] * ratio, 2.0 * np.pi)[None])[0]
+                for p, s in zip(observations, signals, strict=True)
+            ]
+            places.append(_concentration("motor_position", np.concatenate(angle)[used], power))
+        best = max((each for each in places if each is not None), key=lambda each: each.share, default=None)
+        excess = float(np.sqrt(max(float(power.mean()), 0.0)))
+        explained = _energy(nominal, joint) - _energy(fit, joint)
+        found.append(JointMismatch(joint, excess, explained, best, _in_time(observations, used, power)))
+    return tuple(found)
+
+
+def _energy(fit: Fit, joint: int) -> float:
+    """Energy of a joint's whitened residual."""
+    residual = fit.projection.residual[joint]
+    return float(residual @ residual)
+
+
+def _concentration(variable: str, values: Array, power: Array) -> Place | None:
+    """The window of neighbouring bins that holds most of the excess."""
+    total = float(power.sum())
+    edges = np.quantile(values, np.linspace(0.0, 1.0, BINS + 1))
+    if total <= 0.0 or edges[0] == edges[-1]:
+        return None
+    bins = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, BINS - 1)
+    sums = np.bincount(bins, power, minlength=BINS)
+    windows = np.convolve(sums, np.ones(WINDOW), mode="valid")
+    best = int(np.argmax(windows))
+    share = float(windows[best] / total)
+    if share < CONCENTRATED:
+        return None
+    return Place(variable, float(edges[best]), float(edges[best + WINDOW]), min(share, 1.0))
+
+
+def _in_time(observations: Observations, used: BoolArray, power: Array) -> Place | None:
+    """When the excess concentrates, in any one recording."""
+    recording = np.concatenate(
+        [np.full(piece.repetitions * piece.rows, piece.prepared.recording) for piece in observations]
+    )[used]
+    instants = np.concatenate([piece.row_times() for piece in observations])[used]
+    total = float(power.sum())
+    best = None
+    for number, name in enumerate(observations.names):
+        own = recording == number
+        if total <= 0.0 or not own.any() or float(power[own].sum()) < CONCENTRATED * total:
+            continue
+        place = _concentration("time", instants[own], power[own])
+        if place is not None and (best is None or place.share > best.share):
+            best = Place("time", place.low, place.high, place.share, name)
+    return best

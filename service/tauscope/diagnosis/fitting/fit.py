@@ -1,0 +1,330 @@
+"""The extended model fitted to whitened rows by Gauss–Newton steps: Θ, K_v, δ, effects and their shapes together."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.diagnosis.fitting.bounded_step import bounded_step
+from tauscope.diagnosis.fitting.projection import JointColumns, Projection, fitted_parameters, project
+from tauscope.diagnosis.fitting.white_columns import WhiteColumns
+from tauscope.diagnosis.model.extended import ExtendedModel, with_terms
+from tauscope.diagnosis.model.term import Term
+from tauscope.diagnosis.observations.observations import Observations
+from tauscope.effects.last_few import LastFew
+from tauscope.recording.recording import Array
+
+STEPS = 25
+SETTLED = 0.05
+"""Energy that a step takes or promises to take off, below which there is none to follow [noise variances]."""
+
+LARGEST_LOG_STEP = 0.4
+"""Change of a constant's logarithm in one step."""
+
+SHAPE_STEP = 0.15
+"""Change of a linear shape parameter in one step, relative to its bounds."""
+
+TRUSTED = (1.0, 0.25, 0.06, 0.015)
+"""Parts of those changes that are tried, one after the other, until less is left than before."""
+
+FARTHEST = 3.0
+"""Factor beyond which a constant of the friction curve does not move from where the identification found it."""
+
+KEPT = 8
+"""Fits without some terms that are kept."""
+
+AT_LIMIT = 1e-6
+"""Part of its largest step within which a constant or a shape is at its limit."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """An extended model at its optimum.
+
+    model : ExtendedModel
+        with fitted parameters
+    projection : Projection
+        of its columns there, without those that would lead out of their bounds; its residual is what one more linear
+        step would leave
+    energy : float
+        Σ r² that the model leaves, the prior's included [noise variances]
+    joint_energies : (n,) float64
+        the same by joint, without the prior's
+    spread : (p, r) float64
+        square root of the covariance; a shape at its bound is as uncertain as if there were none
+    """
+
+    model: ExtendedModel
+    projection: Projection
+    energy: float
+    joint_energies: Array
+    spread: Array
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance of all parameters for white noise of the modelled size, (p, p)."""
+        return self.spread @ self.spread.T
+
+    def inflation(self, *, at_least: float = 1.0) -> float:
+        """Residual energy per degree of freedom: what is left is more than the modelled noise by this factor.
+
+        Parameters
+        ----------
+        at_least : float
+            1 where the noise is known; less where its size is no more than a guess that the fit may correct
+        """
+        return max(at_least, self.energy / self.projection.freedom)
+
+
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """A model as it is.
+
+    model : ExtendedModel
+        the model
+    residual : list of (R_j,) float64
+        what it leaves, whitened
+    """
+
+    model: ExtendedModel
+    residual: list[Array]
+
+    @property
+    def energy(self) -> float:
+        """Σ r² of the data's rows and of the prior's."""
+        _, left = self.model.prior()
+        return float(_energies(self.residual).sum() + left @ left)
+
+
+class Fitter:
+    """Fits extended models to the same observations.
+
+    Parameters
+    ----------
+    observations : Observations
+        the data, noise known
+    """
+
+    def __init__(self, observations: Observations) -> None:
+        self.observations = observations
+        self._white = WhiteColumns(observations)
+        self._without: LastFew[tuple[Fit, tuple[int, ...]], Fit] = LastFew(KEPT)
+
+    def fit(self, model: ExtendedModel, *, steps: int = STEPS) -> Fit:
+        """Fit all parameters.
+
+        Parameters
+        ----------
+        model : ExtendedModel
+            where to start
+        steps : int
+            most Gauss–Newton steps
+        """
+        limits = _constants_limits(model)
+        at = self.linear_optimum(model)
+        projection = self._project(at)
+        for _ in range(steps):
+            if at.energy - projection.energy < SETTLED:
+                break
+            tried = self._descended(at, projection, limits)
+            if tried is None:
+                break
+            gained, at = at.energy - tried.energy, tried
+            projection = self._project(at)
+            if gained < SETTLED:
+                break
+        projection, spread = self._within_limits(at, projection, limits)
+        return Fit(at.model, projection, at.energy, _energies(at.residual), spread)
+
+    def _within_limits(self, at: Tried, projection: Projection, limits: Array) -> tuple[Projection, Array]:
+        """The projection without what would only lead beyond limits, and the spread of all parameters.
+
+        What they would do beyond is nothing that the model can do; but nor does a shape's bound make it known.
+        """
+        stopped = _stopped(at.model, projection.step, limits)
+        if not stopped:
+            return projection, projection.spread
+        constants = [place for place in stopped if _is_constant(at.model, place)]
+        within = self._project(at, but=stopped)
+        if constants == stopped:
+            return within, within.spread
+        return within, self._project(at, but=constants).spread
+
+    def _descended(self, at: Tried, projection: Projection, limits: Array) -> Tried | None:
+        """The longest step after which no more is left than before, as `linear_optimum` gives it."""
+        curved, lower, upper, reach = _room(at.model, limits)
+        last = None
+        for trusted in TRUSTED:
+            low, high = np.maximum(lower, -trusted * reach), np.minimum(upper, trusted * reach)
+            step = bounded_step(projection.step, projection.spread, curved, low, high, reach)
+            if last is not None and np.array_equal(step, last):
+                continue  # it was within these limits before
+            tried, last = self.linear_optimum(_stepped(at.model, step)), step
+            if tried.energy <= at.energy * (1.0 + 1e-12):
+                return tried
+        return None
+
+    def linear_optimum(self, model: ExtendedModel) -> Tried:
+        """The model with the best Θ and coefficients for its shapes.
+
+        A step in a shape that is cut short would else leave coefficients that belong to another shape.
+
+        Parameters
+        ----------
+        model : ExtendedModel
+            with the constants and shapes that it keeps
+        """
+        at = self._tried(model)
+        linear = np.ones(model.size, dtype=bool)
+        linear[model.structure.size : model.structure.size + len(model.constants)] = False
+        linear[list(model.unmoved)] = False
+        for term, place in zip(model.terms, model.term_places(), strict=True):
+            linear[place.start + len(term.coefficients) : place.stop] = False
+        places = np.cumsum(linear) - 1
+        columns = [(own, linear[own.index]) for own in self._white.linear(model)]
+        free = [JointColumns(places[own.index[moves]], own.rows[moves]) for own, moves in columns]
+        step = np.zeros(model.size)
+        step[linear] = fitted_parameters(free, at.residual, int(linear.sum()))
+        return self._tried(_stepped(model, step))
+
+    def without(self, fit: Fit, places: Sequence[int]) -> Fit:
+        """The model fitted anew without some of its terms; the last few are kept, as several ask for the same.
+
+        Parameters
+        ----------
+        fit : Fit
+            the model
+        places : sequence of int
+            of the terms that are left out
+        """
+        terms = [term for place, term in enumerate(fit.model.terms) if place not in places]
+        key = fit, tuple(sorted(places))
+        return self._without.get(key, lambda: self.fit(with_terms(fit.model, terms)))
+
+    def projected(self, model: ExtendedModel) -> Fit:
+        """The linear step at a model as it is, without moving it.
+
+        Parameters
+        ----------
+        model : ExtendedModel
+            the model
+        """
+        projection = self._project(self._tried(model))
+        return Fit(model, projection, projection.energy, _energies(projection.residual), projection.spread)
+
+    def covariance(self, fit: Fit) -> Array:
+        """Covariance of all parameters, those that a term displaced as uncertain as they would be without that, (p, p).
+
+        Parameters
+        ----------
+        fit : Fit
+            the model at its optimum
+        """
+        if not any(term.displaced for term in fit.model.terms):
+            return fit.covariance
+        return self.projected(with_terms(fit.model, [replace(t, displaced=()) for t in fit.model.terms])).covariance
+
+    def white_residual(self, model: ExtendedModel) -> list[Array]:
+        """Whitened residual of a model as it is, (R_j,) a joint.
+
+        Parameters
+        ----------
+        model : ExtendedModel
+            the model
+        """
+        return self._white.residual(model)
+
+    def columns(self, model: ExtendedModel) -> list[JointColumns]:
+        """Whitened columns of all parameters of a model, one entry a joint.
+
+        Parameters
+        ----------
+        model : ExtendedModel
+            the model
+        """
+        return self._white.all(model)
+
+    def _tried(self, model: ExtendedModel) -> Tried:
+        return Tried(model, self._white.residual(model))
+
+    def _project(self, at: Tried, but: Sequence[int] = ()) -> Projection:
+        """The linear step at a model, in all parameters but some."""
+        noise = self.observations.noise
+        rows = sum(own.share * len(row) for own, row in zip(noise, at.residual, strict=True))
+        columns = _without(self._white.all(at.model), but)
+        return replace(project(columns, at.residual, at.model.size, at.model.prior()), independent=rows)
+
+
+def _energies(residual: Sequence[Array]) -> Array:
+    """Σ r² by joint, (n,)."""
+    return np.array([float(row @ row) for row in residual])
+
+
+def _constants_limits(model: ExtendedModel) -> Array:
+    """Logarithms of the lowest and highest value of every constant of the friction curve, (c, 2)."""
+    start = np.log([model.constant(place) for place in range(len(model.constants))])
+    return np.stack([start - np.log(FARTHEST), start + np.log(FARTHEST)], axis=-1)
+
+
+def _stopped(model: ExtendedModel, step: Array, limits: Array) -> list[int]:
+    """Places of the constants and shapes that would move on beyond their limits."""
+    curved, lower, upper, reach = _room(model, limits)
+    wanted, near = step[curved], AT_LIMIT * reach
+    return [int(place) for place in curved[((wanted < 0.0) & (lower > -near)) | ((wanted > 0.0) & (upper < near))]]
+
+
+def _is_constant(model: ExtendedModel, place: int) -> bool:
+    """Whether a parameter is one of the friction curve's constants."""
+    return 0 <= place - model.structure.size < len(model.constants)
+
+
+def _without(columns: list[JointColumns], places: Sequence[int]) -> list[JointColumns]:
+    """The same with nothing in the columns of some parameters."""
+    if not places:
+        return columns
+    return [JointColumns(own.index, np.where(np.isin(own.index, places)[:, None], 0.0, own.rows)) for own in columns]
+
+
+def _room(model: ExtendedModel, limits: Array) -> tuple[NDArray[np.intp], Array, Array, Array]:
+    """Places of constants and shapes, how far each may go down and up, and how far in one step, (k,) each."""
+    first = model.structure.size
+    rows = [
+        (first + place, *(limits[place] - np.log(model.constant(place))), LARGEST_LOG_STEP)
+        for place in range(len(model.constants))
+    ]
+    for term, place in zip(model.terms, model.term_places(), strict=True):
+        effect, count = term.effect, len(term.coefficients)
+        for number, free in enumerate(term.free_shapes):
+            value = float(term.shape[free])
+            low, high = float(effect.lower[free]) - value, float(effect.upper[free]) - value
+            rows.append((place.start + count + number, low, high, _largest_move(term, free)))
+    told = np.array(rows, dtype=np.float64).reshape(-1, 4)
+    return told[:, 0].astype(np.intp), np.minimum(told[:, 1], 0.0), np.maximum(told[:, 2], 0.0), told[:, 3]
+
+
+def _stepped(model: ExtendedModel, step: Array) -> ExtendedModel:
+    """The model moved by a step; rounding leads no shape out of its bounds."""
+    size = model.structure.size
+    terms = list(model.structure.terms)
+    for place, (joint, name) in enumerate(model.constants):
+        if step[size + place]:
+            terms[joint] = replace(terms[joint], **{name: model.constant(place) * float(np.exp(step[size + place]))})
+    moved = []
+    for term, place in zip(model.terms, model.term_places(), strict=True):
+        count = len(term.coefficients)
+        shape = term.shape.copy()
+        free = list(term.free_shapes)
+        shape[free] = np.clip(shape[free] + step[place][count:], term.effect.lower[free], term.effect.upper[free])
+        moved.append(replace(term, shape=shape, coefficients=term.coefficients + step[place][:count]))
+    stepped = replace(
+        model, structure=model.structure.with_terms(tuple(terms)), parameters=model.parameters + step[:size]
+    )
+    return with_terms(stepped, moved)
+
+
+def _largest_move(term: Term, place: int) -> float:
+    """How far one step may move a shape parameter."""
+    if term.effect.shapes[place].logarithmic:
+        return max(LARGEST_LOG_STEP * abs(float(term.shape[place])), np.finfo(float).tiny)
+    return max(SHAPE_STEP * float(term.effect.upper[place] - term.effect.lower[place]), np.finfo(float).tiny)

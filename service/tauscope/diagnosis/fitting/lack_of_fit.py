@@ -1,0 +1,204 @@
+"""Whether anything but noise is left at a joint, without asking what.
+
+Two tests. *Omnibus*: a basis of smooth functions of the joint's state and of time, projected off the model, holds no
+more of the residual's energy per direction than the rest does (F test: an error of the noise's size does not matter).
+*Pure error*: the mean over repetitions differs from the model by no more than repetitions differ among themselves.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from tauscope.diagnosis.fitting.fit import Fit
+from tauscope.diagnosis.observations.observations import Observations, Piece
+from tauscope.effects.side_by_side import side_by_side
+from tauscope.recording.recording import Array
+
+FEATURES = 60
+HATS = 12
+"""Hat functions of time in every recording."""
+
+MEASURABLE = 1.0
+"""Standard errors of the noise's power, as repetitions tell it, that a mismatch exceeds it by."""
+
+DIRECTION = 1e-3
+"""Singular value of the features beside a model, of unit length each, below which there is no direction of its own,
+relative to the largest."""
+
+LEVEL = 1e-3
+"""Chance, over all joints and both tests, at which a mismatch is called significant."""
+
+RARE = 0.01
+"""Chance at one joint, by either test, from which it is worth to look for more there."""
+
+
+@dataclass(frozen=True, eq=False)
+class LackOfFit:
+    """What is left.
+
+    omnibus, pure_error : (n,) float64
+        p-values; 1 where the test could not be made
+    excess : (n,) float64
+        Σ r² beyond the noise's, in noise variances, never negative
+    measurable : (n,) float64
+        the excess from which it exceeds what the noise's own power is uncertain by [noise variances]
+    structured : (n,) float64
+        the part of it that smooth functions of state and time hold, where the omnibus test tells that from chance
+    """
+
+    omnibus: Array
+    pure_error: Array
+    excess: Array
+    measurable: Array
+    structured: Array
+
+    @property
+    def significant(self) -> list[bool]:
+        """Per joint, whether more than noise is left."""
+        level = _level(len(self.omnibus))
+        return [bool(min(a, b) < level) for a, b in zip(self.omnibus, self.pure_error, strict=True)]
+
+    @property
+    def mismatch(self) -> list[bool]:
+        """Per joint, whether it is significant and an excess that can be measured: less is nothing to look for."""
+        pairs = zip(self.significant, self.excess, self.measurable, strict=True)
+        return [significant and bool(excess > least) for significant, excess, least in pairs]
+
+    @property
+    def worth_a_look(self) -> list[bool]:
+        """Per joint, whether so much is left rarely by chance: a search asks more of what it finds than this test."""
+        return [bool(min(a, b) < RARE) for a, b in zip(self.omnibus, self.pure_error, strict=True)]
+
+
+def lack_of_fit(fit: Fit, observations: Observations, *, pure_error: bool, seed: int = 0) -> LackOfFit:
+    """Test what a model leaves.
+
+    Parameters
+    ----------
+    fit : Fit
+        the model at its optimum
+    observations : Observations
+        the rows that it was fitted to
+    pure_error : bool
+        whether their noise is known from repetitions
+    seed : int
+        of the random features
+    """
+    joints = observations.robot.joint_count
+    omnibus, pure = np.ones(joints), np.ones(joints)
+    excess, measurable, structured = np.zeros(joints), np.zeros(joints), np.zeros(joints)
+    rows = sum(own.share * len(row) for own, row in zip(observations.noise, fit.projection.residual, strict=True))
+    share = fit.projection.spread.shape[1] / max(rows, 1.0)
+    repeated = pure_error_rows(observations)
+    freedoms = [
+        noise.share * len(residual) * (1.0 - share)
+        for noise, residual in zip(observations.noise, fit.projection.residual, strict=True)
+    ]
+    tests = side_by_side(lambda joint: _omnibus(fit, observations, joint, freedoms[joint], seed), range(joints))
+    for joint, residual in enumerate(fit.projection.residual):
+        omnibus[joint], beyond_chance = tests[joint]
+        freedom = freedoms[joint]
+        if omnibus[joint] < _level(joints):
+            structured[joint] = max(beyond_chance, 0.0)
+        over = observations.noise[joint].over_repetitions
+        energy = float(residual @ residual) * over  # in what repetitions differ by
+        excess[joint] = max(energy - freedom, 0.0) / over
+        if pure_error and repeated[joint] > 0:  # else a saturated fit of the same rows says what noise is: any excess
+            measurable[joint] = MEASURABLE * np.sqrt(2.0 * freedom * (1.0 + freedom / repeated[joint]))
+        means = freedom - repeated[joint]
+        if (pure_error or over > 1.0) and repeated[joint] > 0 and means > 1.0:
+            ratio = max(energy - repeated[joint], 0.0) / means
+            pure[joint] = float(stats.f.sf(ratio, means, repeated[joint]))
+    return LackOfFit(omnibus, pure, excess, measurable, structured)
+
+
+def pure_error_rows(observations: Observations) -> Array:
+    """Degrees of freedom of what differs between repetitions, (n,).
+
+    Parameters
+    ----------
+    observations : Observations
+        the data
+    """
+    found = np.zeros(observations.robot.joint_count)
+    for piece in observations:
+        number, motion = piece.prepared.recording, piece.prepared.motion
+        runs = observations.repetitions[number] if 0 <= number < len(observations.repetitions) else ()
+        end = float(piece.time[0, -1])
+        for run in runs:
+            first = max(run.start_s, float(piece.time[0, 0]))
+            last = min(run.start_s + run.count * run.length_s, end) - run.length_s
+            found += max(last - first, 0.0) * motion.band.rate_hz
+    return found * np.array([noise.share for noise in observations.noise])
+
+
+def _level(joints: int) -> float:
+    """Chance at which one test at one joint is called significant."""
+    return LEVEL / (2 * joints)
+
+
+def _omnibus(fit: Fit, observations: Observations, joint: int, freedom: float, seed: int) -> tuple[float, float]:
+    """The omnibus test of one joint, as `_f_test` gives it."""
+    rows = [_reduced_features(piece, joint, observations, seed) for piece in observations]
+    white = observations.white(joint, rows)
+    basis = fit.projection.basis[joint]
+    return _f_test(white - (white @ basis.T) @ basis, fit.projection.residual[joint], freedom)
+
+
+def _f_test(columns: Array, residual: Array, freedom: float) -> tuple[float, float]:
+    """p-value of the residual's energy in the columns' span against the rest, and what it has there beyond chance."""
+    scale = np.linalg.norm(columns, axis=1)
+    columns = columns[scale > 1e-9 * max(float(scale.max(initial=0.0)), 1e-300)]
+    if not len(columns):
+        return 1.0, 0.0
+    unit = columns / np.linalg.norm(columns, axis=1)[:, None]
+    energies, axes = np.linalg.eigh(unit @ unit.T)
+    known = energies > DIRECTION**2 * energies[-1]
+    count = int(known.sum())
+    inside = float(np.sum((axes[:, known].T @ (unit @ residual)) ** 2 / energies[known]))
+    rest = float(residual @ residual) - inside
+    freedom -= count
+    if freedom < count or rest <= 0.0:
+        return 1.0, 0.0
+    by_chance = count * rest / freedom
+    return float(stats.f.sf(inside / by_chance, count, freedom)), inside - by_chance
+
+
+def _reduced_features(piece: Piece, joint: int, observations: Observations, seed: int) -> Array:
+    """The features in the common band, (k, P M): the same whatever the model and the noise, and made once."""
+    key = f"features of joint {joint}, seed {seed}"
+    if key not in piece.memory:
+        piece.memory[key] = piece.reduced(_features(piece, joint, observations, seed))
+    return piece.memory[key]
+
+
+def _features(piece: Piece, joint: int, observations: Observations, seed: int) -> Array:
+    """Smooth functions of state and time at the recorded rate, (k, P, N)."""
+    motion = piece.prepared.motion
+    rng = np.random.default_rng([seed, joint])
+    states = np.concatenate([motion.position, motion.velocity], axis=1)
+    reach = np.maximum(_reach(observations), 1e-12)
+    count = observations.robot.joint_count
+    weight = 0.5 * rng.standard_normal((FEATURES, 2 * count)) * (rng.random((FEATURES, 2 * count)) < 1.5 / count)
+    own = (joint, count + joint)
+    weight[:, own] = 1.5 * rng.standard_normal((FEATURES, 2))
+    phase = rng.uniform(0.0, 2.0 * np.pi, FEATURES)
+    waves = np.cos((weight / reach) @ states.T + phase[:, None])
+    of_state = np.repeat(waves[:, None], piece.repetitions, axis=1)
+    ends = [float(each.time.max()) for each in observations if each.prepared.recording == piece.prepared.recording]
+    recordings = sorted({each.prepared.recording for each in observations})
+    hats = np.zeros((HATS * len(recordings), *piece.time.shape))
+    place = recordings.index(piece.prepared.recording) * HATS
+    at = piece.time / max(1e-9, *ends) * (HATS - 1)
+    for number in range(HATS):
+        hats[place + number] = np.maximum(1.0 - np.abs(at - number), 0.0)
+    return np.concatenate([of_state, hats])
+
+
+def _reach(observations: Observations) -> Array:
+    """Standard deviation of every joint's position and velocity, (2 n,)."""
+    motions = [piece.prepared.motion for piece in observations]
+    position = np.concatenate([motion.position for motion in motions]).std(axis=0)
+    velocity = np.concatenate([motion.velocity for motion in motions]).std(axis=0)
+    return np.concatenate([position, velocity])

@@ -1,0 +1,191 @@
+"""Motions to choose the next experiment from: Fourier series of several kinds, sweeps, slow reversals.
+
+All keep the arm's limits of position, speed and acceleration, and of torque as far as the identified model predicts it;
+where that would allow no posture, as far as the robot file's does.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tauscope.diagnosis.next_experiment.sweeps import sweep
+from tauscope.errors import ExcitationError
+from tauscope.excitation import ExcitationOptions
+from tauscope.excitation.setting import Setting
+from tauscope.excitation.slow_reversals import slow_part
+from tauscope.identification import Identification
+from tauscope.robot import FrictionCoefficients, Model, Robot
+from tauscope.trajectory import FourierSegment, FourierSeries, MotionSamples, Trajectory
+
+DURATION_S = 20.0
+"""Of every Fourier series and sweep [s]."""
+
+WIDE = "a wide motion"
+
+KINDS = {
+    "a random motion": (10.0, 5),
+    "a fast motion": (4.0, 4),
+    WIDE: (10.0, 2),
+}
+"""Period [s] and harmonics of the Fourier series."""
+
+SWEEP_SHARES = (0.08, 0.3, 0.8)
+"""Speeds of sweeps, as part of the limit."""
+
+SLOW_POSTURES = 3
+
+WIDEST_OF = 8
+"""Wide motions of which the one that crosses most of the position ranges is taken."""
+
+CHECKED = 2000
+"""Instants at which a motion's torque and range are looked at."""
+
+TAKEN_BACK = 0.75
+"""Factor by which a sweep that needs too much torque is slowed down."""
+
+MOST_TAKEN_BACK = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Primitive:
+    """One motion of the bank.
+
+    kind : str
+        what it is, in words
+    trajectory : Trajectory
+        from rest to rest, within the limits
+    """
+
+    kind: str
+    trajectory: Trajectory
+
+
+class Bank:
+    """Makes motions for one arm.
+
+    Parameters
+    ----------
+    identification : Identification
+        the arm, and the model that predicts its torque
+    rng : numpy.random.Generator
+        source of the motions
+    """
+
+    def __init__(self, identification: Identification, rng: np.random.Generator) -> None:
+        self._rng = rng
+        try:
+            self._prepare(_as_identified(identification))
+        except ExcitationError:
+            # the arm was in some posture: what was identified of a poor motion is no guide where it allows none
+            self._prepare(identification.robot)
+
+    def _prepare(self, robot: Robot) -> None:
+        """Constraints and standing postures of an arm as it is believed to be."""
+        self._settings = {
+            kind: Setting.of(robot, ExcitationOptions(period_s=period, harmonics=harmonics))
+            for kind, (period, harmonics) in KINDS.items()
+        }
+        self._robot = robot
+        first = next(iter(self._settings.values()))
+        self._limits, self._states = first.planned, first.states
+        self._postures = first.feasibility.standing_postures(self._rng)
+
+    def first_look(self, of_each: int) -> Iterator[Primitive]:
+        """Some motions of every kind.
+
+        Parameters
+        ----------
+        of_each : int
+            Fourier series of each kind
+        """
+        for kind in KINDS:
+            yield from self.fourier(kind, of_each)
+        for share in SWEEP_SHARES:
+            yield from self._sweep(share)
+        yield from self._slow_reversals()
+
+    def everywhere(self, count: int) -> Iterator[Primitive]:
+        """Motions through as much of the ranges of positions and speeds as one takes in, slow reversals included.
+
+        Parameters
+        ----------
+        count : int
+            how many are tried
+        """
+        setting = self._settings[WIDE]
+        for _ in range(count):
+            drawn = (setting.feasibility.random_start(self._postures, self._rng) for _ in range(WIDEST_OF))
+            found = [setting.space.series(x) for x in drawn if x is not None]
+            if not found:
+                continue
+            series = max(found, key=self._crossed)
+            slow = slow_part(self._robot, series, self._limits, self._states, SLOW_POSTURES).segments
+            kind = f"{WIDE} and slow reversals in several postures" if slow else WIDE
+            yield Primitive(kind, self._trajectory(_repeated(series), *slow))
+
+    def _crossed(self, series: FourierSeries) -> float:
+        """Part of its position range that the joint with the least of it crosses."""
+        position = series.evaluate(np.linspace(0.0, series.period_s, CHECKED)).position
+        return float((np.ptp(position, axis=0) / (2.0 * self._limits.half_range)).min())
+
+    def fourier(self, kind: str, count: int) -> Iterator[Primitive]:
+        """Random Fourier series about random postures.
+
+        Parameters
+        ----------
+        kind : str
+            of `KINDS`
+        count : int
+            how many are tried
+        """
+        setting = self._settings[kind]
+        for _ in range(count):
+            x = setting.feasibility.random_start(self._postures, self._rng)
+            if x is not None:
+                yield Primitive(kind, self._trajectory(_repeated(setting.space.series(x))))
+
+    def _sweep(self, share: float) -> Iterator[Primitive]:
+        """Constant speed to and fro, slowed down until its torque is there."""
+        for _ in range(MOST_TAKEN_BACK):
+            segment = sweep(self._limits, share, DURATION_S)
+            motion = segment.evaluate(np.linspace(0.0, segment.duration_s, CHECKED))
+            if self._usage(motion) <= 1.0:
+                yield Primitive(f"sweeps at {100.0 * share:.0f} % of the top speed", self._trajectory(segment))
+                return
+            share *= TAKEN_BACK
+
+    def _slow_reversals(self) -> Iterator[Primitive]:
+        setting = next(iter(self._settings.values()))
+        x = setting.feasibility.random_start(self._postures, self._rng)
+        if x is None:
+            return
+        series = setting.space.series(x)
+        slow = slow_part(self._robot, series, self._limits, self._states, SLOW_POSTURES)
+        if slow.segments:
+            yield Primitive("slow reversals in several postures", self._trajectory(*slow.segments))
+
+    def _usage(self, motion: MotionSamples) -> float:
+        return self._states.largest(motion)
+
+    def _trajectory(self, *segments: object) -> Trajectory:
+        names = tuple(joint.name for joint in self._robot.joints)
+        return Trajectory(self._robot.name, names, segments, self._limits)  # pyright: ignore[reportArgumentType]
+
+
+def _repeated(series: FourierSeries) -> FourierSegment:
+    """As many periods as come closest to `DURATION_S`."""
+    return FourierSegment(series, max(1, round(DURATION_S / series.period_s)), 0)
+
+
+def _as_identified(identification: Identification) -> Robot:
+    """The arm with the links and the friction that were identified, for the torque that motions need."""
+    structure, parameters = identification.structure, identification.consistent_parameters
+    friction = []
+    for joint in range(identification.robot.joint_count):
+        columns = {name: structure.coefficient(joint, name) for name in ("stiction", "stribeck", "viscous")}
+        values = {name: 0.0 if at is None else float(parameters[at]) for name, at in columns.items()}
+        values["viscous"] = max(values["viscous"], 0.0)
+        friction.append(FrictionCoefficients(**values))
+    model = Model(tuple(identification.consistent.links), tuple(friction))
+    return replace(identification.robot, model=model)

@@ -1,0 +1,332 @@
+"""The recordings' rows as a diagnosis sees them: in one band, repetitions kept apart, every joint's noise white.
+
+An identification averages a motion's repetitions. Here each counts as the motion that it was: under stiff friction a
+joint that comes to rest creeps a little differently every time, and the average's torque is nobody's. What differs
+between repetitions beyond their motion is noise, or a change over time (`tauscope.diagnosis.noise.floor`).
+"""
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.diagnosis.observations.band import STATE_BANDS, quiet_cutoffs, state_cutoffs
+from tauscope.diagnosis.observations.row_weighting import RowWeighting
+from tauscope.diagnosis.observations.spikes import without_spikes
+from tauscope.diagnosis.observations.whitening import JointNoise
+from tauscope.dynamics.base_parameters import BaseParameters
+from tauscope.identification.dataset import Dataset, PreparedMotion
+from tauscope.recording.conditioning import Conditioner
+from tauscope.recording.conditioning.filters import smooth
+from tauscope.recording.conditioning.position_noise import PositionNoise
+from tauscope.recording.recording import Array
+from tauscope.robot import Robot
+
+BoolArray = NDArray[np.bool_]
+
+LEFT_OUT = 100.0
+"""Factor to the noise of a joint that is left out."""
+
+
+@dataclass(frozen=True)
+class Repetition:
+    """Where the motion of a recording repeats.
+
+    start_s : float
+        since the beginning of the recording [s]
+    length_s : float
+        of one period [s]
+    count : int
+        whole periods
+    """
+
+    start_s: float
+    length_s: float
+    count: int
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """One piece of motion with the torque of every repetition in the common band.
+
+    prepared : PreparedMotion
+        motion and rigid-body columns
+    torque : (n, P, M) float64
+        measured torque in the common band
+    used : (n, P, M) bool
+        rows that rest on measured torque
+    time : (P, N) float64
+        instants at the recorded rate, from the beginning of the recording [s]
+    state_hz : (n,) float64
+        band of each joint's own motion [Hz]
+    position_noise : PositionNoise
+        noise and rounding of the measured positions
+    by_position : (n,) bool
+        joints whose acceleration was made of their positions
+    quiet_hz : (n,) float64 or None
+        bands in which the velocities say most of single samples [Hz]; None for no filter
+    rigid_hz : float or None
+        band in which the accelerations do [Hz]; None for no filter
+    memory : dict
+        what others have made of this piece and may need again
+    """
+
+    prepared: PreparedMotion
+    torque: Array
+    used: BoolArray
+    time: Array
+    state_hz: Array
+    position_noise: PositionNoise
+    by_position: BoolArray
+    quiet_hz: Array | None = None
+    rigid_hz: float | None = None
+    memory: dict[str, Any] = field(default_factory=dict, repr=False)
+
+    @property
+    def velocity_std(self) -> Array:
+        """Noise of the velocity in the motion's own band, (n,) [rad/s or m/s]: σ² = D (2π)² f³/3."""
+        return 2.0 * np.pi * np.sqrt(self.position_noise.density * self.state_hz**3 / 3.0)
+
+    @property
+    def repetitions(self) -> int:
+        """P."""
+        return self.torque.shape[1]
+
+    @property
+    def rows(self) -> int:
+        """Rows of one repetition, M."""
+        return self.torque.shape[2]
+
+    def reduced(self, values: Array) -> Array:
+        """Signals (k, N) or (k, P, N) in the common band, all repetitions one after another, (k, P M).
+
+        Parameters
+        ----------
+        values : (k, N) or (k, P, N) float64
+            at the recorded rate
+        """
+        rows = self.prepared.motion.band.reduce(values)
+        return self.repeated(rows) if rows.ndim == 2 else rows.reshape(len(rows), -1)
+
+    def repeated(self, rows: Array) -> Array:
+        """Rows (k, M) that are the same in every repetition, (k, P M).
+
+        Parameters
+        ----------
+        rows : (k, M) float64
+            in the common band
+        """
+        return rows if self.repetitions == 1 else np.tile(rows, (1, self.repetitions))
+
+    def without_noise_of_inertia(self, values: Array) -> Array:
+        """Accelerations, or torque of the links (n, N), without what lies far above the common band.
+
+        Friction's step needs the motion's whole band; inertia does not, and multiplies that band's noise by the square
+        of its frequency, which a column that is not linear in it would fold back.
+
+        Parameters
+        ----------
+        values : (n, N) float64
+            at the recorded rate
+        """
+        if self.rigid_hz is None:
+            return np.ascontiguousarray(values)
+        return np.ascontiguousarray(smooth(values.T, self.prepared.motion.rate_hz, self.rigid_hz).T)
+
+    def quiet_acceleration(self) -> Array:
+        """The motion's acceleration `without_noise_of_inertia`, (n, N): made once."""
+        if "quiet_acceleration" not in self.memory:
+            self.memory["quiet_acceleration"] = self.without_noise_of_inertia(self.prepared.motion.acceleration.T)
+        return self.memory["quiet_acceleration"]
+
+    def quiet_rigid(self) -> list[Array]:
+        """Columns (m_j, N) of the links that each joint moves `without_noise_of_inertia`: made once."""
+        if "quiet_rigid" not in self.memory:
+            self.memory["quiet_rigid"] = [self.without_noise_of_inertia(own) for own in self.prepared.rigid]
+        return self.memory["quiet_rigid"]
+
+    def row_times(self) -> Array:
+        """Instant of every row, (P M,) [s]."""
+        motion = self.prepared.motion
+        offset = (len(motion.time) - 1 - (self.rows - 1) * motion.rate_hz / motion.band.rate_hz) / 2.0
+        first = self.time[:, :1] + max(offset, 0.0) / motion.rate_hz
+        return (first + np.arange(self.rows) / motion.band.rate_hz).ravel()
+
+
+@dataclass(frozen=True, eq=False)
+class Observations:
+    """All pieces of some recordings.
+
+    robot : Robot
+        the arm
+    pieces : tuple of Piece
+        in the order of the recordings
+    names : tuple of str
+        the recordings
+    noise : tuple of JointNoise
+        one a joint; empty until it is known
+    repetitions : tuple of tuple of Repetition
+        where each recording's motion repeats
+    weightings : tuple of RowWeighting
+        how much the whitened rows of each joint count; empty where all count alike
+    as_measured : Observations or None
+        the same recordings with their motion as it was measured, by which residuals are stated; None where these are
+    """
+
+    robot: Robot
+    pieces: tuple[Piece, ...]
+    names: tuple[str, ...]
+    noise: tuple[JointNoise, ...] = ()
+    repetitions: tuple[tuple[Repetition, ...], ...] = ()
+    weightings: tuple[RowWeighting, ...] = ()
+    as_measured: "Observations | None" = None
+    _kept: dict[int, BoolArray] = field(default_factory=dict, repr=False)
+
+    @staticmethod
+    def prepare(
+        conditioners: Sequence[Conditioner],
+        robot: Robot,
+        base: BaseParameters,
+        cutoff_hz: float | None,
+        steepness: Array | None = None,
+    ) -> "Observations":
+        """Condition recordings in a band.
+
+        Parameters
+        ----------
+        conditioners : sequence of Conditioner
+            the surveyed recordings
+        robot : Robot
+            the arm
+        base : BaseParameters
+            its identifiable combinations
+        cutoff_hz : float or None
+            the common band [Hz]; None for no filter
+        steepness : (n,) float64 or None
+            K_v of every joint's friction, for the band of the motion itself [s/rad or s/m]
+        """
+        starts = [float(c.recording.samples(0, 1).time[0]) for c in conditioners]
+        bands = [state_cutoffs(c, cutoff_hz, steepness) for c in conditioners]
+        quiet = [quiet_cutoffs(c, cutoff_hz, steepness) for c in conditioners]
+        apart = [c.as_one_motion(band) for c, band in zip(conditioners, bands, strict=True)]
+        prepared = Dataset(apart, robot, base, cutoff_hz)
+        return Observations(
+            robot,
+            pieces=tuple(
+                replace(
+                    _piece(each, starts[each.recording], conditioners[each.recording], bands[each.recording]),
+                    quiet_hz=quiet[each.recording],
+                    rigid_hz=None if cutoff_hz is None else STATE_BANDS[0] * cutoff_hz,
+                )
+                for each in prepared
+            ),
+            names=tuple(c.recording.name for c in conditioners),
+            repetitions=tuple(
+                tuple(Repetition(run.start_s - start, run.length_s, run.count) for run in c.timing.runs)
+                for c, start in zip(conditioners, starts, strict=True)
+            ),
+        )
+
+    def with_noise(self, noise: Sequence[JointNoise]) -> "Observations":
+        """The same rows with their noise known.
+
+        Parameters
+        ----------
+        noise : sequence of JointNoise, length n
+            one a joint
+        """
+        return replace(self, noise=tuple(noise), weightings=(), _kept={})
+
+    def with_weightings(self, weightings: Sequence[RowWeighting]) -> "Observations":
+        """The same rows, counting as much as they say.
+
+        Parameters
+        ----------
+        weightings : sequence of RowWeighting
+            one a joint, or none where all rows count alike
+        """
+        return replace(self, weightings=tuple(weightings))
+
+    def without_joints(self, joints: Collection[int]) -> "Observations":
+        """The same rows, those of some joints as good as left out: what no other joint tells stays what it is.
+
+        Parameters
+        ----------
+        joints : collection of int
+            indices, from 0
+        """
+        noise = [own.times(LEFT_OUT) if joint in joints else own for joint, own in enumerate(self.noise)]
+        return replace(self, noise=tuple(noise))
+
+    def torque(self, joint: int) -> list[Array]:
+        """Measured torque of one joint in the common band, piece by piece, (1, P M) each.
+
+        Parameters
+        ----------
+        joint : int
+            joint index, from 0
+        """
+        return [piece.torque[joint].reshape(1, -1) for piece in self.pieces]
+
+    def white(self, joint: int, rows: Sequence[Array]) -> Array:
+        """Rows of all pieces, whitened, those that were not measured left out, (k, R).
+
+        Parameters
+        ----------
+        joint : int
+            joint index, from 0
+        rows : sequence of (k, P M) float64
+            a piece each
+        """
+        whitened = np.concatenate([self.noise[joint].whitened(each) for each in rows], axis=-1)
+        kept = self.kept(joint)
+        counted = whitened if kept.all() else whitened[..., kept]
+        return self.weightings[joint].applied(counted) if self.weightings else counted
+
+    def kept(self, joint: int) -> BoolArray:
+        """Whitened rows that count.
+
+        Parameters
+        ----------
+        joint : int
+            joint index, from 0
+        """
+        if joint not in self._kept:
+            self._kept[joint] = np.concatenate(
+                [self.noise[joint].kept(piece.used[joint].ravel()) for piece in self.pieces]
+            )
+        return self._kept[joint]
+
+    def row_labels(self, joint: int) -> tuple[NDArray[np.intp], Array]:
+        """Recording and instant of every whitened row that counts, (R,) each.
+
+        Parameters
+        ----------
+        joint : int
+            joint index, from 0
+        """
+        order = self.noise[joint].order
+        recording = [np.full(piece.repetitions * piece.rows - order, piece.prepared.recording) for piece in self.pieces]
+        instants = [piece.row_times()[order:] for piece in self.pieces]
+        kept = self.kept(joint)
+        return np.concatenate(recording)[kept], np.concatenate(instants)[kept]
+
+    def __iter__(self) -> Iterator[Piece]:
+        """The pieces."""
+        return iter(self.pieces)
+
+
+def _piece(prepared: PreparedMotion, start_s: float, conditioner: Conditioner, state_hz: Array | None) -> Piece:
+    """The torque of every repetition in the common band."""
+    motion = prepared.motion
+    length = len(motion.time) / motion.rate_hz
+    time = motion.time - start_s + length * np.arange(motion.repetitions)[:, None]
+    reduce, reduce_mask = motion.band.reduce, motion.band.reduce_mask
+    used = np.stack([reduce_mask(np.ascontiguousarray(measured.T)) for measured in motion.measured], axis=1)
+    torque = np.stack([reduce(without_spikes(np.ascontiguousarray(each.T))) for each in motion.torque], axis=1)
+    widest = np.full(motion.position.shape[1], motion.rate_hz / 2.0)
+    width = widest if state_hz is None else np.minimum(state_hz, widest)
+    source = conditioner.source
+    return Piece(prepared, torque, used, time, width, conditioner.noise, ~(source.velocity | source.acceleration))

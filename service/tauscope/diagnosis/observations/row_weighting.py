@@ -1,0 +1,73 @@
+"""How much whitened rows count that the columns are not certain of, each by itself and many together.
+
+The columns of row i are wrong by something of standard deviation u_i of its own, and by errors S (k, R) that all rows
+share, each of unknown size with standard deviation 1. In units of the rows' noise their covariance is then
+
+    W⁻² + W⁻¹ Sᵀ S W⁻¹,        W = diag(1/√(1 + u²)),
+
+and W followed by (I + SᵀS)^(-1/2) makes them white again. The second factor differs from I in k directions only.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tauscope.recording.recording import Array
+
+
+@dataclass(frozen=True, eq=False)
+class RowWeighting:
+    """What the rows of one joint are multiplied by.
+
+    weights : (R,) float64
+        W: 1 where the columns are certain
+    directions : (k, R) float64
+        orthonormal, those of the shared errors among weighted rows
+    shrinkage : (k,) float64
+        share that is taken off along each: 0 where nothing is shared, 1 where nothing is left
+    """
+
+    weights: Array
+    directions: Array
+    shrinkage: Array
+
+    @staticmethod
+    def of(weights: Array, shared: Array) -> "RowWeighting":
+        """From the errors themselves.
+
+        Parameters
+        ----------
+        weights : (R,) float64
+            W
+        shared : (k, R) float64
+            S: each error at one standard deviation, among weighted rows
+        """
+        _, sizes, directions = np.linalg.svd(shared, full_matrices=False)
+        return RowWeighting(weights, directions, 1.0 - 1.0 / np.sqrt(1.0 + sizes**2))
+
+    @property
+    def is_guided(self) -> bool:
+        """Whether anything is said of the columns' errors."""
+        return bool(len(self.shrinkage))
+
+    @staticmethod
+    def certain(count: int) -> "RowWeighting":
+        """For columns of whose errors nothing is said.
+
+        Parameters
+        ----------
+        count : int
+            rows R
+        """
+        return RowWeighting(np.ones(count), np.empty((0, count)), np.empty(0))
+
+    def applied(self, rows: Array) -> Array:
+        """Whitened rows as they count, (k, R).
+
+        Parameters
+        ----------
+        rows : (k, R) float64
+            whitened rows
+        """
+        weighted = rows * self.weights
+        return weighted - ((weighted @ self.directions.T) * self.shrinkage) @ self.directions

@@ -1,0 +1,136 @@
+"""The noise of one joint's rows, and the filter that makes it white."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import signal
+
+from tauscope.identification.autocorrelation import AutocovarianceSum, Autoregression, LaggedProducts
+from tauscope.recording.recording import Array
+
+WELL_INSIDE = 0.85
+"""Part of the band in which its own filter leaves the noise as it is."""
+
+FEWEST_FOR_SPECTRUM = 32
+
+SMALLEST_SHARE = 0.3
+"""Rows are never taken for more dependent than this."""
+
+FLOOR = 0.01
+"""Share of the noise's power that counts as white, so that whitening does not amplify by more than this what the
+band's own filter has cut."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointNoise:
+    """Noise e_t = Σ a_k e_{t-k} + ε_t of one joint's rows in the common band.
+
+    model : Autoregression
+        its coefficients and variances
+    share : float
+        independent rows among a hundred, as a fraction: rows are closer than the band asks for, and above the band
+        there is no noise
+    over_repetitions : float
+        its power over that of what repetitions differ by, where it is far more: then most of it is no noise; else 1
+    """
+
+    model: Autoregression
+    share: float = 1.0
+    over_repetitions: float = 1.0
+
+    @property
+    def std(self) -> float:
+        """Standard deviation of the innovations ε."""
+        return float(np.sqrt(self.model.innovation_variance))
+
+    @property
+    def order(self) -> int:
+        """Rows that the filter takes from the beginning of a piece."""
+        return self.model.order
+
+    def times(self, factor: float) -> "JointNoise":
+        """Noise of the same colour, so many times as large.
+
+        Parameters
+        ----------
+        factor : float
+            to its standard deviation
+        """
+        power = factor**2
+        model = Autoregression(
+            self.model.coefficients, power * self.model.innovation_variance, power * self.model.variance
+        )
+        return replace(self, model=model)
+
+    def whitened(self, rows: Array) -> Array:
+        """Rows (..., T) made white with unit variance, (..., T - p).
+
+        Parameters
+        ----------
+        rows : (..., T) float64
+            consecutive rows, time last
+        """
+        if not self.order:
+            return rows / self.std
+        filtered = signal.lfilter(np.append(1.0, -self.model.coefficients), [1.0], rows, axis=-1)
+        return filtered[..., self.order :] / self.std
+
+    def kept(self, used: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Whitened rows (T - p,) of which all that went in was measured.
+
+        Parameters
+        ----------
+        used : (T,) bool
+            which rows rest on measured torque
+        """
+        if used.all():
+            return used[self.order :]
+        missed = np.convolve(~used, np.ones(self.order + 1))[: len(used)] > 0.5
+        return ~missed[self.order :]
+
+
+def fitted_noise(pieces: Iterable[tuple[Array, NDArray[np.bool_], float]], band_share: float = 1.0) -> JointNoise:
+    """Noise model of smallest BIC of pieces that are noise alone.
+
+    Within the band the whitened noise has unit density: its mean power is `JointNoise.share`.
+
+    Parameters
+    ----------
+    pieces : iterable of ((T,) float64, (T,) bool, float)
+        consecutive rows, which of them count, and the factor that turns their power into the noise's
+    band_share : float
+        the band's cut-off relative to the rows' own highest frequency
+    """
+    pieces = list(pieces)
+    total = AutocovarianceSum()
+    for rows, used, factor in pieces:
+        products = LaggedProducts.of(rows * np.sqrt(factor), used)
+        products.products[0] *= 1.0 + FLOOR
+        total.add(products)
+    model = total.model()
+    smallest = np.finfo(float).tiny
+    variance = max(model.variance / (1.0 + FLOOR), smallest)
+    filtering = JointNoise(Autoregression(model.coefficients, 1.0, variance))
+    squares, count = 0.0, 0
+    inside, whole = 0.0, 0.0
+    for rows, used, factor in pieces:  # what the filter makes of these rows: the floor must not count as noise
+        kept = filtering.kept(used)
+        left = np.where(kept, filtering.whitened(rows), 0.0)
+        squares += factor * float(left @ left)
+        count += int(kept.sum())
+        of_band, of_all = _densities(left, band_share)
+        inside, whole = inside + factor * of_band * len(left), whole + factor * of_all * len(left)
+    share = float(np.clip(whole / inside, SMALLEST_SHARE, 1.0)) if band_share < 1.0 and inside > 0.0 else 1.0
+    innovation = max(squares / max(count, 1) / share, smallest)
+    return JointNoise(Autoregression(model.coefficients, innovation, variance), share)
+
+
+def _densities(rows: Array, band_share: float) -> tuple[float, float]:
+    """Mean spectral density of rows well inside the band, and everywhere."""
+    if len(rows) < FEWEST_FOR_SPECTRUM:
+        return 0.0, 0.0
+    power = np.abs(np.fft.rfft(rows * signal.windows.hann(len(rows), sym=False))) ** 2
+    last = max(2, int(WELL_INSIDE * band_share * (len(power) - 1)))
+    return float(power[1:last].mean()), float(power[1:].mean())

@@ -1,0 +1,29 @@
+"""Torque = regressor × parameters: the regressor, base parameters, rigid-body dynamics and friction columns."""
+
+from tauscope.dynamics.base_parameters import BaseParameters, base_parameters
+from tauscope.dynamics.friction import (
+    FRICTION_COLUMNS,
+    friction_columns,
+    friction_torque,
+    smooth_sign,
+    smooth_sign_slope,
+)
+from tauscope.dynamics.regressor import TorqueRegressor, torque_regressor
+from tauscope.dynamics.rigid_body import gravity_torque, inverse_dynamics, kinetic_energy, mass_matrix, potential_energy
+
+__all__ = [
+    "FRICTION_COLUMNS",
+    "BaseParameters",
+    "TorqueRegressor",
+    "base_parameters",
+    "friction_columns",
+    "friction_torque",
+    "gravity_torque",
+    "inverse_dynamics",
+    "kinetic_energy",
+    "mass_matrix",
+    "potential_energy",
+    "smooth_sign",
+    "smooth_sign_slope",
+    "torque_regressor",
+]

@@ -1,0 +1,146 @@
+"""What is constant about one segment of the chain, split into turns in a plane and shifts of the origin.
+
+Any rotation is R = Rz(φ) Rx(β) Rz(γ). In ``before · motion_z(q) · after`` the turns about z next to the joint merge
+with its angle, so that a segment given by Denavit-Hartenberg parameters takes two turns in all, any other five at most.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.robot.robot import JointType, Segment
+
+Array = NDArray[np.float64]
+Plane = tuple[int, int]
+"""The two components that a turn mixes, in the order in which a positive angle leads from one to the other."""
+
+Offset = tuple[float | Array, float | Array, float | Array]
+"""Components of a shift of the origin, each the same for all samples or one a sample."""
+
+ABOUT_X: Plane = (1, 2)
+ABOUT_Z: Plane = (0, 1)
+
+
+class Step:
+    """Constants of one segment: turns and offsets before the joint's motion and after it.
+
+    Parameters
+    ----------
+    segment : Segment
+        the joint and its two placements
+
+    Attributes
+    ----------
+    revolute : bool
+        whether the joint turns
+    angle : float
+        turn about the joint's axis that is added to its position, where it is revolute [rad]
+    turns_before, turns_after : list of (Plane, float, float)
+        constant turns: plane, cosine, sine
+    before : three floats
+        translation of the placement before the joint, in frame j-1 [m]
+    after : three floats
+        translation of the placement after the joint, in frame j [m]
+    """
+
+    def __init__(self, segment: Segment) -> None:
+        self.revolute = segment.type is JointType.REVOLUTE
+        first, about_x, third = euler_zxz(segment.before.rotation)
+        fourth, about_x_after, last = euler_zxz(segment.after.rotation)
+        # The middle turns are about the joint's own axis and merge with its angle.
+        self.angle = third + fourth
+        middle = [] if self.revolute else [(ABOUT_Z, self.angle)]
+        self.turns_before = _turns([(ABOUT_Z, first), (ABOUT_X, about_x), *middle])
+        self.turns_after = _turns([(ABOUT_X, about_x_after), (ABOUT_Z, last)])
+        self.before = _offset(segment.before.translation)
+        self.after = _offset(segment.after.rotation.T @ segment.after.translation)
+        self._axis = _offset(segment.after.rotation[2])
+
+    def slid(self, q: Array) -> Offset:
+        """Offset after a prismatic joint, p + ẑ q in frame j.
+
+        Parameters
+        ----------
+        q : (N,) float64
+            joint position [m]
+
+        Returns
+        -------
+        three floats or (N,) float64
+            the components [m]
+        """
+        x, y, z = (p if along == 0.0 else p + along * q for p, along in zip(self.after, self._axis, strict=True))
+        return x, y, z
+
+
+def euler_zxz(rotation: Array) -> tuple[float, float, float]:
+    """Angles of R = Rz(φ) Rx(β) Rz(γ), with φ in [-π/2, π/2], and zero where z stays parallel to z.
+
+    Parameters
+    ----------
+    rotation : (3, 3) float64
+        R
+
+    Returns
+    -------
+    tuple of float
+        φ, β, γ [rad]
+    """
+    first = 0.0
+    sine_x, sine_y = rotation[0, 2], -rotation[1, 2]
+    if np.hypot(sine_x, sine_y) > _ROUNDING:
+        sign = -1.0 if sine_y < 0 else 1.0
+        first = float(np.arctan2(sign * sine_x, sign * sine_y))
+    c, s = np.cos(first), np.sin(first)
+    x, y = c * rotation[0] + s * rotation[1], c * rotation[1] - s * rotation[0]
+    return first, float(np.arctan2(-y[2], rotation[2, 2])), float(np.arctan2(-x[1], x[0]))
+
+
+def from_euler_zxz(first: float, about_x: float, last: float) -> Array:
+    """The rotation R = Rz(φ) Rx(β) Rz(γ).
+
+    Parameters
+    ----------
+    first : float
+        φ [rad]
+    about_x : float
+        β [rad]
+    last : float
+        γ [rad]
+
+    Returns
+    -------
+    (3, 3) float64
+        R
+    """
+    (c1, c2, c3), (s1, s2, s3) = np.cos([first, about_x, last]), np.sin([first, about_x, last])
+    return np.array(
+        [
+            [c1 * c3 - s1 * c2 * s3, -c1 * s3 - s1 * c2 * c3, s1 * s2],
+            [s1 * c3 + c1 * c2 * s3, -s1 * s3 + c1 * c2 * c3, -c1 * s2],
+            [s2 * s3, s2 * c3, c2],
+        ]
+    )
+
+
+_ROUNDING = 1e-15
+"""Below this a sine, cosine or length is rounding (cos π/2 = 6e-17); 1e-8 is a user's own digits and is kept."""
+
+
+def _turns(angles: list[tuple[Plane, float]]) -> list[tuple[Plane, float, float]]:
+    """Plane, cosine and sine of the turns that turn anything, exact at right angles."""
+    turns = []
+    for plane, angle in angles:
+        cosine, sine = _exact(np.cos(angle)), _exact(np.sin(angle))
+        if (cosine, sine) != (1.0, 0.0):
+            turns.append((plane, cosine, sine))
+    return turns
+
+
+def _exact(value: float) -> float:
+    nearest = round(value)
+    return float(nearest if abs(value - nearest) < _ROUNDING else value)
+
+
+def _offset(vector: Array) -> tuple[float, float, float]:
+    x, y, z = (0.0 if abs(value) < _ROUNDING else float(value) for value in vector)
+    return x, y, z

@@ -1,0 +1,119 @@
+"""Static friction of one joint: the seed paper's equations (7) to (9), with a constant offset beside them."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.errors import IdentificationError
+from tauscope.robot.robot import FrictionCoefficients, FrictionShape
+
+Array = NDArray[np.float64]
+
+FRICTION_COLUMNS = ("stiction", "stribeck", "viscous", "offset")
+"""Names of the columns of `friction_columns`."""
+
+_TWO_OVER_PI = 2.0 / np.pi
+
+
+def smooth_sign(velocity: Array, k_v: float | Array) -> Array:
+    """Smooth sign function S₀(v) = 2/π arctan(K_v v), the seed paper's equation (8).
+
+    Parameters
+    ----------
+    velocity : (...) float64
+        v [rad/s or m/s]
+    k_v : float or (...) float64
+        steepness K_v at rest [s/rad or s/m]
+
+    Returns
+    -------
+    (...) float64
+        S₀, between -1 and 1
+    """
+    return _TWO_OVER_PI * np.arctan(k_v * velocity)
+
+
+def smooth_sign_slope(velocity: Array, k_v: float | Array) -> Array:
+    """Derivative of S₀ by its steepness, ∂S₀/∂K_v = 2/π v / (1 + (K_v v)²); by δ likewise.
+
+    Parameters
+    ----------
+    velocity : (...) float64
+        v [rad/s or m/s]
+    k_v : float or (...) float64
+        steepness K_v or δ [s/rad or s/m]
+
+    Returns
+    -------
+    (...) float64
+        ∂S₀/∂K_v [rad/s or m/s]
+    """
+    return _TWO_OVER_PI * velocity / (1.0 + (k_v * velocity) ** 2)
+
+
+def friction_columns(velocity: Array, shape: FrictionShape, *, offset: bool = True) -> Array:
+    """Friction columns of one joint, the seed paper's (9): Φ_fric = [2/π arctan(v K_v), 2/π arctan(v δ), v, 1].
+
+    Parameters
+    ----------
+    velocity : (N,) float64
+        v [rad/s or m/s]
+    shape : FrictionShape
+        K_v and δ, both given [s/rad or s/m]
+    offset : bool
+        whether the constant column is wanted, which the paper does not have
+
+    Returns
+    -------
+    (N, 4) or (N, 3) float64
+        columns of τ_s, τ_sc, τ_v and the offset, as in `FRICTION_COLUMNS`
+
+    Raises
+    ------
+    IdentificationError
+        K_v or δ is not given
+    """
+    k_v, delta = _given(shape)
+    columns = np.empty((4 if offset else 3, len(velocity))).T
+    columns[:, 0] = smooth_sign(velocity, k_v)
+    columns[:, 1] = smooth_sign(velocity, delta)
+    columns[:, 2] = velocity
+    if offset:
+        columns[:, 3] = 1.0
+    return columns
+
+
+def friction_torque(coefficients: FrictionCoefficients, shape: FrictionShape, velocity: Array) -> Array:
+    """Friction torque τ_f = τ_s S₀(v) + τ_sc 2/π arctan(v δ) + τ_v v, the seed paper's equation (7).
+
+    The paper prints (7) without the v of its last term; (9) has it.
+
+    Parameters
+    ----------
+    coefficients : FrictionCoefficients
+        τ_s, τ_sc, τ_v
+    shape : FrictionShape
+        K_v and δ, both given [s/rad or s/m]
+    velocity : (N,) float64
+        v [rad/s or m/s]
+
+    Returns
+    -------
+    (N,) float64
+        τ_f, which the drive has to overcome [Nm or N]
+
+    Raises
+    ------
+    IdentificationError
+        K_v or δ is not given
+    """
+    weights = np.array([coefficients.stiction, coefficients.stribeck, coefficients.viscous])
+    return friction_columns(velocity, shape, offset=False) @ weights
+
+
+def _given(shape: FrictionShape) -> tuple[float, float]:
+    if shape.k_v is None or shape.delta is None:
+        missing = "k_v" if shape.k_v is None else "delta"
+        raise IdentificationError(
+            f"the friction curve needs {missing}: give it as friction_shape in the robot file, or have it estimated"
+        )
+    return shape.k_v, shape.delta

@@ -1,0 +1,174 @@
+"""Torques, mass matrix and energies of an arm whose standard parameters are given."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from tauscope.dynamics.chain_motion import Array, ChainMotion
+from tauscope.dynamics.regressor import CHUNK
+from tauscope.robot.kinematics import link_placements
+from tauscope.robot.robot import STANDARD_PARAMETERS, LinkInertia, Robot
+
+_LEVI_CIVITA = np.array([[[(i - j) * (j - k) * (k - i) / 2.0 for k in range(3)] for j in range(3)] for i in range(3)])
+"""ε_ijk."""
+
+
+def inverse_dynamics(robot: Robot, parameters: Array, q: Array, qd: Array, qdd: Array) -> Array:
+    """Joint torque τ = H(q) q̈ + h(q, q̇) + c(q) = Φ(q, q̇, q̈) Θ, the seed paper's equations (1) and (2).
+
+    Parameters
+    ----------
+    robot : Robot
+        the chain and gravity
+    parameters : (10 n,) float64
+        Θ, ten standard parameters a link in the order of `STANDARD_PARAMETERS`
+    q : (N, n) float64
+        joint position [rad or m]
+    qd : (N, n) float64
+        joint velocity [rad/s or m/s]
+    qdd : (N, n) float64
+        joint acceleration [rad/s² or m/s²]
+
+    Returns
+    -------
+    (N, n) float64
+        joint torque or force, without friction [Nm or N]
+    """
+    joints, maps = robot.joint_count, [_wrench_of_motion(link) for link in _links(parameters)]
+    motion = ChainMotion(robot, min(CHUNK, max(len(q), 1)))
+    torque = np.zeros((joints, len(q)))
+    for part in _chunks(len(q)):
+        state = [np.ascontiguousarray(each[part].T) for each in (q, qd, qdd)]
+        for link, (wrench_of, moved) in enumerate(zip(maps, motion.links(*state), strict=True)):
+            wrench = wrench_of @ np.stack([*moved.acceleration, *(entry for row in moved.field for entry in row)])
+            for screw, component in zip((*moved.screw_angular, *moved.screw_linear), wrench, strict=True):
+                torque[: link + 1, part] += screw * component
+    return np.ascontiguousarray(torque.T)
+
+
+def gravity_torque(robot: Robot, parameters: Array, q: Array) -> Array:
+    """Torque c(q) that holds the arm against gravity, the last term of the seed paper's equation (1).
+
+    Parameters
+    ----------
+    robot : Robot
+        the chain and gravity
+    parameters : (10 n,) float64
+        Θ, ten standard parameters a link
+    q : (N, n) float64
+        joint position [rad or m]
+
+    Returns
+    -------
+    (N, n) float64
+        joint torque or force [Nm or N]
+    """
+    rest = np.zeros_like(q)
+    return inverse_dynamics(robot, parameters, q, rest, rest)
+
+
+def mass_matrix(robot: Robot, parameters: Array, q: Array) -> Array:
+    """Joint-space inertia H(q) of the seed paper's equation (1): H = Σ_j J_jᵀ G_j J_j.
+
+    J_j holds the joint screws of link j (`tauscope.dynamics.chain_motion`), G_j its inertia about its frame's origin.
+
+    Parameters
+    ----------
+    robot : Robot
+        the chain
+    parameters : (10 n,) float64
+        Θ, ten standard parameters a link
+    q : (N, n) float64
+        joint position [rad or m]
+
+    Returns
+    -------
+    (N, n, n) float64
+        symmetric, and positive definite where the links are physically possible [kg m², kg m, kg]
+    """
+    joints = robot.joint_count
+    inertias = [_spatial_inertia(link) for link in _links(parameters)]
+    motion = ChainMotion(robot, min(CHUNK, max(len(q), 1)))
+    mass = np.zeros((len(q), joints, joints))
+    for part in _chunks(len(q)):
+        position = np.ascontiguousarray(q[part].T)
+        rest = np.zeros_like(position)
+        for link, (inertia, moved) in enumerate(zip(inertias, motion.links(position, rest, rest), strict=True)):
+            screws = np.stack([*moved.screw_angular, *moved.screw_linear])
+            momenta = np.tensordot(inertia, screws, axes=1)
+            mass[part, : link + 1, : link + 1] += np.einsum("ain,akn->nik", screws, momenta)
+    return mass
+
+
+def kinetic_energy(robot: Robot, parameters: Array, q: Array, qd: Array) -> Array:
+    """Kinetic energy T = ½ q̇ᵀ H(q) q̇.
+
+    Parameters
+    ----------
+    robot : Robot
+        the chain
+    parameters : (10 n,) float64
+        Θ, ten standard parameters a link
+    q : (N, n) float64
+        joint position [rad or m]
+    qd : (N, n) float64
+        joint velocity [rad/s or m/s]
+
+    Returns
+    -------
+    (N,) float64
+        T [J]
+    """
+    return 0.5 * np.einsum("ni,nik,nk->n", qd, mass_matrix(robot, parameters, q), qd)
+
+
+def potential_energy(robot: Robot, parameters: Array, q: Array) -> Array:
+    """Potential energy U = -gᵀ Σ_j (m_j p_j + R_j m_j s_j), zero at the base frame's origin.
+
+    Parameters
+    ----------
+    robot : Robot
+        the chain and gravity
+    parameters : (10 n,) float64
+        Θ, ten standard parameters a link
+    q : (N, n) float64
+        joint position [rad or m]
+
+    Returns
+    -------
+    (N,) float64
+        U [J]
+    """
+    energy = np.zeros(len(q))
+    for link, placement in zip(_links(parameters), link_placements(robot, q).swapaxes(0, 1), strict=True):
+        rotation, position = placement[:, :3, :3], placement[:, :3, 3]
+        energy -= (link.mass * position + rotation @ link.first_moment) @ robot.gravity
+    return energy
+
+
+def _links(parameters: Array) -> list[LinkInertia]:
+    return [LinkInertia.from_vector(vector) for vector in parameters.reshape(-1, len(STANDARD_PARAMETERS))]
+
+
+def _spatial_inertia(link: LinkInertia) -> Array:
+    """G, so that (n, f) = G (ω, v) are angular and linear momentum at the frame's origin."""
+    x, y, z = link.first_moment
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.block([[link.inertia, cross], [-cross, link.mass * np.eye(3)]])
+
+
+def _wrench_of_motion(link: LinkInertia) -> Array:
+    """What makes moment n and force f at a link's origin of its motion, (n, f) = G (a, M), (6, 12).
+
+    A point at r accelerates by a + M r. With m, ms and Σ = ∫ r rᵀ dm = ½ tr(I) 1 - I,
+    f = m a + M ms and n = ∫ r × (a + M r) dm = ms × a + ε : (M Σ), n_i = ε_ijk (M Σ)_kj.
+    """
+    second = 0.5 * np.trace(link.inertia) * np.eye(3) - link.inertia
+    x, y, z = link.first_moment
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    of_field = np.einsum("ijk,jl->ikl", _LEVI_CIVITA, second).reshape(3, 9)
+    return np.block([[cross, of_field], [link.mass * np.eye(3), np.kron(np.eye(3), link.first_moment)]])
+
+
+def _chunks(samples: int) -> Iterator[slice]:
+    return (slice(start, min(start + CHUNK, samples)) for start in range(0, samples, CHUNK))

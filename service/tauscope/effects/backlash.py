@@ -1,0 +1,337 @@
+"""Play of a transmission: teeth part where the load turns its sign, and meet when the link has crossed the gap.
+
+Stiff teeth stop the link; on springy ones it swings, at frequencies that a diagnosis may well see.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+from scipy.integrate import cumulative_trapezoid
+from scipy.interpolate import CubicSpline
+
+from tauscope.effects.deflection import BAND, Deflection
+from tauscope.effects.effect import Effect, mesh
+from tauscope.effects.parameters import Coefficient, Quantity, Shape
+from tauscope.effects.setting import Setting
+from tauscope.recording.recording import Array
+
+GAPS = np.array([1e-4, 3e-4, 1e-3, 3e-3, 1e-2])
+"""Gaps looked at, relative to the joint's range of motion."""
+
+BANDS = np.array([2.0, 1.0, 0.35])
+"""Bands to which the load is smoothed, relative to the common one."""
+
+FARTHEST_FLOWN = 1.6
+"""Gap that is flown over, relative to b, beyond which no teeth are as far apart: on simulated arms it is 0.75 to
+1.3 of b, and 2 or more where something else is taken for play."""
+
+SPRINGY_GAPS = np.geomspace(2e-5, 1e-2, 9)
+"""Gaps on springy teeth that are looked at, relative to the joint's range of motion: closer to each other, as a link
+that swings comes back at other instants, and smaller, as it swings on after them."""
+
+SPRINGY_BAND = 3.0
+"""Band of the load on springy teeth, relative to the common one: when a link meets them hangs on all of it."""
+
+RESONANCES = np.array([0.7, 1.0, 1.5, 2.2])
+"""Resonances of the link on springy teeth at its mean inertia, relative to the common band."""
+
+STEPS = 15.0
+"""Steps of the integration in a period of the resonance at its least inertia."""
+
+LOSSES = np.array([0.8, 8.0, 80.0])
+"""Least, usual and largest share of their force that teeth lose a speed [s/rad or s/m]: what strikes them by v bounces
+back by some v - 2/3 c v²."""
+
+DAMPING = 0.2
+"""Damping ratio of teeth that touch, beside what they lose under load: where less is lost a link bounces on, but when
+it comes back hangs on everything that a recording does not show."""
+
+MORE_THAN_A_SPRING = 10.0
+"""What springy teeth have to explain more than plainer shapes, beside what tells two effects apart [noise variances]:
+together as much as an elastic joint's resonance."""
+
+SAME = 1.6
+"""Factor between the gap that is crossed on springy teeth and the one that is found, up to which they are the same."""
+
+LEAST_MET = 0.4
+"""Part of the gap that is crossed by which a link moves at least as foreseen, where nothing else is missing: bounces at
+other instants than the model's add nothing, on simulated arms up to half of it. Beside others it is `SAME`: what a
+spring's or friction's formula leaves, at another joint too, is taken for teeth that a link meets half the time."""
+
+
+def place_between_teeth(load: Array, inertia: Array, gap: float, rate_hz: float) -> Array:
+    """Where a link is in the play of its transmission, in gaps from the middle, -1/2 … 1/2.
+
+    The teeth carry the load on one side until it turns its sign. Then the link moves on under its load alone,
+    I δ̈ = τ_rb, until it meets teeth again, where it stays: gears and their grease swallow the shock.
+
+    Parameters
+    ----------
+    load : (N,) float64
+        τ_rb [Nm or N]
+    inertia : (N,) float64
+        I; where it is zero all along, the link crosses at once [kg m² or kg]
+    gap : float
+        b, above zero [rad or m]
+    rate_hz : float
+        sampling rate [Hz]
+
+    Returns
+    -------
+    (N,) float64
+        δ/b
+    """
+    sides = np.where(load >= 0.0, 0.5, -0.5)
+    if not inertia.all():
+        return sides
+    time = np.arange(len(load)) / rate_hz
+    speed = cumulative_trapezoid(load / inertia, time, initial=0) / gap
+    way = cumulative_trapezoid(speed, time, initial=0)
+    place, side, begin = np.empty(len(load)), sides[0], 0
+    while begin < len(load):
+        parted = begin + _first(sides[begin:] != side)
+        place[begin:parted] = side
+        if parted == len(load):
+            break
+        flight = side + way[parted:] - way[parted] - speed[parted] * (time[parted:] - time[parted])
+        flown = 1 + _first(np.abs(flight[1:]) >= 0.5)
+        place[parted : parted + flown] = flight[:flown]
+        side, begin = np.copysign(0.5, flight[min(flown, len(flight) - 1)]), parted + flown
+    return place
+
+
+def place_between_springs(
+    load: Array, inertia: Array, gap: float, compliance: float, loss: float, rate_hz: float
+) -> Array:
+    """Where a link is against its motor, in gaps, where the teeth give way under load.
+
+    I δ̈ = τ_rb - T with T = max(0, K x (1 + c ẋ) + D ẋ) of the overlap x = |δ| - b/2 where that is above zero, against
+    δ: teeth push and never pull. c is the loss of Hunt and Crossley (J. Appl. Mech. 42, 1975), which grows with the
+    overlap, D = 2 ζ √(K Ī). By leapfrog steps, from rest on the teeth under the first load.
+
+    Parameters
+    ----------
+    load : (N,) float64
+        τ_rb [Nm or N]
+    inertia : (N,) float64
+        I, above zero [kg m² or kg]
+    gap : float
+        b, above zero [rad or m]
+    compliance : float
+        1/K [rad/Nm or m/N]
+    loss : float
+        c [s/rad or s/m]
+    rate_hz : float
+        sampling rate [Hz]
+
+    Returns
+    -------
+    (N,) float64
+        δ/b
+    """
+    highest_hz = 1.0 / (2.0 * np.pi * math.sqrt(compliance * float(inertia.min())))
+    time = np.arange(len(load)) / rate_hz
+    steps = max(int(time[-1] * STEPS * highest_hz), 2)
+    instants, step = np.linspace(0.0, time[-1], steps, retstep=True)
+    pushes = np.interp(instants, time, load / inertia / gap).tolist()
+    stiffness = np.interp(instants, time, 1.0 / (compliance * inertia)).tolist()
+    damping = 2.0 * DAMPING * math.sqrt(float(inertia.mean()) / compliance)
+    dampings = np.interp(instants, time, damping / inertia).tolist()
+    place = math.copysign(0.5 + abs(float(load[0])) * compliance / gap, float(load[0]))
+    speed, lost, places = 0.0, loss * gap, []
+    for push, spring, damper in zip(pushes, stiffness, dampings, strict=True):
+        places.append(place)
+        overlap, coasting = abs(place) - 0.5, speed + step * push
+        speed = coasting
+        if overlap > 0.0:  # what depends on the speed counts at the step's end: stable however much is lost
+            side, force = math.copysign(1.0, place), spring * overlap
+            stopped = (side * coasting - step * force) / (1.0 + step * (lost * force + damper))
+            speed = side * min(stopped, side * coasting)
+        place += step * speed
+    return np.asarray(CubicSpline(instants, places)(time))
+
+
+def _first(is_so: np.ndarray) -> int:
+    """Index of the first True; the length where there is none."""
+    return int(is_so.argmax()) if is_so.any() else len(is_so)
+
+
+class Backlash(Deflection):
+    """q_link = q - b u, u the place of the link between the teeth."""
+
+    id: ClassVar[str] = "backlash"
+    equation: ClassVar[str] = "q_link = q - delta, delta = +-b/2 under load, I d2(delta)/dt2 = tau_rb in between"
+    meaning: ClassVar[str] = "the transmission has play when the load changes sign"
+    remedy: ClassVar[str] = "take up the play, or model a dead zone"
+    revealing_motion: ClassVar[str] = "poses in which the joint's load passes slowly through zero"
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("b", "{q}", positive=True),)
+    # What is flown over is b, and less where the load is smoothed: without it the motor, too, moves on during a flight.
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("flown", "{q}", logarithmic=True, reported=False), BAND)
+
+    @classmethod
+    def forms(cls, setting: Setting) -> Sequence[Effect]:
+        """One a joint that moves under load.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        """
+        made = []
+        for joint in cls.deflected_joints(setting):
+            gaps, bands = GAPS * (setting.highest[joint] - setting.lowest[joint]), BANDS * setting.cutoff_hz
+            bounds = np.array([0.5 * gaps[0], bands[-1]]), np.array([2.0 * gaps[-1], bands[0]])
+            made.append(cls(joint, mesh(gaps, bands), *bounds))
+        return made
+
+    @classmethod
+    def farther_forms(cls, setting: Setting) -> Sequence[Effect]:
+        """The same with teeth that give way, one a joint whose link has an inertia.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        """
+        return SpringyTeeth.forms(setting)
+
+    def quantities(
+        self, setting: Setting, coefficients: Array, shape: Array, covariance: Array
+    ) -> tuple[Quantity, ...]:
+        """b; where the link crosses more than it is found to move by, what it crosses.
+
+        A bounce at another instant than the model's adds nothing to how far the link moves; of how long it flies they
+        still tell. Half the difference counts as an error that the covariance does not know.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        coefficients : (1,) float64
+            b [rad or m]
+        shape : (k,) float64
+            gap that is crossed [rad or m], and what else shapes the column
+        covariance : (1 + k, 1 + k) float64
+            of both
+        """
+        (found,) = super().quantities(setting, coefficients, shape, covariance)
+        apart = max(float(shape[0]) - found.value, 0.0)
+        return (replace(found, value=found.value + apart, std=float(np.hypot(found.std, 0.5 * apart))),)
+
+    def is_consistent(self, coefficients: Array, shape: Array, *, alone: bool = False) -> bool:
+        """Whether the gap that the link flies over is the one by which it moves.
+
+        Parameters
+        ----------
+        coefficients : (1,) float64
+            b [rad or m]
+        shape : (2,) float64
+            gap that is flown over [rad or m], band of the load [Hz]
+        alone : bool
+            whether nothing else is known to be missing
+        """
+        return bool(shape[0] <= FARTHEST_FLOWN * coefficients[0])
+
+    def deflection(self, load: Array, inertia: Array, shape: Array, rate_hz: float) -> Array:
+        """Place between the teeth.
+
+        Parameters
+        ----------
+        load, inertia : (N,) float64
+            of the link [Nm or N, kg m² or kg]
+        shape : (2,) float64
+            gap that is flown over [rad or m], band of the load [Hz]
+        rate_hz : float
+            sampling rate [Hz]
+        """
+        return place_between_teeth(load, inertia, float(shape[0]), rate_hz)
+
+
+class SpringyTeeth(Backlash):
+    """The same where the teeth give way, so that a link that has crossed the gap swings on them."""
+
+    shapes: ClassVar[tuple[Shape, ...]] = (
+        *Backlash.shapes,
+        Shape("swinging", "{q}/{tau}", logarithmic=True, reported=False),
+        Shape("loss", "s/{q}", logarithmic=True, reported=False),
+    )
+    swings: ClassVar[bool] = True
+
+    @classmethod
+    def forms(cls, setting: Setting) -> Sequence[Effect]:
+        """One a joint that moves under load, and whose link has an inertia.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        """
+        made = []
+        for joint in cls.deflected_joints(setting):
+            if setting.inertia[joint] <= 0.0:
+                continue
+            gaps = SPRINGY_GAPS * (setting.highest[joint] - setting.lowest[joint])
+            swinging = 1.0 / ((2.0 * np.pi * RESONANCES * setting.cutoff_hz) ** 2 * setting.inertia[joint])
+            grid = mesh(gaps, np.array([SPRINGY_BAND * setting.cutoff_hz]), swinging, LOSSES[1:2])
+            lower, upper = grid.min(axis=0) * [0.5, 1.0, 0.7, 1.0], grid.max(axis=0) * [2.0, 1.0, 1.4, 1.0]
+            lower[-1], upper[-1] = LOSSES[0], LOSSES[-1]
+            made.append(cls(joint, grid, lower, upper))
+        return made
+
+    @classmethod
+    def farther_forms(cls, setting: Setting) -> Sequence[Effect]:
+        """None: these are.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        """
+        return ()
+
+    def reluctance(self, shapes: Array) -> Array:
+        """They have to be clearly better than a spring: with next to no gap they are one, with a resonance to choose.
+
+        Parameters
+        ----------
+        shapes : (g, 4) float64
+            gap that is crossed [rad or m], band of the load [Hz], compliance of the teeth [rad/Nm or m/N], their loss
+            [s/rad or s/m]
+        """
+        return np.full(len(shapes), MORE_THAN_A_SPRING)
+
+    def is_consistent(self, coefficients: Array, shape: Array, *, alone: bool = False) -> bool:
+        """Whether the gap that the link crosses is the one by which it moves.
+
+        Parameters
+        ----------
+        coefficients : (1,) float64
+            b [rad or m]
+        shape : (4,) float64
+            gap that is crossed [rad or m], band of the load [Hz], compliance of the teeth [rad/Nm or m/N], their loss
+            [s/rad or s/m]
+        alone : bool
+            whether nothing else is known to be missing
+        """
+        least = LEAST_MET if alone else 1.0 / SAME
+        return bool(least < coefficients[0] / shape[0] < SAME)
+
+    def deflection(self, load: Array, inertia: Array, shape: Array, rate_hz: float) -> Array:
+        """Place between and on the teeth; where no inertia is known that could swing, as on stiff ones.
+
+        Parameters
+        ----------
+        load, inertia : (N,) float64
+            of the link, inertia zero where it is not known [Nm or N, kg m² or kg]
+        shape : (4,) float64
+            gap that is crossed [rad or m], band of the load [Hz], compliance of the teeth [rad/Nm or m/N], their loss
+            [s/rad or s/m]
+        rate_hz : float
+            sampling rate [Hz]
+        """
+        if not inertia.all():
+            return place_between_teeth(load, inertia, float(shape[0]), rate_hz)
+        return place_between_springs(load, inertia, float(shape[0]), float(shape[2]), float(shape[3]), rate_hz)

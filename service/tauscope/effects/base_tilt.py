@@ -1,0 +1,71 @@
+"""The direction of gravity in the base frame: a base that is not level."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from tauscope.dynamics import gravity_torque
+from tauscope.effects.effect import Effect
+from tauscope.effects.parameters import Coefficient
+from tauscope.effects.setting import Setting
+from tauscope.effects.signals import Signals
+from tauscope.recording.recording import Array
+
+
+def tilt_directions(gravity: Array) -> tuple[Array, Array]:
+    """Two unit vectors across gravity, the frame's own axes where gravity lies along one.
+
+    Parameters
+    ----------
+    gravity : (3,) float64
+        in the base frame [m/s²]
+    """
+    axes = np.eye(3)
+    main = int(np.argmax(np.abs(gravity)))
+    unit = gravity / np.linalg.norm(gravity)
+    others = [axes[axis] - (axes[axis] @ unit) * unit for axis in range(3) if axis != main]
+    return others[0] / np.linalg.norm(others[0]), others[1] / np.linalg.norm(others[1])
+
+
+class BaseTilt(Effect):
+    """τ = ∂τ/∂g (|g| α_1 e_1 + |g| α_2 e_2), e_1 and e_2 across gravity."""
+
+    of_motion_alone: ClassVar[bool] = True  # the consistent links, as for `KinematicError`
+    id: ClassVar[str] = "base_tilt"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "others"})
+    equation: ClassVar[str] = "tau = dtau/dg (|g| (alpha_1 e_1 + alpha_2 e_2)), e_1 and e_2 across gravity"
+    meaning: ClassVar[str] = "gravity points elsewhere in the base frame than the robot file says"
+    remedy: ClassVar[str] = "level the base, or correct gravity in the robot file"
+    revealing_motion: ClassVar[str] = "wide poses all round the first joint"
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("alpha_1", "rad"), Coefficient("alpha_2", "rad"))
+
+    @classmethod
+    def forms(cls, setting: Setting) -> Sequence[Effect]:
+        """One for the arm, where there is gravity.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        """
+        return [cls(None)] if np.linalg.norm(setting.robot.gravity) > 0.0 else []
+
+    def columns(self, signals: Signals, shapes: Array) -> Array:
+        """Torque of gravity of the same strength across the stated one.
+
+        Parameters
+        ----------
+        signals : Signals
+            one piece of motion
+        shapes : (1, 0) float64
+            none
+        """
+        strength = float(np.linalg.norm(signals.robot.gravity))
+        position = np.ascontiguousarray(signals.position.T)
+        torques = [
+            gravity_torque(replace(signals.robot, gravity=strength * direction), signals.links, position).T
+            for direction in tilt_directions(signals.robot.gravity)
+        ]
+        return np.stack(torques)[None]

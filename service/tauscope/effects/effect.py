@@ -1,0 +1,323 @@
+"""What an effect of the catalogue is: torque that the nominal model lacks, linear in coefficients for a given shape.
+
+One object is one *form* of an effect at one place: a joint, or the whole arm. Its columns are made at the recorded
+rate, before any filter, so that torque and columns pass the same one. Adding an effect is one file: a class with its
+equation, its columns and the forms that it can take on a given arm.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.effects.parameters import Coefficient, Quantity, Shape
+from tauscope.effects.setting import Setting
+from tauscope.effects.signals import Signals
+from tauscope.recording.recording import Array
+from tauscope.robot import JointType
+
+_POSITION = {JointType.REVOLUTE: "rad", JointType.PRISMATIC: "m"}
+_TORQUE = {JointType.REVOLUTE: "Nm", JointType.PRISMATIC: "N"}
+
+
+NO_SHAPE = np.zeros((1, 0))
+"""The grid of an effect without shape parameters."""
+
+
+@dataclass(frozen=True, eq=False)
+class Effect(ABC):
+    """One form of an effect at one place.
+
+    joint : int or None
+        joint index, from 0; None for the whole arm
+    grid : (g, k) float64
+        values of the shape parameters at which the effect is looked for
+    lower, upper : (k,) float64
+        bounds of the shape parameters
+
+    Columns of an effect `of_motion_alone` are the same beside every model, and are made once; those of one that
+    `has_step` change with K_v of its joint; one `of_motion_and_step` changes with nothing else of the model, and one
+    `of_motion_and_load` with nothing but the links that it has found, as far as they load the joint.
+    Columns of what `swings` with the load hold the noise of the positions as the residual does: it changes the load
+    that is predicted, and a resonance turns its phase round.
+    What a sensor does not pass on, a spring carries for the motor, or a displaced link for its neighbours,
+    `may_exceed_measured`; nothing else can.
+    An effect that is `screened` is looked for beside the nominal model; any other becomes a finding by comparison with
+    a given model.
+    What an effect that is `within_step` explains lies where friction turns its sign and nowhere else.
+    One that does not do the same whenever the motion does, that does not `repeats_with_motion`, passes for noise there.
+    What its law depends on are its `arguments`: ``position``, ``velocity``, ``acceleration`` of its joint, the ``load``
+    on its transmission, ``time``, the ``others``' motion; None where it acts on whatever torque there is.
+    """
+
+    id: ClassVar[str]
+    equation: ClassVar[str]
+    meaning: ClassVar[str]
+    remedy: ClassVar[str]
+    revealing_motion: ClassVar[str]
+    coefficients: ClassVar[tuple[Coefficient, ...]]
+    shapes: ClassVar[tuple[Shape, ...]] = ()
+    repeats: ClassVar[bool] = False
+    of_motion_alone: ClassVar[bool] = False
+    has_step: ClassVar[bool] = False
+    of_motion_and_step: ClassVar[bool] = False
+    of_motion_and_load: ClassVar[bool] = False
+    within_step: ClassVar[bool] = False
+    swings: ClassVar[bool] = False
+    may_exceed_measured: ClassVar[bool] = False
+    screened: ClassVar[bool] = True
+    repeats_with_motion: ClassVar[bool] = True
+    arguments: ClassVar[frozenset[str] | None] = None
+
+    joint: int | None
+    grid: Array = field(default_factory=lambda: NO_SHAPE)
+    lower: Array = field(default_factory=lambda: np.zeros(0))
+    upper: Array = field(default_factory=lambda: np.zeros(0))
+
+    @classmethod
+    @abstractmethod
+    def forms(cls, setting: Setting) -> "Sequence[Effect]":
+        """All forms and places worth looking at on this arm and motion.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm and the ranges of its motion
+        """
+
+    @classmethod
+    def farther_forms(cls, setting: Setting) -> "Sequence[Effect]":
+        """Forms that show in a small part of the motion: looked at where all others leave more than noise.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm and the ranges of its motion
+        """
+        return ()
+
+    @abstractmethod
+    def columns(self, signals: Signals, shapes: Array) -> Array:
+        """Torque per unit of each coefficient, for several shapes at once.
+
+        Parameters
+        ----------
+        signals : Signals
+            one piece of motion
+        shapes : (g, k) float64
+            values of the shape parameters
+
+        Returns
+        -------
+        (g, c, m, N) or (g, c, m, P, N) float64
+            for the m joints of `touched`; with P where repetitions of the same motion differ
+        """
+
+    def torque_of(self, signals: Signals, coefficients: Array, shape: Array) -> Array:
+        """Torque of the effect at its full size, (m, N) or (m, P, N): what its columns stand for to first order.
+
+        Parameters
+        ----------
+        signals : Signals
+            one piece of motion
+        coefficients : (c,) float64
+            values of the coefficients
+        shape : (k,) float64
+            values of the shape parameters
+        """
+        (columns,) = self.columns(signals, shape[None])
+        return np.asarray(np.tensordot(coefficients, columns, axes=1), dtype=np.float64)
+
+    def factor(self, coefficients: Array) -> float:
+        """By how much it multiplies what the parameters of the plain model make at its joint: 1 where it only adds.
+
+        Parameters
+        ----------
+        coefficients : (c,) float64
+            values of the coefficients
+        """
+        return 1.0
+
+    def rough_grid(self) -> Array:
+        """Some of the grid's shapes, for those who only want to know what the effect may look like, (g, k)."""
+        return self.grid
+
+    def reluctance(self, shapes: Array) -> Array:
+        """By how much more than others a shape has to explain before it is preferred, (g,) [noise variances].
+
+        Parameters
+        ----------
+        shapes : (g, k) float64
+            values of the shape parameters
+        """
+        return np.zeros(len(shapes))
+
+    def alike(self, shape: Array) -> Sequence[Array]:
+        """Shapes of each other kind that look nearly as this one does, (g, k): only their optima tell which is better.
+
+        Parameters
+        ----------
+        shape : (k,) float64
+            values of the shape parameters
+        """
+        return ()
+
+    def is_possible(self, shape: Array, k_v: float | None) -> bool:
+        """Whether this shape is still what the effect means, beside the joint's friction as it was fitted with it.
+
+        Parameters
+        ----------
+        shape : (k,) float64
+            values of the shape parameters
+        k_v : float or None
+            K_v of the effect's joint; None where there is none [s/rad or s/m]
+        """
+        return True
+
+    def is_consistent(self, coefficients: Array, shape: Array, *, alone: bool = False) -> bool:
+        """Whether coefficients and shape, each fitted freely, can belong to one thing.
+
+        Parameters
+        ----------
+        coefficients : (c,) float64
+            values of the coefficients
+        shape : (k,) float64
+            values of the shape parameters
+        alone : bool
+            whether nothing else is known to be missing
+        """
+        return True
+
+    def preferable(self, coefficients: Array, shapes: Array) -> NDArray[np.bool_]:
+        """Shapes to choose among, (g,): those that belong together with their coefficients, or all where none does.
+
+        What explains most may be a shape that its own size contradicts: a resonance at which the data have something
+        else, on a spring that gives way by far less.
+
+        Parameters
+        ----------
+        coefficients : (g, c) float64
+            of every shape
+        shapes : (g, k) float64
+            values of the shape parameters
+        """
+        possible = [self.is_consistent(*each, alone=True) for each in zip(coefficients, shapes, strict=True)]
+        return np.array(possible) if any(possible) else np.ones(len(shapes), dtype=bool)
+
+    def touched(self, joint_count: int) -> tuple[int, ...]:
+        """Joints whose torque the effect changes: its own one, or all.
+
+        Parameters
+        ----------
+        joint_count : int
+            n
+        """
+        return tuple(range(joint_count)) if self.joint is None else (self.joint,)
+
+    def is_free(self, place: int) -> bool:
+        """Whether a shape parameter is estimated between the grid's points.
+
+        Parameters
+        ----------
+        place : int
+            which of the shape parameters
+        """
+        return not self.shapes[place].fixed
+
+    def name(self, joint_names: Sequence[str]) -> str:
+        """``effect@joint``, or the effect alone where it belongs to the whole arm.
+
+        Parameters
+        ----------
+        joint_names : sequence of str
+            names of the arm's joints
+        """
+        return self.id if self.joint is None else f"{self.id}@{joint_names[self.joint]}"
+
+    def where(self, joint_names: Sequence[str]) -> str:
+        """The place in words.
+
+        Parameters
+        ----------
+        joint_names : sequence of str
+            names of the arm's joints
+        """
+        return "the whole arm" if self.joint is None else joint_names[self.joint]
+
+    def unit(self, template: str, setting: Setting) -> str:
+        """A unit with the joint's own units of torque and position.
+
+        Parameters
+        ----------
+        template : str
+            with ``{tau}`` and ``{q}``
+        setting : Setting
+            the arm
+        """
+        return self.unit_at(template, setting, self.joint)
+
+    @staticmethod
+    def unit_at(template: str, setting: Setting, joint: int | None) -> str:
+        """The same for any joint.
+
+        Parameters
+        ----------
+        template : str
+            with ``{tau}`` and ``{q}``
+        setting : Setting
+            the arm
+        joint : int or None
+            joint index, from 0; None for the whole arm
+        """
+        kind = setting.robot.joints[joint or 0].type
+        return template.format(tau=_TORQUE[kind], q=_POSITION[kind])
+
+    def quantities(
+        self, setting: Setting, coefficients: Array, shape: Array, covariance: Array
+    ) -> tuple[Quantity, ...]:
+        """The parameters of a finding: coefficients, then shapes.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        coefficients : (c,) float64
+            estimates
+        shape : (k,) float64
+            estimates
+        covariance : (c + k, c + k) float64
+            of both
+        """
+        std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        names = (*self.coefficients, *self.shapes)
+        values = (*coefficients, *shape)
+        return tuple(
+            Quantity(each.name, float(value), float(error), self.unit(each.unit, setting))
+            for each, value, error in zip(names, values, std, strict=True)
+            if isinstance(each, Coefficient) or each.reported
+        )
+
+
+def per_joint_columns(rows: Array) -> Array:
+    """Columns (g, c, N) of a single joint in the form that `Effect.columns` returns, (g, c, 1, N).
+
+    Parameters
+    ----------
+    rows : (g, c, N) float64
+        columns
+    """
+    return rows[:, :, None, :]
+
+
+def mesh(*axes: Array) -> Array:
+    """All combinations of the shape parameters' values, (g, k).
+
+    Parameters
+    ----------
+    *axes : (g_i,) float64
+        values of each shape parameter
+    """
+    return np.stack([part.ravel() for part in np.meshgrid(*axes, indexing="ij")], axis=1)

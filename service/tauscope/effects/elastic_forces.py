@@ -1,0 +1,138 @@
+"""Elastic torque that depends on the joint's own angle: springs, counterbalances, hoses and end stops."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from tauscope.effects.effect import Effect, mesh, per_joint_columns
+from tauscope.effects.parameters import Coefficient, Shape
+from tauscope.effects.setting import Setting
+from tauscope.effects.signals import Signals
+from tauscope.recording.recording import Array
+
+ONSETS = np.linspace(0.2, 0.9, 8)
+"""Angles at which a cable begins to pull, relative to the range of motion: one that always pulls is a spring."""
+
+EXPONENTS = np.array([1.0, 1.5, 2.0])
+
+USUAL_EXPONENT = 1.5
+"""Of hoses and cables; data that see a short way past the angle hardly tell exponents apart, and extrapolate badly."""
+
+CLEARLY_BETTER = 10.0
+"""What another exponent has to explain more [noise variances]."""
+
+
+class JointSpring(Effect):
+    """τ = k (q - q_0), k < 0 where a counterbalance pushes away; the constant is in the nominal model's offset.
+
+    What a counterbalance carries the motor need not: its torque may well be more than was measured.
+    """
+
+    of_motion_alone: ClassVar[bool] = True
+    may_exceed_measured: ClassVar[bool] = True
+    id: ClassVar[str] = "joint_spring"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"position"})
+    equation: ClassVar[str] = "tau = k (q - q_0)"
+    meaning: ClassVar[str] = "an elastic torque grows linearly with the angle"
+    remedy: ClassVar[str] = "add a spring to the joint"
+    revealing_motion: ClassVar[str] = "the joint's whole range, in several poses of the other joints"
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("k", "{tau}/{q}"),)
+
+    @classmethod
+    def forms(cls, setting: Setting) -> Sequence[Effect]:
+        """One a joint that moves.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        """
+        return [cls(joint) for joint in setting.joints if setting.moves(joint)]
+
+    def columns(self, signals: Signals, shapes: Array) -> Array:
+        """The angle.
+
+        Parameters
+        ----------
+        signals : Signals
+            one piece of motion
+        shapes : (1, 0) float64
+            none
+        """
+        return per_joint_columns(signals.position[self.joint][None, None])
+
+
+@dataclass(frozen=True, eq=False)
+class CableForce(Effect):
+    """τ = ±k max(±(q - q_t), 0)^p.
+
+    side : int
+        +1 where it pulls beyond q_t, -1 where below
+    """
+
+    of_motion_alone: ClassVar[bool] = True
+    may_exceed_measured: ClassVar[bool] = True
+    id: ClassVar[str] = "cable_force"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"position"})
+    equation: ClassVar[str] = "tau = +-k max(+-(q - q_t), 0)^p"
+    meaning: ClassVar[str] = "a one-sided elastic torque sets in past an angle"
+    remedy: ClassVar[str] = "re-route the hose or cable, or model its pull past the angle"
+    revealing_motion: ClassVar[str] = "motion well past the angle on both sides"
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("k", "{tau}/{q}^p", positive=True),)
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("q_t", "{q}"), Shape("p", "1", fixed=True))
+
+    side: int = 1
+
+    @classmethod
+    def forms(cls, setting: Setting) -> Sequence[Effect]:
+        """Both sides of every joint that moves.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        """
+        made = []
+        for joint in setting.joints:
+            if setting.moves(joint):
+                low, high = float(setting.lowest[joint]), float(setting.highest[joint])
+                for side in (1, -1):
+                    onsets = np.sort((low if side > 0 else high) + side * ONSETS * (high - low))
+                    bounds = np.array([onsets[0], 1.0]), np.array([onsets[-1], 2.0])
+                    made.append(cls(joint, mesh(onsets, EXPONENTS), *bounds, side=side))
+        return made
+
+    def reluctance(self, shapes: Array) -> Array:
+        """Another exponent than the usual one has to be clearly better.
+
+        Parameters
+        ----------
+        shapes : (g, 2) float64
+            q_t [rad or m], p
+        """
+        return np.where(shapes[:, 1] == USUAL_EXPONENT, 0.0, CLEARLY_BETTER)
+
+    def alike(self, shape: Array) -> Sequence[Array]:
+        """The other exponents: on a grid of onsets any of them may come nearest.
+
+        Parameters
+        ----------
+        shape : (2,) float64
+            q_t [rad or m], p
+        """
+        return [self.grid[self.grid[:, 1] == exponent] for exponent in EXPONENTS if exponent != shape[1]]
+
+    def columns(self, signals: Signals, shapes: Array) -> Array:
+        """±max(±(q - q_t), 0)^p.
+
+        Parameters
+        ----------
+        signals : Signals
+            one piece of motion
+        shapes : (g, 2) float64
+            q_t [rad or m], p
+        """
+        beyond = np.maximum(self.side * (signals.position[self.joint] - shapes[:, :1]), 0.0)
+        return per_joint_columns((self.side * beyond ** shapes[:, 1:])[:, None])

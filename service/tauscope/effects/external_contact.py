@@ -1,0 +1,152 @@
+"""Contact with the surroundings for a while: the tool presses with a force, or something acts on one joint."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from tauscope.dynamics import gravity_torque
+from tauscope.effects.effect import Effect
+from tauscope.effects.parameters import Coefficient, Shape
+from tauscope.effects.setting import Setting
+from tauscope.effects.signals import Signals
+from tauscope.effects.time_local import EVERY, HALF_SINE, TimeLocalEffect
+from tauscope.recording.recording import Array
+from tauscope.robot.robot import STANDARD_PARAMETERS
+
+LENGTHS_S = (0.5, 1.5, 4.5)
+"""Lengths of the windows looked through [s]."""
+
+OVERLAP = 0.4
+"""Part of a window that its neighbour covers too."""
+
+SINE_WIDTH = 1.35
+"""Length of a half sine, relative to the rectangle that is most like it: that holds 0.92 of its energy."""
+
+JOINTS_FOR_A_FORCE = 3
+"""Joints from which the three components of a force can be told apart."""
+
+_WINDOW = (
+    Shape("scope", "1", fixed=True, reported=False),
+    Shape("t_0", "s"),
+    Shape("t_1", "s"),
+    Shape("profile", "1", fixed=True, reported=False),
+)
+
+
+class ExternalContact(TimeLocalEffect):
+    """τ = J(q)ᵀ F w(t), F at the origin of the last link's frame in base axes."""
+
+    of_motion_alone: ClassVar[bool] = True
+    id: ClassVar[str] = "external_contact"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"time"})
+    equation: ClassVar[str] = "tau = J(q)^T F w(t), or tau_j = c w(t); w = 1 or a half sine from t_0 to t_1"
+    meaning: ClassVar[str] = "the arm touches something for a while"
+    remedy: ClassVar[str] = "clear what it touches, or leave that stretch of the recording out"
+    revealing_motion: ClassVar[str] = "the same motion once more without contact"
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (
+        Coefficient("F_x", "N"),
+        Coefficient("F_y", "N"),
+        Coefficient("F_z", "N"),
+    )
+    shapes: ClassVar[tuple[Shape, ...]] = _WINDOW
+
+    @classmethod
+    def forms(cls, setting: Setting) -> Sequence[Effect]:
+        """A force at the tool of an arm with enough joints, and a torque at every joint.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        """
+        grid, bounds = contact_windows(setting.durations)
+        if not len(grid):
+            return []
+        whole = [cls(None, grid, *bounds)] if setting.robot.joint_count >= JOINTS_FOR_A_FORCE else []
+        return [*whole, *(JointContact(joint, grid, *bounds) for joint in setting.joints)]
+
+    def alike(self, shape: Array) -> Sequence[Array]:
+        """A push that rises and falls beside one that is there at once, and the other way about.
+
+        Parameters
+        ----------
+        shape : (4,) float64
+            the window
+        """
+        scope, start, end, profile = shape
+        was_sine = profile == HALF_SINE
+        half = 0.5 * (end - start) * (1.0 / SINE_WIDTH if was_sine else SINE_WIDTH)
+        middle = 0.5 * (start + end)
+        return [np.array([[scope, max(middle - half, 0.0), middle + half, 0.0 if was_sine else HALF_SINE]])]
+
+    def torque(self, signals: Signals, shape: Array) -> Array:
+        """J(q)ᵀ, (3, n, N).
+
+        Parameters
+        ----------
+        signals : Signals
+            one piece of motion
+        shape : (4,) float64
+            the window
+        """
+        return signals.remembered_of_motion("transposed Jacobian", lambda: transposed_jacobian(signals))
+
+
+class JointContact(ExternalContact):
+    """τ_j = c w(t): the same at one joint alone."""
+
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("c", "{tau}"),)
+
+    def torque(self, signals: Signals, shape: Array) -> Array:
+        """One, (1, 1, N).
+
+        Parameters
+        ----------
+        signals : Signals
+            one piece of motion
+        shape : (4,) float64
+            the window
+        """
+        return np.ones((1, 1, signals.position.shape[1]))
+
+
+def transposed_jacobian(signals: Signals) -> Array:
+    """J(q)ᵀ of the last link's origin, base axes, (3, n, N): torque that holds it against a unit force.
+
+    It is the torque that a unit mass there would ask for in a gravity of one unit along -x, -y, -z.
+
+    Parameters
+    ----------
+    signals : Signals
+        one piece of motion
+    """
+    robot = signals.robot
+    unit_mass = np.zeros(len(STANDARD_PARAMETERS) * robot.joint_count)
+    unit_mass[-len(STANDARD_PARAMETERS) + STANDARD_PARAMETERS.index("m")] = 1.0
+    position = np.ascontiguousarray(signals.position.T)
+    rows = [gravity_torque(replace(robot, gravity=-axis), unit_mass, position).T for axis in np.eye(3)]
+    return np.stack(rows)
+
+
+def contact_windows(durations: Sequence[float]) -> tuple[Array, tuple[Array, Array]]:
+    """Windows of one recording each, and windows at the same instants of all, with the bounds of their shapes.
+
+    Parameters
+    ----------
+    durations : sequence of float
+        of the recordings [s]
+    """
+    scopes = [(float(place), length) for place, length in enumerate(durations)]
+    if len(durations) > 1:
+        scopes.append((EVERY, min(durations)))
+    rows = []
+    for scope, whole in scopes:
+        for length in LENGTHS_S:
+            starts = np.arange(0.0, whole - length, (1.0 - OVERLAP) * length)
+            rows += [(scope, start, start + length, profile) for start in starts for profile in (0.0, HALF_SINE)]
+    longest = max(durations)
+    lower = np.array([EVERY, 0.0, 0.0, 0.0])
+    upper = np.array([len(durations) - 1.0, longest, longest, 1.0])
+    return np.array(rows).reshape(-1, 4), (lower, upper)

@@ -1,0 +1,182 @@
+"""A transmission that gives way under load, quasi-statically or with the resonance of link and spring."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+from scipy.linalg import solve_banded
+
+from tauscope.effects.deflection import BAND, Deflection
+from tauscope.effects.effect import Effect
+from tauscope.effects.parameters import Coefficient, Quantity, Shape
+from tauscope.effects.setting import Setting
+from tauscope.recording.recording import Array
+
+BANDS = np.array([1.41, 1.0, 0.35, 0.12])
+"""Bands to which the load is smoothed, relative to the common one; the widest passes all that is compared there."""
+
+SWINGING_BANDS = BANDS[:2]
+"""The same where the link swings: near a resonance, what a narrower one takes from the load passes for compliance."""
+
+RESONANCES = np.array([0.6, 0.75, 0.9, 1.1, 1.35, 1.7, 2.2, 3.0])
+"""Resonances of the link at its mean inertia, the motor held, relative to the common band; beyond, nothing is seen."""
+
+BETWEEN = np.geomspace(1.0 / 1.5, 1.5, 15)
+"""Compliances that swing, relative to the grid's best: a resonance within the band is far narrower than the grid."""
+
+SAME = 1.6
+"""Factor between the compliance that swings and the one that is found, up to which they are the same."""
+
+CLEARLY_BETTER = 20.0
+"""What a resonance has to explain more than a joint that follows its load at once [noise variances]."""
+
+DAMPING = 0.1
+"""Damping ratio of the resonance: gears and bearings make it heavier than steel alone."""
+
+
+def transmitted(load: Array, inertia: Array, compliance: float, rate_hz: float) -> Array:
+    """What a spring transmits to a link whose load is given for a rigid transmission: I δ̈ + D δ̇ + K δ = τ_rb.
+
+    D = 2 ζ √(K Ī) with the mean inertia Ī. By the trapezoidal rule, from rest under the first load.
+
+    Parameters
+    ----------
+    load : (N,) float64
+        τ_rb [Nm or N]
+    inertia : (N,) float64
+        I, above zero [kg m² or kg]
+    compliance : float
+        1/K [rad/Nm or m/N]
+    rate_hz : float
+        sampling rate [Hz]
+
+    Returns
+    -------
+    (N,) float64
+        K δ [Nm or N]
+    """
+    by_acceleration = rate_hz**2 * compliance * inertia
+    by_rate = DAMPING * rate_hz * np.sqrt(compliance * inertia.mean())
+    ahead = by_acceleration + by_rate + 0.25
+    here = 0.5 - 2.0 * by_acceleration
+    behind = by_acceleration - by_rate + 0.25
+    # row k + 1 holds the equation at k; the first two say that it rests
+    count = len(load)
+    matrix = np.zeros((3, count))
+    matrix[0, :2], matrix[0, 2:] = 1.0, ahead[1:-1]
+    matrix[1, 1:-1], matrix[2, :-2] = here[1:-1], behind[1:-1]
+    right = np.concatenate([load[:1], load[:1], 0.25 * (load[2:] + 2.0 * load[1:-1] + load[:-2])])
+    return np.asarray(solve_banded((2, 0), matrix, right))
+
+
+class JointElasticity(Deflection):
+    """q_link = q - c τ, τ the load as the spring passes it on."""
+
+    id: ClassVar[str] = "joint_elasticity"
+    equation: ClassVar[str] = "q_link = q - c tau_rb, c = 1/stiffness"
+    meaning: ClassVar[str] = "the transmission gives way under load"
+    remedy: ClassVar[str] = "model the joint as two masses with a stiffness between them"
+    revealing_motion: ClassVar[str] = "sharp reversals from constant speed, and an encoder on the link"
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("c", "{q}/{tau}", positive=True),)
+    shapes: ClassVar[tuple[Shape, ...]] = (BAND, Shape("swinging", "{q}/{tau}", fixed=True, reported=False))
+    swings: ClassVar[bool] = True
+
+    @classmethod
+    def forms(cls, setting: Setting) -> Sequence[Effect]:
+        """One a joint that moves.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        """
+        bands = BANDS * setting.cutoff_hz
+        stiff = np.stack([bands, np.zeros(len(bands))], axis=1)
+        made = []
+        for joint in cls.deflected_joints(setting):
+            grid = stiff
+            if setting.inertia[joint] > 0.0:
+                swinging = 1.0 / ((2.0 * np.pi * RESONANCES * setting.cutoff_hz) ** 2 * setting.inertia[joint])
+                swings = [[band, each] for band in SWINGING_BANDS * setting.cutoff_hz for each in swinging]
+                grid = np.concatenate([stiff, np.array(swings)])
+            made.append(cls(joint, grid, grid.min(axis=0), grid.max(axis=0)))
+        return made
+
+    def reluctance(self, shapes: Array) -> Array:
+        """A resonance has to be clearly better: where little is seen, any of them fits some noise.
+
+        Parameters
+        ----------
+        shapes : (g, 2) float64
+            band of the load [Hz], compliance on which the link swings, 0 where it does not [rad/Nm or m/N]
+        """
+        return np.where(shapes[:, 1] == 0.0, 0.0, CLEARLY_BETTER)
+
+    def alike(self, shape: Array) -> Sequence[Array]:
+        """What swings a little slower or faster, in either band.
+
+        Parameters
+        ----------
+        shape : (2,) float64
+            band of the load [Hz], compliance on which the link swings, 0 where it does not [rad/Nm or m/N]
+        """
+        if shape[1] == 0.0:
+            return ()
+        bands = np.unique(self.grid[self.grid[:, 1] > 0.0, 0])
+        return [np.stack([np.full(len(BETWEEN), band), shape[1] * BETWEEN], axis=1) for band in bands]
+
+    def is_consistent(self, coefficients: Array, shape: Array, *, alone: bool = False) -> bool:
+        """Whether what gives way is what the link swings on.
+
+        Parameters
+        ----------
+        coefficients : (1,) float64
+            c [rad/Nm or m/N]
+        shape : (2,) float64
+            band of the load [Hz], compliance on which the link swings, 0 where it does not [rad/Nm or m/N]
+        alone : bool
+            whether nothing else is known to be missing
+        """
+        return bool(shape[1] == 0.0 or 1.0 / SAME < coefficients[0] / shape[1] < SAME)
+
+    def quantities(
+        self, setting: Setting, coefficients: Array, shape: Array, covariance: Array
+    ) -> tuple[Quantity, ...]:
+        """c; where the link swings, the mean of what gives way and what it swings on: both estimate one compliance.
+
+        The load of a resonance is known only within a band, which errs the one way in the amplitude and the other way
+        in the frequency: half the difference is an error of their mean that the covariance does not know.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        coefficients : (1,) float64
+            c [rad/Nm or m/N]
+        shape : (2,) float64
+            band of the load [Hz], compliance on which the link swings, 0 where it does not [rad/Nm or m/N]
+        covariance : (3, 3) float64
+            of both
+        """
+        (found,) = super().quantities(setting, coefficients, shape, covariance)
+        swinging = float(shape[1])
+        if swinging == 0.0:
+            return (found,)
+        apart = 0.5 * (found.value - swinging)
+        return (replace(found, value=found.value - apart, std=float(np.hypot(found.std, apart))),)
+
+    def deflection(self, load: Array, inertia: Array, shape: Array, rate_hz: float) -> Array:
+        """What the spring transmits.
+
+        Parameters
+        ----------
+        load, inertia : (N,) float64
+            of the link [Nm or N, kg m² or kg]
+        shape : (2,) float64
+            band of the load [Hz], compliance on which the link swings, 0 where it does not [rad/Nm or m/N]
+        rate_hz : float
+            sampling rate [Hz]
+        """
+        swinging = float(shape[1])
+        return load if swinging == 0.0 or not inertia.all() else transmitted(load, inertia, swinging, rate_hz)

@@ -1,0 +1,113 @@
+"""A link frame that is not where the robot file has it: a wrong length.
+
+The base parameters take nearly all of it: what is left of a few millimetres is often a ten-thousandth of its torque.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from tauscope.dynamics import inverse_dynamics
+from tauscope.effects.effect import Effect
+from tauscope.effects.parameters import Coefficient, Shape
+from tauscope.effects.setting import Setting
+from tauscope.effects.signals import Signals
+from tauscope.recording.recording import Array
+from tauscope.robot import Placement, Robot
+
+STEP_M = 1e-5
+"""Displacement of a frame for the difference quotient [m]; torque is quadratic in it, on the scale of the arm."""
+
+LARGEST_M = 0.2
+"""A frame farther off is no error of measurement [m]."""
+
+
+class KinematicError(Effect):
+    """τ = ∂τ/∂d d: the frame of one link lies d farther along one axis, of those before its last turn."""
+
+    id: ClassVar[str] = "kinematic_error"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "velocity", "acceleration", "others"})
+    equation: ClassVar[str] = "tau = dtau/dd d, d the displacement of one link's frame along one of its axes"
+    meaning: ClassVar[str] = "a link length or frame is wrong"
+    remedy: ClassVar[str] = "measure the arm's geometry, and correct the robot file by d"
+    revealing_motion: ClassVar[str] = "none: measure the tool's place in several postures instead"
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("d", "m", largest=LARGEST_M),)
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("link", "1", fixed=True), Shape("axis", "1", fixed=True))
+    may_exceed_measured: ClassVar[bool] = True  # links that are balanced in one place are not in another
+    of_motion_alone: ClassVar[bool] = True  # the consistent links, which no model of a diagnosis changes
+
+    @classmethod
+    def forms(cls, setting: Setting) -> Sequence[Effect]:
+        """One for the arm; links and axes are its shapes, the last link left out: what it carries hangs at its frame.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        """
+        links = np.arange(1.0, setting.robot.joint_count)
+        grid = np.stack(np.meshgrid(links, np.arange(1.0, 4.0), indexing="ij"), axis=-1).reshape(-1, 2)
+        return [cls(None, grid, grid[0], grid[-1])] if len(grid) else []
+
+    def rough_grid(self) -> Array:
+        """None: nearly all of these columns is the identified parameters' own, and the rest like everything else."""
+        return self.grid[:0]
+
+    def columns(self, signals: Signals, shapes: Array) -> Array:
+        """Torque per metre, (g, 1, n, N).
+
+        Parameters
+        ----------
+        signals : Signals
+            one piece of motion
+        shapes : (g, 2) float64
+            number of the link and of the axis, from 1
+        """
+        exact, *longer = _torques(signals, [(shapes[0], 0.0), *((shape, STEP_M) for shape in shapes)])
+        return np.stack([(each - exact) / STEP_M for each in longer])[:, None]
+
+    def torque_of(self, signals: Signals, coefficients: Array, shape: Array) -> Array:
+        """Torque of the arm as it is less that of the arm as the file has it, (n, N).
+
+        Parameters
+        ----------
+        signals : Signals
+            one piece of motion
+        coefficients : (1,) float64
+            d [m]
+        shape : (2,) float64
+            number of the link and of the axis
+        """
+        longer, exact = _torques(signals, [(shape, float(coefficients[0])), (shape, 0.0)])
+        return longer - exact
+
+
+def _torques(signals: Signals, displacements: Sequence[tuple[Array, float]]) -> list[Array]:
+    """Rigid-body torque (n, N) with one link's frame displaced along one of its axes, for each shape and length."""
+    state = [np.ascontiguousarray(each.T) for each in (signals.position, signals.velocity, signals.acceleration)]
+    found = []
+    for shape, by in displacements:
+        link, axis = (int(each) - 1 for each in shape)
+        arm = displaced(signals.robot, link, by * np.eye(3)[axis])
+        found.append(inverse_dynamics(arm, signals.links, *state).T)
+    return found
+
+
+def displaced(robot: Robot, link: int, by: Array) -> Robot:
+    """The arm with the frame of one link, and all that follows, displaced.
+
+    Parameters
+    ----------
+    robot : Robot
+        the arm
+    link : int
+        index of the link, from 0
+    by : (3,) float64
+        displacement in the moved joint's frame [m]
+    """
+    segment = robot.segments[link]
+    after = Placement(segment.after.rotation, segment.after.translation + by)
+    segments = (*robot.segments[:link], replace(segment, after=after), *robot.segments[link + 1 :])
+    return replace(robot, segments=segments)

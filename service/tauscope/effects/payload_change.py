@@ -1,0 +1,184 @@
+"""Mass picked up or dropped while it was recorded, or between two recordings."""
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from tauscope.effects.carried_body import FARTHEST_M, MASS, PLACE, body_columns, body_quantities, unit_body
+from tauscope.effects.effect import Effect
+from tauscope.effects.parameters import Coefficient, Quantity, Shape
+from tauscope.effects.setting import Setting
+from tauscope.effects.signals import Signals
+from tauscope.effects.time_local import EVERY, OUTSIDE, TimeLocalEffect, since
+from tauscope.recording.recording import Array
+
+NEAR_EDGE = 0.03
+"""Part of a recording within which an edge of a window is the recording's own."""
+
+INSTANTS = 12
+"""Instants of every recording at which the payload may change."""
+
+
+class PayloadChange(TimeLocalEffect):
+    """τ = m Φ_body(r) w(t), Φ_body the torque of a point mass at r of the last link."""
+
+    of_motion_alone: ClassVar[bool] = True
+    id: ClassVar[str] = "payload_change"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "velocity", "acceleration", "others", "time"})
+    equation: ClassVar[str] = "tau = m Phi_body(q, qd, qdd; r) w(t), w = 1 from t_on to t_off"
+    meaning: ClassVar[str] = "a mass at the tool is picked up or dropped"
+    remedy: ClassVar[str] = "record with one payload at a time, or add the body to the last link while it is carried"
+    revealing_motion: ClassVar[str] = "the same motion without payload, and once more with it all the time"
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (MASS,)
+    shapes: ClassVar[tuple[Shape, ...]] = (
+        Shape("scope", "1", fixed=True, reported=False),
+        Shape("t_on", "s"),
+        Shape("t_off", "s"),
+        Shape("profile", "1", fixed=True, reported=False),
+        *PLACE,
+    )
+
+    @classmethod
+    def forms(cls, setting: Setting) -> Sequence[Effect]:
+        """One for the arm.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        """
+        grid = payload_windows(setting.durations)
+        longest = max(setting.durations)
+        lower = np.array([since(len(setting.durations) - 1), 0.0, 0.0, OUTSIDE, *(-FARTHEST_M,) * 3])
+        upper = np.array([len(setting.durations) - 1.0, longest, 1.1 * longest, 0.0, *(FARTHEST_M,) * 3])
+        return [cls(None, grid, lower, upper)] if len(grid) else []
+
+    def outside(self, shape: Array) -> Array | None:
+        """What is missing within a window is carried outside it: which of the two, training recordings cannot say.
+
+        Parameters
+        ----------
+        shape : (7,) float64
+            the window, r [m]
+        """
+        if shape[0] == EVERY:  # held-out recordings have it at the same instants
+            return None
+        other = shape.copy()
+        other[3] = 0.0 if shape[3] == OUTSIDE else OUTSIDE
+        return other
+
+    def torque(self, signals: Signals, shape: Array) -> Array:
+        """Torque of one kilogramme at r, (1, n, N).
+
+        Parameters
+        ----------
+        signals : Signals
+            one piece of motion
+        shape : (7,) float64
+            the window, r [m]
+        """
+        return np.tensordot(unit_body(shape[4:]), body_columns(signals), axes=1)[None]
+
+    def quantities(
+        self, setting: Setting, coefficients: Array, shape: Array, covariance: Array
+    ) -> tuple[Quantity, ...]:
+        """Mass, first moment, and when.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        coefficients : (1,) float64
+            m [kg]
+        shape : (7,) float64
+            the window, r [m]
+        covariance : (8, 8) float64
+            of both
+        """
+        body = (0, 5, 6, 7)
+        sign, instants = carried(float(coefficients[0]), shape, setting.durations)
+        found = list(body_quantities(sign * float(coefficients[0]), shape[4:], covariance[np.ix_(body, body)]))
+        std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        found += [Quantity(name, float(shape[place]), float(std[1 + place]), "s") for name, place in instants.items()]
+        return tuple(found)
+
+    def when(self, coefficients: Array, shape: Array, names: Sequence[str], durations: Sequence[float]) -> str:
+        """When it is picked up and dropped, in words.
+
+        Parameters
+        ----------
+        coefficients : (1,) float64
+            m [kg]
+        shape : (7,) float64
+            the window, r [m]
+        names : sequence of str
+            of the training recordings
+        durations : sequence of float
+            of the same [s]
+        """
+        _, instants = carried(float(coefficients[0]), shape, durations)
+        verbs = {"t_on": "picked up", "t_off": "dropped"}
+        said = [f"{verbs[name]} at {shape[place]:.2f} s" for name, place in instants.items()]
+        where = self.recording_words(shape, names)
+        return f"{' and '.join(said)} of {where}" if said else f"carried in {where}"
+
+
+def carried(mass: float, shape: Array, durations: Sequence[float]) -> tuple[float, dict[str, int]]:
+    """The sign that makes the mass positive, and which of the window's edges are its being picked up and dropped.
+
+    Beside a nominal model that has it or not, a mass that is missing in one part is a mass that is carried in the rest.
+
+    Parameters
+    ----------
+    mass : float
+        m [kg]
+    shape : (7,) float64
+        the window
+    durations : sequence of float
+        of the recordings [s]
+
+    Returns
+    -------
+    tuple of float and dict of str to int
+        ±1, and places among the shapes of ``t_on`` and ``t_off``
+    """
+    scope, start, end = shape[:3]
+    if shape[3] == OUTSIDE:
+        sign, edges = carried(-mass, np.array([scope, start, end, 0.0]), durations)
+        return -sign, edges
+    if scope < EVERY:
+        return (1.0, {"t_on": 1}) if mass > 0.0 else (-1.0, {"t_off": 1})
+    length = min(durations) if scope == EVERY else durations[int(scope)]
+    from_begin, to_end = start < NEAR_EDGE * length, end > (1.0 - NEAR_EDGE) * length
+    if mass < 0.0 and from_begin != to_end:
+        return -1.0, {"t_on": 2} if from_begin else {"t_off": 1}
+    edges = {} if from_begin else {"t_on": 1}
+    return 1.0, edges if to_end else {**edges, "t_off": 2}
+
+
+def payload_windows(durations: Sequence[float]) -> Array:
+    """Windows (g, 7) in which something may be carried: scope, start, end, profile, and r = 0.
+
+    Within one recording, at the same instants of all, or from one recording on.
+
+    Parameters
+    ----------
+    durations : sequence of float
+        of the recordings [s]
+    """
+    rows = []
+    scopes = [(float(place), length) for place, length in enumerate(durations)]
+    if len(durations) > 1:
+        scopes.append((EVERY, min(durations)))
+    for scope, whole in scopes:
+        edges = np.linspace(0.0, whole, INSTANTS + 1)
+        for first, start in enumerate(edges[:-1]):
+            for end in edges[first + 2 :]:
+                if not (scope == EVERY and start == 0.0 and end == edges[-1]):
+                    beyond = 0.05 * whole if end == edges[-1] else 0.0
+                    rows.append((scope, start, end + beyond, 0.0, 0.0, 0.0, 0.0))
+    for place, whole in enumerate(durations[:-1]):
+        for start in np.linspace(0.0, whole, INSTANTS + 1)[0 if place else 1 :]:
+            rows.append((since(place), start, 0.0, 0.0, 0.0, 0.0, 0.0))
+    return np.array(rows).reshape(-1, 7)

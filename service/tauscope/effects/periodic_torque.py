@@ -1,0 +1,294 @@
+"""Torque that repeats with the angle of the motor or the joint: cogging, and ripple in proportion to the load.
+
+Orders are counted per unit of joint position. Where the robot file states a gear ratio, only whole multiples of the
+motor's revolution can occur; otherwise the angle-periodogram is scanned as finely as the range of motion resolves.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import ClassVar
+
+import numpy as np
+
+from tauscope.effects.effect import Effect, per_joint_columns
+from tauscope.effects.last_few import LastFew
+from tauscope.effects.parameters import Coefficient, Quantity, Shape
+from tauscope.effects.setting import Setting
+from tauscope.effects.side_by_side import THREADS
+from tauscope.effects.signals import Signals
+from tauscope.recording.recording import Array
+from tauscope.robot import JointType
+
+FEWEST_CYCLES = 1.5
+"""Cycles over the range of motion below which a periodic torque is a spring or a bump by another name."""
+
+CYCLES_A_STEP = 0.35
+"""Step of the scan in cycles over the range of motion: a peak is two wide."""
+
+BAND_SHARE = 0.8
+"""Share of the band up to which the frequency at typical speed may reach."""
+
+MOST_ORDERS = 220
+
+EVEN = 1e-9
+"""Spread of steps, relative to one, up to which they are even: over a thousand orders no phase is off by as much."""
+
+FARTHER = 8.0
+"""Factor up to which orders are looked at where something is left: they reach the band near reversals only, in a
+twentieth of the time of a sine."""
+
+MOST_FARTHER_ORDERS = 800
+
+FEW = 2
+"""Orders at once up to which sines are kept: one of a fit, and the two of its difference quotient."""
+
+KEPT = 24 * THREADS
+"""Sets of them that are kept a piece: those of a model with all orders that it may have."""
+
+
+def possible_orders(setting: Setting, joint: int) -> Array:
+    """Orders of a periodic torque that this motion can show, (g,), ascending; empty where there are none.
+
+    Parameters
+    ----------
+    setting : Setting
+        the arm and its motion
+    joint : int
+        joint index, from 0
+    """
+    return _orders(setting, joint, 1.0)[:MOST_ORDERS]
+
+
+def farther_orders(setting: Setting, joint: int) -> Array:
+    """Orders beyond those, that show in a part of the motion only, (g,), ascending.
+
+    Parameters
+    ----------
+    setting : Setting
+        the arm and its motion
+    joint : int
+        joint index, from 0
+    """
+    near = possible_orders(setting, joint)
+    return _orders(setting, joint, FARTHER)[len(near) :][:MOST_FARTHER_ORDERS]
+
+
+def _orders(setting: Setting, joint: int, factor: float) -> Array:
+    """Orders whose frequency at rms speed reaches up to some times the band."""
+    if not setting.moves(joint):
+        return np.zeros(0)
+    reach = float(setting.highest[joint] - setting.lowest[joint])
+    lowest = FEWEST_CYCLES * 2.0 * np.pi / reach
+    highest = factor * BAND_SHARE * 2.0 * np.pi * setting.cutoff_hz / float(setting.speed[joint])
+    if _is_geared(setting, joint):
+        unit = abs(setting.robot.joints[joint].gear_ratio or 1.0) * _pole_pairs(setting, joint)
+        lowest = min(lowest, unit) if reach >= 2.0 * np.pi / unit * FEWEST_CYCLES else lowest
+        multiples = np.arange(max(1, int(np.ceil(lowest / unit - 1e-9))), int(highest / unit) + 1)
+        return np.asarray(unit * multiples, dtype=np.float64)
+    step = CYCLES_A_STEP * 2.0 * np.pi / reach
+    return np.asarray(np.arange(lowest, highest, step), dtype=np.float64)
+
+
+def _pole_pairs(setting: Setting, joint: int) -> int:
+    drive = setting.robot.joints[joint].drive or {}
+    pairs = drive.get("pole_pairs", 1)
+    return int(pairs) if isinstance(pairs, int | float) and pairs >= 1 else 1
+
+
+def _is_geared(setting: Setting, joint: int) -> bool:
+    described = setting.robot.joints[joint]
+    return described.gear_ratio is not None and described.type is JointType.REVOLUTE
+
+
+def waves(position: Array, orders: Array) -> Array:
+    """Sines and cosines of orders of a position; of even steps by sin(a + b) and cos(a + b), ten times as quick.
+
+    Parameters
+    ----------
+    position : (N,) float64
+        q [rad or m]
+    orders : (g,) float64
+        k [1/rad or 1/m]
+
+    Returns
+    -------
+    (g, 2, N) float64
+        sin kq, cos kq
+    """
+    steps = np.diff(orders)
+    if len(steps) < 2 or np.ptp(steps) > EVEN * abs(steps[0]):
+        angle = orders[:, None] * position
+        return np.stack([np.sin(angle), np.cos(angle)], axis=1)
+    found = np.empty((len(orders), 2, len(position)))
+    found[0] = np.sin(orders[0] * position), np.cos(orders[0] * position)
+    sine, cosine = np.sin(steps[0] * position), np.cos(steps[0] * position)
+    for before, after in pairwise(found):
+        after[0] = before[0] * cosine + before[1] * sine
+        after[1] = before[1] * cosine - before[0] * sine
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Periodic(Effect):
+    """Sine and cosine of an order, with a weight of its own.
+
+    geared : bool
+        whether only whole multiples of the motor's revolution can occur
+    """
+
+    geared: bool = False
+
+    repeats: ClassVar[bool] = True
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("order", "1/{q}"),)
+
+    @classmethod
+    def forms(cls, setting: Setting) -> Sequence[Effect]:
+        """One a joint whose motion covers enough cycles.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        """
+        return cls._of_orders(setting, possible_orders)
+
+    @classmethod
+    def farther_forms(cls, setting: Setting) -> Sequence[Effect]:
+        """The same of orders that show near reversals only.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        """
+        return cls._of_orders(setting, farther_orders)
+
+    @classmethod
+    def _of_orders(cls, setting: Setting, orders: Callable[[Setting, int], Array]) -> Sequence[Effect]:
+        """One a joint where the effect may be and has such orders."""
+        found = {joint: orders(setting, joint) for joint in cls._places(setting)}
+        return [
+            cls(joint, own[:, None], 0.9 * own[:1], 1.1 * own[-1:], geared=_is_geared(setting, joint))
+            for joint, own in found.items()
+            if len(own)
+        ]
+
+    @classmethod
+    def _places(cls, setting: Setting) -> Sequence[int]:
+        return setting.joints
+
+    def is_free(self, place: int) -> bool:
+        """Whether the order lies between the grid's points.
+
+        Parameters
+        ----------
+        place : int
+            the order is the only shape
+        """
+        return not self.geared
+
+    def quantities(
+        self, setting: Setting, coefficients: Array, shape: Array, covariance: Array
+    ) -> tuple[Quantity, ...]:
+        """Amplitude, phase and order instead of sine and cosine.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        coefficients : (2,) float64
+            of sine and cosine
+        shape : (1,) float64
+            order
+        covariance : (3, 3) float64
+            of both and the order
+        """
+        sine, cosine = (float(value) for value in coefficients)
+        amplitude = float(np.hypot(sine, cosine)) or 1e-300
+        of_amplitude = np.array([sine, cosine]) / amplitude
+        of_phase = np.array([-cosine, sine]) / amplitude**2
+        own = covariance[:2, :2]
+        return (
+            Quantity("order", float(shape[0]), float(np.sqrt(max(covariance[2, 2], 0.0))), self.unit("1/{q}", setting)),
+            Quantity(
+                "amplitude",
+                amplitude,
+                float(np.sqrt(of_amplitude @ own @ of_amplitude)),
+                self.unit(self.coefficients[0].unit, setting),
+            ),
+            Quantity(
+                "phase",
+                float(np.arctan2(cosine, sine)),
+                float(np.sqrt(of_phase @ own @ of_phase)),
+                "rad",
+                period=2.0 * np.pi,
+            ),
+        )
+
+    def _waves(self, signals: Signals, shapes: Array) -> Array:
+        """Sin kq, cos kq, (g, 2, N); of an order or two they are kept, for a fit asks again under other loads."""
+        joint, orders = self.joint or 0, shapes[:, 0]
+        if len(orders) > FEW:
+            return waves(signals.position[joint], orders)
+        kept: LastFew[tuple[int, bytes], Array] = signals.remembered_of_motion("waves", lambda: LastFew(KEPT))
+        return kept.get((joint, orders.tobytes()), lambda: waves(signals.position[joint], orders))
+
+
+class Cogging(_Periodic):
+    """τ = Σ a sin(k q + φ)."""
+
+    of_motion_alone: ClassVar[bool] = True
+    id: ClassVar[str] = "cogging"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"position"})
+    equation: ClassVar[str] = "tau = sum a sin(k q + phi)"
+    meaning: ClassVar[str] = "torque repeats with the angle, whatever the load"
+    remedy: ClassVar[str] = "compensate the torque over the motor's angle"
+    revealing_motion: ClassVar[str] = (
+        "slow constant speed over the whole range, the load changed by other joints' poses"
+    )
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("sine", "{tau}"), Coefficient("cosine", "{tau}"))
+
+    def columns(self, signals: Signals, shapes: Array) -> Array:
+        """Sin kq, cos kq.
+
+        Parameters
+        ----------
+        signals : Signals
+            one piece of motion
+        shapes : (g, 1) float64
+            k [1/rad or 1/m]
+        """
+        return per_joint_columns(self._waves(signals, shapes))
+
+
+class TorqueRipple(_Periodic):
+    """τ = τ_rb Σ a sin(k q + φ)."""
+
+    of_motion_and_load: ClassVar[bool] = True
+    id: ClassVar[str] = "torque_ripple"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "load"})
+    equation: ClassVar[str] = "tau = tau_rb sum a sin(k q + phi)"
+    meaning: ClassVar[str] = "torque repeats with the angle, in proportion to the load"
+    remedy: ClassVar[str] = "correct the torque constant over the motor's angle"
+    revealing_motion: ClassVar[str] = "the same angles under other loads: other poses of the other joints"
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (
+        Coefficient("sine", "1", largest=1.0),
+        Coefficient("cosine", "1", largest=1.0),
+    )
+
+    @classmethod
+    def _places(cls, setting: Setting) -> Sequence[int]:
+        return [joint for joint in super()._places(setting) if setting.is_loaded(joint)]
+
+    def columns(self, signals: Signals, shapes: Array) -> Array:
+        """τ_rb sin kq, τ_rb cos kq.
+
+        Parameters
+        ----------
+        signals : Signals
+            one piece of motion
+        shapes : (g, 1) float64
+            k [1/rad or 1/m]
+        """
+        return per_joint_columns(signals.load[self.joint] * self._waves(signals, shapes))

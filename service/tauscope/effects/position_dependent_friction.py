@@ -1,0 +1,87 @@
+"""A friction level that varies with position: an eccentric bearing, an oval one, a rail that is worn in its middle."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from tauscope.effects.effect import Effect, per_joint_columns
+from tauscope.effects.parameters import Coefficient, Shape
+from tauscope.effects.setting import Setting
+from tauscope.effects.signals import Signals
+from tauscope.recording.recording import Array
+from tauscope.robot import JointType
+
+TIMES_A_TURN = np.array([1.0, 2.0, 3.0])
+"""An eccentric bearing, an oval one, and one that three jaws hold."""
+
+RADIANS_A_STROKE = np.array([1.0, 2.0, 4.0, 6.0, 9.0, 12.0, 15.0, 18.0])
+"""k times the stroke of a linear axis: from what is bent a little up to three waves."""
+
+
+@dataclass(frozen=True, eq=False)
+class PositionDependentFriction(Effect):
+    """τ = A(q̇) (a cos kq + b sin kq).
+
+    turns : bool
+        whether the joint comes round again: k is a whole number then
+    """
+
+    has_step: ClassVar[bool] = True
+    of_motion_and_step: ClassVar[bool] = True
+    id: ClassVar[str] = "position_dependent_friction"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "velocity"})
+    equation: ClassVar[str] = "tau = sgn(qd) (a cos kq + b sin kq)"
+    meaning: ClassVar[str] = "the friction level varies with the joint's position"
+    remedy: ClassVar[str] = "let the Coulomb level vary with the joint's position"
+    revealing_motion: ClassVar[str] = "the same positions under other loads and speeds"
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("a", "{tau}"), Coefficient("b", "{tau}"))
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("k", "1/{q}", logarithmic=True),)
+
+    turns: bool = True
+
+    @classmethod
+    def forms(cls, setting: Setting) -> Sequence[Effect]:
+        """One a joint that moves.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        """
+        return [cls._of_joint(setting, joint) for joint in setting.joints if setting.moves(joint)]
+
+    @classmethod
+    def _of_joint(cls, setting: Setting, joint: int) -> Effect:
+        turns = setting.robot.joints[joint].type is JointType.REVOLUTE
+        stroke = float(setting.highest[joint] - setting.lowest[joint])
+        waves = TIMES_A_TURN if turns else RADIANS_A_STROKE / stroke
+        return cls(joint, waves[:, None], 0.8 * waves[:1], 1.2 * waves[-1:], turns=turns)
+
+    def is_free(self, place: int) -> bool:
+        """Whether k is estimated between the grid's points.
+
+        Parameters
+        ----------
+        place : int
+            k is the only shape
+        """
+        return not self.turns
+
+    def rough_grid(self) -> Array:
+        """Once a turn, or a few waves along a rail."""
+        return self.grid[:1] if self.turns else self.grid[::3]
+
+    def columns(self, signals: Signals, shapes: Array) -> Array:
+        """A(q̇) cos kq, A(q̇) sin kq.
+
+        Parameters
+        ----------
+        signals : Signals
+            one piece of motion
+        shapes : (g, 1) float64
+            k [1/rad or 1/m]
+        """
+        step, angle = signals.step[self.joint], shapes * signals.position[self.joint]
+        return per_joint_columns(np.stack([step * np.cos(angle), step * np.sin(angle)], axis=1))

@@ -1,0 +1,109 @@
+"""Friction that rises over a distance after every reversal, as bristles bend before they slide (Dahl).
+
+dz/dq = (sgn q̇ - z) / x_s, so that over a stretch of one direction z approaches ±1 exponentially in the distance
+covered. The nominal model has the whole Coulomb step at once; the column is what the bristles lag behind it.
+"""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import ClassVar
+
+import numpy as np
+
+from tauscope.effects.effect import Effect, per_joint_columns
+from tauscope.effects.parameters import Coefficient, Shape
+from tauscope.effects.setting import Setting
+from tauscope.effects.signals import Signals
+from tauscope.recording.recording import Array
+
+DISTANCES = np.array([5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 1.6e-2, 3.2e-2])
+"""Bristle lengths looked at, relative to the joint's range of motion."""
+
+RESOLVED = 4.0
+"""Bristle length, in standard deviations of the position's noise, below which it is a step like any other."""
+
+
+def bristle_deflection(position: Array, lengths: Array, start: Array) -> Array:
+    """Deflection z of Dahl bristles along a motion, -1 … 1.
+
+    Parameters
+    ----------
+    position : (N,) float64
+        q [rad or m]
+    lengths : (g,) float64
+        x_s [rad or m]
+    start : (g,) float64
+        z at the first sample
+
+    Returns
+    -------
+    (g, N) float64
+        z; exact between samples of one direction
+    """
+    step = np.diff(position)
+    direction = np.sign(step)
+    bounds = np.flatnonzero(np.diff(direction)) + 1
+    edges = np.concatenate([[0], bounds, [len(step)]])
+    deflection = np.empty((len(lengths), len(position)))
+    deflection[:, 0] = state = start
+    for first, last in pairwise(edges):
+        sliding = direction[first]
+        distance = np.abs(position[first + 1 : last + 1] - position[first])
+        deflection[:, first + 1 : last + 1] = sliding + (state - sliding)[:, None] * np.exp(
+            -distance / lengths[:, None]
+        )
+        state = deflection[:, last]
+    return deflection
+
+
+class PreslidingHysteresis(Effect):
+    """τ = F (z - A(q̇)), z the bristles' deflection."""
+
+    has_step: ClassVar[bool] = True
+    of_motion_and_step: ClassVar[bool] = True
+    within_step: ClassVar[bool] = True
+    id: ClassVar[str] = "presliding_hysteresis"
+    arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "velocity"})
+    equation: ClassVar[str] = "tau = F (z - sgn(qd)), dz/dt = qd/x_s - |qd| z/x_s"
+    meaning: ClassVar[str] = "friction rises over a distance after each reversal instead of stepping"
+    remedy: ClassVar[str] = "replace the Coulomb step by a Dahl or LuGre bristle"
+    revealing_motion: ClassVar[str] = "slow small reversals, a few hundredths of a radian per second"
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("F", "{tau}", positive=True),)
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("x_s", "{q}", logarithmic=True),)
+
+    @classmethod
+    def forms(cls, setting: Setting) -> Sequence[Effect]:
+        """One a joint that moves both ways.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        """
+        made = []
+        for joint in setting.joints:
+            if setting.reverses(joint):
+                noise = 0.0 if setting.position_std is None else setting.position_std[joint]
+                lengths = DISTANCES * (setting.highest[joint] - setting.lowest[joint])
+                lengths = lengths[lengths > RESOLVED * noise]
+                if len(lengths):
+                    shortest = np.maximum(0.3 * lengths[:1], RESOLVED * noise)
+                    made.append(cls(joint, lengths[:, None], shortest, 3.0 * lengths[-1:]))
+        return made
+
+    def columns(self, signals: Signals, shapes: Array) -> Array:
+        """Deflection less step, z - A(q̇).
+
+        Parameters
+        ----------
+        signals : Signals
+            one piece of motion
+        shapes : (g, 1) float64
+            x_s [rad or m]
+        """
+        position, lengths = signals.position[self.joint], shapes[:, 0]
+        start = np.full(len(lengths), signals.step[self.joint, 0])  # sliding where it moves, relaxed where it rests
+        if signals.periodic:  # a period later the bristles stand as they stood
+            start = bristle_deflection(position, lengths, start)[:, -1]
+        deflection = bristle_deflection(position, lengths, start)
+        return per_joint_columns((deflection - signals.step[self.joint])[:, None])

@@ -1,0 +1,131 @@
+"""What an effect's columns are made of: one piece of motion, and what the present model says of it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+import numpy as np
+
+from tauscope.recording.conditioning.filters import derivative, smooth
+from tauscope.recording.recording import Array
+from tauscope.robot import Robot
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, eq=False)
+class Signals:
+    """One piece of conditioned motion at the recorded rate, samples last, with the fitted model's torque.
+
+    robot : Robot
+        the arm
+    rate_hz : float
+        sampling rate [Hz]
+    time : (P, N) float64
+        instants of every repetition, from the beginning of the recording [s]
+    recording : int
+        index of the recording, from 0; held-out recordings have negative ones
+    position, velocity, acceleration : (n, N) float64
+        q, q̇, q̈
+    load : (n, N) float64
+        fitted torque of the rigid body, which the transmission carries [Nm or N]
+    torque : (n, N) float64
+        fitted torque of the whole model [Nm or N]
+    step : (n, N) float64
+        A(K_v q̇), the smooth sign of the velocity
+    steepness : (n,) float64
+        K_v [s/rad or s/m]
+    bodies : (10 n,) float64
+        standard parameters that stand for the fitted base parameters: all that torque along this chain needs
+    links : (10 n,) float64
+        standard parameters of the nearest physically consistent links, for another chain or another gravity
+    periodic : bool
+        whether the piece is one period of a motion that repeats
+    of_motion : dict of str to anything
+        what was made of the motion alone, whatever the model: shared by all signals of the same piece
+    """
+
+    robot: Robot
+    rate_hz: float
+    time: Array
+    recording: int
+    position: Array
+    velocity: Array
+    acceleration: Array
+    load: Array
+    torque: Array
+    step: Array
+    steepness: Array
+    bodies: Array
+    links: Array
+    periodic: bool
+    of_motion: dict[str, Any] = field(default_factory=dict, repr=False)
+    _memory: dict[str, Any] = field(default_factory=dict, repr=False)
+
+    def remembered(self, name: str, make: Callable[[], T]) -> T:
+        """What several effects need of the same piece, made once.
+
+        Parameters
+        ----------
+        name : str
+            by which it is known
+        make : callable
+            makes it
+        """
+        if name not in self._memory:
+            self._memory[name] = make()
+        return self._memory[name]
+
+    def remembered_of_motion(self, name: str, make: Callable[[], T]) -> T:
+        """What depends on the motion and not on the model, made once for all models.
+
+        Parameters
+        ----------
+        name : str
+            by which it is known
+        make : callable
+            makes it
+        """
+        if name not in self.of_motion:
+            self.of_motion[name] = make()
+        return self.of_motion[name]
+
+    def derivative(self, values: Array) -> Array:
+        """Derivative in time of signals (..., N): by their Fourier series where periodic, else by differences.
+
+        Parameters
+        ----------
+        values : (..., N) float64
+            signals, time last
+        """
+        count = values.shape[-1]
+        if not self.periodic:
+            return _differences(values, self.rate_hz)
+        rate = 2j * np.pi * np.fft.rfftfreq(count, 1.0 / self.rate_hz)
+        if count % 2 == 0:
+            rate[-1] = 0.0
+        return np.fft.irfft(rate * np.fft.rfft(values, axis=-1), n=count, axis=-1)
+
+    def smoothed(self, values: Array, cutoff_hz: float) -> Array:
+        """Signals (N,) without what lies above a frequency, the phase kept.
+
+        Parameters
+        ----------
+        values : (N,) float64
+            a signal
+        cutoff_hz : float
+            highest frequency kept [Hz]
+        """
+        if not self.periodic:
+            return smooth(values[:, None], self.rate_hz, cutoff_hz)[:, 0]
+        spectrum = np.fft.rfft(values)
+        frequency = np.fft.rfftfreq(len(values), 1.0 / self.rate_hz)
+        return np.fft.irfft(spectrum / (1.0 + (frequency / cutoff_hz) ** 8), n=len(values))
+
+
+def _differences(values: Array, rate_hz: float) -> Array:
+    """Central differences of eighth order, of second order at the ends."""
+    rows = np.ascontiguousarray(values.reshape(-1, values.shape[-1]).T)
+    slope = derivative(rows, rate_hz)
+    ends = np.isnan(slope[:, :1])
+    return np.where(ends, np.gradient(rows, 1.0 / rate_hz, axis=0), slope).T.reshape(values.shape)

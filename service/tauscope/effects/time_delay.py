@@ -1,0 +1,60 @@
+"""A torque channel that is late against the positions: by a delay, or behind a low-pass filter."""
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from tauscope.effects.effect import Effect
+from tauscope.effects.late_torque import Lag, LateTorque, Shift, shifted
+from tauscope.effects.parameters import Coefficient
+from tauscope.effects.setting import Setting
+from tauscope.effects.signals import Signals
+from tauscope.recording.recording import Array
+
+
+class TimeDelay(LateTorque):
+    """τ_recorded(t) = τ(t - d), to first order -d dτ/dt."""
+
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("d", "s"),)
+
+    @classmethod
+    def forms(cls, setting: Setting) -> Sequence[Effect]:
+        """All forms, the small delay first.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        """
+        return [*(cls(place) for place in cls.places(setting)), *Shift.forms(setting), *Lag.forms(setting)]
+
+    def columns(self, signals: Signals, shapes: Array) -> Array:
+        """-dτ/dt of the model's torque.
+
+        Parameters
+        ----------
+        signals : Signals
+            one piece of motion
+        shapes : (1, 0) float64
+            none
+        """
+        torque = self.measured(signals)
+        # Over two samples: where friction steps from one sample to the next, a finer slope is no torque that anybody
+        # records.
+        return -np.gradient(torque, 1.0 / signals.rate_hz, axis=-1)[None, None]
+
+    def torque_of(self, signals: Signals, coefficients: Array, shape: Array) -> Array:
+        """τ(t - d) - τ(t): friction's step arrives late, it does not become a spike.
+
+        Parameters
+        ----------
+        signals : Signals
+            one piece of motion
+        coefficients : (1,) float64
+            d [s]
+        shape : (0,) float64
+            none
+        """
+        torque = self.measured(signals)
+        return shifted(torque, float(coefficients[0]), signals) - torque

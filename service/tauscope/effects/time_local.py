@@ -1,0 +1,181 @@
+"""Effects that are there for a part of the time only: what they do, and the window in which they do it.
+
+A window is found by its edges among a great many. Their columns are one and the same torque, seen through different
+windows: a screening needs that torque once (`tauscope.diagnosis.screening.windows`), and the exact columns where it
+refines.
+"""
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.effects.effect import Effect
+from tauscope.effects.signals import Signals
+from tauscope.recording.recording import Array
+
+IndexArray = NDArray[np.intp]
+
+EVERY = -1.0
+"""Scope of a window that lies at the same instants of every recording, held-out ones included."""
+
+HALF_SINE = 1.0
+"""Profile of a window that rises and falls as half a sine."""
+
+OUTSIDE = -1.0
+"""…of one that is open wherever the rectangular one is shut, in the training recordings; any other is rectangular."""
+
+
+ROUGHLY = 40
+"""Windows that stand for all in a rough grid."""
+
+
+def since(recording: int) -> float:
+    """Scope of a window that opens in one recording and stays open through all later ones.
+
+    Parameters
+    ----------
+    recording : int
+        index of the recording, from 0
+    """
+    return -2.0 - recording
+
+
+class TimeLocalEffect(Effect):
+    """An effect seen through a window w(t); its first shapes are scope, start, end and profile of the window.
+
+    The scope is the index of the one recording that the window belongs to, `EVERY`, or `since` a recording.
+    """
+
+    repeats_with_motion: ClassVar[bool] = False
+
+    @abstractmethod
+    def torque(self, signals: Signals, shape: Array) -> Array:
+        """Torque per unit of each coefficient as if the window were always open, (c, m, N).
+
+        Parameters
+        ----------
+        signals : Signals
+            one piece of motion
+        shape : (k,) float64
+            values of the shape parameters; those of the window do not matter
+        """
+
+    def outside(self, shape: Array) -> Array | None:
+        """Shape of the same effect wherever else in the training recordings, where that may be meant; else None.
+
+        Parameters
+        ----------
+        shape : (k,) float64
+            values of the shape parameters
+        """
+        return None
+
+    def rough_grid(self) -> Array:
+        """Few of the many windows, (g, k)."""
+        return self.grid[:: max(1, len(self.grid) // ROUGHLY)]
+
+    def columns(self, signals: Signals, shapes: Array) -> Array:
+        """The torque within the windows.
+
+        Parameters
+        ----------
+        signals : Signals
+            one piece of motion
+        shapes : (g, k) float64
+            scope, start [s], end [s], profile, then the effect's own
+        """
+        found = []
+        for shape in shapes:
+            window = open_share(shape, signals.recording, signals.time, 1.0 / signals.rate_hz)
+            found.append(self.torque(signals, shape)[:, :, None, :] * window)
+        return np.stack(found)
+
+    def when(self, coefficients: Array, shape: Array, names: Sequence[str], durations: Sequence[float]) -> str:
+        """When, in words.
+
+        Parameters
+        ----------
+        coefficients : (c,) float64
+            estimates
+        shape : (k,) float64
+            values of the shape parameters
+        names : sequence of str
+            of the training recordings
+        durations : sequence of float
+            of the same [s]
+        """
+        scope, start, end = shape[:3]
+        if scope < EVERY:
+            return f"from {start:.2f} s of {names[int(-2 - scope)]} on"
+        return f"from {start:.2f} to {end:.2f} s of {self.recording_words(shape, names)}"
+
+    @staticmethod
+    def recording_words(shape: Array, names: Sequence[str]) -> str:
+        """Which recording, in words.
+
+        Parameters
+        ----------
+        shape : (k,) float64
+            values of the shape parameters
+        names : sequence of str
+            of the training recordings
+        """
+        scope = shape[0]
+        if scope == EVERY:
+            return "every recording"
+        return names[int(-2 - scope) if scope < EVERY else int(scope)]
+
+
+def open_share(shapes: Array, recording: int, time: Array, interval_s: float) -> Array:
+    """w(t) of windows: 1 where one is open, the part of an interval at the samples that its edges cut.
+
+    Parameters
+    ----------
+    shapes : (..., k) float64
+        scope, start [s], end [s], profile: of one window, or of one a sample
+    recording : int
+        index of the recording, negative for held-out ones
+    time : (...) float64
+        instants, from the beginning of the recording [s]
+    interval_s : float
+        what one instant stands for [s]
+    """
+    scope, start, end, profile = np.moveaxis(shapes[..., :4], -1, 0)
+    first = np.where(scope < EVERY, -2.0 - scope, np.inf)  # the recording in which it opens for good
+    share = np.clip((time - start) / interval_s + 0.5, 0.0, 1.0)
+    share = share * np.where(scope < EVERY, 1.0, np.clip((end - time) / interval_s + 0.5, 0.0, 1.0))
+    length = np.maximum(end - start, interval_s)
+    inside = (time > start) & (time < end)
+    sine = np.sin(np.pi * np.where(inside, time - start, 0.0) / length)
+    share = np.where((profile == HALF_SINE) & (scope >= EVERY), sine, share)
+    share = np.where((scope == EVERY) | (scope == recording) | (first == recording), share, 0.0)
+    if recording < 0:
+        return np.where(profile == OUTSIDE, 0.0, share)
+    share = np.where(first < recording, 1.0, share)
+    return np.where(profile == OUTSIDE, 1.0 - share, share)
+
+
+def open_samples(shapes: Array, recording: int, time: Array, interval_s: float) -> tuple[IndexArray, IndexArray]:
+    """First sample of every window, and the one after its last, (g,) each: all others are shut.
+
+    Parameters
+    ----------
+    shapes : (g, k) float64
+        scope, start [s], end [s], profile
+    recording : int
+        index of the recording, negative for held-out ones
+    time : (N,) float64
+        instants in rising order, from the beginning of the recording [s]
+    interval_s : float
+        what one instant stands for [s]
+    """
+    scope, start, end, profile = shapes[:, :4].T
+    opened = np.where(scope < EVERY, -2.0 - scope, np.inf)
+    first = np.searchsorted(time, start - interval_s)
+    last = np.searchsorted(time, np.where(scope < EVERY, np.inf, end + interval_s))
+    whole = (opened < recording) | (profile == OUTSIDE)
+    shut = ~whole & (scope != EVERY) & (scope != recording) & (opened != recording)
+    return np.where(whole, 0, first), np.where(shut, 0, np.where(whole, len(time), last))

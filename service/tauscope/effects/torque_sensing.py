@@ -1,0 +1,216 @@
+"""What is wrong with the size of the recorded torque: scaled, or compressed at high load."""
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from tauscope.effects.effect import Effect, per_joint_columns
+from tauscope.effects.parameters import Coefficient, Quantity, Shape
+from tauscope.effects.setting import Setting
+from tauscope.effects.signals import Signals
+from tauscope.recording.recording import Array
+
+COMPRESSIONS = np.array([0.3, 0.5, 0.8, 1.3, 2.2, 4.0])
+"""Levels of a soft curve looked at, relative to the largest torque."""
+
+CLIPS = np.array([0.3, 0.45, 0.6, 0.7, 0.8, 0.9])
+"""Levels of a hard one."""
+
+CLIPPED_AT_LEAST = 0.5
+"""Part of what lies beyond the level that a hard curve takes off: one that takes off little is a soft curve."""
+
+
+class TorqueGainError(Effect):
+    """τ_recorded = (1 + g) τ."""
+
+    id: ClassVar[str] = "torque_gain_error"
+    equation: ClassVar[str] = "tau_recorded = (1 + g) tau"
+    meaning: ClassVar[str] = "the recorded torque is scaled: the torque constant is wrong"
+    remedy: ClassVar[str] = "correct the joint's torque_constant by 1 + g"
+    revealing_motion: ClassVar[str] = "fast motion of neighbouring joints that share inertia, or a known added mass"
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("g", "1"),)
+    may_exceed_measured: ClassVar[bool] = True
+
+    @classmethod
+    def forms(cls, setting: Setting) -> Sequence[Effect]:
+        """One a joint.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        """
+        return [cls(joint) for joint in setting.joints]
+
+    def columns(self, signals: Signals, shapes: Array) -> Array:
+        """The model's torque.
+
+        Parameters
+        ----------
+        signals : Signals
+            one piece of motion
+        shapes : (1, 0) float64
+            none
+        """
+        return per_joint_columns(signals.torque[self.joint][None, None])
+
+    def factor(self, coefficients: Array) -> float:
+        """1 + g: with a wrong sign every parameter works the other way round.
+
+        Parameters
+        ----------
+        coefficients : (1,) float64
+            g
+        """
+        return 1.0 + float(coefficients[0])
+
+
+class Saturation(Effect):
+    """τ_recorded = τ - a (τ - r(τ)): what all curves r have in common; a is 1 where nothing else bends them."""
+
+    id: ClassVar[str] = "torque_saturation"
+    equation: ClassVar[str] = "tau_recorded = tau - a (tau - c tanh(tau/c)); clipped: tau - a (tau - clip(tau, +-c))"
+    meaning: ClassVar[str] = "the recorded torque is compressed or clipped at high load"
+    remedy: ClassVar[str] = "record within the sensor's or the drive's linear range"
+    revealing_motion: ClassVar[str] = "the same motion slower and without payload, well below the level"
+    shapes: ClassVar[tuple[Shape, ...]] = (Shape("c", "{tau}", logarithmic=True),)
+    may_exceed_measured: ClassVar[bool] = True
+
+    @classmethod
+    def of_levels(cls, setting: Setting, parts: Array) -> list[Effect]:
+        """One a joint.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        parts : (g,) float64
+            levels looked at, relative to the joint's largest torque
+        """
+        made: list[Effect] = []
+        for joint in setting.joints:
+            levels = parts * float(setting.top_torque[joint])
+            made.append(cls(joint, levels[:, None], 0.7 * levels[:1], 1.5 * levels[-1:]))
+        return made
+
+    @abstractmethod
+    def recorded(self, torque: Array, levels: Array) -> Array:
+        """Torque r(τ) as it is recorded with a = 1, (g, N).
+
+        Parameters
+        ----------
+        torque : (N,) float64
+            as it is [Nm or N]
+        levels : (g, 1) float64
+            c [Nm or N]
+        """
+
+    def columns(self, signals: Signals, shapes: Array) -> Array:
+        """What the recorded torque falls short by.
+
+        Parameters
+        ----------
+        signals : Signals
+            one piece of motion
+        shapes : (g, 1) float64
+            c [Nm or N]
+        """
+        torque = signals.torque[self.joint]
+        return per_joint_columns((self.recorded(torque, shapes) - torque)[:, None])
+
+
+class TorqueSaturation(Saturation):
+    """r(τ) = c tanh(τ/c), a soft curve; where it is only bent a little no data tell a and c apart, but c/√a."""
+
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("a", "1", positive=True),)
+
+    @classmethod
+    def forms(cls, setting: Setting) -> Sequence[Effect]:
+        """Both curves at every joint.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        """
+        return [*cls.of_levels(setting, COMPRESSIONS), *Clipping.forms(setting)]
+
+    def recorded(self, torque: Array, levels: Array) -> Array:
+        """A soft curve, c tanh(τ/c), (g, N).
+
+        Parameters
+        ----------
+        torque : (N,) float64
+            as it is [Nm or N]
+        levels : (g, 1) float64
+            c [Nm or N]
+        """
+        return levels * np.tanh(torque / levels)
+
+    def is_consistent(self, coefficients: Array, shape: Array, *, alone: bool = False) -> bool:
+        """Whether a curve with a = 1 that is bent as much has a level that a sensor may have.
+
+        Parameters
+        ----------
+        coefficients : (1,) float64
+            a
+        shape : (1,) float64
+            c [Nm or N]
+        alone : bool
+            whether nothing else is known to be missing
+        """
+        return bool(shape[0] >= self.lower[0] * np.sqrt(coefficients[0]))
+
+    def quantities(
+        self, setting: Setting, coefficients: Array, shape: Array, covariance: Array
+    ) -> tuple[Quantity, ...]:
+        """The level c/√a.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        coefficients : (1,) float64
+            a
+        shape : (1,) float64
+            c [Nm or N]
+        covariance : (2, 2) float64
+            of both
+        """
+        share, level = max(float(coefficients[0]), 1e-12), float(shape[0])
+        slope = np.array([-0.5 * level / share**1.5, 1.0 / np.sqrt(share)])
+        std = float(np.sqrt(max(slope @ covariance @ slope, 0.0)))
+        return (Quantity("c", level / np.sqrt(share), std, self.unit("{tau}", setting)),)
+
+
+class Clipping(Saturation):
+    """r(τ) = clip(τ, ±c): what lies beyond the level is cut off."""
+
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (
+        Coefficient("a", "1", positive=True, largest=2.0, smallest=CLIPPED_AT_LEAST),
+    )
+
+    @classmethod
+    def forms(cls, setting: Setting) -> Sequence[Effect]:
+        """One a joint.
+
+        Parameters
+        ----------
+        setting : Setting
+            the arm
+        """
+        return cls.of_levels(setting, CLIPS)
+
+    def recorded(self, torque: Array, levels: Array) -> Array:
+        """A hard curve, clip(τ, ±c), (g, N).
+
+        Parameters
+        ----------
+        torque : (N,) float64
+            as it is [Nm or N]
+        levels : (g, 1) float64
+            c [Nm or N]
+        """
+        return np.clip(torque, -levels, levels)

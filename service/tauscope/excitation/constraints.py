@@ -1,0 +1,273 @@
+"""The constraints of the seed paper's (21) as parts used of a limit, exact and smooth.
+
+Everything that may not be exceeded is a usage: |q̇| / q̇_max, the distance from the middle of the position range over
+half of it, predicted over available torque, nearness to an obstacle. The motion is feasible where all usages stay
+within 1 at every instant. The optimiser sees the largest usage over time through a p-norm, which is smooth, scaled by
+what it is off at the present motion: (⟨u^p⟩)^{1/p} · (max u / (⟨u^p⟩)^{1/p})_present.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.excitation.information import ExcitationRegressor, MotionGradient
+from tauscope.excitation.series_space import SeriesSpace
+from tauscope.excitation.torque_prediction import TorquePrediction
+from tauscope.excitation.workspace import WorkspaceUsage
+from tauscope.trajectory.fourier_series import MotionSamples, between_samples
+from tauscope.trajectory.limits import MotionLimits
+
+Array = NDArray[np.float64]
+
+POWER = 30.0
+"""p of the p-norm over time: the largest usages decide, yet several peaks at once have a say."""
+
+SAMPLES_PER_HARMONIC = 40
+"""Instants a period of the highest harmonic at which kinematic limits are held: 0.3 % is left for what lies between."""
+
+INACTIVE = 0.8
+"""Usage below which, in random states anywhere within the limits, a constraint needs no attention while optimising."""
+
+RANDOM_STATES = 256
+"""States looked at for that."""
+
+
+@dataclass(frozen=True, eq=False)
+class SmoothMaximum:
+    """Smooth stand-ins of the largest usages.
+
+    values : (C,) float64
+        one a constraint
+    jacobian : (C, n, columns) float64
+        their derivatives by the vector x
+    """
+
+    values: Array
+    jacobian: Array
+
+
+class KinematicUsage:
+    """Usage of the limits of position, velocity and acceleration: exact at every instant.
+
+    Parameters
+    ----------
+    space : SeriesSpace
+        where vectors live
+    limits : MotionLimits
+        limits of every joint
+    """
+
+    def __init__(self, space: SeriesSpace, limits: MotionLimits) -> None:
+        samples = SAMPLES_PER_HARMONIC * space.harmonics
+        self._grid = space.grid(samples)
+        self._limits = limits
+        # What holds at the samples with this to spare holds between them too.
+        self._between = between_samples(space.harmonics, samples)
+        self._slopes = (1.0 / limits.half_range, 1.0 / limits.velocity, 1.0 / limits.acceleration)
+
+    def signed(self, x: Array) -> tuple[Array, Array, Array]:
+        """Position, velocity and acceleration as parts of their limits, -1 to 1 within; (K, n) each.
+
+        Parameters
+        ----------
+        x : (n, columns) float64
+            centre and coefficients
+        """
+        motion = self._grid.motion(x)
+        place = (motion.position - self._limits.middle) / self._limits.half_range
+        # The bound holds for what swings about the centre; the centre itself is the same between samples.
+        centre = x[:, 0]
+        return (
+            centre + (place - centre) * self._between,
+            motion.velocity * (self._between * self._slopes[1]),
+            motion.acceleration * (self._between * self._slopes[2]),
+        )
+
+    def largest(self, x: Array) -> Array:
+        """Largest usage of position, velocity and acceleration at any instant, (3, n).
+
+        Parameters
+        ----------
+        x : (n, columns) float64
+            centre and coefficients
+        """
+        return np.stack([np.abs(part).max(axis=0) for part in self.signed(x)])
+
+    def fitted(self, x: Array, fraction: float = 1.0) -> Array:
+        """The nearest series of the same shape within the limits: amplitudes taken back, then centres shifted.
+
+        Parameters
+        ----------
+        x : (n, columns) float64
+            centre and coefficients
+        fraction : float
+            part of the limits that may be used
+        """
+        place, velocity, acceleration = self.signed(x)
+        swing = place - x[:, 0]
+        needed = np.stack(
+            [0.5 * np.ptp(swing, axis=0), np.abs(velocity).max(axis=0), np.abs(acceleration).max(axis=0)]
+        ).max(axis=0)
+        shrink = np.minimum(1.0, fraction / np.maximum(needed, 1e-300))
+        low, high = shrink * swing.min(axis=0), shrink * swing.max(axis=0)
+        fitted = x.copy()
+        fitted[:, 1:] *= shrink[:, None]
+        fitted[:, 0] = np.clip(x[:, 0], -fraction - low, fraction - high)
+        return fitted
+
+    def smooth(self, x: Array, scale: Array) -> SmoothMaximum:
+        """Smooth largest usages, position, velocity, acceleration of every joint.
+
+        Parameters
+        ----------
+        x : (n, columns) float64
+            centre and coefficients
+        scale : (3 n,) float64
+            factors that make them exact at the present motion
+        """
+        joints = len(x)
+        values = np.empty(3 * joints)
+        jacobian = np.zeros((3 * joints, *x.shape))
+        zero = np.zeros((self._grid.samples, joints))
+        for kind, part in enumerate(self.signed(x)):
+            rows = slice(kind * joints, (kind + 1) * joints)
+            values[rows], weight = smooth_maximum(np.abs(part), scale[rows])
+            weight *= np.sign(part)
+            parts = [zero, zero, zero]
+            parts[kind] = weight * (self._between * self._slopes[kind])
+            by_x = self._grid.pull_back(MotionGradient(*parts))
+            if kind == 0:
+                by_x[:, 0] = weight.sum(axis=0)
+            jacobian[np.arange(rows.start, rows.stop), np.arange(joints)] = by_x
+        return SmoothMaximum(values, jacobian)
+
+
+class StateUsage:
+    """Usage of what depends on the whole state: predicted torque and workspace.
+
+    Parameters
+    ----------
+    regressor : ExcitationRegressor
+        of the robot
+    torque : TorquePrediction or None
+        None where there is no prior model or no torque limit
+    workspace : WorkspaceUsage or None
+        None where nothing is forbidden
+    """
+
+    def __init__(
+        self, regressor: ExcitationRegressor, torque: TorquePrediction | None, workspace: WorkspaceUsage | None
+    ) -> None:
+        self._regressor = regressor
+        self.torque = torque
+        self.workspace = workspace
+
+    def usages(self, motion: MotionSamples, base: Array | None = None) -> list[Array]:
+        """Usage of torque, then of workspace, as far as they are constrained; (N, n) and (N, obstacles × points).
+
+        Parameters
+        ----------
+        motion : MotionSamples
+            N samples
+        base : (n, m, N) float64 or None
+            base regressor of the same motion, where the caller has it
+        """
+        parts = []
+        if self.torque is not None:
+            parts.append(self.torque.usage(motion, base))
+        if self.workspace is not None:
+            parts.append(self.workspace.usage(motion))
+        return parts
+
+    def largest(self, motion: MotionSamples) -> float:
+        """Largest usage of all, 0 where nothing is constrained.
+
+        Parameters
+        ----------
+        motion : MotionSamples
+            N samples
+        """
+        return max((float(part.max()) for part in self.usages(motion)), default=0.0)
+
+    def without_inactive(self, limits: MotionLimits, rng: np.random.Generator) -> "StateUsage":
+        """Only what random states within the limits come anywhere near.
+
+        Parameters
+        ----------
+        limits : MotionLimits
+            limits of every joint
+        rng : numpy.random.Generator
+            source of the states
+        """
+        unit = [rng.uniform(-1.0, 1.0, (RANDOM_STATES, len(limits.velocity))) for _ in range(3)]
+        states = MotionSamples(
+            limits.middle + limits.half_range * unit[0], limits.velocity * unit[1], limits.acceleration * unit[2]
+        )
+        parts = iter([bool(part.max() > INACTIVE) for part in self.usages(states)])
+        torque = self.torque if self.torque is not None and next(parts) else None
+        workspace = self.workspace if self.workspace is not None and next(parts) else None
+        return StateUsage(self._regressor, torque, workspace)
+
+    @property
+    def count(self) -> int:
+        """Number of smooth constraints: one for torque, one for workspace, as far as there are any."""
+        return (self.torque is not None) + (self.workspace is not None)
+
+    def smooth_values(self, motion: MotionSamples, base: Array, scale: Array) -> Array:
+        """Smooth largest usages over all samples and joints, or points, (count,).
+
+        Parameters
+        ----------
+        motion : MotionSamples
+            N samples
+        base : (n, m, N) float64
+            base regressor of the same motion
+        scale : (count,) float64
+            factors that make them exact at the present motion
+        """
+        parts = self.usages(motion, base)
+        return np.array([smooth_maximum(p.reshape(-1, 1), s)[0][0] for p, s in zip(parts, scale, strict=True)])
+
+    def smooth_gradients(self, motion: MotionSamples, base: Array, scale: Array) -> list[MotionGradient]:
+        """Derivatives of `smooth_values` by the motion.
+
+        Parameters
+        ----------
+        motion : MotionSamples
+            N samples
+        base : (n, m, N) float64
+            base regressor of the same motion
+        scale : (count,) float64
+            factors that make them exact at the present motion
+        """
+        parts = self.usages(motion, base)
+        weights = [smooth_maximum(p.reshape(-1, 1), s)[1].reshape(p.shape) for p, s in zip(parts, scale, strict=True)]
+        gradients = []
+        if self.torque is not None:
+            gradients.append(self.torque.pull_back(motion, base, weights.pop(0)))
+        if self.workspace is not None:
+            gradients.append(self.workspace.pull_back(motion, weights.pop(0)))
+        return gradients
+
+
+def smooth_maximum(usage: Array, scale: float | Array = 1.0) -> tuple[Array, Array]:
+    """The p-norm mean of usages over time and its derivatives.
+
+    Parameters
+    ----------
+    usage : (N, C) float64
+        not negative
+    scale : float or (C,) float64
+        factors
+
+    Returns
+    -------
+    tuple of (C,) and (N, C) float64
+        values, and derivatives of value c by usage [:, c]
+    """
+    top = np.maximum(usage.max(axis=0), 1e-12)
+    powers = (usage / top) ** (POWER - 1.0)
+    mean = np.maximum((powers * (usage / top)).mean(axis=0), 1e-300)
+    values = scale * top * mean ** (1.0 / POWER)
+    return values, scale * mean ** (1.0 / POWER - 1.0) * powers / len(usage)

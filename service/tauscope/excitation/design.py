@@ -1,0 +1,170 @@
+"""Designing an excitation: from a robot and a few wishes to a trajectory that a run can play."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tauscope.excitation.criteria import Criterion, reported_value
+from tauscope.excitation.margins import Margins, trajectory_margins
+from tauscope.excitation.optimiser import OptimiserProgress, optimise
+from tauscope.excitation.options import ExcitationOptions
+from tauscope.excitation.setting import Setting
+from tauscope.excitation.slow_reversals import SlowPart, slow_part
+from tauscope.robot import Robot
+from tauscope.trajectory.fourier_series import FourierSeries
+from tauscope.trajectory.segments import FourierSegment, Segment
+from tauscope.trajectory.trajectory import DesignRecord, Trajectory
+
+ACTIVE = 0.01
+"""Part of a limit: a limit that leaves no more than this above what is spared by wish is one that limits the design."""
+
+ACTIVE_CLEARANCE_M = 0.005
+"""Clearance from floor or boxes at which they limit the design [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class ExcitationDesign:
+    """A designed excitation.
+
+    trajectory : Trajectory
+        what a run plays: the repeated periods, slow reversals, and the first period again
+    series : FourierSeries
+        its repeated part
+    periods : int
+        how often it is repeated
+    criterion : Criterion
+        what was minimised
+    value : float
+        the criterion's value for one period
+    condition_number : float
+        of the stacked, unweighted regressor of one period, in SI units
+    random_value : float
+        the criterion's value of the best random series that the optimiser began with
+    history : tuple of (int, int, float, float)
+        start, iteration, criterion's value as the optimiser sees it, largest violation of a constraint
+    margins : Margins
+        what is left of every limit
+    active : tuple of str
+        constraints that keep the criterion from getting better, for example ``velocity of joint2``
+    notes : tuple of str
+        what was assumed or could not be done, as sentences
+    evaluations : int
+        motions whose criterion was computed
+    seconds : float
+        time that the optimiser took [s]
+    """
+
+    trajectory: Trajectory
+    series: FourierSeries
+    periods: int
+    criterion: Criterion
+    value: float
+    condition_number: float
+    random_value: float
+    history: tuple[tuple[int, int, float, float], ...]
+    margins: Margins
+    active: tuple[str, ...]
+    notes: tuple[str, ...]
+    evaluations: int
+    seconds: float
+
+
+def design_excitation(
+    robot: Robot,
+    options: ExcitationOptions | None = None,
+    *,
+    progress: Callable[[OptimiserProgress], None] = lambda _: None,
+) -> ExcitationDesign:
+    """The best excitation found within the limits: the seed paper's (20) and (21).
+
+    Parameters
+    ----------
+    robot : Robot
+        the arm; its `model`, where there is one, predicts torques
+    options : ExcitationOptions or None
+        what is wished; the defaults where None
+    progress : callable
+        told of every iteration
+
+    Returns
+    -------
+    ExcitationDesign
+        whose trajectory keeps all limits, and begins and ends at rest
+
+    Raises
+    ------
+    ExcitationError
+        where no motion keeps the limits, naming the constraint and the joint that block
+    """
+    options = options or ExcitationOptions()
+    setting = Setting.of(robot, options)
+    rng = np.random.default_rng(options.seed)
+    result = optimise(setting.stages(rng), setting.feasibility, rng, starts=options.starts, progress=progress)
+    series = setting.space.series(result.x)
+    slow = slow_part(robot, series, setting.planned, setting.states, options.slow_postures)
+    value, condition_number = setting.value(series)
+    record = DesignRecord(options.criterion.value, value, condition_number, {}, options.seed)
+    segments = _segments(series, slow, options)
+    names = tuple(joint.name for joint in robot.joints)
+    trajectory = Trajectory(robot.name, names, segments, setting.stated, record)
+    margins = trajectory_margins(trajectory, setting.stated, setting.states, setting.available)
+    return ExcitationDesign(
+        trajectory=replace(trajectory, design=replace(record, margins=margins.as_table())),
+        series=series,
+        periods=options.periods,
+        criterion=options.criterion,
+        value=value,
+        condition_number=condition_number,
+        random_value=result.random_value,
+        history=tuple(
+            (entry.start, entry.iteration, reported_value(options.criterion, entry.own), entry.violation)
+            for entry in result.history
+        ),
+        margins=margins,
+        active=_active(robot, margins, options),
+        notes=_notes(robot, setting, slow),
+        evaluations=result.evaluations,
+        seconds=result.seconds,
+    )
+
+
+def _segments(series: FourierSeries, slow: SlowPart, options: ExcitationOptions) -> tuple[Segment, ...]:
+    """The repeated periods, slow reversals, and the first period again, numbered on."""
+    segments: list[Segment] = [FourierSegment(series, options.periods, first_period=0), *slow.segments]
+    if options.closing_period:
+        segments.append(FourierSegment(series, 1, first_period=options.periods))
+    return tuple(segments)
+
+
+def _active(robot: Robot, margins: Margins, options: ExcitationOptions) -> tuple[str, ...]:
+    """What keeps the criterion from getting better."""
+    spared = 1.0 - options.limit_fraction
+    kinds = {"position": spared, "velocity": spared, "acceleration": spared, "torque": 0.0}
+    table = margins.as_table()
+    found = []
+    for kind, kept in kinds.items():
+        left = table.get(kind, (None,) * robot.joint_count)
+        found += [
+            f"{kind} of {joint.name}"
+            for joint, value in zip(robot.joints, left, strict=True)
+            if value is not None and value <= kept + ACTIVE
+        ]
+    if margins.workspace_m is not None and margins.workspace_m <= ACTIVE_CLEARANCE_M:
+        found.append("workspace")
+    return tuple(found)
+
+
+def _notes(robot: Robot, setting: Setting, slow: SlowPart) -> tuple[str, ...]:
+    """What was assumed or could not be done."""
+    notes = list(setting.stated.assumed)
+    if robot.model.links is None:
+        notes.append("torque is not constrained: the robot file has no model to predict it with")
+    else:
+        missing = [joint.name for joint in robot.joints if joint.limits.torque is None]
+        if missing:
+            notes.append(f"torque is not constrained on {', '.join(missing)}: no limit is stated")
+    wanted = setting.options.slow_postures
+    if slow.postures < wanted:
+        notes.append(f"slow reversals at {slow.postures} of {wanted} postures: no more have room within the limits")
+    return tuple(notes)

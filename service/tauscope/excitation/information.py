@@ -1,0 +1,209 @@
+"""The information that a motion gives about base parameters and friction, and its gradient by the motion.
+
+L has the columns of identification: the base parameters' (`tauscope.dynamics`), and for each joint stiction, viscous
+friction and an offset, with a Stribeck column where the robot file states δ. Joint j's rows hold zeros for the links
+before it and for the friction of others; these are never computed.
+"""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.dynamics import BaseParameters
+from tauscope.dynamics.friction import smooth_sign
+from tauscope.dynamics.regressor import TorqueRegressor
+from tauscope.dynamics.regressor_gradient import RegressorGradient
+from tauscope.robot import STANDARD_PARAMETERS, Robot
+from tauscope.trajectory.fourier_series import MotionSamples
+
+Array = NDArray[np.float64]
+Columns = NDArray[np.intp]
+
+ORDINARY_STEEPNESS = 500.0
+"""K_v where the robot file states none [s/rad or s/m]: its sign function turns within a hundredth of usual speeds."""
+
+APART = 4.0
+"""K_v is never taken for less than this many δ: the two columns would be one."""
+
+
+class ColumnScaling(StrEnum):
+    """In which units the parameters are counted; condition numbers depend on it, ``log-det`` does not."""
+
+    NONE = "none"
+    """SI units, as the seed paper's (20), FIGAROH and `identify` count them."""
+    TYPICAL = "typical"
+    """Each column divided by its rms over random motions within the limits: units fall out."""
+
+
+@dataclass(frozen=True, eq=False)
+class MotionGradient:
+    """Derivatives of a scalar by a motion.
+
+    position, velocity, acceleration : (N, n) float64
+        by q, q̇ and q̈ of every sample
+    """
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+
+class ExcitationRegressor:
+    """The regressor L of a motion, joint by joint, its information matrix and the way back from it.
+
+    Parameters
+    ----------
+    robot : Robot
+        the chain, gravity and friction shapes
+    base : BaseParameters
+        its identifiable combinations
+    capacity : int
+        largest number of samples
+    noise_std : (n,) float64 or None
+        expected torque noise of each joint, by which its rows are divided [Nm or N]; equal weights where None
+    steepest : (n,) float64 or None
+        largest K_v that the samples resolve: a steeper sign function is taken so, for a gradient that means something
+        [s/rad or s/m]; None for the curve as it is
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        base: BaseParameters,
+        *,
+        capacity: int,
+        noise_std: Array | None = None,
+        steepest: Array | None = None,
+    ) -> None:
+        self.joint_count = robot.joint_count
+        self.base_columns = base.independent_columns
+        self._regressor = TorqueRegressor(robot, columns=self.base_columns, chunk=capacity)
+        self._gradient = RegressorGradient(robot, columns=self.base_columns, capacity=capacity)
+        self._weight = np.ones(robot.joint_count) if noise_std is None else 1.0 / np.asarray(noise_std)
+        self._slopes = [_slopes(robot, joint, steepest) for joint in range(robot.joint_count)]
+        first = np.searchsorted(self.base_columns, len(STANDARD_PARAMETERS) * np.arange(robot.joint_count))
+        self._first = [int(place) for place in first]
+        self._columns: list[Columns] = []
+        self.column_count = len(self.base_columns)
+        for first_own, slopes in zip(self._first, self._slopes, strict=True):
+            friction = self.column_count + np.arange(len(slopes) + 2)
+            self._columns.append(np.concatenate([np.arange(first_own, len(self.base_columns)), friction]))
+            self.column_count += len(friction)
+
+    @property
+    def first_columns(self) -> list[int]:
+        """For each joint its first base column that is not always zero."""
+        return self._first
+
+    def base_regressor(self, motion: MotionSamples) -> Array:
+        """Columns of the base parameters, (n, m, N): those of links before a joint are not set.
+
+        Parameters
+        ----------
+        motion : MotionSamples
+            N samples
+        """
+        out = np.empty((self.joint_count, len(self.base_columns), len(motion.position)))
+        self._regressor.write_shares(motion.position, motion.velocity, motion.acceleration, out)
+        return out
+
+    def rows(self, motion: MotionSamples, base: Array | None = None) -> list[Array]:
+        """L joint by joint: for each its columns that are not always zero, (C_j, N), weighted.
+
+        Parameters
+        ----------
+        motion : MotionSamples
+            N samples
+        base : (n, m, N) float64 or None
+            `base_regressor` of the same motion, where the caller has it
+        """
+        base = self.base_regressor(motion) if base is None else base
+        rows = []
+        for joint, slopes in enumerate(self._slopes):
+            velocity = motion.velocity[:, joint]
+            own = base[joint, self._first[joint] :]
+            block = np.empty((len(self._columns[joint]), len(velocity)))
+            np.multiply(own, self._weight[joint], out=block[: len(own)])
+            for place, slope in enumerate(slopes, len(own)):
+                block[place] = smooth_sign(velocity, slope) * self._weight[joint]
+            block[-2] = velocity * self._weight[joint]
+            block[-1] = self._weight[joint]
+            rows.append(block)
+        return rows
+
+    def information(self, rows: list[Array]) -> Array:
+        """A = LᵀL / N, (p, p).
+
+        Parameters
+        ----------
+        rows : list of (C_j, N) float64
+            from `rows`
+        """
+        information = np.zeros((self.column_count, self.column_count))
+        for block, columns in zip(rows, self._columns, strict=True):
+            information[np.ix_(columns, columns)] += block @ block.T
+        return information / rows[0].shape[1]
+
+    def stacked(self, motion: MotionSamples) -> Array:
+        """L as one matrix, joint after joint, (n N, p), weighted.
+
+        Parameters
+        ----------
+        motion : MotionSamples
+            N samples
+        """
+        count = len(motion.position)
+        matrix = np.zeros((self.joint_count * count, self.column_count))
+        for joint, (block, columns) in enumerate(zip(self.rows(motion), self._columns, strict=True)):
+            matrix[joint * count : (joint + 1) * count, columns] = block.T
+        return matrix
+
+    def pull_back(self, motion: MotionSamples, rows: list[Array], by_information: Array) -> MotionGradient:
+        """Derivatives by the motion of a scalar whose derivative by A is known.
+
+        Parameters
+        ----------
+        motion : MotionSamples
+            N samples
+        rows : list of (C_j, N) float64
+            from `rows`
+        by_information : (p, p) float64
+            symmetric derivative by A
+        """
+        count = len(motion.position)
+        weight = np.zeros((self.joint_count, len(self.base_columns), count))
+        of_velocity = np.zeros_like(motion.velocity)
+        for joint, (block, columns) in enumerate(zip(rows, self._columns, strict=True)):
+            back = (2.0 * self._weight[joint] / count) * (by_information[np.ix_(columns, columns)] @ block)
+            own = len(self.base_columns) - self._first[joint]
+            weight[joint, self._first[joint] :] = back[:own]
+            velocity = motion.velocity[:, joint]
+            for slope, of_column in zip(self._slopes[joint], back[own:], strict=False):
+                of_velocity[:, joint] += of_column * (2.0 / np.pi) * slope / (1.0 + (slope * velocity) ** 2)
+            of_velocity[:, joint] += back[-2]
+        gradient = self.pull_back_base(motion, weight)
+        return MotionGradient(gradient.position, gradient.velocity + of_velocity, gradient.acceleration)
+
+    def pull_back_base(self, motion: MotionSamples, weight: Array) -> MotionGradient:
+        """Derivatives by the motion of a scalar whose derivatives by the base parameters' columns are known.
+
+        Parameters
+        ----------
+        motion : MotionSamples
+            N samples
+        weight : (n, m, N) float64
+            derivative by `base_regressor`
+        """
+        parts = self._gradient.contract(motion.position, motion.velocity, motion.acceleration, weight)
+        return MotionGradient(*parts)
+
+
+def _slopes(robot: Robot, joint: int, steepest: Array | None) -> tuple[float, ...]:
+    """Steepness of the sign columns of a joint: K_v, and δ where the robot file states it."""
+    shape = robot.joints[joint].friction_shape
+    k_v = ORDINARY_STEEPNESS if shape.k_v is None else shape.k_v
+    if steepest is not None:
+        k_v = min(k_v, max(float(steepest[joint]), APART * (shape.delta or 0.0)))
+    return (k_v,) if shape.delta is None else (k_v, shape.delta)

@@ -1,0 +1,173 @@
+"""What a trajectory leaves of every limit, and the refusal of one that leaves nothing."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.errors import ExcitationError
+from tauscope.excitation.constraints import StateUsage
+from tauscope.robot import JointType, Robot
+from tauscope.trajectory.fourier_series import MotionSamples, between_samples
+from tauscope.trajectory.limits import MotionLimits
+from tauscope.trajectory.segments import FourierSegment, Segment
+from tauscope.trajectory.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+
+CHECK_RATE_HZ = 500.0
+"""Rate at which segments are looked at that are no Fourier series [Hz]."""
+
+SAMPLES_PER_HARMONIC = 400
+"""Instants a period of the highest harmonic at which a Fourier series is looked at."""
+
+ROUNDING = 1e-6
+"""Part of a limit by which rounding may exceed it: a file's digits."""
+
+
+@dataclass(frozen=True, eq=False)
+class Margins:
+    """What is left of every limit, as part of the limit; negative where it is exceeded.
+
+    position, velocity, acceleration : (n,) float64
+        of each joint's limits; position counts from the middle of the range
+    torque : (n,) float64 or None
+        of the torque that may be used, by the prior model; infinite where there is no limit, None without a model
+    workspace_m : float or None
+        smallest clearance of joint origins and tool from floor and boxes [m]; None where nothing is forbidden
+    """
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+    torque: Array | None = None
+    workspace_m: float | None = None
+
+    def as_table(self) -> Mapping[str, tuple[float | None, ...]]:
+        """Margins of the joints by kind of limit, None where there is no limit."""
+        kinds = {"position": self.position, "velocity": self.velocity, "acceleration": self.acceleration}
+        if self.torque is not None:
+            kinds["torque"] = self.torque
+        return {kind: tuple(float(v) if np.isfinite(v) else None for v in values) for kind, values in kinds.items()}
+
+
+def kinematic_margins(trajectory: Trajectory, limits: MotionLimits) -> Margins:
+    """Margins of position, velocity and acceleration over a whole trajectory; of Fourier series at every instant.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        the motion
+    limits : MotionLimits
+        limits of every joint
+    """
+    return trajectory_margins(trajectory, limits, None, limits.torque)
+
+
+def trajectory_margins(
+    trajectory: Trajectory, limits: MotionLimits, states: StateUsage | None, available: Array
+) -> Margins:
+    """Margins over a whole trajectory.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        the motion
+    limits : MotionLimits
+        limits of every joint
+    states : StateUsage or None
+        torque prediction and workspace, as far as there are any
+    available : (n,) float64
+        torque that may be used, infinite where there is no limit [Nm or N]
+    """
+    usage = np.zeros((3, trajectory.joint_count))
+    torque = np.zeros(trajectory.joint_count)
+    clearance = np.inf
+    for segment in trajectory.segments:
+        motion, between = _looked_at(segment)
+        usage = np.maximum(usage, _kinematic_usage(segment, motion, between, limits))
+        if states is not None and states.torque is not None:
+            torque = np.maximum(torque, states.torque.torque(motion).max(axis=0) / available)
+        if states is not None and states.workspace is not None:
+            clearance = min(clearance, float(states.workspace.clearance(motion.position).min()))
+    predicted = states is not None and states.torque is not None
+    return Margins(
+        *(1.0 - usage),
+        torque=np.where(np.isfinite(available), 1.0 - torque, np.inf) if predicted else None,
+        workspace_m=clearance if np.isfinite(clearance) else None,
+    )
+
+
+def require_within_limits(trajectory: Trajectory, robot: Robot, limits: MotionLimits, name: str = "trajectory") -> None:
+    """Refuse a trajectory that leaves the limits of position, velocity or acceleration at any instant.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        the motion
+    robot : Robot
+        the arm, for its joints' names and units
+    limits : MotionLimits
+        its limits
+    name : str
+        what the message calls the trajectory
+
+    Raises
+    ------
+    ExcitationError
+        naming joint, instant, value and limit
+    """
+    margins = kinematic_margins(trajectory, limits)
+    for kind in ("position", "velocity", "acceleration"):
+        left = getattr(margins, kind)
+        if (left >= -ROUNDING).all():
+            continue
+        j = int(np.argmin(left))
+        begin = 0.0
+        worst = (-np.inf, 0.0, 0.0)
+        for segment in trajectory.segments:
+            motion, _ = _looked_at(segment)
+            values = getattr(motion, kind)[:, j]
+            centre = limits.middle[j] if kind == "position" else 0.0
+            at = int(np.argmax(np.abs(values - centre)))
+            instant = begin + at * segment.duration_s / max(len(values) - 1, 1)
+            worst = max(worst, (abs(values[at] - centre), instant, float(values[at])))
+            begin += segment.duration_s
+        unit = ("rad" if robot.joints[j].type is JointType.REVOLUTE else "m") + {
+            "position": "",
+            "velocity": "/s",
+            "acceleration": "/s²",
+        }[kind]
+        bound = {
+            "position": f"{limits.position_low[j]:.6g} to {limits.position_high[j]:.6g}",
+            "velocity": f"{limits.velocity[j]:.6g}",
+            "acceleration": f"{limits.acceleration[j]:.6g}",
+        }[kind]
+        raise ExcitationError(
+            f"{name}: {robot.joints[j].name}: {kind} is {worst[2]:.6g} {unit} at {worst[1]:.3f} s, "
+            f"the limit is {bound} {unit}; make the motion slower or smaller"
+        )
+
+
+def _looked_at(segment: Segment) -> tuple[MotionSamples, float]:
+    """A segment at instants that show its extremes, and the factor by which it may exceed them in between."""
+    if isinstance(segment, FourierSegment):
+        series = segment.series
+        count = SAMPLES_PER_HARMONIC * series.harmonics
+        time = np.arange(float(count)) * (series.period_s / count)
+        return series.evaluate(time), between_samples(series.harmonics, count)
+    count = max(int(np.ceil(segment.duration_s * CHECK_RATE_HZ)), 50)
+    return segment.evaluate(np.linspace(0.0, segment.duration_s, count + 1)), 1.0
+
+
+def _kinematic_usage(segment: Segment, motion: MotionSamples, between: float, limits: MotionLimits) -> Array:
+    """Largest usage of position, velocity and acceleration, (3, n)."""
+    centre = segment.series.centre if isinstance(segment, FourierSegment) else limits.middle
+    place = centre + between * (motion.position - centre) - limits.middle
+    parts = (
+        np.abs(place) / limits.half_range,
+        between * np.abs(motion.velocity) / limits.velocity,
+        between * np.abs(motion.acceleration) / limits.acceleration,
+    )
+    return np.stack([part.max(axis=0) for part in parts])

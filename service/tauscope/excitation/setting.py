@@ -1,0 +1,211 @@
+"""What a design works with: one robot's limits, predictions and spaces, made once."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.dynamics import BaseParameters, base_parameters
+from tauscope.errors import ExcitationError
+from tauscope.excitation.constraints import KinematicUsage, StateUsage
+from tauscope.excitation.criteria import Criterion, CriterionValue, criterion_value, reported_value
+from tauscope.excitation.feasibility import Feasibility, require_room
+from tauscope.excitation.information import ColumnScaling, ExcitationRegressor
+from tauscope.excitation.optimiser import Stages
+from tauscope.excitation.options import ExcitationOptions
+from tauscope.excitation.problem import ExcitationProblem, Objective
+from tauscope.excitation.series_space import SeriesSpace
+from tauscope.excitation.torque_prediction import TorquePrediction
+from tauscope.excitation.workspace import WorkspaceUsage
+from tauscope.robot import Robot
+from tauscope.trajectory.fourier_series import FourierSeries, MotionSamples
+from tauscope.trajectory.limits import MotionLimits, motion_limits
+
+Array = NDArray[np.float64]
+
+SAMPLES_PER_HARMONIC = (24, 48)
+"""Instants a period of the highest harmonic at which the optimiser looks, first and last: friction's sign asks for more
+than the ten that the rest of the regressor needs."""
+
+FINE_SAMPLES_PER_HARMONIC = 80
+"""Instants a period of the highest harmonic at which torque and workspace are held."""
+
+REPORT_SAMPLES = 2000
+"""Instants a period from which the reported criterion and condition number are computed."""
+
+EXACT_SAMPLES = 1000
+"""Instants a period from which candidates are compared."""
+
+RESOLVED_STEPS = 5.0
+"""The sign function may turn within this part of the change of speed from instant to instant, as 1/K_v."""
+
+SCALING_STATES = 512
+"""Random states from which `ColumnScaling.TYPICAL` takes the size of a column."""
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """One robot's limits, predictions and spaces.
+
+    robot : Robot
+        the arm
+    options : ExcitationOptions
+        what is wished
+    base : BaseParameters
+        its identifiable combinations
+    stated : MotionLimits
+        its limits
+    planned : MotionLimits
+        the part of them that is used
+    available : (n,) float64
+        torque that may be used, infinite where there is no limit [Nm or N]
+    space : SeriesSpace
+        where vectors live
+    states : StateUsage
+        torque and workspace, as far as they are limited
+    feasibility : Feasibility
+        what keeps all limits
+    """
+
+    robot: Robot
+    options: ExcitationOptions
+    base: BaseParameters
+    stated: MotionLimits
+    planned: MotionLimits
+    available: Array
+    space: SeriesSpace
+    states: StateUsage
+    feasibility: Feasibility
+
+    @staticmethod
+    def of(robot: Robot, options: ExcitationOptions) -> "Setting":
+        """Prepare a design.
+
+        Parameters
+        ----------
+        robot : Robot
+            the arm
+        options : ExcitationOptions
+            what is wished
+
+        Raises
+        ------
+        ExcitationError
+            for options that do not fit the robot
+        """
+        if options.noise_std is not None:
+            _require_noise(np.asarray(options.noise_std), robot)
+        base = base_parameters(robot)
+        stated = motion_limits(robot)
+        require_room(robot, stated)
+        planned = stated.scaled(options.limit_fraction)
+        available = _available_torque(robot, stated, options)
+        space = SeriesSpace(planned, options.period_s, options.harmonics)
+        fine = space.grid(FINE_SAMPLES_PER_HARMONIC * options.harmonics)
+        regressor = ExcitationRegressor(robot, base, capacity=REPORT_SAMPLES)
+        torque = None
+        if robot.model.links is not None:
+            torque = TorquePrediction(robot, base, regressor, stated.velocity, available)
+        workspace = None if options.workspace.is_open else WorkspaceUsage(robot, options.workspace)
+        if workspace is not None and not workspace.names:
+            workspace = None
+        limited = torque if torque is not None and np.isfinite(available).any() else None
+        states = StateUsage(regressor, limited, workspace)
+        kinematics = KinematicUsage(space, planned)
+        feasibility = Feasibility(robot, space, fine, planned, kinematics, states)
+        return Setting(robot, options, base, stated, planned, available, space, states, feasibility)
+
+    def stages(self, rng: np.random.Generator) -> Stages:
+        """What the optimiser sees.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+            source of random states, for what may be left out
+        """
+        states = self.states.without_inactive(self.planned, rng)
+        scaling = self._scaling()
+        coarse, fine = (self._problem(samples, states, scaling) for samples in SAMPLES_PER_HARMONIC)
+        return Stages(coarse, fine, lambda x: self._exact(self.space.series(x), EXACT_SAMPLES, scaling))
+
+    def value(self, series: FourierSeries) -> tuple[float, float]:
+        """The criterion of a series and its condition number, with friction's curves as they are.
+
+        Parameters
+        ----------
+        series : FourierSeries
+            the motion
+
+        Returns
+        -------
+        tuple of float
+            the criterion, and the condition number of the stacked, unweighted regressor in SI units
+        """
+        motion = _instants(series, REPORT_SAMPLES)
+        plain = ExcitationRegressor(self.robot, self.base, capacity=REPORT_SAMPLES)
+        condition_number = criterion_value(Criterion.COND_2, plain.information(plain.rows(motion))).condition_number
+        own = self._exact(series, REPORT_SAMPLES, self._scaling()).own
+        return reported_value(self.options.criterion, own), condition_number
+
+    def _problem(self, samples_per_harmonic: int, states: StateUsage, scaling: Array) -> ExcitationProblem:
+        """Criterion and constraints at so many instants a period of the highest harmonic."""
+        options = self.options
+        grid = self.space.grid(samples_per_harmonic * options.harmonics)
+        # Where the sign function turned within one step, its place between two instants would decide, and no gradient.
+        top = 2.0 * np.pi * options.harmonics / options.period_s
+        step_s = options.period_s / grid.samples
+        change = 0.5 * step_s * np.minimum(self.planned.acceleration, 0.5 * top * self.planned.velocity)
+        regressor = ExcitationRegressor(
+            self.robot, self.base, capacity=grid.samples, noise_std=options.noise_std, steepest=RESOLVED_STEPS / change
+        )
+        if states.torque is not None:
+            states = StateUsage(regressor, states.torque.seen_by(regressor), states.workspace)
+        objective = Objective(options.criterion, options.information_weight, regressor, scaling)
+        fine, kinematics = self.feasibility.grid, self.feasibility.kinematics
+        return ExcitationProblem(self.space, grid, fine, objective, kinematics, states)
+
+    def _exact(self, series: FourierSeries, samples: int, scaling: Array) -> CriterionValue:
+        """The criterion with friction's curves as they are."""
+        options = self.options
+        regressor = ExcitationRegressor(self.robot, self.base, capacity=samples, noise_std=options.noise_std)
+        information = regressor.information(regressor.rows(_instants(series, samples)))
+        information /= np.multiply.outer(scaling, scaling)
+        return criterion_value(options.criterion, information, options.information_weight)
+
+    def _scaling(self) -> Array:
+        """What each column is divided by, (p,)."""
+        regressor = ExcitationRegressor(
+            self.robot, self.base, capacity=SCALING_STATES, noise_std=self.options.noise_std
+        )
+        if self.options.scaling is ColumnScaling.NONE:
+            return np.ones(regressor.column_count)
+        rng = np.random.default_rng(self.options.seed)
+        unit = [rng.uniform(-1.0, 1.0, (SCALING_STATES, self.robot.joint_count)) for _ in range(3)]
+        limits = self.planned
+        states = MotionSamples(
+            limits.middle + limits.half_range * unit[0], limits.velocity * unit[1], limits.acceleration * unit[2]
+        )
+        return np.sqrt(np.mean(regressor.stacked(states) ** 2, axis=0) * self.robot.joint_count)
+
+
+def _instants(series: FourierSeries, samples: int) -> MotionSamples:
+    """One period of a series at equispaced instants."""
+    return series.evaluate(np.arange(float(samples)) * (series.period_s / samples))
+
+
+def _available_torque(robot: Robot, stated: MotionLimits, options: ExcitationOptions) -> Array:
+    """Torque limits less what is kept free."""
+    available = (1.0 - options.torque_margin) * stated.torque - options.torque_offset
+    for joint, limit, value in zip(robot.joints, stated.torque, available, strict=True):
+        if not value > 0.0:
+            raise ExcitationError(
+                f"{joint.name}: torque limit {limit:.4g} less the margin leaves {value:.4g}; "
+                "lower the margin or raise the limit"
+            )
+    return available
+
+
+def _require_noise(noise_std: Array, robot: Robot) -> None:
+    """Refuse noise that weights cannot be made of."""
+    if noise_std.shape != (robot.joint_count,) or not (np.isfinite(noise_std) & (noise_std > 0.0)).all():
+        raise ExcitationError(f"noise_std needs {robot.joint_count} positive numbers, one a joint")

@@ -1,0 +1,124 @@
+"""Torque that a motion will need, as far as the prior model knows."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.dynamics import BaseParameters
+from tauscope.excitation.information import ExcitationRegressor, MotionGradient
+from tauscope.robot import FrictionCoefficients, Robot
+from tauscope.trajectory.fourier_series import MotionSamples
+
+Array = NDArray[np.float64]
+
+REST_SPEED = 1e-3
+"""Part of the speed limit below which |v| is rounded off, for a gradient at rest."""
+
+SMALL_TORQUE = 1e-2
+"""Part of the torque limit below which |τ| is rounded off, for a gradient where it changes its sign."""
+
+
+class TorquePrediction:
+    """Largest torque that each joint will need: |rigid-body torque| + friction, whichever way friction acts.
+
+    Friction counts with the larger of stiction and Coulomb level whatever the direction: near a reversal it acts
+    either way, and the sum is an upper bound of |τ|.
+
+    Parameters
+    ----------
+    robot : Robot
+        its `model` is what is known
+    base : BaseParameters
+        its identifiable combinations
+    regressor : ExcitationRegressor
+        of the same robot
+    velocity : (n,) float64
+        speed limits [rad/s or m/s]
+    available : (n,) float64
+        torque that may be used, infinite where there is no limit [Nm or N]
+    """
+
+    def __init__(
+        self, robot: Robot, base: BaseParameters, regressor: ExcitationRegressor, velocity: Array, available: Array
+    ) -> None:
+        if robot.model.links is None:
+            raise ValueError("the robot has no model: there is nothing to predict with")
+        self._robot, self._base_parameters, self._velocity = robot, base, velocity
+        parameters = np.concatenate([link.to_vector() for link in robot.model.links])
+        friction = robot.model.friction or (FrictionCoefficients(),) * robot.joint_count
+        self._regressor = regressor
+        self._base = base.project(parameters)
+        self._level = np.array([max(abs(f.stiction), abs(f.stiction + f.stribeck)) for f in friction])
+        self._viscous = np.array([abs(f.viscous) for f in friction])
+        self._rest = REST_SPEED * velocity
+        self.available = available
+        self._small = np.where(np.isfinite(available), SMALL_TORQUE * available, 1.0)
+
+    def seen_by(self, regressor: ExcitationRegressor) -> "TorquePrediction":
+        """The same prediction from another regressor's base columns.
+
+        Parameters
+        ----------
+        regressor : ExcitationRegressor
+            of the same robot
+        """
+        return TorquePrediction(self._robot, self._base_parameters, regressor, self._velocity, self.available)
+
+    def torque(self, motion: MotionSamples, base: Array | None = None) -> Array:
+        """Bound of |τ| at every sample, (N, n) [Nm or N].
+
+        Parameters
+        ----------
+        motion : MotionSamples
+            N samples
+        base : (n, m, N) float64 or None
+            `ExcitationRegressor.base_regressor` of the same motion, where the caller has it
+        """
+        base = self._regressor.base_regressor(motion) if base is None else base
+        return self._rounded(self._rigid(base), self._small) + self._friction(motion)
+
+    def usage(self, motion: MotionSamples, base: Array | None = None) -> Array:
+        """Part of the available torque that is used at every sample, (N, n); zero where there is no limit.
+
+        Parameters
+        ----------
+        motion : MotionSamples
+            N samples
+        base : (n, m, N) float64 or None
+            `ExcitationRegressor.base_regressor` of the same motion, where the caller has it
+        """
+        return self.torque(motion, base) / self.available
+
+    def pull_back(self, motion: MotionSamples, base: Array, weight: Array) -> MotionGradient:
+        """Derivatives by the motion of Σ weight · usage.
+
+        Parameters
+        ----------
+        motion : MotionSamples
+            N samples
+        base : (n, m, N) float64
+            `ExcitationRegressor.base_regressor` of the same motion
+        weight : (N, n) float64
+            derivative by `usage`
+        """
+        rigid = self._rigid(base)
+        by_torque = weight / self.available
+        by_rigid = by_torque * rigid / self._rounded(rigid, self._small)
+        columns = by_rigid.T[:, None, :] * self._base[None, :, None]
+        gradient = self._regressor.pull_back_base(motion, columns)
+        speed = motion.velocity / self._rounded(motion.velocity, self._rest)
+        return MotionGradient(
+            gradient.position, gradient.velocity + by_torque * self._viscous * speed, gradient.acceleration
+        )
+
+    def _rigid(self, base: Array) -> Array:
+        """Rigid-body torque, (N, n)."""
+        first = self._regressor.first_columns
+        return np.stack([self._base[at:] @ base[joint, at:] for joint, at in enumerate(first)], axis=1)
+
+    def _friction(self, motion: MotionSamples) -> Array:
+        return self._level + self._viscous * self._rounded(motion.velocity, self._rest)
+
+    @staticmethod
+    def _rounded(values: Array, small: Array) -> Array:
+        """√(x² + ε²), never less than |x|."""
+        return np.sqrt(values**2 + small**2)

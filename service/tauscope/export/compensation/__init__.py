@@ -1,0 +1,28 @@
+"""Friction compensation: each joint's coefficients, ready for a controller, in joint torque and in drive units."""
+
+from tauscope.export.compensation.c_header import to_c_header
+from tauscope.export.compensation.document import to_document, to_json, to_yaml
+from tauscope.export.compensation.drive_units import DriveUnits, drive_units
+from tauscope.export.compensation.model import (
+    CompensationModel,
+    JointCompensation,
+    JointFriction,
+    RecordingSource,
+    friction_torque,
+)
+from tauscope.export.compensation.python_module import to_python
+
+__all__ = [
+    "CompensationModel",
+    "DriveUnits",
+    "JointCompensation",
+    "JointFriction",
+    "RecordingSource",
+    "drive_units",
+    "friction_torque",
+    "to_c_header",
+    "to_document",
+    "to_json",
+    "to_python",
+    "to_yaml",
+]

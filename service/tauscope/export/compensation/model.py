@@ -1,0 +1,151 @@
+"""What friction compensation is made of: coefficients, drive units, and where they came from."""
+
+import math
+from dataclasses import dataclass
+from datetime import date
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.errors import ExportError
+from tauscope.export.compensation.drive_units import UNKNOWN_UNITS, DriveUnits
+from tauscope.robot import JointType
+from tauscope.robot.messages import one_line, shown
+
+EQUATION = "tau = stiction*(2/pi)*atan(k_v*v) + stribeck*(2/pi)*atan(delta*v) + viscous*v + offset"
+"""Equations (7) and (8) of the seed paper, with the constant offset that real drives have."""
+
+
+@dataclass(frozen=True)
+class JointFriction:
+    """Friction of one joint and the constant beside it, equations (7), (8).
+
+    stiction, stribeck : float
+        τ_s, τ_sc [Nm or N]; their sum is the Coulomb level at speed
+    viscous : float
+        τ_v [Nm s/rad or N s/m]
+    offset : float
+        constant torque [Nm or N]
+    k_v : float
+        K_v, slope of the smooth sign [s/rad or s/m]
+    delta : float or None
+        δ, shape of the Stribeck effect [s/rad or s/m]; None where the joint has none
+    """
+
+    stiction: float
+    stribeck: float
+    viscous: float
+    offset: float
+    k_v: float
+    delta: float | None = None
+
+
+@dataclass(frozen=True)
+class JointCompensation:
+    """One joint of a compensation model.
+
+    name : str
+        as in the robot file
+    type : JointType
+        revolute (rad, Nm) or prismatic (m, N)
+    friction : JointFriction
+        coefficients
+    units : DriveUnits
+        how a joint torque is written in the drive's units, where that is known
+    """
+
+    name: str
+    type: JointType
+    friction: JointFriction
+    units: DriveUnits = UNKNOWN_UNITS
+
+
+@dataclass(frozen=True)
+class RecordingSource:
+    """A recording that the coefficients were estimated from: its name, and the sha256 of its bytes in hexadecimal."""
+
+    name: str
+    sha256: str
+
+
+@dataclass(frozen=True)
+class CompensationModel:
+    """Friction compensation of a robot, with its provenance.
+
+    robot : str
+        the robot's name
+    joints : tuple of JointCompensation, length n
+        in chain order
+    created : date
+        day or moment of the identification
+    recordings : tuple of RecordingSource
+        what the coefficients were estimated from
+    version : str
+        of Tauscope
+    """
+
+    robot: str
+    joints: tuple[JointCompensation, ...]
+    created: date
+    recordings: tuple[RecordingSource, ...]
+    version: str
+
+    def __post_init__(self) -> None:
+        """Refuse what no file could hold or no controller use."""
+        if not self.joints:
+            raise ExportError("the compensation model has no joints; identify the robot first")
+        for joint in self.joints:
+            check_friction(joint.name, joint.friction)
+
+
+def check_friction(joint: str, friction: JointFriction) -> None:
+    """Refuse coefficients that are not finite and shapes without meaning.
+
+    Parameters
+    ----------
+    joint : str
+        the joint's name, for the message
+    friction : JointFriction
+        its coefficients
+
+    Raises
+    ------
+    ExportError
+        naming the joint and the coefficient
+    """
+    for name in ("stiction", "stribeck", "viscous", "offset", "k_v"):
+        if not math.isfinite(getattr(friction, name)):
+            raise ExportError(one_line(f"joint {shown(joint)}: {name} is not finite; identify it from other data"))
+    if friction.k_v <= 0.0:
+        raise ExportError(
+            one_line(f"joint {shown(joint)}: k_v = {friction.k_v:g} is not positive; give a positive k_v")
+        )
+    if friction.delta is None:
+        if friction.stribeck != 0.0:
+            raise ExportError(one_line(f"joint {shown(joint)}: has a Stribeck term but no delta; give its delta"))
+    elif not (math.isfinite(friction.delta) and friction.delta > 0.0):
+        text = f"joint {shown(joint)}: delta = {friction.delta:g} is not positive and finite; give a positive delta"
+        raise ExportError(one_line(text))
+
+
+def friction_torque(friction: JointFriction, velocity: NDArray[np.float64] | float) -> NDArray[np.float64]:
+    """Torque that compensates a joint's friction: τ_s S(K_v v) + τ_sc S(δ v) + τ_v v + offset, S(x) = (2/π) atan x.
+
+    Seed paper, equations (7) and (8).
+
+    Parameters
+    ----------
+    friction : JointFriction
+        coefficients of the joint
+    velocity : array_like of float64
+        v [rad/s or m/s]
+
+    Returns
+    -------
+    array of float64
+        torque of the shape of `velocity` [Nm or N]
+    """
+    v = np.asarray(velocity, dtype=np.float64)
+    step = np.arctan(friction.k_v * v) * (2.0 / np.pi)
+    stribeck = np.arctan((friction.delta or 0.0) * v) * (2.0 / np.pi)
+    return friction.stiction * step + friction.stribeck * stribeck + friction.viscous * v + friction.offset

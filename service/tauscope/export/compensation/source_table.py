@@ -1,0 +1,97 @@
+"""What the C header and the Python module have in common: the functions to write, and the comment above them."""
+
+import textwrap
+from dataclasses import dataclass
+
+from tauscope.export.compensation.identifiers import comment_text
+from tauscope.export.compensation.model import EQUATION, CompensationModel, JointCompensation
+from tauscope.robot import JointType
+
+COEFFICIENTS = ("stiction", "stribeck", "viscous", "offset", "k_v", "delta")
+
+
+@dataclass(frozen=True)
+class UnitFunction:
+    """A function that gives the friction in one unit.
+
+    suffix : str
+        end of its name
+    meaning : str
+        what it returns
+    torque_per_unit : tuple of float, length n
+        what one unit means at each joint [Nm or N]
+    """
+
+    suffix: str
+    meaning: str
+    torque_per_unit: tuple[float, ...]
+
+
+def unit_functions(model: CompensationModel) -> tuple[tuple[UnitFunction, ...], tuple[str, ...]]:
+    """The functions of a model in drive units, and the units that are left out because a joint does not know them.
+
+    Parameters
+    ----------
+    model : CompensationModel
+        what to write
+
+    Returns
+    -------
+    functions : tuple of UnitFunction
+        for units that every joint knows
+    missing : tuple of str
+        one sentence for each unit that is left out
+    """
+    candidates = (
+        ("friction_current_ma", "motor current in mA", [j.units.torque_per_milliampere for j in model.joints]),
+        ("friction_permille", "torque in 1/1000 of rated torque", [j.units.torque_per_permille for j in model.joints]),
+    )
+    functions, missing = [], []
+    for suffix, meaning, per_unit in candidates:
+        known = tuple(value for value in per_unit if value is not None)
+        if len(known) == len(per_unit):
+            functions.append(UnitFunction(suffix, meaning, known))
+        else:
+            unknown = ", ".join(j.name for j, value in zip(model.joints, per_unit, strict=True) if value is None)
+            missing.append(f"{meaning}: not known for {unknown}; the function {suffix} is not written.")
+    return tuple(functions), tuple(missing)
+
+
+def heading(model: CompensationModel) -> tuple[str, ...]:
+    """Lines of the comment at the top: what this is, in which units, and where it came from; safe in any language.
+
+    Parameters
+    ----------
+    model : CompensationModel
+        what to write
+    """
+    lines = [
+        f"Friction compensation of {model.robot}, written by Tauscope {model.version} on {model.created.isoformat()}.",
+        "",
+        f"{EQUATION.replace('*', ' ')}, with the offset included.",
+        "Joint numbers start at 1. v in rad/s, torque in Nm; of a prismatic joint v in m/s, force in N.",
+        "",
+        *(_joint_line(number, joint) for number, joint in enumerate(model.joints, start=1)),
+        "",
+        *(f"Recording {source.name}, sha256 {source.sha256}." for source in model.recordings),
+        *unit_functions(model)[1],
+    ]
+    return tuple(part for line in lines for part in textwrap.wrap(comment_text(line), 100) or [""])
+
+
+def row(joint: JointCompensation) -> tuple[float, ...]:
+    """A joint's numbers in the order of `COEFFICIENTS`; δ is 0 where the joint has no Stribeck term.
+
+    Parameters
+    ----------
+    joint : JointCompensation
+        the joint
+    """
+    values = {name: getattr(joint.friction, name) for name in COEFFICIENTS}
+    return tuple(0.0 if values[name] is None else float(values[name]) for name in COEFFICIENTS)
+
+
+def _joint_line(number: int, joint: JointCompensation) -> str:
+    """A joint's number, name and units in one line."""
+    kind = "prismatic" if joint.type is JointType.PRISMATIC else "revolute"
+    return f"Joint {number}: {joint.name} ({kind}). " + " ".join(f"{remark}." for remark in joint.units.remarks)

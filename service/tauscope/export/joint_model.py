@@ -1,0 +1,171 @@
+"""What an export says of one joint and the link that it carries, in the terms that simulators have.
+
+Simulators know two friction numbers: a dry level and a damping. The dry level is the kinetic Coulomb level τ_s + τ_sc,
+what is left at speed: it is felt over most of any motion, while τ_s is felt only near rest. The damping is τ_v.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.errors import ExportError
+from tauscope.export.compensation.model import JointFriction, check_friction
+from tauscope.robot import LinkInertia, Robot, find_defect
+from tauscope.robot.finding import Severity
+from tauscope.robot.messages import one_line, shown
+
+
+@dataclass(frozen=True, eq=False)
+class JointModel:
+    """One joint's part of the model; None leaves what the file says as it is.
+
+    link : LinkInertia or None
+        the link that the joint carries, in its link frame, bodies on fixed joints included
+    friction : JointFriction or None
+        coefficients
+    rotor_inertia : float or None
+        the motor's inertia reflected to the joint [kg m² or kg]
+    """
+
+    link: LinkInertia | None = None
+    friction: JointFriction | None = None
+    rotor_inertia: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class CentredInertia:
+    """A link as simulators want it.
+
+    mass : float
+        m [kg]
+    centre : (3,) float64
+        centre of mass in the link frame [m]
+    inertia : (3, 3) float64
+        about the centre of mass, along the axes of the link frame [kg m²]
+    """
+
+    mass: float
+    centre: NDArray[np.float64]
+    inertia: NDArray[np.float64]
+
+
+def joint_models(
+    robot: Robot,
+    links: Sequence[LinkInertia],
+    friction: Sequence[JointFriction],
+    rotor_inertia: Sequence[float | None] | None = None,
+) -> dict[str, JointModel]:
+    """The whole robot's model by joint name, as the exports take it.
+
+    Parameters
+    ----------
+    robot : Robot
+        the arm
+    links : sequence of LinkInertia, length n
+        identified links, in their link frames
+    friction : sequence of JointFriction, length n
+        identified friction
+    rotor_inertia : sequence of float or None, length n, optional
+        identified rotor inertias [kg m² or kg]
+
+    Returns
+    -------
+    dict of str to JointModel
+        one entry a joint, in chain order
+    """
+    rotors = [None] * robot.joint_count if rotor_inertia is None else rotor_inertia
+    rows = zip(robot.joints, links, friction, rotors, strict=True)
+    return {joint.name: JointModel(link, coefficients, rotor) for joint, link, coefficients, rotor in rows}
+
+
+def centred(joint: str, link: LinkInertia) -> CentredInertia:
+    """Centre of mass and inertia about it: I_c = I - m (sᵀs 1 - s sᵀ), equation (5) reversed.
+
+    Parameters
+    ----------
+    joint : str
+        name of the joint that carries the link, for messages
+    link : LinkInertia
+        inertia about the link frame's origin
+
+    Returns
+    -------
+    CentredInertia
+        mass, centre, inertia
+
+    Raises
+    ------
+    ExportError
+        if no rigid body has these parameters
+    """
+    defect = find_defect(link) if np.isfinite(link.to_vector()).all() else None
+    if not np.isfinite(link.to_vector()).all() or link.mass <= 0.0 or (defect and defect.severity is Severity.ERROR):
+        reason = defect.text if defect else f"mass {link.mass:g} kg"
+        text = f"the link of joint {shown(joint)} cannot exist ({reason}); export the physically consistent model"
+        raise ExportError(one_line(text))
+    centre = link.first_moment / link.mass
+    inertia = link.inertia - link.mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+    return CentredInertia(link.mass, centre, 0.5 * (inertia + inertia.T))
+
+
+def dry_friction_and_damping(joint: str, friction: JointFriction) -> tuple[float, float]:
+    """The two numbers that simulators hold: τ_s + τ_sc and τ_v, neither below zero.
+
+    Parameters
+    ----------
+    joint : str
+        the joint's name, for messages
+    friction : JointFriction
+        coefficients
+
+    Returns
+    -------
+    tuple of two float
+        dry friction [Nm or N], damping [Nm s/rad or N s/m]
+
+    Raises
+    ------
+    ExportError
+        if a coefficient is not finite
+    """
+    check_friction(joint, friction)
+    return max(0.0, friction.stiction + friction.stribeck), max(0.0, friction.viscous)
+
+
+def friction_notes(joint: str, friction: JointFriction, format_name: str) -> list[str]:
+    """What is lost of a joint's friction in a format that holds a dry level and a damping.
+
+    Parameters
+    ----------
+    joint : str
+        the joint's name
+    friction : JointFriction
+        coefficients
+    format_name : str
+        "URDF" or "MJCF"
+
+    Returns
+    -------
+    list of str
+        one sentence each; empty where nothing is lost
+    """
+    notes = []
+    if friction.stribeck != 0.0:
+        notes.append(
+            f"{joint}: {format_name} has no Stribeck effect. Written is the level at speed, stiction + stribeck = "
+            f"{friction.stiction + friction.stribeck:.6g}; near rest the identified friction is {friction.stiction:.6g}"
+            f" (delta = {friction.delta:.6g})."
+        )
+    if friction.offset != 0.0:
+        notes.append(f"{joint}: {format_name} has no constant torque; the identified offset is {friction.offset:.6g}.")
+    if friction.stiction + friction.stribeck != 0.0:
+        notes.append(
+            f"{joint}: {format_name} takes dry friction as a step at zero velocity; identified is "
+            f"(2/pi) atan(k_v v) with k_v = {friction.k_v:.6g}."
+        )
+    for label, value in (("stiction + stribeck", friction.stiction + friction.stribeck), ("viscous", friction.viscous)):
+        if value < 0.0:
+            notes.append(f"{joint}: the identified {label} = {value:.6g} would drive the joint; 0 is written.")
+    return notes

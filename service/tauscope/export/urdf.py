@@ -1,0 +1,217 @@
+"""The identified model written into the user's own URDF: inertials and joint dynamics, nothing else."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tauscope.errors import ExportError
+from tauscope.export.compensation.identifiers import comment_text
+from tauscope.export.compensation.model import JointFriction
+from tauscope.export.joint_model import CentredInertia, JointModel, centred, dry_friction_and_damping, friction_notes
+from tauscope.export.xml_spans import Element, XmlText
+from tauscope.robot.messages import nearest, one_line, shown
+
+_MARKER = "Model identified by Tauscope."
+_INERTIA = (("ixx", 0, 0), ("ixy", 0, 1), ("ixz", 0, 2), ("iyy", 1, 1), ("iyz", 1, 2), ("izz", 2, 2))
+
+
+@dataclass(frozen=True)
+class PatchedUrdf:
+    """A URDF with the identified model in it.
+
+    data : bytes
+        the file
+    notes : tuple of str
+        what the format cannot hold and what was decided; also a comment in the file
+    """
+
+    data: bytes
+    notes: tuple[str, ...]
+
+
+def patch_urdf(source: bytes | Path, models: Mapping[str, JointModel]) -> PatchedUrdf:
+    """Write links and friction into a URDF in place; comments, meshes, order and white space stay byte for byte.
+
+    A link's ``<inertial>`` gets the centre of mass, rpy 0, and the inertia about the centre of mass along the link
+    frame's axes. ``<dynamics>`` gets damping = τ_v and friction = τ_s + τ_sc, the Coulomb level at speed. Links on
+    fixed joints below are part of the identified link: their own inertials are set to zero, not removed, because
+    simulators make up a mass from the shapes of a link that has none.
+
+    Parameters
+    ----------
+    source : bytes or Path
+        the URDF, or where it is
+    models : mapping of str to JointModel
+        what to write, by the URDF's joint names; each link in the frame of the URDF link that its joint carries
+
+    Returns
+    -------
+    PatchedUrdf
+        the new file and the notes
+
+    Raises
+    ------
+    ExportError
+        if the file is not a URDF, a joint is not in it or does not move, or a link cannot exist
+    """
+    data, label = _read(source)
+    text = XmlText(data, label)
+    if text.root.name.rpartition(":")[2] != "robot":
+        raise ExportError(one_line(f"{label}: the outermost element is <{text.root.name}>, not <robot>; give a URDF"))
+    tree = _Tree(text.root, label)
+    notes: list[str] = []
+    for name, model in models.items():
+        joint = tree.moving_joint(name)
+        if model.link is not None:
+            inertia = centred(name, model.link)
+            _write_inertial(text, tree.link(joint.child), inertia)
+            notes += _zero_fixed_children(text, tree, joint.child, frozenset(models))
+        if model.friction is not None:
+            notes += _write_dynamics(text, joint.element, name, model.friction)
+        if model.rotor_inertia:
+            notes.append(f"{name}: URDF has no rotor inertia; the identified value is {model.rotor_inertia:.6g}.")
+    lines = [comment_text(note) for note in notes]
+    text.set_comment(text.root, _MARKER, "".join(f"\n       {line}" for line in lines))
+    return PatchedUrdf(text.edited(), tuple(notes))
+
+
+@dataclass(frozen=True, eq=False)
+class _Joint:
+    """A joint element, its type and the names of the links that it joins."""
+
+    element: Element
+    type: str
+    parent: str
+    child: str
+
+
+class _Tree:
+    """Links and joints of a URDF by name."""
+
+    def __init__(self, root: Element, label: str) -> None:
+        self.label = label
+        self._links = {link.attributes.get("name", ""): link for link in root.named("link")}
+        self._joints = {joint.attributes.get("name", ""): _joint(joint) for joint in root.named("joint")}
+
+    def link(self, name: str) -> Element:
+        """The link element of a name."""
+        if name not in self._links:
+            raise ExportError(one_line(f"{self.label}: link {shown(name)} is not in the file; add it"))
+        return self._links[name]
+
+    def moving_joint(self, name: str) -> _Joint:
+        """The joint of a name, which must move."""
+        joint = self._joints.get(name)
+        if joint is None:
+            hint = nearest(name, self._joints)
+            raise ExportError(one_line(f"{self.label}: joint {shown(name)} is not in the file; {hint}"))
+        if joint.type == "fixed":
+            text = f"joint {shown(name)} is fixed; name the moving joint that carries its link"
+            raise ExportError(one_line(f"{self.label}: {text}"))
+        return joint
+
+    def below(self, link: str) -> list[tuple[str, _Joint]]:
+        """Joints that hang on a link."""
+        return [(name, joint) for name, joint in self._joints.items() if joint.parent == link]
+
+
+def _read(source: bytes | Path) -> tuple[bytes, str]:
+    """The file's bytes and its name for messages."""
+    if isinstance(source, bytes):
+        return source, "URDF"
+    try:
+        return source.read_bytes(), one_line(str(source))
+    except OSError as error:
+        raise ExportError(one_line(f"{source}: cannot be read: {error.strerror}; check the path")) from None
+
+
+def _joint(element: Element) -> _Joint:
+    """Type and ends of a joint element."""
+    ends = [next((e.attributes.get("link", "") for e in element.named(end)), "") for end in ("parent", "child")]
+    return _Joint(element, element.attributes.get("type", ""), ends[0], ends[1])
+
+
+def _write_inertial(text: XmlText, link: Element, inertia: CentredInertia) -> None:
+    """Set a link's inertial, adding what is missing of it."""
+    values = {
+        "origin": {"xyz": _numbers(*inertia.centre), "rpy": "0 0 0"},
+        "mass": {"value": _numbers(inertia.mass)},
+        "inertia": {key: _numbers(inertia.inertia[row, column]) for key, row, column in _INERTIA},
+    }
+    tags = {kind: _tag(f"{link.prefix}{kind}", attributes) for kind, attributes in values.items()}
+    inertials = list(link.named("inertial"))
+    if not inertials:
+        name = f"{link.prefix}inertial"
+        text.append_child(link, [f"<{name}>", *(f"  {tag}" for tag in tags.values()), f"</{name}>"])
+    for inertial in inertials:
+        missing = [tag for kind, tag in tags.items() if not any(inertial.named(kind))]
+        if missing:
+            text.append_child(inertial, missing)
+        for kind, attributes in values.items():
+            for element in inertial.named(kind):
+                # Another way to write a rotation, where present, must not contradict rpy.
+                turned = {"quat_xyzw": "0 0 0 1"} if "quat_xyzw" in element.attributes else {}
+                text.set_attributes(element, attributes | turned)
+
+
+def _zero_fixed_children(text: XmlText, tree: _Tree, link: str, identified: frozenset[str]) -> list[str]:
+    """Zero the inertials of the links that a link carries on fixed joints; say so, and what moves beside the model."""
+    notes = []
+    seen, waiting = {link}, [link]
+    while waiting:
+        for name, below in tree.below(waiting.pop()):
+            if below.type != "fixed":
+                if name not in identified:
+                    notes.append(
+                        f"{below.child} moves on joint {name}, which was not identified: it is left as it was. If that "
+                        f"joint stood still in the recordings, its mass is part of link {link} too."
+                    )
+            elif below.child not in seen:
+                seen.add(below.child)
+                waiting.append(below.child)
+                notes += _zero_inertial(text, tree.link(below.child), below.child, name, link)
+    return notes
+
+
+def _zero_inertial(text: XmlText, element: Element, name: str, joint: str, carrier: str) -> list[str]:
+    """Zero one link's inertial, because its mass is part of the link that carries it."""
+    inertials = list(element.named("inertial"))
+    for inertial in inertials:
+        for mass in inertial.named("mass"):
+            text.set_attributes(mass, {"value": "0"})
+        for inertia in inertial.named("inertia"):
+            text.set_attributes(inertia, {key: "0" for key, _, _ in _INERTIA})
+    if inertials:
+        return [
+            f"The mass of link {name}, on fixed joint {joint}, is part of link {carrier}: its inertial is set to zero."
+        ]
+    if any(element.named("collision")):
+        return [
+            f"Link {name}, on fixed joint {joint}, has shapes but no inertial: some simulators make up a mass for it, "
+            f"which is already part of link {carrier}."
+        ]
+    return []
+
+
+def _write_dynamics(text: XmlText, element: Element, name: str, friction: JointFriction) -> list[str]:
+    """Set a joint's damping and friction; notes on what they cannot hold."""
+    dry, damping = dry_friction_and_damping(name, friction)
+    values = {"damping": _numbers(damping), "friction": _numbers(dry)}
+    existing = list(element.named("dynamics"))
+    for dynamics in existing:
+        text.set_attributes(dynamics, values)
+    if not existing:
+        text.append_child(element, [_tag(f"{element.prefix}dynamics", values)])
+    return friction_notes(name, friction, "URDF")
+
+
+def _tag(name: str, attributes: Mapping[str, str]) -> str:
+    """An empty element."""
+    return f"<{name} " + " ".join(f'{key}="{value}"' for key, value in attributes.items()) + "/>"
+
+
+def _numbers(*values: float | np.float64) -> str:
+    """Numbers that read back as the same float64; no negative zero."""
+    return " ".join(repr(float(value) + 0.0) for value in values)

@@ -1,0 +1,188 @@
+"""Candidate columns of friction's steps after all other columns were projected off: small matrices to search in.
+
+All columns Z that do not depend on a shape constant (rigid body, viscous, offset) are projected off: with S Sᵀ =
+(ZᵀZ)⁻¹ from the factors at hand, Q = Z S is never formed, only Qᵀ G = Sᵀ (ZᵀG) of the candidate columns G, summed in
+one pass. What is left are Gram matrices of the candidates.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from tauscope.dynamics.friction import smooth_sign
+from tauscope.identification.dataset import PreparedMotion
+from tauscope.identification.least_squares import Solution
+from tauscope.identification.structure import ModelStructure
+from tauscope.recording.recording import Array
+
+COLLINEAR = 1e-9
+"""A second column with less than this share of its energy left beside the first adds nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointGrid:
+    """One joint's candidate columns after projection: a step of every slope, and v|v| as the last.
+
+    slopes : (g,) float64
+        candidate constants
+    gram : (g + 1, g + 1) float64
+        GᵀG of its columns, before projection
+    inner : (z, g + 1) float64
+        Q_jᵀ G: what the projection takes away
+    target : (g + 1,) float64
+        Gᵀ y after projection
+    """
+
+    slopes: Array
+    gram: Array
+    inner: Array
+    target: Array
+
+    @property
+    def bend(self) -> int:
+        """The candidate v|v|: viscous friction that bends with speed, which the model itself does not have."""
+        return len(self.slopes)
+
+    def block(self, other: "JointGrid", mine: list[int], theirs: list[int]) -> Array:
+        """Projected Gram matrix between columns of two joints.
+
+        Parameters
+        ----------
+        other : JointGrid
+            the second joint's candidates, or these
+        mine, theirs : list of int
+            candidates of either
+        """
+        product = -self.inner[:, mine].T @ other.inner[:, theirs]
+        return product + self.gram[np.ix_(mine, theirs)] if self is other else product
+
+
+def projected_grids(
+    motions: Iterable[PreparedMotion],
+    structure: ModelStructure,
+    shared: NDArray[np.intp],
+    solution: Solution,
+    noise_std: Array,
+    slopes: list[Array],
+) -> list[JointGrid]:
+    """Candidate columns of every joint, projected off the shared ones; one pass over the data.
+
+    Parameters
+    ----------
+    motions : iterable of PreparedMotion
+        the data, in pieces
+    structure : ModelStructure
+        the model's columns
+    shared : (z,) int
+        its global columns that do not depend on any shape constant, ascending
+    solution : Solution
+        the estimate with these columns alone
+    noise_std : (n,) float64
+        residual standard deviation of every joint, for the weights [Nm or N]
+    slopes : list of (g,) float64, length n
+        every joint's candidates [s/rad or s/m]
+    """
+    joints = range(structure.robot.joint_count)
+    gram = [np.zeros((len(values) + 1, len(values) + 1)) for values in slopes]
+    cross = [np.zeros((len(shared), len(values) + 1)) for values in slopes]
+    target = [np.zeros(len(values) + 1) for values in slopes]
+    for prepared in motions:
+        for joint in joints:
+            columns = prepared.joint_columns(structure, joint)
+            index = structure.joint_columns(joint)
+            kept = np.isin(index, shared)
+            place = np.searchsorted(shared, index[kept])
+            velocity = prepared.motion.velocity[:, joint]
+            weight = prepared.used[joint] * (prepared.row_weight / noise_std[joint])
+            candidates = np.vstack([smooth_sign(velocity, slopes[joint][:, None]), velocity * np.abs(velocity)])
+            steps = weight * prepared.motion.band.reduce(candidates)
+            common = weight * columns[kept]
+            residual = weight * prepared.reduced_torque[joint] - solution.parameters[place] @ common
+            gram[joint] += steps @ steps.T
+            cross[joint][place] += common @ steps.T
+            target[joint] += steps @ residual
+    return [JointGrid(slopes[j], gram[j], solution.spread.T @ cross[j], target[j]) for j in joints]
+
+
+def total_gain(grids: list[JointGrid], chosen: list[list[int]]) -> float:
+    """What the chosen columns of all joints together take off the criterion.
+
+    Parameters
+    ----------
+    grids : list of JointGrid
+        one a joint
+    chosen : list of list of int
+        its candidates that the model has
+    """
+    pairs = list(zip(grids, chosen, strict=True))
+    matrix = np.block([[a.block(b, i, j) for b, j in pairs] for a, i in pairs])
+    target = np.concatenate([grid.target[indices] for grid, indices in pairs])
+    return float(target @ linalg.lstsq(matrix, target, cond=1e-12)[0])
+
+
+@dataclass(frozen=True, eq=False)
+class Conditional:
+    """One joint's candidates after the chosen columns of all other joints are projected off as well.
+
+    gram : (g + 1, g + 1) float64
+        Gram matrix of the candidates
+    target : (g + 1,) float64
+        their products with the torque
+    """
+
+    gram: Array
+    target: Array
+
+    @staticmethod
+    def of(grids: list[JointGrid], chosen: list[list[int]], joint: int) -> "Conditional":
+        """The candidates of one joint with the other joints as chosen.
+
+        Parameters
+        ----------
+        grids : list of JointGrid
+            one a joint
+        chosen : list of list of int
+            their candidates that the model has
+        joint : int
+            joint index, from 0
+        """
+        grid, every = grids[joint], list(range(len(grids[joint].target)))
+        gram, target = grid.block(grid, every, every), grid.target
+        others = [(grids[k], chosen[k]) for k in range(len(grids)) if k != joint]
+        if not others:
+            return Conditional(gram, target)
+        matrix = np.block([[a.block(b, i, j) for b, j in others] for a, i in others])
+        cross = np.vstack([other.block(grid, indices, every) for other, indices in others])
+        known = np.concatenate([other.target[indices] for other, indices in others])
+        solved = linalg.lstsq(matrix, np.column_stack([cross, known]), cond=1e-12)[0]
+        return Conditional(gram - cross.T @ solved[:, :-1], target - cross.T @ solved[:, -1])
+
+    def gains(self, options: list[list[int]], *, physical: bool = False) -> Array:
+        """What each option, one or two columns, takes off the criterion.
+
+        Parameters
+        ----------
+        options : list of list of int
+            candidates, all of them one or all of them two
+        physical : bool
+            whether a pair counts only where friction falls from τ_s > 0 to a lower τ_s + τ_sc ≥ 0
+        """
+        first = np.array([option[0] for option in options])
+        energy = np.maximum(np.diag(self.gram), np.finfo(float).tiny)
+        single = self.target[first] ** 2 / energy[first]
+        if len(options[0]) == 1:
+            return single
+        second = np.array([option[1] for option in options])
+        overlap = self.gram[first, second] / energy[first]
+        left = energy[second] - overlap * self.gram[first, second]
+        apart = left > COLLINEAR * energy[second]
+        stribeck = np.where(apart, self.target[second] - overlap * self.target[first], 0.0) / np.where(apart, left, 1.0)
+        added = stribeck**2 * left
+        if physical:
+            stiction = self.target[first] / energy[first] - overlap * stribeck
+            falls = (stribeck < 0.0) & (stiction + stribeck >= 0.0)
+            added = np.where(falls, added, 0.0)
+        return single + added

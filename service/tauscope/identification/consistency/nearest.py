@@ -1,0 +1,167 @@
+"""The nearest physically consistent parameters, by one convex conic program.
+
+    minimise    ‖R x - z‖² + Σ ((x_i - μ_i) / (w s_i))²
+    subject to  pseudo-inertia of every link ⪰ ε (tiny, relative to the link's mass and size),   G x ≤ h
+
+‖R x - z‖² is the weighted least-squares criterion in units of the noise: a step of 1 is one standard deviation. The
+second sum decides only where the data do not. Its width is w = 10 times the magnitude s_i that a parameter may be
+expected to have, so a combination known to a standard deviation σ moves by about (σ / (w s))² of its distance to μ:
+one known to 10 % of its magnitude moves by 1e-4 of that distance, 0.001 σ; one that the data leave open takes its most
+plausible value. The metric is Euclidean in scaled parameters, which keeps the program quadratic.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.errors import IdentificationError
+from tauscope.identification.consistency.inequalities import LinearInequalities
+from tauscope.identification.consistency.prior import Prior
+from tauscope.identification.consistency.program import assemble, solve
+from tauscope.robot import LinkInertia
+
+Array = NDArray[np.float64]
+
+MARGIN = 1e-7
+"""ε: smallest eigenvalue of a scaled pseudo-inertia. A link of 0.3 m keeps 0.1 mm of thickness."""
+
+PRIOR_WIDTH = 10.0
+"""w: standard deviation of the prior in units of the expected magnitudes."""
+
+_ACTIVE = 10.0
+"""A constraint counts as active where less than this many margins are left."""
+
+
+@dataclass(frozen=True, eq=False)
+class ConsistentParameters:
+    """A full parameter set of a robot that can exist.
+
+    links : tuple of LinkInertia, length n
+        each with a positive definite pseudo-inertia, in its link frame
+    parameters : (p,) float64
+        x: standard parameters of all links, then friction coefficients
+    objective : float
+        value of the whole criterion at x
+    squared_residual : float
+        ‖R x - z‖² [noise variances]
+    free_squared_residual : float
+        the least that any x, consistent or not, reaches [noise variances]
+    prior_squared_distance : float
+        the criterion's second sum at x
+    status : str
+        "interior" where no constraint is felt, else the solver's word: "Solved" or "AlmostSolved"
+    duality_gap : float
+        proof of optimality: how far the criterion may be above its minimum, relative to it or to 1
+    active_links : tuple of bool, length n
+        whether a link lies on the boundary of what can exist
+    active_inequalities : tuple of str
+        names of the inequalities that hold with equality
+    """
+
+    links: tuple[LinkInertia, ...]
+    parameters: Array
+    objective: float
+    squared_residual: float
+    free_squared_residual: float
+    prior_squared_distance: float
+    status: str
+    duality_gap: float
+    active_links: tuple[bool, ...]
+    active_inequalities: tuple[str, ...]
+
+    @property
+    def friction(self) -> Array:
+        """Friction coefficients, the tail of `parameters`, shape (p - 10 n,)."""
+        return self.parameters[10 * len(self.links) :]
+
+    @property
+    def residual_increase(self) -> float:
+        """What consistency costs: ‖R x - z‖² above the unconstrained least squares [noise variances]."""
+        return self.squared_residual - self.free_squared_residual
+
+
+def nearest_consistent_parameters(
+    factor: Array,
+    target: Array,
+    prior: Prior,
+    inequalities: LinearInequalities | None = None,
+    *,
+    margin: float = MARGIN,
+    prior_width: float = PRIOR_WIDTH,
+) -> ConsistentParameters:
+    """Nearest x to a weighted least-squares estimate such that every link can exist and G x ≤ h.
+
+    min ‖R x - z‖² + Σ ((x_i - μ_i) / (w s_i))², pseudo-inertia ⪰ ε, G x ≤ h; see the module for w, s and ε. The program
+    is convex: there is one answer, and `duality_gap` certifies it.
+
+    Parameters
+    ----------
+    factor : (r, p) float64
+        R, any factor of the weighted normal matrix RᵀR, whitened: a unit of R x is one standard deviation of the noise.
+        Columns: ten standard parameters for each link, then friction coefficients. Rank may be deficient.
+    target : (r,) float64
+        z
+    prior : Prior
+        plausible point μ and magnitudes s of the parameters
+    inequalities : LinearInequalities, optional
+        G and h; none where absent
+    margin : float
+        ε, relative to each link's mass and size
+    prior_width : float
+        w
+
+    Returns
+    -------
+    ConsistentParameters
+        the optimum, what it costs, and which constraints it touches
+
+    Raises
+    ------
+    IdentificationError
+        where R or z is not finite, where the inequalities contradict each other or leave no link that can exist, or
+        where the solver does not reach the accuracy that is asked for
+    """
+    inequalities = inequalities or LinearInequalities.none(prior.mean.size)
+    _check_input(factor, target, prior, inequalities)
+    program = assemble(factor, target, prior, inequalities, margin=margin, prior_width=prior_width)
+    scaled, status, gap = solve(program)
+    parameters = scaled * prior.scale
+    squared_residual = float(np.sum((factor @ parameters - target) ** 2))
+    distance = float(np.sum(((parameters - prior.mean) / (prior_width * prior.scale)) ** 2))
+    felt = program.slacks(scaled) <= _ACTIVE * margin
+    least = program.smallest_eigenvalues(scaled)
+    return ConsistentParameters(
+        links=tuple(LinkInertia.from_vector(parameters[10 * j : 10 * j + 10]) for j in range(program.link_count)),
+        parameters=parameters,
+        objective=squared_residual + distance,
+        squared_residual=squared_residual,
+        free_squared_residual=_free_squared_residual(factor * prior.scale, target),
+        prior_squared_distance=distance,
+        status=status,
+        duality_gap=gap,
+        active_links=tuple(bool(value <= _ACTIVE * margin) for value in least),
+        active_inequalities=tuple(name for name, on in zip(inequalities.names, felt, strict=True) if on),
+    )
+
+
+def _check_input(factor: Array, target: Array, prior: Prior, inequalities: LinearInequalities) -> None:
+    """Refuse shapes that do not fit and numbers that are not finite."""
+    size = prior.mean.size
+    if factor.shape != (target.size, size) or inequalities.matrix.shape[1] != size:
+        raise IdentificationError(
+            f"the information has shape {factor.shape} and the inequalities {inequalities.matrix.shape}, but the "
+            f"parameter vector has {size} entries; pass all three for the same parameters"
+        )
+    unusable = ~np.isfinite(factor).all(axis=0)
+    if unusable.any() or not np.isfinite(target).all():
+        where = f"parameter {int(np.argmax(unusable)) + 1}" if unusable.any() else "the torque"
+        raise IdentificationError(
+            f"the information of {where} is not finite; check the recording's gaps and the noise variances"
+        )
+
+
+def _free_squared_residual(scaled_factor: Array, target: Array) -> float:
+    """The least ‖R x - z‖² over all x, rank-deficient R included."""
+    free = np.linalg.lstsq(scaled_factor, target, rcond=1e-12)[0]
+    return float(np.sum((scaled_factor @ free - target) ** 2))

@@ -1,0 +1,62 @@
+"""The 4x4 pseudo-inertia as clarabel's cone wants it, and the magnitude of its entries.
+
+J = ∫ [r; 1] [r; 1]ᵀ dm is positive definite if and only if m > 0 and the inertia about the centre of mass is positive
+definite and keeps the triangle inequalities. Source: P. M. Wensing, S. Kim, J.-J. E. Slotine, "Linear matrix
+inequalities for physically consistent inertial parameter identification", IEEE RA-L 3(1), 2018, equation (11).
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.robot import LinkInertia, pseudo_inertia
+
+Array = NDArray[np.float64]
+
+UPPER_TRIANGLE = tuple((row, column) for column in range(4) for row in range(column + 1))
+"""Entries of a symmetric 4x4 matrix, upper triangle column by column: the order of clarabel's PSDTriangleConeT."""
+
+_ROWS, _COLUMNS = np.array(UPPER_TRIANGLE).T
+
+
+def triangle_of_parameters() -> Array:
+    """Matrix B with svec(J) = B Θ: the scaled upper triangle of J as a linear map of a link's standard parameters.
+
+    Off-diagonal entries carry √2, so that ⟨svec(X), svec(Y)⟩ = tr(X Y), as clarabel's PSDTriangleConeT wants it.
+
+    Returns
+    -------
+    (10, 10) float64
+        B; rows in the order of `UPPER_TRIANGLE`, columns in the order of `STANDARD_PARAMETERS`
+    """
+    weight = np.where(_ROWS == _COLUMNS, 1.0, np.sqrt(2.0))
+    units = (pseudo_inertia(LinkInertia.from_vector(unit)) for unit in np.eye(10))
+    return np.stack([weight * unit[_ROWS, _COLUMNS] for unit in units], axis=1)
+
+
+def identity_triangle() -> Array:
+    """Scaled upper triangle of the 4x4 identity.
+
+    Returns
+    -------
+    (10,) float64
+        in the order of `UPPER_TRIANGLE`
+    """
+    return np.eye(4)[_ROWS, _COLUMNS]
+
+
+def parameter_scale(mass: float, length: float) -> Array:
+    """Magnitude of each standard parameter of a link of the given mass and size: m ℓ², m and m ℓ.
+
+    Parameters
+    ----------
+    mass : float
+        m [kg]
+    length : float
+        ℓ [m]
+
+    Returns
+    -------
+    (10,) float64
+        in the order of `STANDARD_PARAMETERS`
+    """
+    return mass * np.array([length**2] * 6 + [1.0] + [length] * 3)

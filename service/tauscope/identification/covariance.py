@@ -1,0 +1,81 @@
+"""Standard errors that stay right when the residual is autocorrelated.
+
+cov Θ̂ = B M B,  B = (Σ_j w_j² A_jᵀ A_j)⁻¹,  M = Σ_j w_j⁴ A_jᵀ Ω_j A_j,
+
+with Ω_j the covariance of joint j's residual by its autoregressive model and w_j = 1/σ_j (WLS) or 1 (LS). For white
+residuals this is (LᵀΣ⁻¹L)⁻¹. Estimated shape constants of the friction enter as columns of their own, so that what they
+leave uncertain shows in the coefficients.
+"""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from tauscope.identification.autocorrelation import Autoregression
+from tauscope.identification.dataset import PreparedMotion
+from tauscope.identification.least_squares import JointFactor
+from tauscope.identification.shape_sensitivity import ShapeParameter, columns_with_shapes, pseudo_inverse
+from tauscope.identification.structure import ModelStructure
+from tauscope.recording.recording import Array
+
+MOST_FREEDOM_LOST = 0.25
+"""The covariance is enlarged by no more than the inverse of this for the degrees of freedom that parameters took."""
+
+
+def parameter_covariance(
+    motions: Iterable[PreparedMotion],
+    structure: ModelStructure,
+    parameters: Array,
+    factors: Sequence[JointFactor],
+    weight: Array,
+    autoregressions: Sequence[Autoregression],
+    shapes: Sequence[ShapeParameter] = (),
+) -> Array:
+    """Covariance of all parameters, with the estimated shape constants appended.
+
+    Parameters
+    ----------
+    motions : iterable of PreparedMotion
+        the data, in pieces; gone through only for joints whose residual is coloured or whose shape was estimated
+    structure : ModelStructure
+        the model's columns
+    parameters : (p,) float64
+        the estimate
+    factors : sequence of JointFactor, length n
+        of this model on these data
+    weight : (n,) float64
+        w_j, the weights that the estimate was made with
+    autoregressions : sequence of Autoregression, length n
+        of each joint's residual in the common band
+    shapes : sequence of ShapeParameter
+        shape constants that were estimated, s of them
+
+    Returns
+    -------
+    (p + s, p + s) float64
+        covariance of Θ and of the logarithms of the shape constants
+    """
+    size = structure.size + len(shapes)
+    bread, meat = np.zeros((size, size)), np.zeros((size, size))
+    extended = {joint for joint, _ in shapes}
+    passed = [joint for joint, model in enumerate(autoregressions) if model.order > 0 or joint in extended]
+    for joint, (factor, model) in enumerate(zip(factors, autoregressions, strict=True)):
+        if joint not in passed:
+            columns = factor.triangle[:, :-1]
+            square = columns.T @ columns
+            place = np.ix_(factor.columns, factor.columns)
+            bread[place] += weight[joint] ** 2 * square
+            meat[place] += weight[joint] ** 4 * model.variance * square
+    for prepared in motions if passed else ():
+        for joint in passed:
+            columns, index = columns_with_shapes(prepared, structure, joint, parameters, shapes)
+            used = prepared.used[joint]
+            columns = prepared.row_weight * (columns if used.all() else columns * used)
+            coloured = autoregressions[joint].colour(columns)
+            place = np.ix_(index, index)
+            bread[place] += weight[joint] ** 2 * (columns @ columns.T)
+            meat[place] += weight[joint] ** 4 * (coloured @ coloured.T)
+    # The parameters took their degrees of freedom out of the residual where it is strongest; coloured rows count less.
+    rows = sum(f.rows / model.long_run_ratio for f, model in zip(factors, autoregressions, strict=True))
+    inverse = pseudo_inverse(bread)
+    return rows / max(rows - size, MOST_FREEDOM_LOST * rows) * inverse @ meat @ inverse

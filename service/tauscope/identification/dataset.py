@@ -1,0 +1,219 @@
+"""The recordings' equations, ready to be summed: kept in memory while they are few, made again when they are many."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from tauscope.dynamics.base_parameters import BaseParameters
+from tauscope.dynamics.regressor import TorqueRegressor
+from tauscope.identification.structure import ModelStructure
+from tauscope.recording.conditioning import Conditioner, Mask, Motion
+from tauscope.recording.recording import Array
+from tauscope.robot import Robot
+
+MEMORY_LIMIT = 256 * 1024 * 1024
+"""Bytes of columns that are kept between passes; beyond, every pass conditions the recording again."""
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedMotion:
+    """One piece of motion with its rigid-body columns.
+
+    motion : Motion
+        the conditioned motion
+    rigid : tuple of (m_j, N) float64, length n
+        base regressor L at the recorded rate: of each joint's row the columns of the links that it moves
+    reduced_rigid : tuple of (m_j, M) float64, length n
+        the same in the common band, decimated
+    reduced_torque : (n, M) float64
+        measured torque in the common band, mean of the repetitions
+    used : (n, M) bool
+        rows that rest on measured torque
+    recording : int
+        index of the recording it came from
+    """
+
+    motion: Motion
+    rigid: tuple[Array, ...]
+    reduced_rigid: tuple[Array, ...]
+    reduced_torque: Array
+    used: Mask
+    recording: int
+
+    @property
+    def row_weight(self) -> float:
+        """√P: a mean of P repetitions has 1/P of the noise variance."""
+        return float(np.sqrt(self.motion.repetitions))
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of the columns [bytes]."""
+        return sum(columns.nbytes for columns in (*self.rigid, *self.reduced_rigid))
+
+    def joint_columns(self, structure: ModelStructure, joint: int) -> Array:
+        """All columns of a joint's equation in the common band, (p_j, M).
+
+        Parameters
+        ----------
+        structure : ModelStructure
+            the model's columns
+        joint : int
+            joint index, from 0
+        """
+        return np.concatenate(self.joint_column_groups(structure, joint))
+
+    def joint_column_groups(self, structure: ModelStructure, joint: int) -> tuple[Array, Array]:
+        """The same columns without a copy: those of the links that the joint moves, and its own terms.
+
+        Parameters
+        ----------
+        structure : ModelStructure
+            the model's columns
+        joint : int
+            joint index, from 0
+        """
+        motion = self.motion
+        own = structure.joint_term_columns(joint, motion.velocity[:, joint], motion.acceleration[:, joint])
+        return self.reduced_rigid[joint], motion.band.reduce(own)
+
+    def predicted_rows(self, structure: ModelStructure, parameters: Array) -> Array:
+        """Model torque in the common band, (n, M).
+
+        Parameters
+        ----------
+        structure : ModelStructure
+            the model's columns
+        parameters : (p,) float64
+            one parameter set
+        """
+        motion = self.motion
+        outward, others = [], []
+        for joint, rigid in enumerate(self.reduced_rigid):
+            links, own = np.split(parameters[structure.joint_columns(joint)], [len(rigid)])
+            terms = structure.joint_term_columns(joint, motion.velocity[:, joint], motion.acceleration[:, joint])
+            outward.append(links @ rigid)
+            others.append(own @ terms)
+        return np.stack(outward) + motion.band.reduce(np.stack(others))
+
+    def predicted_torque(self, structure: ModelStructure, candidates: Array) -> Array:
+        """Model torque at the recorded rate, before any filter, of several parameter sets at once.
+
+        Parameters
+        ----------
+        structure : ModelStructure
+            the model's columns
+        candidates : (c, p) float64
+            parameter sets
+
+        Returns
+        -------
+        (c, n, N) float64
+            torque of every set at every joint
+        """
+        motion = self.motion
+        samples, count = motion.position.shape
+        torque = np.empty((len(candidates), count, samples))
+        for joint in range(count):
+            own = structure.joint_term_columns(joint, motion.velocity[:, joint], motion.acceleration[:, joint])
+            outward, others = np.split(structure.joint_columns(joint), [len(self.rigid[joint])])
+            torque[:, joint] = candidates[:, outward] @ self.rigid[joint]
+            torque[:, joint] += candidates[:, others] @ own
+        return torque
+
+
+@dataclass(eq=False)
+class Dataset:
+    """All pieces of motion of some recordings, in one band, that can be gone through again and again.
+
+    conditioners : sequence of Conditioner
+        one a recording
+    robot : Robot
+        the arm
+    base : BaseParameters
+        its identifiable combinations
+    cutoff_hz : float or None
+        the common band; None for no filter
+    """
+
+    conditioners: Sequence[Conditioner]
+    robot: Robot
+    base: BaseParameters
+    cutoff_hz: float | None
+    _kept: list[PreparedMotion] | None = field(default=None, repr=False)
+    _too_large: bool = field(default=False, repr=False)
+
+    def __iter__(self) -> Iterator[PreparedMotion]:
+        """The pieces in the order of the recordings; computed once where they fit into `MEMORY_LIMIT`."""
+        if self._kept is not None:
+            yield from self._kept
+            return
+        kept: list[PreparedMotion] = []
+        size = 0
+        for prepared in self._prepare():
+            size += prepared.nbytes
+            self._too_large = self._too_large or size > MEMORY_LIMIT
+            if self._too_large:
+                kept.clear()
+            else:
+                kept.append(prepared)
+            yield prepared
+        if not self._too_large:
+            self._kept = kept
+
+    def _prepare(self) -> Iterator[PreparedMotion]:
+        """Condition, evaluate the regressor, and reduce."""
+        for index, conditioner in enumerate(self.conditioners):
+            for measured in conditioner.motions(self.cutoff_hz):
+                yield prepared_motion(_without_jitter(measured, conditioner.moving), self.robot, self.base, index)
+
+
+def prepared_motion(motion: Motion, robot: Robot, base: BaseParameters, recording: int) -> PreparedMotion:
+    """One piece of motion with its rigid-body columns, at the recorded rate and in the common band.
+
+    Parameters
+    ----------
+    motion : Motion
+        the conditioned motion
+    robot : Robot
+        the arm
+    base : BaseParameters
+        its identifiable combinations
+    recording : int
+        index of the recording it came from
+    """
+    regressor = TorqueRegressor(robot, columns=base.independent_columns)
+    whole = np.empty((robot.joint_count, regressor.column_count, len(motion.position)))
+    regressor.write_shares(motion.position, motion.velocity, motion.acceleration, whole)
+    rigid = tuple(row[base.outward(joint)] for joint, row in enumerate(whole))
+    reduce = motion.band.reduce
+    return PreparedMotion(
+        motion,
+        rigid,
+        tuple(reduce(columns) for columns in rigid),
+        reduce(np.ascontiguousarray(motion.mean_torque.T)),
+        motion.band.reduce_mask(np.asarray(motion.measured.any(axis=0)).T),
+        recording,
+    )
+
+
+def _without_jitter(motion: Motion, moving: Mask) -> Motion:
+    """The motion with joints that stand still standing still: their encoder's noise is no friction's velocity."""
+    if moving.all():
+        return motion
+    return replace(motion, velocity=motion.velocity * moving, acceleration=motion.acceleration * moving)
+
+
+def rms_speed(motions: Iterable[PreparedMotion]) -> Array:
+    """Root mean square of every joint's velocity, at least 1e-9, (n,) [rad/s or m/s].
+
+    Parameters
+    ----------
+    motions : iterable of PreparedMotion
+        the data, in pieces; at least one
+    """
+    squares, count = 0.0, 0
+    for prepared in motions:
+        squares = squares + np.sum(prepared.motion.velocity**2, axis=0)
+        count += len(prepared.motion.velocity)
+    return np.maximum(np.sqrt(squares / count), 1e-9)

@@ -1,0 +1,312 @@
+"""Shape constants K_v and δ of the friction curve, by separable least squares.
+
+The coefficients of (7) are linear and are eliminated exactly (variable projection); only the shape constants remain.
+Every joint's constants are searched over a logarithmic grid of candidates, joint after joint until nothing moves, and
+refined between grid points. A constant that the data cannot tell says so and takes an ordinary value that fits as well:
+never a slope that ran away.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.identification.candidate_steps import Conditional, JointGrid, projected_grids, total_gain
+from tauscope.identification.dataset import PreparedMotion
+from tauscope.identification.least_squares import JointFactor, restricted, solve
+from tauscope.identification.structure import ModelStructure
+from tauscope.recording.recording import Array
+from tauscope.robot import FrictionShape
+
+GRID_POINTS = 42
+GRID_DECADES = (0.2, 4.3)
+"""Candidates times the joint's rms velocity run over these powers of ten: from a gentle Stribeck slope to a step."""
+
+LEAST_STEP = 10**0.8
+"""K_v times the rms velocity is at least this: what is gentler is viscous friction by another name."""
+
+ORDINARY = 1000.0
+"""K times the rms velocity of a constant that the data leave open, as near as they allow: the step of a textbook."""
+
+STRAIGHT = 0.17
+"""δ times the rms velocity v below which A(δ v) is a straight line but for a hundredth: (δ v)²/3."""
+
+SEPARATION = 4.0
+"""K_v is at least this many times δ: closer, their columns are one."""
+
+IMPROVEMENT = 25.0
+"""What a Stribeck term must take off the criterion to be proposed, in residual variances: five standard errors."""
+
+IMPROVEMENT_SHARE = 0.005
+"""…and the share of the joint's residual energy that it must explain, so that it is not a proxy of something else."""
+
+KNOWN_BAND = 25.0
+"""Constants whose criterion is within this much of the best are not told apart: five standard errors."""
+
+AS_GOOD = 0.02
+"""Share of the residual's energy that is no practical difference between two constants."""
+
+SWEEPS = 4
+
+
+@dataclass(frozen=True)
+class EstimatedShape:
+    """Shape constants of one joint.
+
+    k_v : float
+        slope of the step at zero velocity [s/rad or s/m]
+    delta : float or None
+        slope of the Stribeck term [s/rad or s/m]; None where the data show no such term
+    k_v_identifiable, delta_identifiable : bool
+        False where the data cannot tell the constant
+    k_v_given, delta_given : bool
+        True where the robot file states it
+    """
+
+    k_v: float
+    delta: float | None
+    k_v_identifiable: bool
+    delta_identifiable: bool
+    k_v_given: bool
+    delta_given: bool
+
+
+def estimate_shapes(
+    motions: Iterable[PreparedMotion],
+    structure: ModelStructure,
+    factors: tuple[JointFactor, ...],
+    noise_std: Array,
+    unit: Array,
+    stribeck: Sequence[bool],
+    speed: Array,
+    tight: Sequence[bool] | None = None,
+) -> tuple[EstimatedShape, ...]:
+    """Shape constants of all joints; those that the robot file states are kept.
+
+    Parameters
+    ----------
+    motions : iterable of PreparedMotion
+        the data; gone through once
+    structure : ModelStructure
+        a preliminary model
+    factors : tuple of JointFactor
+        of that model on these data
+    noise_std : (n,) float64
+        residual standard deviation in the common band, for the weights
+    unit : (n,) float64
+        one noise variance, inflated by autocorrelation, relative to `noise_std`²: the measure of what the data can
+        tell; zeros for the best candidates whatever they are worth
+    stribeck : sequence of bool, length n
+        joints at which a Stribeck term of unknown δ may be proposed
+    speed : (n,) float64
+        rms velocity of every joint, which the candidates are relative to [rad/s or m/s]
+    tight : sequence of bool, length n, or None
+        joints whose K_v has a small standard error, which is as good as a profile that falls; none where None
+
+    Returns
+    -------
+    tuple of EstimatedShape
+        one a joint
+    """
+    given = [joint.friction_shape for joint in structure.robot.joints]
+    shared = _shared_columns(structure)
+    without_steps = restricted(factors, shared)
+    solution = solve(without_steps, len(shared), noise_std)
+    slopes = _candidate_slopes(speed, given)
+    grids = projected_grids(motions, structure, shared, solution, noise_std, slopes)
+    chosen = _search(grids, given)
+    squares = (f.squared_residual(solution.parameters) for f in without_steps)
+    energy = sum(square / std**2 for square, std in zip(squares, noise_std, strict=True))
+    rows = sum(factor.rows for factor in factors)
+    variance = max(float(energy - total_gain(grids, chosen)) / rows, np.finfo(float).eps)
+    described = []
+    for joint, (grid, shape) in enumerate(zip(grids, given, strict=True)):
+        conditional, indices = Conditional.of(grids, chosen, joint), chosen[joint]
+        residual_energy = factors[joint].rows * variance
+        if stribeck[joint] and shape.delta is None:
+            indices = _with_stribeck(conditional, grid, indices, shape, variance, residual_energy)
+        is_tight = tight is not None and tight[joint]
+        described.append(_described(conditional, grid, indices, shape, float(unit[joint]), residual_energy, is_tight))
+    return tuple(described)
+
+
+def _candidate_slopes(speed: Array, given: Sequence[FrictionShape]) -> list[Array]:
+    """Per joint a logarithmic grid relative to its rms velocity, then the stated constants."""
+    grids = []
+    for shape, typical in zip(given, speed, strict=True):
+        grid = np.logspace(*GRID_DECADES, GRID_POINTS) / typical
+        stated = [value for value in (shape.k_v, shape.delta) if value is not None]
+        grids.append(np.append(grid, stated))
+    return grids
+
+
+def _shared_columns(structure: ModelStructure) -> NDArray[np.intp]:
+    """Global columns that do not depend on any shape constant."""
+    steps = [
+        structure.coefficient(joint, name)
+        for joint in range(structure.robot.joint_count)
+        for name in ("stiction", "stribeck")
+    ]
+    return np.setdiff1d(np.arange(structure.size), [column for column in steps if column is not None])
+
+
+def _search(grids: list[JointGrid], given: Sequence[FrictionShape]) -> list[list[int]]:
+    """Grid indices [K_v] or [K_v, δ] a joint, each joint's best with the others held, until nothing moves."""
+    options = [_plain_options(grid, shape) for grid, shape in zip(grids, given, strict=True)]
+    chosen = [candidates[len(candidates) // 2] for candidates in options]
+    for _ in range(SWEEPS):
+        before = list(chosen)
+        for joint, candidates in enumerate(options):
+            if len(candidates) > 1:
+                gains = Conditional.of(grids, chosen, joint).gains(candidates)
+                chosen[joint] = candidates[int(np.argmax(gains))]
+        if chosen == before:
+            break
+    return chosen
+
+
+def _steps(grid: JointGrid, shape: FrictionShape) -> list[int]:
+    """Grid indices that K_v may take; the stated one where the robot file states it."""
+    if shape.k_v is not None:
+        return [GRID_POINTS]
+    least = (1.0 - 1e-9) * LEAST_STEP / 10 ** GRID_DECADES[0] * grid.slopes[0]  # a grid point: not left to rounding
+    return [k for k in range(GRID_POINTS) if grid.slopes[k] >= least]
+
+
+def _plain_options(grid: JointGrid, shape: FrictionShape) -> list[list[int]]:
+    """What a joint's constants may be without a Stribeck term of unknown δ; stated constants are kept."""
+    if shape.delta is None:
+        return [[k] for k in _steps(grid, shape)]
+    stated = len(grid.slopes) - 1
+    if shape.k_v is not None:
+        return [[GRID_POINTS, stated]]
+    return [[k, stated] for k in _steps(grid, shape) if grid.slopes[k] >= SEPARATION * shape.delta]
+
+
+def _stribeck_options(grid: JointGrid, shape: FrictionShape) -> list[list[int]]:
+    """Pairs of constants with a Stribeck term, for joints whose file states no δ."""
+    slopes = grid.slopes
+    return [[k, d] for k in _steps(grid, shape) for d in range(GRID_POINTS) if slopes[k] >= SEPARATION * slopes[d]]
+
+
+def _described(
+    conditional: Conditional,
+    grid: JointGrid,
+    indices: list[int],
+    shape: FrictionShape,
+    unit: float,
+    residual_energy: float,
+    is_tight: bool,
+) -> EstimatedShape:
+    """The joint's constants refined, with what the data can tell about them; `unit` is one noise variance.
+
+    A gentle step has a long tail: A(K_v v) = 1 - 2/(π K_v v) for large v. It stands in for viscous friction that bends
+    with speed, which the model has no other column for, and the slope it takes for that is wrong at the low speeds that
+    it is there for. So K_v is known only where the passage through zero tells it: where steeper steps fit clearly worse
+    even beside a column v|v|. That column is for the question alone and never in the model.
+    """
+    slopes = grid.slopes
+    k_v, k_v_known = float(slopes[indices[0]]), True
+    delta, delta_known = shape.delta, shape.delta is not None
+    if shape.k_v is None:
+        steps = [k for k in _steps(grid, shape) if len(indices) == 1 or slopes[k] >= SEPARATION * slopes[indices[1]]]
+        profile = conditional.gains([[k, *indices[1:]] for k in steps])
+        k_v, k_v_known = _peak(profile, slopes[steps], KNOWN_BAND * unit)
+        k_v_known = k_v_known or is_tight
+        if len(indices) == 1:
+            if k_v_known:
+                profile = conditional.gains([[k, grid.bend] for k in steps])
+                k_v_known = bool(profile[-1] <= profile.max() - KNOWN_BAND * unit)
+            if not k_v_known:
+                k_v = _ordinary(profile, slopes[steps], grid, unit, residual_energy)
+    if shape.delta is None and len(indices) > 1:
+        gentle = [d for d in range(GRID_POINTS) if slopes[indices[0]] >= SEPARATION * slopes[d]]
+        profile = conditional.gains([[indices[0], d] for d in gentle])
+        # Where δ begins: beside a K_v of the grid, its profile tells how far that K_v is off, not what is known of δ.
+        delta, _ = _peak(profile, slopes[gentle], KNOWN_BAND * unit)
+    return EstimatedShape(k_v, delta, k_v_known, delta_known, shape.k_v is not None, shape.delta is not None)
+
+
+def _peak(profile: Array, slopes: Array, band: float) -> tuple[float, bool]:
+    """Where a profile peaks, between grid points, and whether it falls by `band` on both sides."""
+    best = int(np.argmax(profile))
+    if not 0 < best < len(slopes) - 1:
+        return float(slopes[best]), False
+    left, middle, right = profile[best - 1 : best + 2]
+    curvature = left - 2.0 * middle + right
+    shift = 0.5 * (left - right) / curvature if curvature < 0.0 else 0.0
+    return float(slopes[best] * np.exp(shift * np.log(slopes[1] / slopes[0]))), bool(
+        max(profile[0], profile[-1]) < profile[best] - band
+    )
+
+
+def _ordinary(profile: Array, slopes: Array, grid: JointGrid, unit: float, residual_energy: float) -> float:
+    """The most ordinary slope of those that fit practically as well as the best: never one that ran away."""
+    ordinary = ORDINARY / 10 ** GRID_DECADES[0] * grid.slopes[0]
+    fitting = profile >= profile.max() - AS_GOOD * residual_energy
+    if profile[0] >= profile.max() - KNOWN_BAND * unit:
+        fitting[:] = True  # it could be viscous friction as well: a stand-in, any step will do
+    candidates = slopes[fitting]
+    return float(candidates[np.argmin(np.abs(np.log(candidates / ordinary)))])
+
+
+def _with_stribeck(
+    conditional: Conditional,
+    grid: JointGrid,
+    plain: list[int],
+    shape: FrictionShape,
+    variance: float,
+    residual_energy: float,
+) -> list[int]:
+    """The best pair [K_v, δ] where it explains enough more than K_v alone, else the plain choice.
+
+    K_v alone may lie between two grid points: it is given the next point's column too, which spans what lies between.
+    """
+    pairs = _stribeck_options(grid, shape)
+    if not pairs:
+        return plain
+    gains = conditional.gains(pairs, physical=True)
+    best = int(np.argmax(gains))
+    alone = float(conditional.gains([plain])[0])
+    if shape.k_v is None:
+        beside = [[plain[0], plain[0] + step] for step in (-1, 1) if 0 <= plain[0] + step < GRID_POINTS]
+        alone = max(alone, float(conditional.gains(beside).max()))
+    enough = max(IMPROVEMENT * variance, IMPROVEMENT_SHARE * residual_energy)
+    return pairs[best] if gains[best] - alone > enough else plain
+
+
+def gentle_range(k_v: float, speed: float) -> tuple[float, float]:
+    """Between which slopes a δ stands for a term of its own: gentler ones are viscous friction, steeper ones K_v's.
+
+    Parameters
+    ----------
+    k_v : float
+        slope of the step at zero velocity [s/rad or s/m]
+    speed : float
+        the joint's rms velocity [rad/s or m/s]
+
+    Returns
+    -------
+    tuple of float
+        gentlest and steepest δ [s/rad or s/m]
+    """
+    return STRAIGHT / speed, k_v / SEPARATION
+
+
+def shape_parameters(shapes: Sequence[EstimatedShape]) -> list[tuple[int, str]]:
+    """The constants that were estimated and not merely chosen: they are refined, and share in the covariance.
+
+    Parameters
+    ----------
+    shapes : sequence of EstimatedShape
+        one a joint
+    """
+    estimated: list[tuple[int, str]] = []
+    for joint, shape in enumerate(shapes):
+        paired = shape.delta is not None and not shape.delta_given
+        if not shape.k_v_given and (shape.k_v_identifiable or paired):
+            estimated.append((joint, "k_v"))
+        if paired:
+            estimated.append((joint, "delta"))
+    return estimated

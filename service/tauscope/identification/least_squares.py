@@ -1,0 +1,259 @@
+"""LS (16), (17) and WLS (18), (19) from orthogonal factors, in constant memory.
+
+Each joint's rows [A_j | y_j] are reduced to their triangular factor R_j piece by piece (sequential QR): the same sums
+as the normal equations without squaring the condition number. Weights scale R_j, so LS, WLS and every reweighting
+between them need one pass over the data.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import lapack, solve_triangular
+
+from tauscope.errors import IdentificationError
+from tauscope.identification.dataset import PreparedMotion
+from tauscope.identification.structure import ModelStructure
+from tauscope.recording.recording import Array
+
+RANK_TOLERANCE = 1e-9
+"""Singular values of the column-scaled factor below this share of the largest are directions without information."""
+
+WELL_CONDITIONED = 1e-6
+"""Reciprocal condition (1-norm) of a factor above which no direction can lack information: the ratio of the singular
+values is at least that over the number of columns."""
+
+ROWS_AT_ONCE = 1 << 10
+"""Rows factorised at once: such a block stays in the processor's cache."""
+
+PANEL = 8
+"""Columns that are eliminated before the rest is updated by one matrix product."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointFactor:
+    """Triangular factor of one joint's equations.
+
+    columns : (p_j,) int
+        global columns of the model
+    triangle : (p_j + 1, p_j + 1) float64
+        R_j of [A_j | y_j]
+    rows : int
+        number of equations
+    """
+
+    columns: NDArray[np.intp]
+    triangle: Array
+    rows: int
+
+    @cached_property
+    def least_squared_residual(self) -> float:
+        """‖A_j Θ_j - y_j‖² where the joint's equations are solved alone: the last entry of R_j, squared.
+
+        Where columns are zero or combinations but for rounding, rounding would decide over that entry.
+        """
+        columns, target = self.triangle[:, :-1], self.triangle[:, -1]
+        if _is_well_conditioned(columns[:-1]):
+            return float(target[-1] ** 2)
+        solution = np.linalg.lstsq(columns, target, rcond=RANK_TOLERANCE)[0]
+        return float(np.sum((columns @ solution - target) ** 2))
+
+    def squared_residual(self, parameters: Array) -> float:
+        """‖A_j Θ - y_j‖².
+
+        Parameters
+        ----------
+        parameters : (p,) float64
+            all parameters of the model
+        """
+        own = np.append(parameters[self.columns], -1.0)
+        return float(np.sum((self.triangle @ own) ** 2))
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A least-squares estimate.
+
+    parameters : (p,) float64
+        Θ; where a direction has no information, its smallest value
+    factor : (p, p) float64
+        R of the weighted equations
+    target : (p,) float64
+        z, so that the criterion is ‖R Θ - z‖² and a constant
+    spread : (p, r) float64
+        S with S Sᵀ = (Lᵀ W L)⁺, r the rank
+    undetermined : (p,) bool
+        parameters that take part in a direction without information
+    """
+
+    parameters: Array
+    factor: Array
+    target: Array
+    spread: Array
+    undetermined: NDArray[np.bool_]
+
+
+def factorise(motions: Iterable[PreparedMotion], structure: ModelStructure) -> tuple[JointFactor, ...]:
+    """One pass over the data: every joint's triangular factor.
+
+    Parameters
+    ----------
+    motions : iterable of PreparedMotion
+        the data, in pieces
+    structure : ModelStructure
+        the model's columns
+
+    Returns
+    -------
+    tuple of JointFactor
+        one a joint
+
+    Raises
+    ------
+    IdentificationError
+        where a joint has fewer measured rows than parameters
+    """
+    joints = range(structure.robot.joint_count)
+    columns = [structure.joint_columns(joint) for joint in joints]
+    triangles = [np.zeros((len(own) + 1, len(own) + 1), order="F") for own in columns]
+    rows = [0] * len(columns)
+    for prepared in motions:
+        for joint in joints:
+            equations = *prepared.joint_column_groups(structure, joint), prepared.reduced_torque[None, joint]
+            _append(triangles[joint], equations, prepared.used[joint], prepared.row_weight)
+            rows[joint] += int(prepared.used[joint].sum())
+    factors = []
+    for joint in joints:
+        if rows[joint] <= len(columns[joint]):
+            name = structure.robot.joints[joint].name
+            raise IdentificationError(
+                f"{name}: {rows[joint]} usable samples for {len(columns[joint])} parameters: record longer, or ask for"
+                " a higher cut-off"
+            )
+        factors.append(JointFactor(columns[joint], triangles[joint], rows[joint]))
+    return tuple(factors)
+
+
+def solve(factors: tuple[JointFactor, ...], size: int, noise_std: Array) -> Solution:
+    """The (weighted) least-squares estimate.
+
+    Θ = argmin Σ_j ‖A_j Θ - y_j‖² / σ_j².
+
+    Parameters
+    ----------
+    factors : tuple of JointFactor
+        one a joint
+    size : int
+        number of parameters p
+    noise_std : (n,) float64
+        σ_j; all ones for LS
+
+    Returns
+    -------
+    Solution
+        the estimate with what its covariance needs
+    """
+    triangle = stacked_factor(factors, size, noise_std)
+    return _solved(triangle[:size, :size], triangle[:size, size])
+
+
+def stacked_factor(factors: tuple[JointFactor, ...], size: int, noise_std: Array) -> Array:
+    """Triangular factor of all joints' equations together, (p + 1, p + 1).
+
+    Parameters
+    ----------
+    factors : tuple of JointFactor
+        one a joint
+    size : int
+        number of parameters p
+    noise_std : (n,) float64
+        σ_j, by which the equations are divided
+    """
+    stacked = np.zeros((sum(len(factor.triangle) for factor in factors), size + 1))
+    row = 0
+    for factor, std in zip(factors, noise_std, strict=True):
+        block = slice(row, row + len(factor.triangle))
+        stacked[block, factor.columns] = factor.triangle[:, :-1] / std
+        stacked[block, size] = factor.triangle[:, -1] / std
+        row += len(factor.triangle)
+    return _triangle(stacked)
+
+
+def restricted(factors: tuple[JointFactor, ...], keep: NDArray[np.intp]) -> tuple[JointFactor, ...]:
+    """The factors of a smaller model: columns left out without another pass over the data.
+
+    Parameters
+    ----------
+    factors : tuple of JointFactor
+        factors of the larger model
+    keep : (k,) int
+        its global columns that stay, ascending; they are numbered anew from 0
+    """
+    position = np.full(max(int(factor.columns.max()) for factor in factors) + 1, -1)
+    position[keep] = np.arange(len(keep))
+    smaller = []
+    for factor in factors:
+        stays = np.flatnonzero(position[factor.columns] >= 0)
+        triangle = factor.triangle[:, np.append(stays, len(factor.columns))]
+        smaller.append(JointFactor(position[factor.columns[stays]], _triangle(triangle), factor.rows))
+    return tuple(smaller)
+
+
+def condition_number(factors: tuple[JointFactor, ...], size: int) -> float:
+    """Condition number of a regressor: largest over smallest singular value, at most 1/ε: more is rounding.
+
+    Parameters
+    ----------
+    factors : tuple of JointFactor
+        one a joint; the condition number is that of their unweighted equations
+    size : int
+        number of parameters p
+    """
+    unweighted = stacked_factor(factors, size, np.ones(len(factors)))[:size, :size]
+    singular = np.linalg.svd(unweighted, compute_uv=False)
+    return float(singular[0] / max(singular[-1], singular[0] * np.finfo(float).eps, np.finfo(float).tiny))
+
+
+def _append(triangle: Array, equations: Sequence[Array], used: NDArray[np.bool_], weight: float) -> None:
+    """Replace R, in place, by that of the rows so far and of new ones: groups of columns (k, M) with time last."""
+    whole = bool(used.all())
+    for start in range(0, len(used), ROWS_AT_ONCE):
+        rows = slice(start, start + ROWS_AT_ONCE)
+        block = np.concatenate([columns[:, rows] for columns in equations])
+        if not whole:
+            block = block[:, used[rows]]
+        if block.size:
+            block *= weight
+            panel = min(PANEL, len(triangle))
+            triangle[:], *_ = lapack.dtpqrt(0, panel, triangle, block.T, overwrite_a=True, overwrite_b=True)
+
+
+def _triangle(matrix: Array) -> Array:
+    """R of the QR factorisation, square, with rows of zeros where there are fewer rows than columns."""
+    upper = np.asarray(np.linalg.qr(matrix, mode="r"))
+    columns = matrix.shape[1]
+    if len(upper) == columns:
+        return upper
+    return np.vstack([upper, np.zeros((columns - len(upper), columns))])
+
+
+def _is_well_conditioned(triangle: Array) -> bool:
+    """Whether every direction holds information beyond doubt; costs a fraction of singular values."""
+    return bool(lapack.dtrcon(triangle)[0] > WELL_CONDITIONED)
+
+
+def _solved(factor: Array, target: Array) -> Solution:
+    """Minimum-norm solution in scaled columns."""
+    scale = np.linalg.norm(factor, axis=0)
+    scale[scale == 0.0] = 1.0
+    scaled = factor / scale
+    if _is_well_conditioned(scaled):
+        inverse = solve_triangular(scaled, np.eye(len(scale))) / scale[:, None]
+        return Solution(inverse @ target, factor, target, inverse, np.zeros(len(scale), dtype=bool))
+    left, singular, right = np.linalg.svd(scaled)
+    known = singular > RANK_TOLERANCE * max(singular[0], np.finfo(float).tiny)
+    spread = right[known].T / singular[known] / scale[:, None]
+    undetermined = np.any(np.abs(right[~known]) > 1e-3, axis=0)
+    return Solution(spread @ (left[:, known].T @ target), factor, target, spread, np.asarray(undetermined))

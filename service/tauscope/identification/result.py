@@ -1,0 +1,278 @@
+"""The identification as a document: what ``identify --json`` writes and the REST API returns (CONTRACT.md)."""
+
+from dataclasses import asdict
+from typing import Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from tauscope.identification.friction_shape import shape_parameters
+from tauscope.identification.identification import Identification
+from tauscope.identification.residuals import Fit
+from tauscope.recording.conditioning import ConditioningSummary
+from tauscope.robot import STANDARD_PARAMETERS, LinkInertia
+
+
+class Document(BaseModel):
+    """Base of all result documents: strict, and closed to unknown keys."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, ser_json_inf_nan="null")
+
+
+class BaseParameterEntry(Document):
+    """One identifiable combination of the links' standard parameters."""
+
+    name: str = Field(description="readable expression, e.g. Ixx2 - Iyy2 - 0.5*msx2")
+    terms: dict[str, float] = Field(description="coefficient of every standard parameter in it, to full precision")
+    value: float = Field(description="estimate [kg m², kg m or kg, by its terms]")
+    std: float | None = Field(description="standard error of the free estimate; null where the recordings are silent")
+    independent: bool = Field(description="whether it is one standard parameter by itself")
+    free_value: float = Field(description="the LS or WLS estimate before physical constraints")
+
+
+class FrictionEntry(Document):
+    """Friction of one joint: τ_s A(K_v q̇) + τ_sc A(δ q̇) + τ_v q̇ + offset, A(x) = (2/π) atan x."""
+
+    joint: str = Field(description="name of the joint")
+    stiction: float = Field(description="τ_s [Nm or N]")
+    stribeck: float = Field(description="τ_sc [Nm or N]; 0 where the data show no such term")
+    viscous: float = Field(description="τ_v [Nm s/rad or N s/m]")
+    offset: float = Field(description="constant torque [Nm or N]")
+    k_v: float = Field(description="K_v [s/rad or s/m]")
+    delta: float | None = Field(description="δ [s/rad or s/m]; null where the data show no Stribeck term")
+    std: dict[str, float | None] = Field(
+        description="standard errors of the entries that were estimated; null where the recordings are silent"
+    )
+    identifiable: dict[str, bool] = Field(description="false for an entry that these data cannot tell")
+
+
+class RotorEntry(Document):
+    """Reflected rotor inertia of one joint, where the data ask for it."""
+
+    joint: str = Field(description="name of the joint")
+    value: float = Field(description="I_a [kg m² or kg]")
+    std: float | None = Field(description="standard error; null where the recordings are silent")
+
+
+class InertiaEntry(Document):
+    """Inertia about the link frame's origin [kg m²]."""
+
+    xx: float = Field(description="Ixx")
+    yy: float = Field(description="Iyy")
+    zz: float = Field(description="Izz")
+    xy: float = Field(description="Ixy")
+    xz: float = Field(description="Ixz")
+    yz: float = Field(description="Iyz")
+
+
+class LinkEntry(Document):
+    """One link of the nearest physically consistent model, in its link frame."""
+
+    mass: float = Field(description="m [kg]")
+    first_moment: list[float] = Field(description="m s [kg m]")
+    inertia: InertiaEntry = Field(description="about the link frame's origin")
+
+
+class FitEntry(Document):
+    """How well the model explains some recordings."""
+
+    rms: list[float] = Field(description="per joint, residual at the recorded rate, unfiltered [Nm or N]")
+    band_rms: list[float] = Field(description="per joint, residual in the common band [Nm or N]")
+    relative_error: float = Field(description="‖τ - τ̂‖ / ‖τ‖ over all joints, in the common band")
+
+
+class FitsEntry(Document):
+    """Fits of the delivered model, and of the physically consistent one where that is another."""
+
+    train: FitEntry = Field(description="on the recordings that the model was made from")
+    held_out: FitEntry | None = Field(default=None, description="on recordings that were not used")
+    links_train: FitEntry = Field(description="of `links` and its friction, on the same recordings")
+    links_held_out: FitEntry | None = Field(default=None, description="of `links` and its friction, held out")
+
+
+class ConditioningEntry(Document):
+    """What was done to one recording, and what was missing in it."""
+
+    recording: str = Field(description="name as given")
+    samples: int = Field(description="rows in the file")
+    missed_positions: int = Field(description="rows without a complete position: bridged or split, and masked")
+    missed_torques: list[int] = Field(description="per joint, samples without a torque: masked")
+    dropped: int = Field(description="rows in pieces too short to filter")
+    gaps: int = Field(description="long gaps at which the recording was split")
+    rate_hz: float = Field(description="sampling rate [Hz]")
+    resampled: bool = Field(description="whether stamps jittered so that signals were interpolated")
+    averaged_periods: int = Field(description="periods averaged into one; 0 where none were")
+    position_noise_std: list[float] = Field(description="per joint, noise of the positions [rad or m]")
+    velocity_source: list[str] = Field(
+        description="per joint, what q̇ and q̈ were taken from: position, recorded velocity or recorded acceleration"
+    )
+
+
+class IdentificationDocument(Document):
+    """Result of an identification, schema tauscope.identification/1."""
+
+    schema_id: Literal["tauscope.identification/1"] = Field(
+        default="tauscope.identification/1", alias="schema", description="name and version of this document's form"
+    )
+    robot: str = Field(description="name of the robot")
+    joints: list[str] = Field(description="names of its joints, in chain order")
+    estimator: Literal["ls", "wls"] = Field(description="how the joints' equations were weighted")
+    constrained: bool = Field(
+        description="true where no rigid bodies can have the free estimate, so that the delivered values are the"
+        " nearest physically consistent ones"
+    )
+    cutoff_hz: float | None = Field(
+        description="band shared by torque and regressor [Hz]; null where nothing was filtered"
+    )
+    noise_std: list[float] = Field(description="per joint, torque noise a sample [Nm or N]")
+    noise_method: Literal["periods", "residual"] = Field(
+        description="from differences between repeated periods (model-free), or from the whitened residual"
+    )
+    condition_number: float = Field(description="of the stacked, unweighted regressor")
+    base_parameters: list[BaseParameterEntry] = Field(description="what torque and position can tell of the links")
+    unidentifiable: list[str] = Field(description="standard parameters that no motion of this arm shows")
+    undetermined: list[str] = Field(description="parameters that these recordings, unlike others, say nothing about")
+    friction: list[FrictionEntry] = Field(description="one a joint")
+    rotor_inertia: list[RotorEntry] = Field(description="joints whose rotor the data ask for")
+    links: list[LinkEntry] = Field(description="nearest physically consistent full parameter set")
+    links_friction: list[FrictionEntry] = Field(description="friction that belongs to `links`")
+    fit: FitsEntry = Field(description="how well it explains the torque")
+    conditioning: list[ConditioningEntry] = Field(description="one a recording used")
+    held_out_conditioning: list[ConditioningEntry] = Field(description="one a held-out recording")
+
+
+def document(identification: Identification) -> IdentificationDocument:
+    """The document of an identification.
+
+    Parameters
+    ----------
+    identification : Identification
+        the result of `identify`
+
+    Returns
+    -------
+    IdentificationDocument
+        plain data; `model_dump_json(by_alias=True)` writes it
+    """
+    result = identification
+    names = _standard_names(result.robot.joint_count)
+    return IdentificationDocument(
+        robot=result.robot.name,
+        joints=[joint.name for joint in result.robot.joints],
+        estimator=result.estimator.value,
+        constrained=result.constrained,
+        cutoff_hz=result.cutoff_hz,
+        noise_std=_floats(result.residuals.noise_std),
+        noise_method="periods" if result.residuals.noise_method == "periods" else "residual",
+        condition_number=result.condition_number,
+        base_parameters=_base_parameters(result),
+        unidentifiable=[names[column] for column in result.structure.base.unidentifiable_columns],
+        undetermined=[name for name, open_ in zip(result.structure.names, result.undetermined, strict=True) if open_],
+        friction=_friction(result, result.parameters),
+        rotor_inertia=_rotors(result),
+        links=[_link(link) for link in result.consistent.links],
+        links_friction=_friction(result, result.consistent_parameters),
+        fit=FitsEntry(
+            train=_fit(result.residuals.fit),
+            held_out=None if result.held_out is None else _fit(result.held_out),
+            links_train=_fit(result.consistent_fit),
+            links_held_out=None if result.held_out_consistent is None else _fit(result.held_out_consistent),
+        ),
+        conditioning=[_conditioning(summary) for summary in result.conditioning],
+        held_out_conditioning=[_conditioning(summary) for summary in result.held_out_conditioning],
+    )
+
+
+def _floats(values: np.ndarray) -> list[float]:
+    return [float(value) for value in values]
+
+
+def _standard_names(joint_count: int) -> list[str]:
+    return [f"{name}{link + 1}" for link in range(joint_count) for name in STANDARD_PARAMETERS]
+
+
+def _std(result: Identification) -> list[float | None]:
+    """Standard errors of all parameters, then of the shape constants' logarithms."""
+    errors: list[float | None] = [*_floats(np.sqrt(np.maximum(np.diag(result.covariance), 0.0)))]
+    for column in np.flatnonzero(result.undetermined):
+        errors[column] = None
+    return errors
+
+
+def _base_parameters(result: Identification) -> list[BaseParameterEntry]:
+    base, std = result.structure.base, _std(result)
+    return [
+        BaseParameterEntry(
+            name=base.expressions[place],
+            terms=dict(base.terms[place]),
+            value=float(result.parameters[place]),
+            std=std[place],
+            independent=bool(base.is_independent(place)),
+            free_value=float(result.free_parameters[place]),
+        )
+        for place in range(result.structure.base_count)
+    ]
+
+
+def _friction(result: Identification, parameters: np.ndarray) -> list[FrictionEntry]:
+    """One entry a joint; coefficients that the model lacks are zero and have no standard error."""
+    std = _std(result)
+    shape_std = dict(zip(shape_parameters(result.shapes), std[result.structure.size :], strict=True))
+    entries = []
+    for joint, (shape, known) in enumerate(zip(result.shapes, result.identifiable, strict=True)):
+        columns = {
+            name: result.structure.coefficient(joint, name) for name in ("stiction", "stribeck", "viscous", "offset")
+        }
+        present = {name: column for name, column in columns.items() if column is not None}
+        errors = {name: std[column] for name, column in present.items()}
+        for name, value in (("k_v", shape.k_v), ("delta", shape.delta)):
+            if value is not None and (joint, name) in shape_std:
+                errors[name] = value * (shape_std[joint, name] or 0.0)
+        values = {name: float(parameters[present[name]]) if name in present else 0.0 for name in columns}
+        entries.append(
+            FrictionEntry(
+                joint=result.robot.joints[joint].name,
+                **values,
+                k_v=shape.k_v,
+                delta=shape.delta,
+                std=errors,
+                identifiable={
+                    name: known[name] for name in ("stiction", "stribeck", "viscous", "offset", "k_v", "delta")
+                },
+            )
+        )
+    return entries
+
+
+def _rotors(result: Identification) -> list[RotorEntry]:
+    std = _std(result)
+    columns = [(j, result.structure.coefficient(j, "rotor_inertia")) for j in range(result.robot.joint_count)]
+    return [
+        RotorEntry(joint=result.robot.joints[joint].name, value=float(result.parameters[column]), std=std[column])
+        for joint, column in columns
+        if column is not None
+    ]
+
+
+def _link(link: LinkInertia) -> LinkEntry:
+    inertia = link.inertia
+    return LinkEntry(
+        mass=float(link.mass),
+        first_moment=_floats(link.first_moment),
+        inertia=InertiaEntry(
+            xx=float(inertia[0, 0]),
+            yy=float(inertia[1, 1]),
+            zz=float(inertia[2, 2]),
+            xy=float(inertia[0, 1]),
+            xz=float(inertia[0, 2]),
+            yz=float(inertia[1, 2]),
+        ),
+    )
+
+
+def _fit(fit: Fit) -> FitEntry:
+    return FitEntry(rms=_floats(fit.rms), band_rms=_floats(fit.band_rms), relative_error=fit.relative_error)
+
+
+def _conditioning(summary: ConditioningSummary) -> ConditioningEntry:
+    return ConditioningEntry.model_validate(asdict(summary), strict=False)

@@ -1,0 +1,172 @@
+"""The friction's shape constants as parameters: how torque answers to them, and their last refinement.
+
+∂τ/∂log K = c · K · ∂A(K q̇)/∂K, with c the coefficient that the constant shapes. With these columns beside the linear
+ones, a Gauss–Newton step improves all constants of all joints at once, and the covariance tells what they leave
+uncertain.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.dynamics.friction import smooth_sign_slope
+from tauscope.identification.dataset import PreparedMotion
+from tauscope.identification.friction_shape import gentle_range
+from tauscope.identification.structure import ModelStructure
+from tauscope.recording.recording import Array
+
+ShapeParameter = tuple[int, str]
+"""Joint index and ``k_v`` or ``delta``: a shape constant that was estimated, as its logarithm."""
+
+LARGEST_STEP = 0.3
+"""Change of a constant's logarithm in one step, about half the way to the next grid point and a bit."""
+
+LARGEST_CHANGE = 0.7
+"""A K_v whose logarithm wants to move further than this from where its profile peaked is left there. A δ may go
+wherever it stands for a term of its own: its profile was taken beside a K_v of the grid, which displaces its peak."""
+
+SETTLED = 1e-3
+STEPS = 10
+
+
+def columns_with_shapes(
+    prepared: PreparedMotion,
+    structure: ModelStructure,
+    joint: int,
+    parameters: Array,
+    shapes: Sequence[ShapeParameter],
+) -> tuple[Array, NDArray[np.intp]]:
+    """A joint's columns followed by those of its estimated shape constants.
+
+    Parameters
+    ----------
+    prepared : PreparedMotion
+        one piece of the data
+    structure : ModelStructure
+        the model's columns, p of them
+    joint : int
+        joint index, from 0
+    parameters : (p,) float64
+        the coefficients, for the amplitudes c
+    shapes : sequence of ShapeParameter
+        all estimated shape constants, in the order of their global columns p, p + 1, …
+
+    Returns
+    -------
+    tuple of (k, M) float64 and (k,) int
+        columns in the common band, and their global places
+    """
+    columns = prepared.joint_columns(structure, joint)
+    index = structure.joint_columns(joint)
+    own = [(place, name) for place, (owner, name) in enumerate(shapes) if owner == joint]
+    if not own:
+        return columns, index
+    velocity = prepared.motion.velocity[:, joint]
+    rows = []
+    for _, name in own:
+        value = _constant(structure, joint, name)
+        coefficient = structure.coefficient(joint, "stiction" if name == "k_v" else "stribeck")
+        amplitude = 0.0 if coefficient is None else parameters[coefficient]
+        rows.append(amplitude * value * smooth_sign_slope(velocity, value))
+    sensitivity = prepared.motion.band.reduce(np.stack(rows))
+    places = structure.size + np.array([place for place, _ in own])
+    return np.concatenate([columns, sensitivity]), np.concatenate([index, places])
+
+
+def refined_structure(
+    motions: Iterable[PreparedMotion],
+    structure: ModelStructure,
+    parameters: Array,
+    weight: Array,
+    shapes: Sequence[ShapeParameter],
+    speed: Array,
+) -> ModelStructure:
+    """The structure with its estimated shape constants moved to the joint optimum, by Gauss–Newton steps.
+
+    Parameters
+    ----------
+    motions : iterable of PreparedMotion
+        the data; gone through once a step
+    structure : ModelStructure
+        the model with constants near the optimum
+    parameters : (p,) float64
+        its coefficients
+    weight : (n,) float64
+        1/σ_j of every joint
+    shapes : sequence of ShapeParameter
+        the constants that were estimated
+    speed : (n,) float64
+        rms velocity of every joint [rad/s or m/s]
+
+    Returns
+    -------
+    ModelStructure
+        with refined constants; a K_v that runs away stays where it was, a δ ends at an end of its range
+    """
+    start = structure
+    for _ in range(STEPS):
+        gram, target = _normal_equations(motions, structure, parameters, weight, shapes)
+        solved = pseudo_inverse(gram) @ target
+        parameters, change = solved[: structure.size], solved[structure.size :]
+        change = np.clip(change, -LARGEST_STEP, LARGEST_STEP)
+        for (joint, name), step in zip(shapes, change, strict=True):
+            moved = _constant(structure, joint, name) * np.exp(step)
+            if name == "delta":
+                moved = np.clip(moved, *gentle_range(structure.terms[joint].k_v, float(speed[joint])))
+            elif abs(np.log(moved / _constant(start, joint, name))) > LARGEST_CHANGE:
+                moved = _constant(start, joint, name)
+            structure = _with_constant(structure, joint, name, float(moved))
+        if np.abs(change).max() < SETTLED:
+            break
+    return structure
+
+
+def pseudo_inverse(matrix: Array) -> Array:
+    """Inverse of a normal matrix in scaled columns; directions without information are left out.
+
+    Parameters
+    ----------
+    matrix : (p, p) float64
+        symmetric, positive semidefinite
+    """
+    scale = np.sqrt(np.diag(matrix))
+    scale[scale == 0.0] = 1.0
+    values, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
+    known = values > 1e-14 * values[-1]
+    half = vectors[:, known] / np.sqrt(values[known]) / scale[:, None]
+    return half @ half.T
+
+
+def _normal_equations(
+    motions: Iterable[PreparedMotion],
+    structure: ModelStructure,
+    parameters: Array,
+    weight: Array,
+    shapes: Sequence[ShapeParameter],
+) -> tuple[Array, Array]:
+    """Gram matrix and right-hand side of coefficients and shape constants together."""
+    size = structure.size + len(shapes)
+    gram, target = np.zeros((size, size)), np.zeros(size)
+    for prepared in motions:
+        for joint in range(structure.robot.joint_count):
+            columns, index = columns_with_shapes(prepared, structure, joint, parameters, shapes)
+            scale = weight[joint] * prepared.row_weight
+            columns = columns * (scale * prepared.used[joint])
+            gram[np.ix_(index, index)] += columns @ columns.T
+            target[index] += columns @ (scale * prepared.reduced_torque[joint])
+    return gram, target
+
+
+def _constant(structure: ModelStructure, joint: int, name: str) -> float:
+    """Present value of a shape constant."""
+    terms = structure.terms[joint]
+    return terms.k_v if name == "k_v" else terms.delta or 0.0
+
+
+def _with_constant(structure: ModelStructure, joint: int, name: str, value: float) -> ModelStructure:
+    """The structure with one shape constant exchanged."""
+    terms = list(structure.terms)
+    terms[joint] = replace(terms[joint], k_v=value) if name == "k_v" else replace(terms[joint], delta=value)
+    return structure.with_terms(tuple(terms))

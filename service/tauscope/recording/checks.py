@@ -1,0 +1,200 @@
+"""What is in a recording, and what about it an engineer should look at before trusting it."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tauscope.recording.measures import Gaps, JointMeasures, StepMeasures, measure_gaps, measure_rows
+from tauscope.recording.reading import read_recording
+from tauscope.recording.recording import EffortKind, Recording
+from tauscope.recording.words import listed
+from tauscope.robot.finding import Finding, Severity
+
+_MEANINGFUL_STEP = 1e-4
+_DEGREES_SPAN = 8 * np.pi
+
+
+@dataclass(frozen=True)
+class Periods:
+    """Repeats of the excitation.
+
+    count : int
+        how many are marked
+    shortest, longest : int
+        number of samples of the shortest and the longest
+    """
+
+    count: int
+    shortest: int
+    longest: int
+
+
+@dataclass(frozen=True)
+class RecordingReport:
+    """What `check_recording` found.
+
+    name : str
+        the path as the user gave it
+    samples : int
+        number of samples N
+    duration_s : float
+        from the first to the last sample [s]
+    rate_hz : float
+        1 / median step [Hz]
+    steps : StepMeasures
+        the clock's steps
+    gaps : Gaps
+        where the clock skips
+    effort_kind : EffortKind
+        torque or drive units
+    columns : tuple of str
+        columns that are read
+    ignored_columns : tuple of str
+        columns that nobody reads
+    missed : dict of str to int
+        number of NaN in each column that has any
+    periods : Periods or None
+        repeats of the excitation, where they are marked
+    joints : tuple of JointMeasures
+        ranges and peculiarities, one a joint
+    findings : tuple of Finding
+        what to look at, warnings first
+    """
+
+    name: str
+    samples: int
+    duration_s: float
+    rate_hz: float
+    steps: StepMeasures
+    gaps: Gaps
+    effort_kind: EffortKind
+    columns: tuple[str, ...]
+    ignored_columns: tuple[str, ...]
+    missed: dict[str, int]
+    periods: Periods | None
+    joints: tuple[JointMeasures, ...]
+    findings: tuple[Finding, ...]
+
+
+def check_recording(
+    path: str | Path, joint_count: int | None = None, joint_names: tuple[str, ...] | None = None
+) -> RecordingReport:
+    """Read a recording and report what it holds, in memory that does not grow with its length.
+
+    Parameters
+    ----------
+    path : str or Path
+        the file or rosbag2 folder
+    joint_count : int or None
+        joints that the recording must have; None where any number is welcome
+    joint_names : tuple of str or None
+        the robot's joints in chain order, where known
+
+    Returns
+    -------
+    RecordingReport
+        figures and findings
+
+    Raises
+    ------
+    RecordingError
+        the file cannot be read or breaks a rule
+    """
+    return report_recording(read_recording(path, joint_count, joint_names))
+
+
+def report_recording(recording: Recording) -> RecordingReport:
+    """Report what a recording holds.
+
+    Parameters
+    ----------
+    recording : Recording
+        the recording
+
+    Returns
+    -------
+    RecordingReport
+        figures and findings
+    """
+    measures = measure_rows(recording)
+    gaps = measure_gaps(recording, measures)
+    runs = measures.period_lengths
+    findings = [*_about_columns(recording), *_about_clock(gaps), *_about_missed(measures.missed)]
+    for joint, measure in enumerate(measures.joints, 1):
+        findings += _about_position(f"q{joint}", measure)
+        findings += _about_effort(f"{recording.effort_kind}{joint}", measure, len(recording))
+    return RecordingReport(
+        name=recording.name,
+        samples=len(recording),
+        duration_s=measures.duration,
+        rate_hz=1.0 / measures.steps.median,
+        steps=measures.steps,
+        gaps=gaps,
+        effort_kind=recording.effort_kind,
+        columns=recording.table.names,
+        ignored_columns=recording.ignored_columns,
+        missed=measures.missed,
+        periods=Periods(len(runs), min(runs), max(runs)) if runs else None,
+        joints=measures.joints,
+        findings=tuple(sorted(findings, key=lambda finding: finding.severity is not Severity.WARNING)),
+    )
+
+
+def _about_columns(recording: Recording) -> Iterator[Finding]:
+    """Columns that are there for nothing."""
+    currents = [f"i{joint}" for joint in range(1, recording.joint_count + 1)]
+    passed_over = [name for name in recording.ignored_columns if name in currents]
+    others = [name for name in recording.ignored_columns if name not in currents]
+    if passed_over:
+        yield Finding(Severity.INFO, ", ".join(passed_over), "currents are not read where torques are there")
+    if others:
+        yield Finding(Severity.INFO, listed(others), "not read: no column of this name is known")
+
+
+def _about_clock(gaps: Gaps) -> Iterator[Finding]:
+    """Samples that the logger lost."""
+    if gaps.count:
+        places = "1 gap" if gaps.count == 1 else f"{gaps.count} gaps"
+        longest = f"the longest, {gaps.longest:.4g} s, begins at t = {gaps.longest_at:.6g} s"
+        yield Finding(Severity.WARNING, "t", f"{places} in the clock; {longest}")
+
+
+def _about_missed(missed: dict[str, int]) -> Iterator[Finding]:
+    """Samples marked as missed."""
+    for name, count in missed.items():
+        if name != "period":
+            yield Finding(
+                Severity.INFO, name, "1 sample missed (NaN)" if count == 1 else f"{count} samples missed (NaN)"
+            )
+
+
+def _about_position(q: str, measure: JointMeasures) -> Iterator[Finding]:
+    """One joint's position channel: stuck, wrapped or in other units."""
+    low, high = measure.position
+    if np.isnan(low):
+        yield Finding(Severity.WARNING, q, "no sample at all")
+    elif low == high:
+        yield Finding(Severity.WARNING, q, "never changes: the joint stood still or its encoder was not read")
+    if measure.wraps:
+        times = "once" if measure.wraps == 1 else f"{measure.wraps} times"
+        text = f"jumps by about 2π {times}, first at t = {measure.first_wrap:.6g} s: unwrap the angle"
+        yield Finding(Severity.WARNING, q, text)
+    elif high - low > _DEGREES_SPAN:
+        yield Finding(Severity.INFO, q, f"spans {high - low:.4g}: positions are read as rad, are these degrees?")
+    if measure.position_step is not None and measure.position_step > _MEANINGFUL_STEP:
+        yield Finding(Severity.INFO, q, f"moves in steps of {measure.position_step:.3g} (encoder resolution)")
+
+
+def _about_effort(effort: str, measure: JointMeasures, samples: int) -> Iterator[Finding]:
+    """One joint's effort channel: absent, stuck or clipped."""
+    low, high = measure.effort
+    if np.isnan(low):
+        yield Finding(Severity.WARNING, effort, "no sample at all")
+    elif low == high:
+        level = "is zero throughout" if low == 0 else f"never changes from {low:.6g}"
+        yield Finding(Severity.WARNING, effort, f"{level}: was it recorded?")
+    for level, count in measure.clipped:
+        share = 100 * count / samples
+        yield Finding(Severity.WARNING, effort, f"stays at exactly {level:.6g} for {share:.2g} % of the time: clipped")

@@ -1,0 +1,283 @@
+"""The band that torque and regressor share: one filter, one decimation, for both.
+
+*Parallel filtering* (Gautier 1997): the torque and every column of the regressor pass the same linear filter and are
+decimated together, so that τ = Φ Θ still holds row by row and noise above the band is gone from both sides.
+"""
+
+from dataclasses import dataclass
+from math import prod
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import signal
+
+from tauscope.recording.recording import Array
+
+OPEN_BAND_FRACTION = 0.45
+"""A cut-off above this part of the sampling rate filters nothing."""
+
+STOP_BAND_DB = 60.0
+
+MASKED_FRACTION = 0.02
+"""A filtered row is not used where more than this share of the filter's weight fell on samples never measured."""
+
+BRIDGED_FRACTION = 0.2
+"""The same where no gap is longer than a quarter of the time from row to row: a straight line across is the signal."""
+
+BLOCK_VALUES = 1 << 19
+"""Numbers in the intermediate result of a decimation: bounds memory, and stays in the cache."""
+
+
+class BandFilter(Protocol):
+    """A linear filter with decimation along the last axis, the same for torque and regressor."""
+
+    @property
+    def rate_hz(self) -> float:
+        """Sampling rate of what comes out [Hz]."""
+        ...
+
+    def reduce(self, values: Array) -> Array:
+        """Values (..., N) filtered and decimated to (..., M).
+
+        Parameters
+        ----------
+        values : (..., N) float64
+            signals, time last
+        """
+        ...
+
+    def reduce_mask(self, measured: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Which of the M outputs rest on measured samples, (..., N) → (..., M).
+
+        Parameters
+        ----------
+        measured : (..., N) bool
+            where a sample was measured
+        """
+        ...
+
+    def filtered_white(self, lags: int) -> Array | None:
+        """Autocovariance of white noise that passed, up to a factor, (lags + 1,); None where it is white still.
+
+        Parameters
+        ----------
+        lags : int
+            largest lag
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class AllPass:
+    """No filter at all: for motion measured so cleanly that nothing needs to be cut.
+
+    rate_hz : float
+        sampling rate of what goes in and comes out [Hz]
+    """
+
+    rate_hz: float
+
+    def reduce(self, values: Array) -> Array:
+        """Values as they are.
+
+        Parameters
+        ----------
+        values : (..., N) float64
+            signals, time last
+        """
+        return values
+
+    def reduce_mask(self, measured: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """The mask as it is.
+
+        Parameters
+        ----------
+        measured : (..., N) bool
+            where a sample was measured
+        """
+        return measured
+
+    def filtered_white(self, lags: int) -> None:
+        """None: white noise stays white.
+
+        Parameters
+        ----------
+        lags : int
+            largest lag
+        """
+
+
+@dataclass(frozen=True, eq=False)
+class Decimator:
+    """Linear-phase low-pass (Kaiser window) evaluated only at every `factor`-th sample.
+
+    kernel : (K,) float64
+        symmetric impulse response of unit sum; K is a multiple of `factor`
+    factor : int
+        decimation D
+    rate_hz : float
+        sampling rate after decimation [Hz]
+
+    Written as one matrix product per group of signals: with X the signal in blocks of D samples,
+    y[m] = Σ_b (X H)[m+b, b], H the kernel in K/D columns. That is several times quicker than a convolution.
+    """
+
+    kernel: Array
+    factor: int
+    rate_hz: float
+
+    @staticmethod
+    def design(rate_hz: float, cutoff_hz: float) -> "Decimator":
+        """The decimator for one band.
+
+        Parameters
+        ----------
+        rate_hz : float
+            sampling rate of the signals [Hz]
+        cutoff_hz : float
+            where half the amplitude is left [Hz]; full stop from 1.5 times that on, at or below the new Nyquist
+            frequency
+        """
+        factor = max(1, int(rate_hz / (3.0 * cutoff_hz) + 1e-9))
+        length, beta = signal.kaiserord(STOP_BAND_DB, 2.0 * cutoff_hz / rate_hz)
+        # An even number of taps has a zero at Nyquist, which nothing but a decimation asks for.
+        taps = length | 1 if factor == 1 else int(np.ceil(length / factor)) * factor
+        kernel = signal.firwin(taps, cutoff_hz, window=("kaiser", beta), fs=rate_hz)
+        return Decimator(kernel / kernel.sum(), factor, rate_hz / factor)
+
+    def reduce(self, values: Array) -> Array:
+        """Signals filtered and decimated; only outputs whose whole kernel lies inside the signal.
+
+        Parameters
+        ----------
+        values : (..., N) float64
+            signals, time last
+
+        Returns
+        -------
+        (..., M) float64
+            M = (N - K) // D + 1, or 0 where N < K
+        """
+        blocks = len(self.kernel) // self.factor
+        outputs = self._outputs(values.shape[-1])
+        used = outputs + blocks - 1
+        rows = values.reshape(prod(values.shape[:-1]), values.shape[-1])
+        result = np.empty((len(rows), outputs))
+        weight = self.kernel.reshape(blocks, self.factor).T
+        group = max(1, BLOCK_VALUES // max(1, used * blocks))
+        for start in range(0, len(rows) if outputs else 0, group):
+            shaped = rows[start : start + group, : used * self.factor].reshape(-1, used, self.factor)
+            partial = shaped @ weight
+            total = partial[:, :outputs, 0].copy()
+            for block in range(1, blocks):
+                total += partial[:, block : block + outputs, block]
+            result[start : start + group] = total
+        return result.reshape(*values.shape[:-1], outputs)
+
+    def reduce_mask(self, measured: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Outputs that rest on measured samples: see `MASKED_FRACTION` and `BRIDGED_FRACTION`.
+
+        Parameters
+        ----------
+        measured : (..., N) bool
+            where a sample was measured
+        """
+        if measured.all():
+            return np.ones((*measured.shape[:-1], self._outputs(measured.shape[-1])), dtype=bool)
+        weight = np.abs(self.kernel)
+        share = Decimator(weight / weight.sum(), self.factor, self.rate_hz)
+        missed = share.reduce((~measured).astype(float))
+        in_long_gaps = share.reduce(_in_long_gaps(measured, self.factor // 4).astype(float))
+        return (in_long_gaps <= MASKED_FRACTION) & (missed <= BRIDGED_FRACTION)
+
+    def filtered_white(self, lags: int) -> Array:
+        """Autocovariance of white noise that passed: Σ_i h_i h_{i + kD}, (lags + 1,).
+
+        Parameters
+        ----------
+        lags : int
+            largest lag
+        """
+        every = np.correlate(self.kernel, self.kernel, "full")[len(self.kernel) - 1 :: self.factor]
+        return np.pad(every[: lags + 1], (0, max(0, lags + 1 - len(every))))
+
+    def _outputs(self, count: int) -> int:
+        return max(0, (count - len(self.kernel)) // self.factor + 1)
+
+
+def _in_long_gaps(measured: NDArray[np.bool_], bridged: int) -> NDArray[np.bool_]:
+    """Samples (..., N) that were not measured and lie in a gap of more than `bridged` of them."""
+    rows = measured.reshape(prod(measured.shape[:-1]), measured.shape[-1])
+    result = np.zeros(rows.shape, dtype=bool)
+    for row, known in zip(result, rows, strict=True):
+        gaps = np.flatnonzero(np.diff(known, prepend=True, append=True)).reshape(-1, 2)
+        long = gaps[:, 1] - gaps[:, 0] > bridged
+        for start, stop in gaps[long]:
+            row[start:stop] = True
+    return result.reshape(measured.shape)
+
+
+@dataclass(frozen=True)
+class HarmonicBand:
+    """The band of one averaged period: its harmonics up to the cut-off, sampled just often enough to hold them.
+
+    period_samples : int
+        samples in the period, N
+    harmonics : int
+        highest harmonic kept, h; the output has M = 2h + 1 samples, on which white noise stays white
+    rate_hz : float
+        sampling rate of the output [Hz]
+    """
+
+    period_samples: int
+    harmonics: int
+    rate_hz: float
+
+    @staticmethod
+    def design(rate_hz: float, period_samples: int, cutoff_hz: float) -> "HarmonicBand":
+        """The band of a period.
+
+        Parameters
+        ----------
+        rate_hz : float
+            sampling rate [Hz]
+        period_samples : int
+            samples in the period
+        cutoff_hz : float
+            highest frequency kept [Hz]
+        """
+        harmonics = min(int(cutoff_hz * period_samples / rate_hz + 1e-9), (period_samples - 1) // 2)
+        return HarmonicBand(period_samples, harmonics, (2 * harmonics + 1) * rate_hz / period_samples)
+
+    def reduce(self, values: Array) -> Array:
+        """Signals of one period, band-limited and resampled to 2h + 1 points.
+
+        Parameters
+        ----------
+        values : (..., N) float64
+            one period, time last
+        """
+        spectrum = np.fft.rfft(values, axis=-1)[..., : self.harmonics + 1]
+        count = 2 * self.harmonics + 1
+        return np.fft.irfft(spectrum, n=count, axis=-1) * (count / self.period_samples)
+
+    def reduce_mask(self, measured: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """All True where the whole period was measured, but for `MASKED_FRACTION`: a harmonic needs all of it.
+
+        Parameters
+        ----------
+        measured : (..., N) bool
+            where a sample was measured in at least one period
+        """
+        whole = measured.mean(axis=-1, keepdims=True) >= 1.0 - MASKED_FRACTION
+        return np.broadcast_to(whole, (*measured.shape[:-1], 2 * self.harmonics + 1))
+
+    def filtered_white(self, lags: int) -> None:
+        """None: white noise stays white.
+
+        Parameters
+        ----------
+        lags : int
+            largest lag
+        """

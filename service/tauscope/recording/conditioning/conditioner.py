@@ -1,0 +1,287 @@
+"""One recording, surveyed once, from which conditioned motion can be drawn at any band, piece by piece."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from tauscope.errors import RecordingError
+from tauscope.recording.conditioning.motion import Motion, Trim, averaged_motion, transient_motion
+from tauscope.recording.conditioning.motion_source import MotionSource, choose_sources
+from tauscope.recording.conditioning.period_runs import PeriodRun
+from tauscope.recording.conditioning.periods import Periods, repeats, split_periods, with_turns_removed
+from tauscope.recording.conditioning.position_noise import (
+    STANDING_STILL,
+    PositionNoise,
+    encoder_step,
+    lowest_limit,
+    position_noise,
+)
+from tauscope.recording.conditioning.summary import ConditioningSummary
+from tauscope.recording.conditioning.timing import Timing, find_stretches, row_at
+from tauscope.recording.conditioning.uniform import Mask, Stretch, read_stretch, uniform_grid
+from tauscope.recording.recording import Array, Recording, Samples
+from tauscope.robot.robot import Robot
+
+WINDOW_ROWS = 1 << 15
+"""Rows conditioned at once: bounds memory whatever the recording's length."""
+
+SURVEYED_WINDOWS = 4
+"""Windows, spread over the recording, from which noise is estimated: it may begin with the arm at rest."""
+
+LONGEST_PERIOD = 2 * WINDOW_ROWS
+"""Samples of a period up to which periods are averaged: the regressor of one period is held in memory."""
+
+AVERAGED_ROWS = 8 * WINDOW_ROWS
+"""Rows that are averaged into one period at most, for the same reason."""
+
+SMALLEST_MOTION = 1e-5
+"""A joint moves where its range exceeds `STANDING_STILL` standard deviations of its noise, and this [rad or m]."""
+
+PERIOD_SPARE = 4
+"""Rows read beyond the periods on either side, so that interpolation has neighbours."""
+
+
+@dataclass(frozen=True, eq=False)
+class Conditioner:
+    """One recording, surveyed once, from which conditioned motion can be drawn at any band.
+
+    recording : Recording
+        the recording
+    robot : Robot
+        sign and torque constant of every joint
+    timing : Timing
+        stretches, sampling rate, repeated periods
+    noise : PositionNoise
+        noise of the positions, and the band that the motion's sources allow
+    source : MotionSource
+        what every joint's velocity and acceleration are made from
+    state_hz : (n,) float64 or None
+        cut-off of the smoothing of motion that is not averaged, joint by joint [Hz]; by the common band's where None
+    """
+
+    recording: Recording
+    robot: Robot
+    timing: Timing
+    noise: PositionNoise
+    source: MotionSource
+    state_hz: Array | None = None
+
+    @staticmethod
+    def survey(recording: Recording, robot: Robot) -> "Conditioner":
+        """Find the usable stretches of a recording, the noise of its positions and the best source of its motion.
+
+        Parameters
+        ----------
+        recording : Recording
+            the recording
+        robot : Robot
+            the robot that it belongs to
+
+        Raises
+        ------
+        RecordingError
+            where nothing in the recording is long enough to be used
+        """
+        timing = find_stretches(recording)
+        spans = _spread_windows(timing.rows)
+        step = encoder_step([recording.samples(*span).position for span in spans])
+        stretches = [read_stretch(recording, robot, *span, timing) for span in spans]
+        noise = position_noise(stretches, step)
+        source = choose_sources(stretches, noise)
+        noise = replace(noise, limit_hz=lowest_limit(source.limits_hz), joint_limits_hz=source.limits_hz)
+        return Conditioner(recording, robot, timing, noise, source)
+
+    def as_one_motion(self, state_hz: Array | None) -> "Conditioner":
+        """The same recording with no period averaged: each repetition of a motion counts as the motion that it was.
+
+        Parameters
+        ----------
+        state_hz : (n,) float64 or None
+            cut-off of the motion's own smoothing, joint by joint [Hz]; by the common band's where None
+        """
+        return replace(self, timing=replace(self.timing, runs=()), state_hz=state_hz)
+
+    @property
+    def position_noise_std(self) -> Array:
+        """Standard deviation of the noise of each joint's position, (n,) [rad or m]."""
+        return np.sqrt(self.noise.density * self.timing.rate_hz / 2.0)
+
+    @cached_property
+    def moving(self) -> Mask:
+        """Joints that leave the noise of their own encoder at some time of the recording, (n,)."""
+        joints = self.robot.joint_count
+        lowest, highest = np.full(joints, np.inf), np.full(joints, -np.inf)
+        for samples in self.usable_samples():
+            position = np.ascontiguousarray(samples.position.T)
+            lowest = np.fmin(lowest, np.fmin.reduce(position, axis=1))
+            highest = np.fmax(highest, np.fmax.reduce(position, axis=1))
+        return highest - lowest > np.maximum(STANDING_STILL * self.position_noise_std, SMALLEST_MOTION)
+
+    def usable_samples(self) -> Iterator[Samples]:
+        """The rows of all stretches as they were recorded, piece by piece."""
+        for start, stop in self.timing.rows:
+            for first in range(start, stop, WINDOW_ROWS):
+                yield self.recording.samples(first, min(first + WINDOW_ROWS, stop))
+
+    def motions(self, cutoff_hz: float | None) -> Iterator[Motion]:
+        """The recording's motion, piece by piece, in one band.
+
+        Parameters
+        ----------
+        cutoff_hz : float or None
+            cut-off of the band that torque and regressor share [Hz]; None for no filter
+
+        Yields
+        ------
+        Motion
+            pieces of bounded size, whatever the recording's length
+
+        Raises
+        ------
+        RecordingError
+            where the band is so narrow that nothing of the recording is left
+        """
+        found = False
+        for rows in self.timing.rows:
+            for motion in self._stretch_motions(rows, cutoff_hz):
+                found = True
+                yield motion
+        if not found:
+            band = "the filters" if cutoff_hz is None else f"a band of {cutoff_hz:.3g} Hz"
+            raise RecordingError(
+                f"{self.recording.name}: too short for {band}: the edges take all of it;"
+                " record longer or ask for a higher cut-off"
+            )
+
+    def summary(self, cutoff_hz: float | None) -> ConditioningSummary:
+        """Counts of what was missing and what was averaged.
+
+        Parameters
+        ----------
+        cutoff_hz : float or None
+            the band [Hz]; whether periods are averaged depends on it
+        """
+        missed, resampled = np.zeros(self.robot.joint_count, int), False
+        for samples in self.usable_samples():
+            missed += np.isnan(samples.effort, order="F").sum(axis=0)
+            time = samples.time[samples.complete]
+            resampled = resampled or bool(len(time) > 1 and uniform_grid(time - time[0], self.timing.rate_hz) is None)
+        groups = (self._averaged(group, cutoff_hz) for rows in self.timing.rows for group in self._groups(rows))
+        return ConditioningSummary(
+            recording=self.recording.name,
+            samples=self.timing.samples,
+            missed_positions=self.timing.missed,
+            dropped=self.timing.dropped,
+            missed_torques=tuple(int(value) for value in missed),
+            gaps=self.timing.gaps,
+            rate_hz=self.timing.rate_hz,
+            resampled=resampled,
+            averaged_periods=max((motion.repetitions for motion in groups if motion is not None), default=0),
+            position_noise_std=tuple(float(value) for value in self.position_noise_std),
+            velocity_source=tuple(str(name) for name in self.source.names),
+        )
+
+    def _stretch_motions(self, rows: tuple[int, int], cutoff_hz: float | None) -> Iterator[Motion]:
+        """Averaged periods where there are any, and what lies between them, in order of time."""
+        cursor = rows[0]
+        half = 0.5 / self.timing.rate_hz
+        for group in self._groups(rows):
+            motion = self._averaged(group, cutoff_hz)
+            if motion is not None:
+                begin, end = (row_at(self.recording, time - half, rows) for time in (group.start_s, group.stop_s))
+                yield from self._transients(cursor, begin, rows, cutoff_hz)
+                yield motion
+                cursor = end
+        yield from self._transients(cursor, rows[1], rows, cutoff_hz)
+
+    def _groups(self, rows: tuple[int, int]) -> Iterator[PeriodRun]:
+        """Parts of a stretch with as many whole periods as are averaged at once."""
+        begin, end = (float(self.recording.samples(row, row + 1).time[0]) for row in (rows[0], rows[1] - 1))
+        interval = 1.0 / self.timing.rate_hz
+        for run in (run.within(rows, begin, end + interval, interval) for run in self.timing.runs):
+            samples = run.length_s * self.timing.rate_hz
+            if run.count < 2 or samples > LONGEST_PERIOD:
+                continue
+            parts = int(np.ceil(run.count / max(2.0, AVERAGED_ROWS // samples)))
+            edges = np.linspace(0, run.count, parts + 1).astype(int)
+            for first, last in pairwise(edges):
+                if last - first >= 2:
+                    yield run.part(int(first), int(last))
+
+    def _averaged(self, group: PeriodRun, cutoff_hz: float | None) -> Motion | None:
+        """The average of some periods; None where they do not repeat, or where torque is missing in all of them."""
+        half = 0.5 / self.timing.rate_hz
+        first, last = (row_at(self.recording, time - half, group.rows) for time in (group.start_s, group.stop_s))
+        first, last = max(first - PERIOD_SPARE, group.rows[0]), min(last + PERIOD_SPARE, group.rows[1])
+        timing = replace(self.timing, runs=(group,))
+        periods = self._repeating(read_stretch(self.recording, self.robot, first, last, timing), cutoff_hz)
+        if periods is None:
+            return None
+        motion = averaged_motion(periods, cutoff_hz, self.source)
+        measured = np.asarray(motion.measured.any(axis=0))
+        usable = motion.band.reduce_mask(measured.T).all(axis=1) | ~np.asarray(measured.any(axis=0))
+        return motion if usable.all() else None
+
+    def _repeating(self, stretch: Stretch, cutoff_hz: float | None) -> Periods | None:
+        """The stretch's periods, where they repeat well enough to be averaged."""
+        periods = split_periods(stretch, refine=True)
+        if periods is None:
+            return None
+        periods = with_turns_removed(periods, [joint.type for joint in self.robot.joints])
+        highest = stretch.rate_hz / 2.0 if cutoff_hz is None else cutoff_hz
+        return periods if periods is not None and repeats(periods, highest, self.noise.density) else None
+
+    def _transients(self, begin: int, end: int, rows: tuple[int, int], cutoff_hz: float | None) -> Iterator[Motion]:
+        """Motion of the rows begin:end in windows that join without a seam.
+
+        Consecutive windows overlap by what filters cost. Where averaged periods lie before or after, the filters run on
+        into them by half the kernel: an output belongs to where its kernel's centre lies.
+        """
+        trim = Trim.design(self.timing.rate_hz, cutoff_hz, self.state_hz)
+        if end - begin < trim.factor:
+            return
+        spare = trim.margin + (trim.kernel - trim.factor) // 2
+        first = max(begin - spare, rows[0])
+        stop = min(end + spare, rows[1])
+        overlap = 2 * trim.margin + trim.kernel - trim.factor
+        size = max(WINDOW_ROWS, 2 * overlap)
+        own_from, own_to = (_own_limit(self.recording, row, rows, self.timing.rate_hz) for row in (begin, end))
+        while first < stop:
+            last = first + size if first + size + (size - overlap) // 2 < stop else stop
+            stretch = read_stretch(self.recording, self.robot, first, last, self.timing)
+            motion = transient_motion(stretch, trim, self.source)
+            if motion is not None:
+                yield replace(motion, own=slice(*(int(i) for i in np.searchsorted(motion.time, [own_from, own_to]))))
+                own_from = float(motion.time[-1]) + 0.5 / motion.rate_hz
+            if last == stop:
+                return
+            step = trim.outputs(len(stretch.position)) * trim.factor
+            following = stretch.start_s + (step - 0.5) / stretch.rate_hz
+            first = max(first + 1, row_at(self.recording, following, (first, last)))
+
+
+def _own_limit(recording: Recording, row: int, rows: tuple[int, int], rate_hz: float) -> float:
+    """Instant just before a row, beyond all time at the ends of the stretch."""
+    if row <= rows[0]:
+        return -np.inf
+    return np.inf if row >= rows[1] else float(recording.samples(row, row + 1).time[0]) - 0.5 / rate_hz
+
+
+def _spread_windows(rows: tuple[tuple[int, int], ...]) -> list[tuple[int, int]]:
+    """At most `SURVEYED_WINDOWS` windows, spread over the stretches: all of a short recording."""
+    total = sum(stop - start for start, stop in rows)
+    if total <= SURVEYED_WINDOWS * WINDOW_ROWS:
+        cut = [(span, -(-(span[1] - span[0]) // WINDOW_ROWS)) for span in rows]
+        edges = [np.linspace(*span, parts + 1).astype(int) for span, parts in cut]
+        return [(int(a), int(b)) for edge in edges for a, b in pairwise(edge)]
+    before = np.cumsum([0, *(stop - start for start, stop in rows)])
+    spans = []
+    for place in np.linspace(0, total - WINDOW_ROWS, SURVEYED_WINDOWS).astype(int):
+        start, stop = rows[int(np.searchsorted(before, place, side="right")) - 1]
+        offset = int(place - before[np.searchsorted(before, place, side="right") - 1])
+        first = max(min(start + offset, stop - WINDOW_ROWS), start)
+        spans.append((first, min(first + WINDOW_ROWS, stop)))
+    return sorted(set(spans))

@@ -1,0 +1,240 @@
+"""Whether a recorded velocity or acceleration may stand in for the derivative of the positions, joint by joint.
+
+Drives often log a velocity that is lagged, filtered, or nothing but the positions' own difference. It is used only
+where two things hold. It is *consistent*: in the band that the positions allow it equals q̇, in gain, in delay and
+without an offset. And it is *quieter*: its noise is its own, not the positions' noise once more, and less of it reaches
+q̈, so that the band may be wider.
+
+In acceleration, where the fast part of the motion weighs most: q̈_recorded = g q̈ - d q⃛ + noise, fitted by least squares
+to signals smoothed alike; g is the gain and d the delay.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from tauscope.recording.conditioning.filters import DIFFERENCE_MARGIN, derivative, smooth, smoothing_margin
+from tauscope.recording.conditioning.position_noise import (
+    PLATEAU,
+    AccelerationSpectrum,
+    PositionNoise,
+    acceleration_spectrum,
+)
+from tauscope.recording.conditioning.uniform import Stretch
+from tauscope.recording.recording import Array
+
+GAIN_TOLERANCE = 0.01
+"""Largest error of the recorded signal's gain."""
+
+PHASE_TOLERANCE = 0.02
+"""Largest phase [rad] by which the recorded signal may lag or lead at the edge of the band that it would open."""
+
+DELAY_TOLERANCE = 0.25
+"""Largest delay, in sample intervals."""
+
+OFFSET_TOLERANCE = 0.01
+"""Largest offset, relative to the rms of the signal."""
+
+MISFIT_TOLERANCE = 0.02
+"""Largest rms of what neither gain, delay nor noise explains, relative to q̈."""
+
+OWN_NOISE = 0.5
+"""Least share of the positions' noise that must show in the difference between the two: where it does not, the recorded
+signal carries that same noise and was made from the positions."""
+
+FLATNESS = 2.0
+"""A measurement's noise is white; where the lower half of its plateau lies this much over the upper one, it was
+filtered, and its plateau tells nothing about its band."""
+
+WORTHWHILE = 1.25
+"""Least widening of the band for which another source is used."""
+
+CLEAR_PART = 0.5
+"""Part of the positions' band in which gain and delay are compared."""
+
+WIDEST = 3.0
+"""Multiple of the positions' band up to which another source widens it: that far its phase can be foretold."""
+
+LOWER_PLATEAU = (0.35, 0.6)
+
+
+class Source(StrEnum):
+    """What a joint's q̇ and q̈ are made from."""
+
+    POSITION = "position"
+    VELOCITY = "recorded velocity"
+    ACCELERATION = "recorded acceleration"
+
+
+@dataclass(frozen=True, eq=False)
+class MotionSource:
+    """What every joint's motion is made from, and the band that it stands.
+
+    velocity, acceleration : (n,) bool
+        whether the recorded signal is used for q̇, for q̈
+    limits_hz : (n,) float64
+        widest band in which q̈ keeps to `NOISE_SHARE`; infinite where it does everywhere
+    """
+
+    velocity: np.ndarray
+    acceleration: np.ndarray
+    limits_hz: Array
+
+    @property
+    def names(self) -> tuple[Source, ...]:
+        """Per joint, the source of its q̈."""
+        return tuple(
+            Source.ACCELERATION if acceleration else Source.VELOCITY if velocity else Source.POSITION
+            for velocity, acceleration in zip(self.velocity, self.acceleration, strict=True)
+        )
+
+
+def choose_sources(stretches: Sequence[Stretch], noise: PositionNoise) -> MotionSource:
+    """The quieter of consistent sources, joint by joint.
+
+    Parameters
+    ----------
+    stretches : sequence of Stretch
+        stretches of motion at one rate
+    noise : PositionNoise
+        noise of their positions, and the band that it allows
+
+    Returns
+    -------
+    MotionSource
+        the positions, wherever nothing better is certain
+    """
+    joint_count = stretches[0].position.shape[1]
+    limits = noise.joint_limits_hz.copy()
+    best = limits.copy()
+    chosen = np.zeros((2, joint_count), dtype=bool)
+    for order, used in ((1, chosen[0]), (0, chosen[1])):
+        recorded = [stretch.velocity if order else stretch.acceleration for stretch in stretches]
+        for joint in range(joint_count):
+            pieces = [
+                (stretch.position[:, joint], values[:, joint])
+                for stretch, values in zip(stretches, recorded, strict=True)
+                if values is not None and np.isfinite(values[:, joint]).all()
+            ]
+            if not pieces or not np.isfinite(limits[joint]):
+                continue
+            rate = stretches[0].rate_hz
+            limit = float(noise.joint_limits_hz[joint])
+            wider = _wider_band(pieces, order, rate, float(noise.density[joint]), limit)
+            if wider is not None and wider > WORTHWHILE * best[joint]:
+                best[joint], used[joint] = wider, True
+                limits[joint] = min(wider, WIDEST * limit)
+    return MotionSource(chosen[0], chosen[1], limits)
+
+
+def _wider_band(
+    pieces: Sequence[tuple[Array, Array]], order: int, rate_hz: float, density: float, limit_hz: float
+) -> float | None:
+    """The band [Hz] that the noise of a signal, `order` differences below q̈, allows; None where it is doubtful."""
+    spectrum = acceleration_spectrum([values[:, None] for _, values in pieces], rate_hz, order)
+    if not _is_flat(spectrum, rate_hz):
+        return None
+    wider = float(spectrum.widest_band(rate_hz)[0])
+    # Gain and delay show where the motion is; the noise at the edge of the positions' band would only blur them.
+    inside = _compare(pieces, order, rate_hz, CLEAR_PART * limit_hz)
+    comparison = _compare(pieces, order, rate_hz, limit_hz)
+    if inside is None or comparison is None or not inside.is_consistent(min(wider, WIDEST * limit_hz), 1.0 / rate_hz):
+        return None
+    expected = density * _noise_gain(rate_hz, limit_hz, 2)
+    own = float(spectrum.density[0]) * _noise_gain(rate_hz, limit_hz, order)
+    explained = (MISFIT_TOLERANCE * comparison.motion) ** 2 + 2.0 * (expected + own)
+    is_its_own = comparison.misfit**2 >= OWN_NOISE * expected
+    return wider if is_its_own and comparison.misfit**2 <= explained else None
+
+
+def _is_flat(spectrum: AccelerationSpectrum, rate_hz: float) -> bool:
+    """Whether the signal's noise is as strong in the lower part of its plateau as in the upper."""
+    part = spectrum.frequency * 2.0 / rate_hz
+    lower, upper = ((part >= low) & (part <= high) for low, high in (LOWER_PLATEAU, PLATEAU))
+    levels = [np.median(spectrum.power[band, 0] / spectrum.gain[band]) for band in (lower, upper)]
+    return bool(levels[0] <= FLATNESS * levels[1])
+
+
+@dataclass(frozen=True)
+class _Comparison:
+    """A recorded signal beside the derivative of the positions, in their band.
+
+    gain, delay : float
+        of the recorded one; delay in seconds
+    gain_std, delay_std : float
+        standard errors
+    offset : float
+        constant part of the recorded signal that is not in the motion, relative to its rms
+    motion, misfit : float
+        rms of q̈, and of what gain and delay leave of the difference
+    """
+
+    gain: float
+    delay: float
+    gain_std: float
+    delay_std: float
+    offset: float
+    motion: float
+    misfit: float
+
+    def is_consistent(self, band_hz: float, interval_s: float) -> bool:
+        """Whether gain and delay, with their standard errors, and offset keep to the tolerances in a band."""
+        delay = abs(self.delay) + self.delay_std
+        return bool(
+            abs(self.gain - 1.0) + self.gain_std <= GAIN_TOLERANCE
+            and delay <= DELAY_TOLERANCE * interval_s
+            and 2.0 * np.pi * band_hz * delay <= PHASE_TOLERANCE
+            and abs(self.offset) <= OFFSET_TOLERANCE
+        )
+
+
+def _compare(pieces: Sequence[tuple[Array, Array]], order: int, rate_hz: float, limit_hz: float) -> _Comparison | None:
+    """Fit the recorded signal to the derivatives of the positions; None where too little of the motion is left."""
+    margin = smoothing_margin(rate_hz, limit_hz) + 3 * DIFFERENCE_MARGIN
+    columns, targets, offsets, squares, count = [], [], 0.0, 0.0, 0
+    for position, recorded in pieces:
+        if len(position) < 3 * margin:
+            continue
+        inner = slice(margin, -margin)
+        series = [smooth(position[:, None], rate_hz, limit_hz)]
+        for _ in range(3):
+            series.append(derivative(series[-1], rate_hz))
+        target = smooth(recorded[:, None], rate_hz, limit_hz)
+        plain = target[inner, 0] - series[2 - order][inner, 0]
+        offsets += plain.sum()
+        squares += float(np.sum(target[inner, 0] ** 2))
+        count += len(plain)
+        for _ in range(order):
+            target = derivative(target, rate_hz)
+        columns.append(np.hstack([values[inner] for values in series[2:]]))
+        targets.append(target[inner, 0])
+    if not columns:
+        return None
+    matrix, target = np.concatenate(columns), np.concatenate(targets)
+    scale = np.sqrt(np.mean(matrix**2, axis=0))
+    if not (scale > 0.0).all():
+        return None
+    solution, *_ = np.linalg.lstsq(matrix / scale, target, rcond=None)
+    misfit = float(np.sqrt(np.mean((target - matrix / scale @ solution) ** 2)))
+    independent = max(1.0, len(target) * 2.0 * limit_hz / rate_hz)
+    inverse = np.linalg.pinv((matrix / scale).T @ (matrix / scale) * (independent / len(target)))
+    std = misfit * np.sqrt(np.maximum(np.diag(inverse), 0.0)) / scale
+    rms = np.sqrt(squares / count)
+    return _Comparison(
+        gain=float(solution[0] / scale[0]),
+        delay=float(-solution[1] / scale[1]),
+        gain_std=float(std[0]),
+        delay_std=float(std[1]),
+        offset=float(offsets / count / rms) if rms > 0.0 else np.inf,
+        motion=float(scale[0]),
+        misfit=misfit,
+    )
+
+
+def _noise_gain(rate_hz: float, limit_hz: float, order: int) -> float:
+    """∫ ω^(2·order) |H|² df of the smoothing at `limit_hz`: variance in q̈ for each unit of a signal's noise density."""
+    frequency = np.linspace(0.0, rate_hz / 2.0, 4097)
+    response = 1.0 / (1.0 + (frequency / limit_hz) ** 8)
+    return float(np.trapezoid((2.0 * np.pi * frequency) ** (2 * order) * response**2, frequency))

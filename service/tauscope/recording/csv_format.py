@@ -1,0 +1,231 @@
+"""Recordings as CSV: a header line, `#` comment lines anywhere, one line a sample."""
+
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from tauscope.errors import RecordingError
+from tauscope.recording.columns import ColumnLayout, find_columns, require_joint_count
+from tauscope.recording.csv_numbers import is_number, parse_number, parse_quickly, shown
+from tauscope.recording.recording import Array, Recording
+from tauscope.recording.row_check import RowCheck, require_rows
+from tauscope.recording.table import SPOOL_ABOVE_BYTES, TableBuilder
+
+_CHUNK_BYTES = 2**18
+_LONGEST_LINE_BYTES = 2**20
+_ROWS_WRITTEN_AT_ONCE = 8192
+_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+_DELIMITERS = (b",", b";", b"\t")
+
+
+def read_csv(
+    path: Path, name: str, joint_count: int | None = None, spool_above_bytes: int = SPOOL_ABOVE_BYTES
+) -> Recording:
+    """Read a CSV recording, in time linear and in memory bounded in its number of lines.
+
+    Comma, semicolon or tab between the fields; an empty field or ``nan`` is a missed sample.
+
+    Parameters
+    ----------
+    path : Path
+        the file
+    name : str
+        what messages call it
+    joint_count : int or None
+        joints that the recording must have; None where any number is welcome
+    spool_above_bytes : int
+        size above which the rows go to a temporary file [bytes]
+
+    Returns
+    -------
+    Recording
+        all samples of the file
+
+    Raises
+    ------
+    RecordingError
+        names the line and column at fault
+    RecordingMismatchError
+        the file has another number of joints
+    """
+    with path.open("rb") as file:
+        header = _read_header(file, name)
+        require_joint_count(header.layout.joint_count, joint_count, name)
+        check = RowCheck(name, header.layout.names)
+        builder: TableBuilder | None = None
+        for chunk in _chunks(file, header.line + 1, name):
+            block, lines = _parse_chunk(chunk, header, name, is_first=builder is None or not len(builder))
+            check(block, lambda row, lines=lines: f"line {lines[row]}")
+            if builder is None:
+                expected = int(len(block) * os.fstat(file.fileno()).st_size / len(chunk.text) * 1.01) + 16
+                builder = TableBuilder(header.layout.names, expected, spool_above_bytes)
+            builder.append(block)
+    layout = header.layout
+    builder = builder or TableBuilder(layout.names)
+    require_rows(len(builder), name)
+    return Recording(name, layout.joint_count, layout.effort_kind, builder.finish(), layout.ignored)
+
+
+def write_csv(recording: Recording, file: BinaryIO) -> None:
+    """Write a recording as CSV; every number in the fewest digits that read back as the same float64.
+
+    Parameters
+    ----------
+    recording : Recording
+        what to write
+    file : binary file
+        open for writing
+    """
+    table = recording.table
+    file.write((",".join(table.names) + "\n").encode())
+    for start in range(0, len(table), _ROWS_WRITTEN_AT_ONCE):
+        block = table.rows(start, min(start + _ROWS_WRITTEN_AT_ONCE, len(table)))
+        lines = [",".join(map(repr, row)) for row in block.tolist()]
+        file.write(("\n".join(lines) + "\n").encode())
+
+
+@dataclass(frozen=True)
+class _Header:
+    """The header line: its number, what separates the fields, and which column is which."""
+
+    line: int
+    delimiter: bytes
+    layout: ColumnLayout
+
+
+@dataclass(frozen=True)
+class _Chunk:
+    """Whole lines of the file; `unterminated` where the file ends without a newline."""
+
+    text: bytes
+    first_line: int
+    unterminated: bool
+
+
+def _read_header(file: BinaryIO, name: str) -> _Header:
+    """Read up to the first line that is neither blank nor a comment."""
+    number = 0
+    while line := file.readline(_LONGEST_LINE_BYTES):
+        number += 1
+        if number == 1:
+            line = line.removeprefix(_BYTE_ORDER_MARK)
+        if len(line) == _LONGEST_LINE_BYTES:
+            raise RecordingError(
+                f"{name}: line {number} has more than {_LONGEST_LINE_BYTES} characters: is this a CSV file?"
+            )
+        _require_text(line, number, name)
+        if not _is_empty(line):
+            return _parse_header(line.strip(b"\r\n"), number, name)
+    raise RecordingError(f"{name}: the file is empty; expected a header line with the columns t, q1…, tau1…")
+
+
+def _parse_header(line: bytes, number: int, name: str) -> _Header:
+    if b"\r" in line:
+        raise RecordingError(f"{name}: the lines end with carriage returns alone; save the file with newlines")
+    delimiter = next((candidate for candidate in _DELIMITERS if candidate in line), b",")
+    fields = [field.strip(b' \t"') for field in line.split(delimiter)]
+    if any(is_number(field) for field in fields) and all(is_number(field) or not field for field in fields):
+        raise RecordingError(
+            f"{name}: line {number} holds numbers where the column names are expected; "
+            "add a header line such as t,q1,q2,tau1,tau2, without '#' in front"
+        )
+    if len(fields) == 1 and len(line.split()) > 1:
+        raise RecordingError(f"{name}: line {number}: the columns are separated by blanks; separate them by commas")
+    try:
+        header = [field.decode("utf-8") for field in fields]
+    except UnicodeDecodeError as error:
+        raise RecordingError(f"{name}: line {number}: the header is not UTF-8 text; save the file as UTF-8") from error
+    return _Header(number, delimiter, find_columns(header, name))
+
+
+def _chunks(file: BinaryIO, line: int, name: str) -> Iterator[_Chunk]:
+    """The rest of the file in pieces that end with a line."""
+    rest = b""
+    while data := file.read(_CHUNK_BYTES):
+        end = data.rfind(b"\n") + 1
+        if end == 0:
+            rest += data
+            if len(rest) > _LONGEST_LINE_BYTES:
+                raise RecordingError(
+                    f"{name}: line {line} has more than {_LONGEST_LINE_BYTES} characters: is this a CSV file?"
+                )
+            continue
+        text = rest + data[:end]
+        rest = data[end:]
+        yield _Chunk(text, line, unterminated=False)
+        line += _count_lines(text)
+    if rest:
+        yield _Chunk(rest + b"\n", line, unterminated=True)
+
+
+def _count_lines(text: bytes) -> int:
+    """Newlines, in a fifth of the time of `bytes.count`."""
+    return int(np.count_nonzero(np.frombuffer(text, dtype=np.uint8) == ord("\n")))
+
+
+def _parse_chunk(chunk: _Chunk, header: _Header, name: str, *, is_first: bool) -> tuple[Array, Sequence[int]]:
+    """The rows of a chunk and the line on which each stands."""
+    layout = header.layout
+    block = parse_quickly(chunk.text, header.delimiter, layout.width, layout.source)
+    if block is not None:
+        return block, range(chunk.first_line, chunk.first_line + len(block))
+    rows: list[list[float]] = []
+    lines: list[int] = []
+    text = chunk.text[:-1].split(b"\n")
+    for number, raw_line in enumerate(text, chunk.first_line):
+        line = raw_line.rstrip(b"\r")  # two of them: text mode has translated a translated line end
+        if _is_empty(line):
+            continue
+        is_truncated = chunk.unterminated and number == chunk.first_line + len(text) - 1
+        fields = _split_line(line, number, header, name, is_truncated=is_truncated)
+        if is_first and not rows:
+            _refuse_units(fields, number, header, name)
+        names = zip(layout.names, layout.source, strict=True)
+        rows.append([parse_number(fields[index], name, number, column) for column, index in names])
+        lines.append(number)
+    return np.array(rows, dtype=np.float64).reshape(len(rows), len(layout.names)), lines
+
+
+def _split_line(line: bytes, number: int, header: _Header, name: str, *, is_truncated: bool) -> list[bytes]:
+    """The fields of a line, as many as the header has."""
+    _require_text(line, number, name)
+    fields = line.split(header.delimiter)
+    width = header.layout.width
+    if len(fields) == width:
+        return fields
+    if is_truncated and len(fields) < width:
+        hint = ": the last line is truncated; delete it or copy the file again"
+    elif header.delimiter == b"," and len(fields) > width and b";" in line:
+        hint = "; separate all lines alike"
+    elif header.delimiter == b"," and len(fields) >= 2 * width - 1 and all(map(is_number, fields)):
+        hint = ": are these decimal commas? write decimals with a point"
+    else:
+        hint = "; complete or delete the line"
+    found = "1 field" if len(fields) == 1 else f"{len(fields)} fields"
+    raise RecordingError(f"{name}: line {number} has {found} where the header has {width} columns{hint}")
+
+
+def _refuse_units(fields: Sequence[bytes], number: int, header: _Header, name: str) -> None:
+    """A first line without a single number is most likely a row of units."""
+    wanted = [fields[index].strip(b' \t"') for index in header.layout.source]
+    if any(wanted) and not any(is_number(field) or field.lower() == b"nan" for field in wanted):
+        text = shown(b",".join(fields).strip())
+        raise RecordingError(
+            f"{name}: line {number} looks like a row of units ({text}); delete it or start it with '#'"
+        )
+
+
+def _require_text(line: bytes, number: int, name: str) -> None:
+    """Refuse bytes that no text file has."""
+    if b"\0" in line:
+        raise RecordingError(f"{name}: line {number} holds a NUL byte; the file is binary, damaged or not UTF-8 text")
+
+
+def _is_empty(line: bytes) -> bool:
+    """Whether a line is blank or a comment."""
+    text = line.strip()
+    return not text or text.startswith(b"#")

@@ -1,0 +1,33 @@
+"""Files that unpack to far more than any recording would: refused before they fill memory or disk."""
+
+from tauscope.errors import RecordingError
+
+ALWAYS_ACCEPTED_BYTES = 2**30
+"""Unpacked size that is never refused: it fits on any disk that holds recordings."""
+
+LARGEST_RATIO = 100
+"""Unpacked over packed size beyond which nothing is a recording: measured motion, with its noise, packs to a third or
+so, and its text to a twentieth."""
+
+
+def require_plausible_inflation(packed_bytes: int, unpacked_bytes: int, name: str) -> None:
+    """Refuse a file that unpacks to more than `LARGEST_RATIO` times its size, beyond a size that does no harm.
+
+    Parameters
+    ----------
+    packed_bytes : int
+        size of the file, or of what was read of it
+    unpacked_bytes : int
+        size of what comes out of it
+    name : str
+        what messages call the file
+
+    Raises
+    ------
+    RecordingError
+        if it does
+    """
+    if unpacked_bytes > max(ALWAYS_ACCEPTED_BYTES, LARGEST_RATIO * packed_bytes):
+        ratio = unpacked_bytes // max(packed_bytes, 1)
+        hint = "no recording packs so well; record it again, or save it uncompressed"
+        raise RecordingError(f"{name}: unpacks to {unpacked_bytes} bytes, {ratio} times its size; {hint}")

@@ -1,0 +1,265 @@
+"""The ROS 2 message sensor_msgs/msg/JointState, from CDR bytes and from JSON to arrays.
+
+std_msgs/Header header {stamp {int32 sec, uint32 nanosec}, string frame_id}; string[] name;
+float64[] position, velocity, effort. In CDR a number is aligned to its own size, counted from behind the four bytes of
+the encapsulation header; a sequence or string is led by its length as uint32.
+
+A publisher repeats one layout: same names, same lengths. `JointStateLayout` learns it from one message and then takes
+whole batches as one array; a message with another layout is decoded by itself.
+"""
+
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic_core import from_json
+
+from tauscope.recording.samples import Array
+
+_CDR_BIG_ENDIAN, _CDR_LITTLE_ENDIAN = 0, 1
+_STAMP_AT = 4
+_TRAILING_PADDING_BYTES = 7
+_NANOSECONDS = 1_000_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class JointState:
+    """One message.
+
+    stamp : int
+        time of measurement [ns]
+    names : tuple of str
+        joint names, may be empty
+    position, velocity, effort : (n,) float64
+        empty where the publisher does not know them
+    """
+
+    stamp: int
+    names: tuple[str, ...]
+    position: Array
+    velocity: Array
+    effort: Array
+
+
+@dataclass(frozen=True, eq=False)
+class JointStates:
+    """Messages of one layout.
+
+    stamp : (N,) int64
+        time of measurement [ns]
+    names : tuple of str
+        joint names, may be empty
+    position, velocity, effort : (N, n) or (N, 0) float64
+        one row a message
+    """
+
+    stamp: NDArray[np.int64]
+    names: tuple[str, ...]
+    position: Array
+    velocity: Array
+    effort: Array
+
+
+class JointStateLayout:
+    """Where a publisher's messages keep what; learned from one message."""
+
+    def __init__(self, message: bytes) -> None:
+        """Learn the layout.
+
+        Parameters
+        ----------
+        message : bytes
+            one CDR message
+
+        Raises
+        ------
+        ValueError
+            it is no JointState
+        """
+        cursor = _Cursor(message)
+        self.first = _decode(cursor)
+        self._size = len(message)
+        self._order = cursor.order
+        self._arrays = cursor.arrays
+        fixed = np.zeros(len(message), dtype=bool)
+        for start, stop in cursor.fixed:
+            fixed[start:stop] = True
+        self._fixed_at = np.flatnonzero(fixed)
+        self._fixed = np.frombuffer(message, np.uint8)[self._fixed_at]
+
+    def decode(self, messages: Sequence[bytes]) -> JointStates | None:
+        """Decode a batch at once, or decline.
+
+        Parameters
+        ----------
+        messages : sequence of bytes
+            CDR messages
+
+        Returns
+        -------
+        JointStates or None
+            None where one of the messages has another layout
+        """
+        if any(len(message) != self._size for message in messages):
+            return None
+        raw = np.frombuffer(b"".join(messages), np.uint8).reshape(len(messages), self._size)
+        if not (raw[:, self._fixed_at] == self._fixed).all():
+            return None
+        seconds = self._column(raw, _STAMP_AT, "i4", 1)[:, 0].astype(np.int64)
+        nanoseconds = self._column(raw, _STAMP_AT + 4, "u4", 1)[:, 0].astype(np.int64)
+        arrays = (self._column(raw, at, "f8", count).astype(np.float64) for at, count in self._arrays)
+        return JointStates(seconds * _NANOSECONDS + nanoseconds, self.first.names, *arrays)
+
+    def _column(self, raw: NDArray[np.uint8], at: int, kind: str, count: int) -> NDArray[np.generic]:
+        """`count` numbers of every message, found at byte `at`."""
+        dtype = np.dtype(self._order + kind)
+        block = np.ascontiguousarray(raw[:, at : at + count * dtype.itemsize])
+        return block.view(dtype) if count else np.empty((len(raw), 0))
+
+
+def decode_cdr(message: bytes) -> JointState:
+    """Decode one CDR message.
+
+    Parameters
+    ----------
+    message : bytes
+        encapsulation header and body
+
+    Raises
+    ------
+    ValueError
+        it is no JointState
+    """
+    return _decode(_Cursor(message))
+
+
+def decode_json(message: bytes) -> JointState:
+    """Decode one message in JSON, with the field names of the ROS 2 message.
+
+    Parameters
+    ----------
+    message : bytes
+        a JSON object
+
+    Raises
+    ------
+    ValueError
+        it is no JointState
+    """
+    content = from_json(message)
+    if not isinstance(content, dict):
+        raise ValueError("the JSON message is not an object")
+    header = content.get("header")
+    stamp = header.get("stamp") if isinstance(header, dict) else None
+    names = content.get("name") or []
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise ValueError("field name is not a list of joint names")
+    arrays = [_json_array(content.get(field), field) for field in ("position", "velocity", "effort")]
+    return JointState(_json_stamp(stamp), tuple(names), *arrays)
+
+
+def as_batch(message: JointState) -> JointStates:
+    """A batch of one.
+
+    Parameters
+    ----------
+    message : JointState
+        its only message
+    """
+    arrays = (array[None, :] for array in (message.position, message.velocity, message.effort))
+    return JointStates(np.array([message.stamp], dtype=np.int64), message.names, *arrays)
+
+
+def _json_stamp(stamp: object) -> int:
+    """Nanoseconds of a stamp, 0 where there is none."""
+    if not isinstance(stamp, dict):
+        return 0
+    seconds, nanoseconds = stamp.get("sec", 0), stamp.get("nanosec", stamp.get("nsec", 0))
+    if not (
+        isinstance(seconds, int) and isinstance(nanoseconds, int) and abs(seconds) < 2**32 and 0 <= nanoseconds < 2**32
+    ):
+        raise ValueError("field header.stamp is not sec and nanosec")
+    return seconds * _NANOSECONDS + nanoseconds
+
+
+def _json_array(value: object, field: str) -> Array:
+    """A list of numbers; null stands for NaN, which JSON cannot write."""
+    if value is None:
+        return np.empty(0)
+    entries = value if isinstance(value, list) else [value]
+    if not isinstance(value, list) or any(isinstance(entry, bool | str | list | dict) for entry in entries):
+        raise ValueError(f"field {field} is not a list of numbers")
+    return np.array([np.nan if entry is None else entry for entry in entries], dtype=np.float64)
+
+
+class _Cursor:
+    """Reads CDR primitives one after the other and notes where the numbers are and which bytes never change."""
+
+    def __init__(self, message: bytes) -> None:
+        if len(message) < _STAMP_AT + 8 or message[0] != 0 or message[1] not in (_CDR_BIG_ENDIAN, _CDR_LITTLE_ENDIAN):
+            raise ValueError("the message is not plain CDR")
+        self.message = message
+        self.order = "<" if message[1] == _CDR_LITTLE_ENDIAN else ">"
+        self.arrays: list[tuple[int, int]] = []
+        self.fixed = [(0, 2)]
+        self._at = _STAMP_AT
+
+    def stamp(self) -> int:
+        """Header stamp [ns]."""
+        seconds, nanoseconds = struct.unpack_from(self.order + "iI", self.message, self._at)
+        self._at += 8
+        return seconds * _NANOSECONDS + nanoseconds
+
+    def length(self) -> int:
+        """A uint32; no sequence has more entries than there are bytes left."""
+        self._align(4)
+        stop = self._at + 4
+        if stop > len(self.message):
+            raise ValueError("the message ends early")
+        (value,) = struct.unpack_from(self.order + "I", self.message, self._at)
+        self.fixed.append((self._at, stop))
+        self._at = stop
+        if value > len(self.message) - self._at:
+            raise ValueError("the message ends early")
+        return value
+
+    def string(self) -> str:
+        """A string; its closing NUL is not part of it."""
+        stop = self.length() + self._at
+        value = self.message[self._at : stop].removesuffix(b"\0")
+        self.fixed.append((self._at, stop))
+        self._at = stop
+        return value.decode("utf-8")
+
+    def numbers(self) -> Array:
+        """A float64 sequence."""
+        count = self.length()
+        if count:
+            self._align(8)
+        stop = self._at + 8 * count
+        if stop > len(self.message):
+            raise ValueError("the message ends early")
+        values = np.frombuffer(self.message, self.order + "f8", count, self._at).astype(np.float64)
+        self.arrays.append((self._at, count))
+        self._at = stop
+        return values
+
+    def finish(self) -> None:
+        """Refuse bytes behind the last field, but for padding."""
+        if len(self.message) - self._at > _TRAILING_PADDING_BYTES:
+            raise ValueError("the message is longer than a JointState")
+
+    def _align(self, size: int) -> None:
+        self._at += -(self._at - 4) % size
+
+
+def _decode(cursor: _Cursor) -> JointState:
+    """Read the fields in the order of the message definition."""
+    stamp = cursor.stamp()
+    cursor.string()  # frame_id
+    names = tuple(cursor.string() for _ in range(cursor.length()))
+    position, velocity, effort = (cursor.numbers() for _ in range(3))
+    cursor.finish()
+    return JointState(stamp, names, position, velocity, effort)

@@ -1,0 +1,297 @@
+"""Recordings as MCAP: joint states as ROS 2 logs them, or as JSON.
+
+The container is read record by record from the front and never through its index, so that a file without one (the
+writer was killed) differs from a whole file only in how it ends. Records and checksums are the mcap library's; the
+walk over a chunk's messages is our own, which is much quicker.
+"""
+
+import os
+import struct
+import zlib
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import BinaryIO, Protocol
+
+import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, Schema
+from mcap.stream_reader import get_chunk_data_stream
+
+from tauscope.errors import RecordingError
+from tauscope.recording.inflation import require_plausible_inflation
+from tauscope.recording.joint_state_log import JointStateLog, MessageHandler
+from tauscope.recording.joint_state_topic import Choice
+from tauscope.recording.recording import Recording
+from tauscope.recording.row_check import MINIMUM_ROWS
+from tauscope.recording.words import reason
+
+MCAP_MAGIC = b"\x89MCAP0\r\n"
+
+_RECORD = struct.Struct("<BQ")
+_MESSAGE = struct.Struct("<HIQQ")
+_MESSAGE_INDEX = struct.Struct("<HI")
+_LARGEST_CHUNK_BYTES = 2**28
+_COPY_BYTES = 2**20
+_UNREADABLE = (
+    McapError,
+    ValueError,
+    struct.error,
+    RuntimeError,
+    EOFError,
+    MemoryError,
+    OverflowError,
+    zstandard.ZstdError,
+)
+
+
+@dataclass(frozen=True)
+class Salvage:
+    """What was read of a file that may be damaged.
+
+    recording : Recording
+        the samples before the damage
+    damage : str or None
+        why reading stopped, None where the file is whole
+    """
+
+    recording: Recording
+    damage: str | None
+
+
+def read_mcap(path: Path, choice: Choice) -> Recording:
+    """Read the joint states of an MCAP file.
+
+    Parameters
+    ----------
+    path : Path
+        the file
+    choice : Choice
+        what is wanted of it
+
+    Returns
+    -------
+    Recording
+        joints in the order of `choice`, or of the messages; time relative to the first message
+
+    Raises
+    ------
+    RecordingError
+        the file is truncated or damaged, or holds no usable joint states
+    """
+    log = JointStateLog(choice)
+    add_mcap(path, choice.file, log)
+    return log.finish()
+
+
+def add_mcap(path: Path, name: str, log: JointStateLog) -> None:
+    """Add the messages of one whole file to a log.
+
+    Parameters
+    ----------
+    path : Path
+        the file
+    name : str
+        what messages call it
+    log : JointStateLog
+        takes the messages
+
+    Raises
+    ------
+    RecordingError
+        the file is truncated or damaged
+    """
+    damage = scan_mcap(path, log)
+    if damage is not None:
+        samples = log.samples
+        keeps = "`tauscope recording convert --recover` keeps them"
+        way_out = keeps if samples >= MINIMUM_ROWS else "record or copy the file again"
+        raise RecordingError(f"{name}: {damage}; {_counted(samples)} before that point can be read: {way_out}")
+
+
+def recover_mcap(path: Path, choice: Choice) -> Salvage:
+    """Read a damaged MCAP file up to the damage.
+
+    Parameters
+    ----------
+    path : Path
+        the file
+    choice : Choice
+        what is wanted of it
+
+    Returns
+    -------
+    Salvage
+        the samples before the damage, and what the damage is
+
+    Raises
+    ------
+    RecordingError
+        nothing usable comes before the damage
+    """
+    log = JointStateLog(choice)
+    damage = scan_mcap(path, log)
+    if damage is not None and log.samples < MINIMUM_ROWS:
+        raise RecordingError(f"{choice.file}: {damage}; {_counted(log.samples)} before that point: nothing to keep")
+    return Salvage(log.finish(), damage)
+
+
+class MessageSink(Protocol):
+    """Whoever wants the messages of an MCAP file."""
+
+    def handler(self, topic: str, type_name: str, encoding: str) -> MessageHandler | None:
+        """Whoever takes the messages of a topic, None where nobody does.
+
+        Parameters
+        ----------
+        topic : str
+            the topic's name
+        type_name : str
+            the message type, empty where the file names none
+        encoding : str
+            how its messages are encoded
+        """
+        ...
+
+
+def scan_mcap(path: Path, sink: MessageSink) -> str | None:
+    """Hand the messages of an MCAP file over, in the order of the file, up to its end or its first damage.
+
+    Parameters
+    ----------
+    path : Path
+        the file
+    sink : MessageSink
+        takes them
+
+    Returns
+    -------
+    str or None
+        why reading stopped before the file's end, None where it is whole
+    """
+    with path.open("rb") as file:
+        try:
+            _Scan(file, os.fstat(file.fileno()).st_size, sink).run()
+        except _DamageError as damage:
+            return str(damage)
+    return None
+
+
+class _DamageError(Exception):
+    """The container cannot be read further; the message completes "file: "."""
+
+
+def _counted(samples: int) -> str:
+    """A count of samples in words."""
+    return {0: "no sample", 1: "1 sample"}.get(samples, f"{samples} samples")
+
+
+class _Scan:
+    """One walk through an MCAP file."""
+
+    def __init__(self, file: BinaryIO, size: int, sink: MessageSink) -> None:
+        self._file, self._size, self._sink = file, size, sink
+        self._checksum = self._unpacked_bytes = self._messages = 0
+        self._schemas: dict[int, str] = {}
+        self._handlers: dict[int, MessageHandler | None] = {}
+
+    def run(self) -> None:
+        """Walk up to the closing magic."""
+        self._read(len(MCAP_MAGIC))
+        while True:
+            at, checksum = self._file.tell(), self._checksum
+            opcode, length = _RECORD.unpack(self._read(_RECORD.size))
+            if length > self._size - self._file.tell():
+                raise _DamageError(f"the file is truncated: it ends within the record at byte {at}")
+            try:
+                if opcode == Opcode.CHUNK:
+                    self._walk_chunk(self._read(length))
+                elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE):
+                    body = self._read(length)
+                    self._take(opcode, body, 0, len(body))
+                elif opcode == Opcode.DATA_END:
+                    (expected,) = struct.unpack_from("<I", self._read(length))
+                    if expected not in (0, checksum):
+                        raise _DamageError("the file is damaged: its data fail their checksum")
+                elif opcode == Opcode.MESSAGE_INDEX:
+                    _require_filled(self._read(length))
+                elif opcode == Opcode.STATISTICS:
+                    self._require_all(*struct.unpack_from("<Q", self._read(length)))
+                else:
+                    self._skip(length)
+            except _UNREADABLE as error:
+                place = f"the record at byte {at}"
+                raise _DamageError(f"the file is damaged: {place} cannot be read ({reason(error)})") from error
+            if opcode == Opcode.FOOTER:
+                break
+        if self._file.read() != MCAP_MAGIC:
+            raise _DamageError("the file does not end as an MCAP file does")
+
+    def _require_all(self, stated: int) -> None:
+        """A record whose kind was damaged is passed over as one that is not known: its messages are missed here."""
+        if stated != self._messages:
+            raise _DamageError(f"the file is damaged: it states {stated} messages and holds {self._messages}")
+
+    def _walk_chunk(self, body: bytes) -> None:
+        """Walk the records within a chunk."""
+        chunk = Chunk.read(ReadDataStream(BytesIO(body)))
+        if chunk.compression not in ("", "zstd", "lz4"):
+            raise ValueError(f"unknown compression {chunk.compression[:20]!r}")
+        declared = [chunk.uncompressed_size]
+        if chunk.compression == "zstd":
+            # The frame states its own size and the decompressor believes it: look before it allocates.
+            declared.append(max(zstandard.frame_content_size(chunk.data), 0))
+        if max(declared) > _LARGEST_CHUNK_BYTES:
+            raise ValueError("implausible chunk size")
+        self._unpacked_bytes += max(declared)
+        require_plausible_inflation(self._file.tell(), self._unpacked_bytes, "what was read so far")
+        stream, size = get_chunk_data_stream(chunk, validate_crc=True)
+        data = stream.read(size)
+        at = 0
+        while at < len(data):
+            opcode, length = _RECORD.unpack_from(data, at)
+            at += _RECORD.size
+            if length > len(data) - at:
+                raise ValueError("a record leaves its chunk")
+            self._take(opcode, data, at, at + length)
+            at += length
+
+    def _take(self, opcode: int, data: bytes, start: int, stop: int) -> None:
+        """Take one record of the data section."""
+        if opcode == Opcode.MESSAGE:
+            channel, _, log_time, _ = _MESSAGE.unpack_from(data, start)
+            if stop - start < _MESSAGE.size or channel not in self._handlers:
+                raise ValueError("a message without a channel")
+            self._messages += 1
+            handler = self._handlers[channel]
+            if handler is not None:
+                handler(log_time, data[start + _MESSAGE.size : stop])
+        elif opcode == Opcode.SCHEMA:
+            schema = Schema.read(ReadDataStream(BytesIO(data[start:stop])))
+            self._schemas[schema.id] = schema.name
+        elif opcode == Opcode.CHANNEL:
+            channel = Channel.read(ReadDataStream(BytesIO(data[start:stop])))
+            if channel.id not in self._handlers:
+                type_name = self._schemas.get(channel.schema_id, "")
+                self._handlers[channel.id] = self._sink.handler(channel.topic, type_name, channel.message_encoding)
+
+    def _read(self, length: int) -> bytes:
+        data = self._file.read(length)
+        if len(data) < length:
+            raise _DamageError("the file is truncated: it ends without a footer")
+        self._checksum = zlib.crc32(data, self._checksum)
+        return data
+
+    def _skip(self, length: int) -> None:
+        """Pass over a record of any size in small memory; the checksum wants its bytes."""
+        while length > 0:
+            length -= len(self._read(min(length, _COPY_BYTES)))
+
+
+def _require_filled(index: bytes) -> None:
+    """An index of messages is as long as it says; a chunk that is taken for one is not."""
+    _, entries_bytes = _MESSAGE_INDEX.unpack_from(index)
+    if entries_bytes != len(index) - _MESSAGE_INDEX.size:
+        raise ValueError("an index of messages that does not fill its record")

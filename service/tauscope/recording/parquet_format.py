@@ -1,0 +1,131 @@
+"""Recordings as Parquet, by pyarrow, which comes with the extra ``tauscope[parquet]``."""
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from tauscope.errors import RecordingError
+from tauscope.recording.columns import find_columns, require_joint_count
+from tauscope.recording.inflation import require_plausible_inflation
+from tauscope.recording.recording import Array, Recording
+from tauscope.recording.row_check import RowCheck, require_rows
+from tauscope.recording.table import SPOOL_ABOVE_BYTES, TableBuilder
+from tauscope.recording.words import printable, reason
+
+PARQUET_MAGIC = b"PAR1"
+
+_NUMBER_TYPE = re.compile(r"u?int(8|16|32|64)|halffloat|float|double")
+_ROWS_AT_ONCE = 2**16
+
+
+def read_parquet(
+    path: Path, name: str, joint_count: int | None = None, spool_above_bytes: int = SPOOL_ABOVE_BYTES
+) -> Recording:
+    """Read a Parquet recording batch by batch; null is a missed sample.
+
+    Parameters
+    ----------
+    path : Path
+        the file
+    name : str
+        what messages call it
+    joint_count : int or None
+        joints that the recording must have; None where any number is welcome
+    spool_above_bytes : int
+        size above which the rows go to a temporary file [bytes]
+
+    Returns
+    -------
+    Recording
+        all samples of the file
+
+    Raises
+    ------
+    RecordingError
+        pyarrow is not installed, the file is damaged, or names the row and column at fault
+    RecordingMismatchError
+        the file has another number of joints
+    """
+    arrow = _arrow(name)
+    with path.open("rb") as stream, _arrow_errors(arrow, name):
+        file = arrow.parquet.ParquetFile(stream, page_checksum_verification=True)
+        layout = find_columns([str(column) for column in file.schema_arrow.names], name)
+        require_joint_count(layout.joint_count, joint_count, name)
+        _require_numbers(file.schema_arrow, layout.names, name)
+        unpacked_bytes = file.metadata.num_rows * len(layout.names) * 8
+        require_plausible_inflation(path.stat().st_size, unpacked_bytes, name)
+        builder = TableBuilder(layout.names, file.metadata.num_rows, spool_above_bytes)
+        check = RowCheck(name, layout.names)
+        for batch in file.iter_batches(batch_size=_ROWS_AT_ONCE, columns=list(layout.names), use_threads=False):
+            first = len(builder) + 1
+            block = np.column_stack([_numbers(batch.column(column)) for column in layout.names])
+            check(block, lambda row, first=first: f"row {first + row}")
+            builder.append(block)
+    require_rows(len(builder), name)
+    return Recording(name, layout.joint_count, layout.effort_kind, builder.finish(), layout.ignored)
+
+
+def write_parquet(recording: Recording, file: BinaryIO) -> None:
+    """Write a recording as Parquet, float64 columns, checksums on every page.
+
+    Parameters
+    ----------
+    recording : Recording
+        what to write
+    file : binary file
+        open for writing
+
+    Raises
+    ------
+    RecordingError
+        pyarrow is not installed
+    """
+    arrow = _arrow(recording.name)
+    table = recording.table
+    schema = arrow.schema([(name, arrow.float64()) for name in table.names])
+    with arrow.parquet.ParquetWriter(file, schema, compression="zstd", write_page_checksum=True) as writer:
+        for start in range(0, len(table), _ROWS_AT_ONCE):
+            block = table.rows(start, min(start + _ROWS_AT_ONCE, len(table)))
+            columns = [arrow.array(np.ascontiguousarray(column)) for column in block.T]
+            writer.write_batch(arrow.record_batch(columns, schema=schema))
+
+
+def _arrow(name: str) -> Any:
+    """The module pyarrow with its Parquet reader, loaded when first wanted: it is large, and an extra."""
+    try:
+        import_module("pyarrow.parquet")
+        return import_module("pyarrow")
+    except ImportError as error:
+        raise RecordingError(
+            f"{name}: Parquet needs pyarrow, which is not installed: pip install tauscope[parquet]"
+        ) from error
+
+
+@contextmanager
+def _arrow_errors(arrow: Any, name: str) -> Iterator[None]:
+    """Arrow's complaints about a damaged file, in one line; it raises many types and they share no base."""
+    try:
+        yield
+    except RecordingError:
+        raise
+    except (arrow.ArrowException, OSError, ValueError, KeyError, TypeError, MemoryError, OverflowError) as error:
+        raise RecordingError(f"{name}: not a readable Parquet file ({reason(error)})") from error
+
+
+def _require_numbers(schema: Any, names: tuple[str, ...], name: str) -> None:
+    """Refuse columns of text, dates and the like."""
+    for column in names:
+        kind = schema.field(column).type
+        if not _NUMBER_TYPE.fullmatch(str(kind)):
+            hint = "seconds as a float are needed" if column == "t" else "numbers are needed"
+            raise RecordingError(f"{name}: column {column} is of type {printable(str(kind))}; {hint}")
+
+
+def _numbers(column: Any) -> Array:
+    """A column as float64, null as NaN."""
+    return column.cast("float64", safe=False).to_numpy(zero_copy_only=False)

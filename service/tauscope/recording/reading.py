@@ -1,0 +1,118 @@
+"""Read a recording, whatever its format."""
+
+import errno
+from collections.abc import Sequence
+from pathlib import Path
+
+from tauscope.errors import RecordingError
+from tauscope.recording.columns import require_joint_count
+from tauscope.recording.csv_format import read_csv
+from tauscope.recording.joint_state_topic import Choice
+from tauscope.recording.mcap_format import MCAP_MAGIC, read_mcap
+from tauscope.recording.parquet_format import PARQUET_MAGIC, read_parquet
+from tauscope.recording.recording import Recording
+from tauscope.recording.rosbag2_format import SQLITE_MAGIC, read_database, read_rosbag2
+from tauscope.recording.words import printable
+
+_LONGEST_PATH = 4096
+_MAGIC_BYTES = 16
+_FOREIGN = (
+    (b"\x1f\x8b", "is compressed by gzip; unpack it first"),
+    (b"\x28\xb5\x2f\xfd", "is compressed by zstd; unpack it first"),
+    (b"BZh", "is compressed by bzip2; unpack it first"),
+    (b"\xfd7zXZ", "is compressed by xz; unpack it first"),
+    (b"PK\x03\x04", "is a zip archive or a spreadsheet; unpack it, or export the sheet as CSV"),
+    (b"\x89HDF", "is an HDF5 or MATLAB file; export it as CSV"),
+    (b"MATLAB 5.0", "is a MATLAB file; export it as CSV"),
+    (b"\x93NUMPY", "is a NumPy file; make a CSV or use Recording.from_arrays"),
+    (b"#ROSBAG V", "is a ROS 1 bag; convert it with `rosbags-convert`"),
+    (b"\xff\xfe", "is UTF-16 text; save it as UTF-8"),
+    (b"\xfe\xff", "is UTF-16 text; save it as UTF-8"),
+)
+
+
+def read_recording(
+    path: str | Path, joint_count: int | None = None, joint_names: Sequence[str] | None = None
+) -> Recording:
+    """Read a recording: CSV, Parquet, MCAP, or a rosbag2 folder or database; told apart by content.
+
+    Parameters
+    ----------
+    path : str or Path
+        the file, or the rosbag2 folder; never written to
+    joint_count : int or None
+        joints that the recording must have; None where any number is welcome, or as many as `joint_names`
+    joint_names : sequence of str or None
+        the robot's joints in chain order: picks and orders the joints of a log that names them
+
+    Returns
+    -------
+    Recording
+        all samples, checked
+
+    Raises
+    ------
+    RecordingError
+        the file cannot be read or breaks a rule; the message names the place
+    RecordingMismatchError
+        the recording has other joints than asked for
+    """
+    path, name = Path(path), printable(str(path), _LONGEST_PATH)
+    names = tuple(joint_names) if joint_names is not None else None
+    if joint_count is None and names is not None:
+        joint_count = len(names)
+    try:
+        recording = _read(path, name, joint_count, Choice(name, joint_count, names))
+    except OSError as error:
+        raise RecordingError(f"{name}: {_reason(error)}") from error
+    require_joint_count(recording.joint_count, joint_count, name)
+    return recording
+
+
+def first_bytes(path: Path, name: str) -> bytes:
+    """The first bytes of a regular file, by which formats are told apart.
+
+    Parameters
+    ----------
+    path : Path
+        the file
+    name : str
+        what messages call it
+
+    Raises
+    ------
+    RecordingError
+        it is not a regular file
+    """
+    if not path.exists():
+        raise FileNotFoundError(errno.ENOENT, "no such file")
+    if not path.is_file():
+        raise RecordingError(f"{name}: not a regular file; save the data to a file first")
+    with path.open("rb") as file:
+        return file.read(_MAGIC_BYTES)
+
+
+def _read(path: Path, name: str, joint_count: int | None, choice: Choice) -> Recording:
+    """Hand the file to the reader of its format."""
+    if path.is_dir():
+        return read_rosbag2(path, choice)
+    magic = first_bytes(path, name)
+    if magic.startswith(PARQUET_MAGIC):
+        return read_parquet(path, name, joint_count)
+    if magic.startswith(MCAP_MAGIC):
+        return read_mcap(path, choice)
+    if magic.startswith(SQLITE_MAGIC):
+        return read_database(path, choice)
+    for start, words in _FOREIGN:
+        if magic.startswith(start):
+            raise RecordingError(f"{name}: {words}")
+    if path.suffix.lower() in (".mcap", ".parquet", ".db3"):
+        found = "is empty" if not magic else f"does not begin as a {path.suffix.lower()} file does"
+        raise RecordingError(f"{name}: the file {found}; it is damaged or of another format")
+    return read_csv(path, name, joint_count)
+
+
+def _reason(error: OSError) -> str:
+    """What the system said, in words."""
+    words = {errno.ENOENT: "no such file", errno.EACCES: "no permission to read it"}
+    return words.get(error.errno or 0, f"cannot be read ({error.strerror or error})")

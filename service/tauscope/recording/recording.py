@@ -1,0 +1,250 @@
+"""What was measured: one continuous motion, its positions and its torques."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from tauscope.errors import RecordingError, RecordingMismatchError
+from tauscope.recording.columns import OPTIONAL_GROUPS, table_columns
+from tauscope.recording.row_check import RowCheck, require_rows
+from tauscope.recording.samples import Array, EffortKind, Samples, Table
+from tauscope.recording.table import MemoryTable
+from tauscope.robot.robot import Robot
+
+__all__ = ["Array", "EffortKind", "Recording", "Samples", "Table"]
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """One continuous motion as it was measured.
+
+    name : str
+        the path as the user gave it, for messages
+    joint_count : int
+        number of joints n
+    effort_kind : EffortKind
+        torque, or drive units in its place
+    table : Table
+        the rows, columns in the order t, q, tau or i, optional groups, period
+    ignored_columns : tuple of str
+        columns of the file that nobody reads
+    """
+
+    name: str
+    joint_count: int
+    effort_kind: EffortKind
+    table: Table
+    ignored_columns: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        """Number of samples N."""
+        return len(self.table)
+
+    def samples(self, start: int = 0, stop: int | None = None) -> Samples:
+        """Samples start:stop, as read-only views of the table where its columns allow.
+
+        Parameters
+        ----------
+        start : int
+            first sample, counted from 0
+        stop : int or None
+            the one after the last; None for the end
+
+        Returns
+        -------
+        Samples
+            the columns that the recording has; None for the others
+        """
+        first, last, _ = slice(start, stop).indices(len(self.table))
+        block = self.table.rows(first, max(first, last))
+        where = {name: index for index, name in enumerate(self.table.names)}
+        groups = {group: self._group(block, group, where) for group in OPTIONAL_GROUPS}
+        n = self.joint_count
+        return Samples(
+            time=block[:, 0],
+            position=block[:, 1 : 1 + n],
+            effort=block[:, 1 + n : 1 + 2 * n],
+            velocity=groups["qd"],
+            acceleration=groups["qdd"],
+            reference=groups["qref"],
+            effort_command=groups["taucmd"],
+            temperature=groups["temp"],
+            link_position=groups["qlink"],
+            period=block[:, where["period"]] if "period" in where else None,
+        )
+
+    def joint_torque(self, effort: Array, robot: Robot) -> Array:
+        """Turn recorded efforts into joint torque: τ = sign · k · effort, with k = 1 where torque was recorded.
+
+        Parameters
+        ----------
+        effort : (N, n) float64
+            `Samples.effort` of this recording [Nm or N, or drive units]
+        robot : Robot
+            the arm, for each joint's sign and torque constant
+
+        Returns
+        -------
+        (N, n) float64
+            joint torque [Nm or N]
+
+        Raises
+        ------
+        RecordingMismatchError
+            the efforts have another number of joints than the robot
+        """
+        if effort.ndim != 2 or effort.shape[1] != robot.joint_count:
+            raise RecordingMismatchError(
+                f"{self.name}: efforts of shape {effort.shape} do not fit the robot's {robot.joint_count} joints"
+            )
+        gain = np.array([float(joint.sign) for joint in robot.joints])
+        if self.effort_kind is EffortKind.CURRENT:
+            gain *= [joint.torque_constant for joint in robot.joints]
+        return effort * gain
+
+    @staticmethod
+    def from_arrays(
+        name: str,
+        time: Array,
+        position: Array,
+        effort: Array,
+        *,
+        effort_kind: EffortKind = EffortKind.TORQUE,
+        velocity: Array | None = None,
+        acceleration: Array | None = None,
+        reference: Array | None = None,
+        effort_command: Array | None = None,
+        temperature: Array | None = None,
+        link_position: Array | None = None,
+        period: Array | None = None,
+    ) -> "Recording":
+        """Make a recording of arrays, held to the same rules as a file.
+
+        Parameters
+        ----------
+        name : str
+            what messages call it
+        time : (N,) float64
+            strictly increasing [s]
+        position : (N, n) float64
+            q [rad or m]
+        effort : (N, n) float64
+            τ [Nm or N], or drive units
+        effort_kind : EffortKind
+            which of the two `effort` holds
+        velocity : (N, n) float64 or None
+            qd [rad/s or m/s]
+        acceleration : (N, n) float64 or None
+            qdd [rad/s² or m/s²]
+        reference : (N, n) float64 or None
+            commanded position [rad or m]
+        effort_command : (N, n) float64 or None
+            commanded effort [Nm or N, or drive units]
+        temperature : (N, n) float64 or None
+            motor or joint temperature [°C]
+        link_position : (N, n) float64 or None
+            position behind the transmission [rad or m]
+        period : (N,) float64 or None
+            index of the repeated excitation period, NaN outside the repeated part
+
+        Returns
+        -------
+        Recording
+            with its own copy of the arrays
+
+        Raises
+        ------
+        RecordingError
+            names the argument, the row (counted from 0, as NumPy does) and the joint at fault
+        """
+        groups = {
+            "qd": velocity,
+            "qdd": acceleration,
+            "qref": reference,
+            "taucmd": effort_command,
+            "temp": temperature,
+            "qlink": link_position,
+        }
+        present = {group: array for group, array in groups.items() if array is not None}
+        return _from_groups(name, time, position, effort, EffortKind(effort_kind), present, period)
+
+    @staticmethod
+    def _group(block: Array, group: str, where: Mapping[str, int]) -> Array | None:
+        """One column a joint; a view where the file has all of them, NaN where it lacks one."""
+        joints = [(joint, where[name]) for name in where if (joint := _joint_of(name, group)) is not None]
+        if not joints:
+            return None
+        joint_count = sum(_joint_of(name, "q") is not None for name in where)
+        first = joints[0][1]
+        if len(joints) == joint_count:
+            return block[:, first : first + joint_count]
+        columns = np.full((len(block), joint_count), np.nan)
+        for joint, index in joints:
+            columns[:, joint - 1] = block[:, index]
+        return columns
+
+
+_ARGUMENTS = {
+    "q": "position",
+    "tau": "effort",
+    "i": "effort",
+    "qd": "velocity",
+    "qdd": "acceleration",
+    "qref": "reference",
+    "taucmd": "effort_command",
+    "temp": "temperature",
+    "qlink": "link_position",
+}
+
+
+def _joint_of(name: str, group: str) -> int | None:
+    """Joint number of a column of this group, None for other columns."""
+    number = name.removeprefix(group)
+    return int(number) if number != name and number.isdecimal() else None
+
+
+def _from_groups(
+    name: str,
+    time: Array,
+    position: Array,
+    effort: Array,
+    effort_kind: EffortKind,
+    groups: Mapping[str, Array],
+    period: Array | None,
+) -> Recording:
+    """Check the arguments one by one and lay them side by side."""
+    time = _checked("time", time, name, None)
+    position = _checked("position", position, name, (len(time), None))
+    shape = (len(time), position.shape[1])
+    columns = [time[:, None], position, _checked("effort", effort, name, shape)]
+    columns += [_checked(_ARGUMENTS[group], groups[group], name, shape) for group in OPTIONAL_GROUPS if group in groups]
+    present = list(groups)
+    if period is not None:
+        columns.append(_checked("period", period, name, (len(time),))[:, None])
+        present.append("period")
+    require_rows(len(time), name)
+    names = table_columns(shape[1], effort_kind, present)
+    data = np.hstack(columns)
+    RowCheck(name, names)(data, lambda row: f"row {row}")
+    return Recording(name, shape[1], effort_kind, MemoryTable(names, data))
+
+
+def _checked(argument: str, array: Array, name: str, shape: tuple[int | None, ...] | None) -> Array:
+    """An argument as float64 of the expected shape, without infinite numbers; `shape` None is any vector."""
+    try:
+        checked = np.asarray(array, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise RecordingError(f"{name}: argument {argument} is not an array of numbers") from error
+    expected = (None,) if shape is None else shape
+    fits = checked.ndim == len(expected) and all(
+        want is None or want == have for want, have in zip(expected, checked.shape, strict=True)
+    )
+    if not fits or 0 in checked.shape[1:]:
+        words = ", ".join("n" if want is None else str(want) for want in expected) if shape else "N"
+        raise RecordingError(f"{name}: argument {argument} has shape {checked.shape}; expected ({words})")
+    if np.isinf(checked).any():
+        row, *column = (int(index) for index in np.argwhere(np.isinf(checked))[0])
+        joint = f", joint {column[0] + 1}" if column else ""
+        raise RecordingError(f"{name}: argument {argument}, row {row}{joint}: the value is infinite")
+    return checked

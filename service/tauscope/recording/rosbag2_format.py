@@ -1,0 +1,150 @@
+"""rosbag2 recordings: a folder with metadata.yaml and its MCAP or SQLite files."""
+
+import sqlite3
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from tauscope.errors import RecordingError
+from tauscope.recording.joint_state_log import JointStateLog
+from tauscope.recording.joint_state_topic import Choice
+from tauscope.recording.mcap_format import add_mcap
+from tauscope.recording.recording import Recording
+from tauscope.recording.words import printable, reason
+
+SQLITE_MAGIC = b"SQLite format 3\0"
+METADATA = "metadata.yaml"
+
+_SQLITE_HEADER_BYTES = 100
+
+
+def read_rosbag2(folder: Path, choice: Choice) -> Recording:
+    """Read the joint states of a rosbag2 folder, its files in the order in which they were recorded.
+
+    Parameters
+    ----------
+    folder : Path
+        the folder
+    choice : Choice
+        what is wanted of it
+
+    Returns
+    -------
+    Recording
+        as `read_mcap` returns it
+
+    Raises
+    ------
+    RecordingError
+        a file is missing or damaged, or there are no usable joint states
+    """
+    log = JointStateLog(choice)
+    for file in _files(folder, choice.file):
+        name = f"{choice.file}/{printable(file)}"
+        path = folder / file
+        if not path.is_file():
+            raise RecordingError(f"{choice.file}: {METADATA} names {printable(file)}, which is not there")
+        if path.suffix == ".mcap":
+            add_mcap(path, name, log)
+        elif path.suffix == ".db3":
+            _add_database(path, name, log)
+        else:
+            raise RecordingError(
+                f"{name}: neither .mcap nor .db3; decompress or convert the bag with `ros2 bag convert` first"
+            )
+    return log.finish()
+
+
+def read_database(path: Path, choice: Choice) -> Recording:
+    """Read the joint states of one rosbag2 SQLite file.
+
+    Parameters
+    ----------
+    path : Path
+        the ``.db3`` file
+    choice : Choice
+        what is wanted of it
+
+    Returns
+    -------
+    Recording
+        as `read_mcap` returns it
+
+    Raises
+    ------
+    RecordingError
+        the file is damaged, or there are no usable joint states
+    """
+    log = JointStateLog(choice)
+    _add_database(path, choice.file, log)
+    return log.finish()
+
+
+def _files(folder: Path, name: str) -> list[str]:
+    """The bag's files, by bare name: a bag never reaches out of its folder."""
+    metadata = folder / METADATA
+    if not metadata.is_file():
+        raise RecordingError(f"{name}: a folder without {METADATA} is no rosbag2 recording; give the file itself")
+    try:
+        content: Any = YAML(typ="safe", pure=True).load(metadata.read_text(encoding="utf-8"))
+    except (YAMLError, ValueError, RecursionError) as error:
+        raise RecordingError(f"{name}/{METADATA}: not a YAML file ({reason(error)})") from error
+    except OSError as error:
+        raise RecordingError(f"{name}/{METADATA}: cannot be read ({error.strerror})") from error
+    try:
+        files = [Path(file).name for file in content["rosbag2_bagfile_information"]["relative_file_paths"]]
+    except (TypeError, KeyError) as error:
+        raise RecordingError(
+            f"{name}/{METADATA}: rosbag2_bagfile_information.relative_file_paths is missing; run `ros2 bag reindex`"
+        ) from error
+    if not files:
+        raise RecordingError(f"{name}/{METADATA}: the bag has no files")
+    return files
+
+
+def _add_database(path: Path, name: str, log: JointStateLog) -> None:
+    """Add the messages of a SQLite file to a log; `immutable` keeps SQLite from making files beside it."""
+    journal = path.with_name(path.name + "-wal")
+    if journal.is_file() and journal.stat().st_size:
+        raise RecordingError(
+            f"{name}: was not closed ({journal.name} holds samples); run `ros2 bag reindex` on its folder"
+        )
+    _require_all_pages(path, name)
+    try:
+        connection = sqlite3.connect(f"file:{quote(str(path.absolute()))}?mode=ro&immutable=1", uri=True)
+        try:
+            (state,) = connection.execute("PRAGMA quick_check(1)").fetchone()
+            if state != "ok":
+                raise RecordingError(f"{name}: the database is damaged; run `ros2 bag reindex` or copy the file again")
+            handlers = {}
+            for number, topic, kind, encoding in connection.execute(
+                "SELECT id, name, type, serialization_format FROM topics"
+            ):
+                handlers[number] = log.handler(str(topic), str(kind), str(encoding))
+            for topic, time, message in connection.execute(
+                "SELECT topic_id, timestamp, data FROM messages ORDER BY id"
+            ):
+                handler = handlers.get(topic)
+                if handler is not None:
+                    if not isinstance(message, bytes) or not isinstance(time, int) or time < 0:
+                        raise RecordingError(f"{name}: the message at time {time!r} is damaged")
+                    handler(time, message)
+        finally:
+            connection.close()
+    except (sqlite3.Error, UnicodeDecodeError) as error:
+        raise RecordingError(f"{name}: not a readable rosbag2 database ({reason(error)})") from error
+
+
+def _require_all_pages(path: Path, name: str) -> None:
+    """Refuse a database that was cut short: SQLite itself would read what is left and say nothing."""
+    with path.open("rb") as file:
+        header = file.read(_SQLITE_HEADER_BYTES)
+        size = file.seek(0, 2)
+    if len(header) == _SQLITE_HEADER_BYTES and header.startswith(SQLITE_MAGIC):
+        page_size, pages = int.from_bytes(header[16:18]), int.from_bytes(header[28:32])
+        if size >= pages * (page_size if page_size > 1 else 2**16):
+            return
+    raise RecordingError(f"{name}: the database is truncated; copy the file again")

@@ -1,0 +1,238 @@
+"""The diagnosis as a page that tells one story: where, what, how much, the proof, what next."""
+
+import shlex
+from collections.abc import Iterator
+
+from markupsafe import Markup
+
+from tauscope.diagnosis import Diagnosis, DiagnosisDocument
+from tauscope.diagnosis.documents.plots import DiagnosisPlots, diagnosis_plots
+from tauscope.diagnosis.next_experiment import PlannedExperiment
+from tauscope.report.csv_text import csv_text
+from tauscope.report.diagnosis_tables import (
+    detectable_table,
+    difference_table,
+    located_table,
+    residual_table,
+    shift_table,
+)
+from tauscope.report.diagnosis_words import (
+    HEADLINES,
+    cautions,
+    constancy_sentence,
+    effect_title,
+    file_title,
+    finding_facts,
+    location_sentence,
+    noise_ratios,
+    place_title,
+    summary_sentences,
+)
+from tauscope.report.heat_map import heat_map, heat_table
+from tauscope.report.motion_figure import motion_figure
+from tauscope.report.page import Card, Drawing, KeyFigure, Numbers, Page, Part, Section, render
+from tauscope.report.proof_figure import proof_figure
+from tauscope.report.provenance import Provenance
+from tauscope.report.quantities import chance, counted, significant, torque_unit
+from tauscope.report.shift_figure import difference_figure, shift_figure
+from tauscope.report.tables import input_table
+from tauscope.robot import JointType
+
+
+def diagnosis_report(
+    diagnosis: Diagnosis,
+    document: DiagnosisDocument,
+    provenance: Provenance,
+    planned: PlannedExperiment | None = None,
+) -> str:
+    """A self-contained HTML page on a diagnosis.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        the result
+    document : DiagnosisDocument
+        the same as plain data
+    provenance : Provenance
+        where it came from
+    planned : PlannedExperiment or None
+        the motion to record next, where one was planned
+
+    Returns
+    -------
+    str
+        HTML with inline figures: no script, no request to anywhere
+    """
+    plots = diagnosis_plots(diagnosis)
+    units = [torque_unit(joint.type) for joint in diagnosis.robot.joints]
+    sections = [
+        _where(plots, document, [joint.type for joint in diagnosis.robot.joints]),
+        _what(document),
+        _how_much(document),
+        _proof(plots, document, units),
+        _next(document, planned),
+        _detectable(document),
+        _reproduce(provenance),
+    ]
+    joints = counted(len(document.joints), "joint")
+    created = provenance.created.strftime("%Y-%m-%d %H:%M %Z").strip()
+    return render(
+        Page(
+            kind="diagnosis",
+            robot=document.robot,
+            headline=HEADLINES[document.verdict],
+            subtitle=f"{joints} · band {significant(document.cutoff_hz, 3)} Hz · {created}",
+            key_figures=list(_key_figures(document)),
+            sentences=list(summary_sentences(document)),
+            cautions=list(cautions(document)),
+            sections=sections,
+            footer=", ".join(f"{name} {version}" for name, version in provenance.versions),
+        )
+    )
+
+
+def _key_figures(document: DiagnosisDocument) -> Iterator[KeyFigure]:
+    """What a reader looks for first."""
+    yield KeyFigure("Verdict", document.verdict.replace("_", " "), "computed from tests, not chosen")
+    names = ", ".join(dict.fromkeys(effect_title(finding.effect) for finding in document.findings[:3]))
+    yield KeyFigure("Findings", str(len(document.findings)), names or "nothing is named")
+    before, after, held_out = noise_ratios(document)
+    most = max(range(len(before)), key=before.__getitem__)
+    yield KeyFigure(
+        "Residual / noise",
+        f"{significant(before[most], 3)} → {significant(after[most], 3)}",
+        f"{document.joints[most]}, {'held-out' if held_out else 'its own'} motion",
+    )
+    noise = "repeated periods" if document.noise_method == "periods" else "the residual"
+    yield KeyFigure("Noise known from", noise, "per joint, a sample")
+
+
+def _where(plots: DiagnosisPlots, document: DiagnosisDocument, types: list[JointType]) -> Section:
+    """Heat maps of joint × state."""
+    caption = (
+        "Each cell holds as many samples as any other of its row and group; its shade is the rms of the residual in it,"
+        " as a multiple of the noise."
+    )
+    label = "Residual of every joint by velocity, position, load, acceleration and time, as a multiple of the noise"
+    parts = [
+        Part(
+            title="What the model leaves",
+            figure=Drawing(heat_map(plots.histograms, document.joints, after=False), f"{label}, before", caption),
+        )
+    ]
+    if document.findings:
+        drawn = heat_map(plots.histograms, document.joints, after=True)
+        parts.append(Part(title="What is left with the findings", figure=Drawing(drawn, f"{label}, after", "")))
+    parts.append(
+        Part(table=located_table(document), numbers=Numbers("Numbers of the maps", heat_table(plots.histograms)))
+    )
+    pairs = zip(document.mismatch, types, strict=True)
+    sentences = [location_sentence(entry, joint_type) for entry, joint_type in pairs if entry.significant]
+    return Section("where", "Where", parts, sentences or ["At no joint is there more than noise."])
+
+
+def _what(document: DiagnosisDocument) -> Section:
+    """Findings, ranked."""
+    total = sum(finding.gain for finding in document.findings)
+    parts = [
+        Part(
+            card=Card(
+                effect_title(finding.effect),
+                place_title(finding.joint),
+                finding.probability,
+                chance(finding.probability),
+                f"{finding.statement}.",
+                finding_facts(finding, total),
+            )
+        )
+        for finding in document.findings
+    ]
+    sentences = [] if parts else ["No effect of the catalogue is named."]
+    if len(parts) > 1:
+        sentences = ["In order of the residual energy that each explains."]
+    return Section("what", "What", parts, sentences)
+
+
+def _how_much(document: DiagnosisDocument) -> Section:
+    """Residuals, and what the left-out effects had done to the parameters."""
+    parts = [Part(title="Residual rms at the recorded rate", table=residual_table(document))]
+    if document.parameter_differences:
+        svg = Markup(difference_figure("differences", document))  # noqa: S704 - our own drawing
+        drawing = Drawing(svg, "How far the simulation's parameters are off", "The arm less what it is compared with.")
+        parts.append(Part(title="What the simulation has wrong", figure=drawing, table=difference_table(document)))
+    if document.parameter_shifts:
+        svg = Markup(shift_figure("shifts", document))  # noqa: S704 - as above
+        drawing = Drawing(
+            svg,
+            "How far parameters moved when the findings were added",
+            "What the left-out effects had been hiding in: estimates with the findings less those without.",
+        )
+        parts.append(Part(title="What had been absorbed where", figure=drawing, table=shift_table(document)))
+    return Section("how-much", "How much", parts, [constancy_sentence(document)])
+
+
+def _proof(plots: DiagnosisPlots, document: DiagnosisDocument, units: list[str]) -> Section:
+    """Torque of motion that was not seen, before and after."""
+    spectra = {spectrum.joint: spectrum for spectrum in plots.spectra}
+    held_out = any(overlay.held_out for overlay in plots.overlays)
+    parts = []
+    for number, (overlay, unit) in enumerate(zip(plots.overlays, units, strict=True), start=1):
+        spectrum = spectra.get(overlay.joint)
+        svg = Markup(proof_figure(f"proof-{number}", overlay, spectrum, unit))  # noqa: S704 - as above
+        names = ("time", "measured", "before", "after")
+        text = csv_text({name: getattr(overlay, name) for name in names})
+        if spectrum is not None:
+            names = ("frequency", "before", "after", "noise")
+            text += "\n\n" + csv_text({name: getattr(spectrum, name) for name in names})
+        parts.append(
+            Part(
+                title=overlay.joint,
+                figure=Drawing(
+                    svg,
+                    f"Torque of {overlay.joint}, measured and modelled without and with the findings",
+                    f"{file_title(overlay.recording)}, the stretch in which the findings take most off the residual.",
+                ),
+                numbers=Numbers(f"Numbers of {overlay.joint}", text=text),
+            )
+        )
+    motion = "on held-out motion, from which neither model was made" if held_out else "on the model's own motion"
+    band = f"Torque below {significant(document.cutoff_hz, 3)} Hz {motion}."
+    return Section("proof", "The proof", parts, [band])
+
+
+def _next(document: DiagnosisDocument, planned: PlannedExperiment | None) -> Section:
+    """The motion that would decide what is open."""
+    wanted = document.next_experiment
+    if wanted is None:
+        return Section("next", "What next", [], ["Nothing is open that another motion would decide."])
+    sentences = [f"{wanted.why[:1].upper()}{wanted.why[1:]}."]
+    if wanted.separates:
+        sentences.append(f"It tells apart: {', '.join(wanted.separates)}.")
+    parts = []
+    if planned is not None:
+        svg = Markup(motion_figure("next-motion", planned.trajectory, list(document.joints)))  # noqa: S704 - as above
+        caption = (
+            f"{significant(planned.trajectory.duration_s, 3)} s, within the robot file's limits, from rest to rest."
+        )
+        parts.append(Part(figure=Drawing(svg, "Positions of the motion to record next", caption)))
+    words = ["tauscope", "run", "ROBOT.yaml", "--trajectory", wanted.trajectory or "NEXT.json", "--out", "next.csv"]
+    note = None if wanted.trajectory else "`tauscope diagnose … --next-trajectory NEXT.json` writes the motion."
+    return Section("next", "What next", [*parts, Part(command=shlex.join(words), note=note)], sentences)
+
+
+def _detectable(document: DiagnosisDocument) -> Section:
+    """What would have been seen."""
+    sentence = (
+        "The smallest size of each effect that nine of ten such data sets would have shown. What is smaller may be"
+        " there and not be named; – stands where no torque along this motion shows it, or it is one with a parameter."
+    )
+    part = Part(table=detectable_table(document))
+    return Section("detectable", "What would have been seen", [part], [sentence])
+
+
+def _reproduce(provenance: Provenance) -> Section:
+    """How to make it again."""
+    parts = [Part(table=input_table(provenance))]
+    if provenance.command:
+        parts.append(Part(command=shlex.join(provenance.command)))
+    return Section("reproduce", "To make it again", parts)

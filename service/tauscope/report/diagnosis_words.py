@@ -1,0 +1,205 @@
+"""A diagnosis in words, the same on terminal and page."""
+
+from collections.abc import Iterator
+from pathlib import PurePath
+
+from tauscope.diagnosis import DiagnosisDocument
+from tauscope.diagnosis.documents.result import FindingEntry, MismatchEntry
+from tauscope.report.quantities import ABSENT, counted, percent, significant, state_unit, torque_unit, with_uncertainty
+from tauscope.report.words import noise_ratio
+from tauscope.robot import JointType
+
+VERDICTS = {
+    "consistent": "nothing but noise is left",
+    "explained": "the findings bring the residual to the noise",
+    "partly_explained": "the findings improve the fit, and a significant remainder stays",
+    "unexplained": "a significant mismatch that nothing in the catalogue explains",
+    "inconclusive": "the parameters do not hold from one recording to the next, and nothing can be named",
+}
+
+HEADLINES = {
+    "consistent": "The model explains the recordings: nothing but noise is left.",
+    "explained": "The findings explain all that the model left.",
+    "partly_explained": "The findings explain part of what the model left; something remains.",
+    "unexplained": "Something is missing that nothing in the catalogue explains.",
+    "inconclusive": "These recordings cannot decide it.",
+}
+
+AGAINST = {
+    "identified": "the best rigid-body and friction model that the data allow",
+    "model": "the robot file's model",
+    "simulation": "recordings of the simulator",
+}
+
+CONFIRMED = {
+    True: "seen again on held-out motion",
+    False: "not seen on held-out motion",
+    None: "not asked: no recording was held out",
+}
+
+DEVIATIONS = 1.96
+"""Standard errors to either side: 95 % of a normal distribution."""
+
+
+def effect_title(effect: str) -> str:
+    """An effect's id as a heading.
+
+    Parameters
+    ----------
+    effect : str
+        id of the effect
+    """
+    return effect.replace("_", " ").capitalize()
+
+
+def place_title(joint: str | None) -> str:
+    """Where an effect is.
+
+    Parameters
+    ----------
+    joint : str or None
+        name of the joint; None for the whole arm
+    """
+    return "of the whole arm" if joint is None else f"at {joint}"
+
+
+def file_title(name: str) -> str:
+    """A recording's name without its folders.
+
+    Parameters
+    ----------
+    name : str
+        as the recording was given
+    """
+    return PurePath(name).name or name
+
+
+def noise_ratios(document: DiagnosisDocument) -> tuple[list[float], list[float], bool]:
+    """Residual over noise of every joint, before and after; and whether on held-out motion.
+
+    Parameters
+    ----------
+    document : DiagnosisDocument
+        the result
+    """
+    fit = document.fit.held_out or document.fit.train
+    before, after = (
+        [noise_ratio(rms, noise) for rms, noise in zip(own, document.noise_std, strict=True)]
+        for own in (fit.rms_before, fit.rms_after)
+    )
+    return before, after, document.fit.held_out is not None
+
+
+def summary_sentences(document: DiagnosisDocument) -> Iterator[str]:
+    """What was compared, what it comes to, and how much better unseen motion is predicted.
+
+    Parameters
+    ----------
+    document : DiagnosisDocument
+        the result
+    """
+    yield f"Compared with {AGAINST[document.against]}: {VERDICTS[document.verdict]}."
+    before, after, held_out = noise_ratios(document)
+    if document.findings and after != before:
+        most = max(range(len(before)), key=lambda place: before[place] - after[place])
+        motion = "On motion that neither model was made from" if held_out else "On the motion itself"
+        yield (
+            f"{motion}, the residual of {document.joints[most]} goes from {significant(before[most], 3)} to"
+            f" {significant(after[most], 3)} times the sensor noise."
+        )
+    if not document.findings:
+        yield "No effect is named. The last table says what size each would have needed to show in these recordings."
+
+
+def cautions(document: DiagnosisDocument) -> Iterator[str]:
+    """What a reader has to know before acting on it.
+
+    Parameters
+    ----------
+    document : DiagnosisDocument
+        the result
+    """
+    if document.fit.held_out is None:
+        yield "No recording was held out: nothing here was tested on motion that the model has not seen."
+    for finding in document.findings:
+        where = f"{effect_title(finding.effect)} {place_title(finding.joint)}"
+        if finding.equivalent:
+            yield f"{where}: these data cannot tell it from {', '.join(finding.equivalent)}."
+        if finding.confirmed is False:
+            yield f"{where} was not seen again on the held-out recordings."
+    for move in document.constancy.moved:
+        yield (
+            f"{move.parameter} is not the same in {file_title(move.between[0])} and {file_title(move.between[1])}:"
+            f" {significant(move.shift_in_std, 3)} standard errors apart."
+        )
+    if document.noise_method == "residual":
+        yield "The noise is estimated from the residual itself; recordings with repeated periods would measure it."
+
+
+def location_sentence(entry: MismatchEntry, joint_type: JointType) -> str:
+    """Where one joint's mismatch concentrates.
+
+    Parameters
+    ----------
+    entry : MismatchEntry
+        of the joint
+    joint_type : JointType
+        how it moves, for units
+    """
+    if not entry.significant:
+        return f"{entry.joint}: nothing but noise."
+    text = f"{entry.joint}: {significant(entry.excess_rms, 3)} {torque_unit(joint_type)} rms beyond the noise"
+    if entry.where is not None:
+        low, high = (significant(value, 2) for value in entry.where.range)
+        variable, unit = entry.where.variable, state_unit(entry.where.variable, joint_type)
+        text += f", {_share(entry.where.share)} of it at a {variable.replace('_', ' ')} of {low} to {high} {unit}"
+    else:
+        text += ", in every part of the motion"
+    if entry.time is not None:
+        low, high = (significant(value, 3) for value in entry.time.range)
+        text += f", {_share(entry.time.share)} between {low} and {high} s"
+    return f"{text}."
+
+
+def _share(share: float) -> str:
+    """A share in a sentence."""
+    return f"{100.0 * share:.0f} %"
+
+
+def finding_facts(finding: FindingEntry, total_gain: float) -> list[tuple[str, str]]:
+    """What is known of a finding, in the order in which one asks.
+
+    Parameters
+    ----------
+    finding : FindingEntry
+        the finding
+    total_gain : float
+        what all findings take off the residual's energy
+    """
+    facts = [
+        (each.name, f"{value}{unit}" if reach == ABSENT else f"{value} ± {reach}{unit} (95 %)")
+        for each in finding.parameters
+        for value, reach in (with_uncertainty(each.value, DEVIATIONS * each.std),)
+        for unit in ("" if each.unit == "1" else f" {each.unit}",)
+    ]
+    facts += [("Torque", finding.equation)] if finding.equation else []
+    if total_gain > 0.0:
+        facts.append(("Explains", f"{percent(finding.gain / total_gain)} of what all findings explain"))
+    facts.append(("Held out", CONFIRMED[finding.confirmed]))
+    others = ", ".join(finding.equivalent) if finding.equivalent else "nothing: it stands alone"
+    return [*facts, ("Could also be", others)]
+
+
+def constancy_sentence(document: DiagnosisDocument) -> str:
+    """Whether the parameters hold from one recording to the next.
+
+    Parameters
+    ----------
+    document : DiagnosisDocument
+        the result
+    """
+    p_value = document.constancy.p_value
+    if document.constancy.moved:
+        moved = counted(len(document.constancy.moved), "parameter")
+        return f"Parameters do not all hold from one recording to the next ({moved} moved; p = {p_value:.2g})."
+    return f"The parameters hold from one recording to the next (p = {p_value:.2g})."

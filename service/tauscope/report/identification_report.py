@@ -1,0 +1,209 @@
+"""The identification as a page: what an engineer reads, shows and files."""
+
+import shlex
+from collections.abc import Iterator, Sequence
+
+from markupsafe import Markup
+
+from tauscope.identification import Identification, IdentificationDocument, document
+from tauscope.recording import Recording
+from tauscope.report.csv_text import csv_text
+from tauscope.report.friction_curve import friction_curve
+from tauscope.report.friction_figure import friction_figure
+from tauscope.report.page import Drawing, KeyFigure, Numbers, Page, Part, Section, render
+from tauscope.report.parameter_figure import parameter_figure
+from tauscope.report.provenance import Provenance
+from tauscope.report.quantities import ABSENT, counted, percent, significant, torque_unit, velocity_unit
+from tauscope.report.residual_figure import residual_figure
+from tauscope.report.series import TorqueSeries, torque_series
+from tauscope.report.tables import (
+    base_parameter_table,
+    conditioning_table,
+    fit_table,
+    friction_table,
+    input_table,
+    link_table,
+    rotor_table,
+)
+from tauscope.report.torque_figure import torque_columns, torque_figure
+from tauscope.report.words import band_words, cautions, fit_sentences, masked_samples, noise_ratio, noise_words
+
+MOST_SERIES = 6
+"""Recordings that the friction curves are compared with."""
+
+_FRICTION_EQUATION = "τ_f(q̇) = τ_s A(K_v q̇) + τ_sc A(δ q̇) + τ_v q̇ + offset,  A(x) = (2/π) arctan x"
+
+
+def identification_report(
+    identification: Identification,
+    recordings: Sequence[Recording],
+    held_out: Sequence[Recording],
+    provenance: Provenance,
+) -> str:
+    """A self-contained HTML page on an identification.
+
+    Parameters
+    ----------
+    identification : Identification
+        the result
+    recordings, held_out : sequence of Recording
+        what it was made from, and judged by
+    provenance : Provenance
+        where all of it came from
+
+    Returns
+    -------
+    str
+        HTML with inline figures: no script, no request to anywhere
+
+    Raises
+    ------
+    RecordingError
+        where a recording cannot be conditioned again
+    """
+    result = document(identification)
+    train = [torque_series(identification, recording) for recording in recordings[:MOST_SERIES]]
+    judged = [torque_series(identification, recording) for recording in held_out[:1]]
+    sections = [
+        _fit_section(result, identification),
+        *(_torque_section(result, identification, series, "held-out") for series in judged),
+        _torque_section(result, identification, train[0], "own"),
+        _friction_section(result, identification, train),
+        _parameter_section(result),
+        _link_section(result),
+        _data_section(result),
+        _source_section(provenance),
+    ]
+    return render(
+        Page(
+            robot=result.robot,
+            subtitle=_subtitle(result, provenance),
+            key_figures=list(_key_figures(result)),
+            sentences=fit_sentences(result),
+            cautions=cautions(result),
+            sections=sections,
+            footer=", ".join(f"{name} {version}" for name, version in provenance.versions),
+        )
+    )
+
+
+def _subtitle(result: IdentificationDocument, provenance: Provenance) -> str:
+    """One line on what was done."""
+    counts = [(len(result.conditioning), ""), (len(result.held_out_conditioning), " held out")]
+    recordings = ", ".join(f"{counted(count, 'recording')}{what}" for count, what in counts if count)
+    joints = counted(len(result.joints), "joint")
+    date = provenance.created.strftime("%Y-%m-%d %H:%M %Z").strip()
+    return f"{joints} · {recordings} · {result.estimator.upper()} · band {band_words(result)} · {date}"
+
+
+def _key_figures(result: IdentificationDocument) -> Iterator[KeyFigure]:
+    """What a reader looks for first."""
+    train, held_out = result.fit.train, result.fit.held_out
+    if held_out is not None:
+        yield KeyFigure("Relative error, held out", percent(held_out.relative_error), "‖τ − τ̂‖ / ‖τ‖ in the band")
+    yield KeyFigure("Relative error", percent(train.relative_error), "on the model's own recordings")
+    ratios = [noise_ratio(*pair) for pair in zip((held_out or train).rms, result.noise_std, strict=True)]
+    worst = max(range(len(ratios)), key=ratios.__getitem__)
+    yield KeyFigure("Residual / noise", significant(ratios[worst], 3), f"at {result.joints[worst]}, the largest of all")
+    yield KeyFigure("Condition number", significant(result.condition_number, 3), "of the unweighted regressor")
+    entries = (*result.conditioning, *result.held_out_conditioning)
+    yield KeyFigure(
+        "Samples", f"{sum(entry.samples for entry in entries):,}".replace(",", " "), f"{masked_samples(result)} masked"
+    )
+
+
+def _fit_section(result: IdentificationDocument, identification: Identification) -> Section:
+    """Residuals of all joints against their noise."""
+    figure = Drawing(
+        Markup(residual_figure("fit", result)),  # noqa: S704 - our own drawing; its text is escaped
+        "Residual of every joint as a multiple of its sensor noise",
+        f"Residual rms at the recorded rate, unfiltered, as a multiple of the sensor noise σ ({noise_words(result)})."
+        " A joint at one has nothing but noise left.",
+    )
+    return Section("fit", "Fit", [Part(figure=figure, table=fit_table(result, identification.robot))])
+
+
+def _torque_section(
+    result: IdentificationDocument, identification: Identification, series: TorqueSeries, kind: str
+) -> Section:
+    """Measured and predicted torque of every joint on one recording."""
+    parts = []
+    for joint, name in enumerate(result.joints):
+        unit = torque_unit(identification.robot.joints[joint].type)
+        svg = torque_figure(f"{kind}-{joint + 1}", series, joint, result.noise_std[joint], unit)
+        label = f"Torque of {name}, measured and predicted, and their difference"
+        caption = f"{name}: torque at the recorded rate above, what the model leaves below; right, the shaded tenth."
+        drawing = Drawing(Markup(svg), label, caption)  # noqa: S704 - as above
+        numbers = Numbers(f"Numbers of {name}", text=csv_text(torque_columns(series, joint)))
+        parts.append(Part(title=name, figure=drawing, numbers=numbers))
+    length = series.time[-1] - series.time[0]
+    shown = f"{series.recording}, {significant(length, 3)} s at {significant(series.rate_hz, 4)} Hz"
+    if series.repetitions > 1:
+        shown += f"; the first of {series.repetitions} periods that were averaged"
+    title = "Torque on a held-out recording" if kind == "held-out" else "Torque on the model's own recording"
+    return Section(f"torque-{kind}", title, parts, [f"{shown}."])
+
+
+def _friction_section(
+    result: IdentificationDocument, identification: Identification, series: Sequence[TorqueSeries]
+) -> Section:
+    """Friction curves and their coefficients."""
+    types = [joint.type for joint in identification.robot.joints]
+    curves = [friction_curve(identification, series, joint) for joint in range(len(types))]
+    units = [(velocity_unit(kind), torque_unit(kind)) for kind in types]
+    figure = Drawing(
+        Markup(friction_figure("friction", curves, result.joints, units)),  # noqa: S704 - as above
+        "Friction of every joint over its velocity",
+        "Solid where recordings exist, between the upright lines; dashed beyond. The band follows from the standard"
+        " errors alone; the dots are the recordings' own: measured torque less that of the rigid body.",
+    )
+    curve_numbers = [
+        Part(numbers=Numbers(f"Numbers of {name}", text=csv_text(curve.columns)))
+        for name, curve in zip(result.joints, curves, strict=True)
+    ]
+    parts = [Part(figure=figure), *curve_numbers, Part(table=friction_table(result), note=_FRICTION_EQUATION)]
+    if result.rotor_inertia:
+        parts.append(Part(title="Reflected rotor inertia", table=rotor_table(result)))
+    return Section("friction", "Friction", parts)
+
+
+def _parameter_section(result: IdentificationDocument) -> Section:
+    """Base parameters."""
+    undetermined = set(result.undetermined)
+    known = [entry for entry in result.base_parameters if entry.name not in undetermined]
+    parts = []
+    if known:
+        caption = "Estimates with 95 % intervals, one panel a unit; inertias about the link frames' origins."
+        svg = Markup(parameter_figure("parameters", known))  # noqa: S704 - as above
+        parts.append(Part(figure=Drawing(svg, "Base parameters with their 95 % intervals", caption)))
+    note = f"No motion of this arm shows {', '.join(result.unidentifiable)}." if result.unidentifiable else None
+    parts.append(Part(table=base_parameter_table(result), note=note))
+    return Section("parameters", "Base parameters", parts)
+
+
+def _link_section(result: IdentificationDocument) -> Section:
+    """The nearest physically consistent model."""
+    fit = result.fit
+    errors = [
+        percent(fit.links_train.relative_error),
+        percent(fit.links_held_out.relative_error if fit.links_held_out else None),
+    ]
+    sentence = (
+        "The nearest full parameter set that rigid bodies can have: every pseudo-inertia positive definite, friction"
+        f" not negative. Relative error {errors[0]} on its own recordings, {errors[1]} held out. Torque and position do"
+        " not determine all of these numbers one by one: their base parameters they do."
+    )
+    return Section("links", "Links", [Part(table=link_table(result))], [sentence.replace(f", {ABSENT} held out", "")])
+
+
+def _data_section(result: IdentificationDocument) -> Section:
+    """What was done to the recordings."""
+    return Section("data", "Recordings", [Part(table=conditioning_table(result))])
+
+
+def _source_section(provenance: Provenance) -> Section:
+    """How to make it again."""
+    parts = [Part(table=input_table(provenance))]
+    if provenance.command:
+        parts.append(Part(command=shlex.join(provenance.command)))
+    return Section("reproduce", "To make it again", parts)

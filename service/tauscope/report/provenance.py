@@ -1,0 +1,147 @@
+"""What a result was made from: enough to make it again, and to notice that a file has changed since."""
+
+import hashlib
+import platform
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from tauscope.errors import RecordingError
+from tauscope.robot import Robot
+
+LIBRARIES = ("tauscope", "numpy", "scipy", "clarabel")
+"""Packages whose version can change a figure."""
+
+
+@dataclass(frozen=True)
+class InputFile:
+    """One file that was read.
+
+    role : str
+        ``robot``, ``urdf``, ``recording``, ``held out`` or ``compared with``
+    path : str
+        as the user gave it
+    size_bytes : int
+        its size
+    sha256 : str
+        of its bytes, in hexadecimal
+    """
+
+    role: str
+    path: str
+    size_bytes: int
+    sha256: str
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where a result comes from.
+
+    command : tuple of str
+        words of the command line that makes it again; empty where there is none
+    inputs : tuple of InputFile
+        what was read
+    versions : tuple of (str, str)
+        name and version of what computed it
+    created : datetime
+        when
+    """
+
+    command: tuple[str, ...]
+    inputs: tuple[InputFile, ...]
+    versions: tuple[tuple[str, str], ...]
+    created: datetime
+
+
+def record_provenance(
+    *,
+    command: Sequence[str],
+    robot: Robot,
+    recordings: Sequence[str],
+    held_out: Sequence[str],
+    created: datetime,
+    compared: Sequence[str] = (),
+) -> Provenance:
+    """Hash all inputs and note the versions.
+
+    Parameters
+    ----------
+    command : sequence of str
+        words of the command line that makes the result again
+    robot : Robot
+        the arm; its robot file and URDF are inputs
+    recordings, held_out : sequence of str
+        paths of the recordings
+    created : datetime
+        when the result was made
+    compared : sequence of str
+        paths of recordings or a model that they were compared with
+
+    Returns
+    -------
+    Provenance
+        all of it
+
+    Raises
+    ------
+    RecordingError
+        where a file cannot be read any more
+    """
+    given = [("robot", str(robot.source))] if robot.source else []
+    given += [("urdf", str(robot.urdf))] if robot.urdf else []
+    given += [("recording", path) for path in recordings] + [("held out", path) for path in held_out]
+    given += [("compared with", path) for path in compared]
+    inputs = tuple(entry for role, path in given for entry in input_files(role, path))
+    return Provenance(tuple(command), inputs, versions(), created)
+
+
+def versions() -> tuple[tuple[str, str], ...]:
+    """Name and version of what can change a figure."""
+    return (("Python", platform.python_version()), *((name, installed_version(name)) for name in LIBRARIES))
+
+
+def installed_version(package: str) -> str:
+    """Version of an installed package.
+
+    Parameters
+    ----------
+    package : str
+        its name on the package index
+    """
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "(not installed)"
+
+
+def input_files(role: str, path: str) -> Iterator[InputFile]:
+    """The file of a path, or the files in it where it is a folder.
+
+    Parameters
+    ----------
+    role : str
+        what it was read as
+    path : str
+        file or folder
+
+    Yields
+    ------
+    InputFile
+        with size and hash
+
+    Raises
+    ------
+    RecordingError
+        where it cannot be read
+    """
+    source = Path(path)
+    try:
+        files = sorted(entry for entry in source.iterdir() if entry.is_file()) if source.is_dir() else [source]
+        for file in files:
+            with file.open("rb") as opened:
+                digest = hashlib.file_digest(opened, "sha256").hexdigest()
+            yield InputFile(role, str(file), file.stat().st_size, digest)
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be read again for its hash ({error.strerror or error})") from error

@@ -1,0 +1,177 @@
+"""Numbers and units as people read them."""
+
+import math
+from collections.abc import Iterable
+
+from tauscope.robot import JointType
+
+ABSENT = "–"
+"""Stands where there is no number."""
+
+_MOST_DECIMALS = 9
+_PLAIN_RANGE = (1e-4, 1e7)
+
+
+def significant(value: float | None, digits: int = 4) -> str:
+    """A number to some significant digits, without an exponent where it is of usual size.
+
+    Parameters
+    ----------
+    value : float or None
+        the number
+    digits : int
+        significant digits
+    """
+    if value is None or not math.isfinite(value):
+        return ABSENT
+    if value == 0.0:
+        return "0"
+    if not _PLAIN_RANGE[0] <= abs(value) < _PLAIN_RANGE[1]:
+        return f"{value:.{digits - 1}e}"
+    rounded = float(f"{value:.{digits - 1}e}")  # first: 0.99999 is 1.000 and not 1.0000
+    return f"{rounded:.{max(digits - 1 - math.floor(math.log10(abs(rounded))), 0)}f}"
+
+
+def given(value: float | None) -> str:
+    """A number that somebody stated, as it was stated: no digits are added.
+
+    Parameters
+    ----------
+    value : float or None
+        the number
+    """
+    return ABSENT if value is None or not math.isfinite(value) else f"{value:.6g}"
+
+
+def with_uncertainty(value: float, std: float | None) -> tuple[str, str]:
+    """A value and its standard error: the error to two significant digits, the value to the same decimal place.
+
+    Parameters
+    ----------
+    value : float
+        the estimate
+    std : float or None
+        its standard error; None, zero or infinite where there is none
+
+    Returns
+    -------
+    tuple of two str
+        value and error, each `ABSENT` where there is no number
+    """
+    if std is None or not math.isfinite(std) or std <= 0.0:
+        return f"{float(f'{value:.3e}'):g}", ABSENT
+    decimals = 1 - math.floor(math.log10(std))
+    largest = max(abs(value), std)
+    if decimals > _MOST_DECIMALS or largest >= _PLAIN_RANGE[1]:
+        digits = min(max(math.floor(math.log10(largest)) + decimals, 1), 15)
+        return f"{value:.{digits}e}", f"{std:.1e}"
+    shown = max(decimals, 0)
+    rounded = round(value, decimals) + 0.0  # no minus zero
+    return f"{rounded:.{shown}f}", f"{round(std, decimals):.{shown}f}"
+
+
+def percent(share: float | None) -> str:
+    """A share as per cent, to two significant digits or a tenth.
+
+    Parameters
+    ----------
+    share : float or None
+        1 is the whole
+    """
+    if share is None or not math.isfinite(share):
+        return ABSENT
+    hundredths = 100.0 * share
+    if 0.0 < hundredths < 0.01:
+        return f"{hundredths:.1e} %"
+    return f"{hundredths:.1f} %" if hundredths >= 1.0 else f"{hundredths:.2g} %"
+
+
+def counted(count: int, thing: str) -> str:
+    """A number of things: ``1 joint``, ``3 joints``.
+
+    Parameters
+    ----------
+    count : int
+        how many
+    thing : str
+        name of one
+    """
+    return f"{count} {thing}" if count == 1 else f"{count} {thing}s"
+
+
+def torque_unit(joint_type: JointType) -> str:
+    """Unit of what drives a joint.
+
+    Parameters
+    ----------
+    joint_type : JointType
+        how the joint moves
+    """
+    return "N" if joint_type is JointType.PRISMATIC else "Nm"
+
+
+def velocity_unit(joint_type: JointType) -> str:
+    """Unit of a joint's velocity.
+
+    Parameters
+    ----------
+    joint_type : JointType
+        how the joint moves
+    """
+    return "m/s" if joint_type is JointType.PRISMATIC else "rad/s"
+
+
+def state_unit(variable: str, joint_type: JointType) -> str:
+    """Unit of a variable that a residual may depend on.
+
+    Parameters
+    ----------
+    variable : str
+        ``velocity``, ``position``, ``load``, ``acceleration``, ``time``, ``temperature`` or ``motor_position``
+    joint_type : JointType
+        how the joint moves
+    """
+    position = "m" if joint_type is JointType.PRISMATIC else "rad"
+    units = {"velocity": f"{position}/s", "position": position, "acceleration": f"{position}/s²", "time": "s"}
+    return {**units, "load": torque_unit(joint_type), "temperature": "°C", "motor_position": "rad"}.get(variable, "")
+
+
+def chance(probability: float) -> str:
+    """A probability as per cent; what is not certain is never said to be.
+
+    Parameters
+    ----------
+    probability : float
+        from 0 to 1
+    """
+    return "> 99 %" if 0.99 < probability < 1.0 else f"{100.0 * probability:.0f} %"
+
+
+def power_of_ten(value: float) -> str:
+    """A number on a logarithmic axis.
+
+    Parameters
+    ----------
+    value : float
+        a power of ten, or one with a sign, or zero
+    """
+    if 1e-3 < abs(value) < 1e4 or value == 0.0:
+        return f"{value:g}".replace("-", "\N{MINUS SIGN}")
+    exponent = round(math.log10(abs(value)))
+    digits = str(exponent).translate(str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻"))
+    sign = "\N{MINUS SIGN}" if value < 0.0 else ""
+    return f"{sign}10{digits}"
+
+
+def base_parameter_unit(terms: Iterable[str]) -> str:
+    """Unit of a combination of standard parameters: that of its first, whose coefficient is one.
+
+    Parameters
+    ----------
+    terms : iterable of str
+        names of the standard parameters in it, e.g. ``m2``, ``msx2``
+    """
+    first = next(iter(terms))
+    if first.startswith("I"):
+        return "kg m²"
+    return "kg m" if first.startswith("ms") else "kg"

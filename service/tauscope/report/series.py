@@ -1,0 +1,85 @@
+"""Measured and predicted torque over time: conditioned again, as for the estimate, but only as much as a page shows."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import islice
+
+import numpy as np
+
+from tauscope.identification import Identification
+from tauscope.identification.dataset import Dataset, PreparedMotion
+from tauscope.recording import Recording
+from tauscope.recording.conditioning import Conditioner
+from tauscope.recording.recording import Array
+
+MOST_PIECES = 8
+"""Pieces of a recording that are conditioned in search of the longest."""
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueSeries:
+    """One continuous piece of a recording beside what the model says.
+
+    recording : str
+        name of the file
+    repetitions : int
+        periods that were averaged for the estimate; the torque is that of the first of them
+    rate_hz : float
+        sampling rate
+    time : (N,) float64
+        [s]
+    velocity : (N, n) float64
+        smoothed q̇ [rad/s or m/s]
+    measured : (N, n) float64
+        measured torque, NaN where none was measured [Nm or N]
+    predicted : (N, n) float64
+        torque of the model [Nm or N]
+    """
+
+    recording: str
+    repetitions: int
+    rate_hz: float
+    time: Array
+    velocity: Array
+    measured: Array
+    predicted: Array
+
+    @property
+    def residual(self) -> Array:
+        """Measured less predicted torque, (N, n) [Nm or N]."""
+        return self.measured - self.predicted
+
+
+def torque_series(identification: Identification, recording: Recording) -> TorqueSeries:
+    """The longest of the first pieces of a recording, with the delivered model's torque.
+
+    Parameters
+    ----------
+    identification : Identification
+        the model
+    recording : Recording
+        one of those that it was made from or judged by
+
+    Returns
+    -------
+    TorqueSeries
+        at the recorded rate, no filter
+    """
+    longest = max(islice(_pieces(identification, recording), MOST_PIECES), key=lambda piece: len(piece.motion.time))
+    motion = longest.motion
+    return TorqueSeries(
+        recording=recording.name,
+        repetitions=motion.repetitions,
+        rate_hz=motion.rate_hz,
+        time=motion.time,
+        velocity=motion.velocity,
+        measured=np.where(motion.measured[0], motion.torque[0], np.nan),
+        predicted=longest.predicted_torque(identification.structure, identification.parameters[None])[0].T,
+    )
+
+
+def _pieces(identification: Identification, recording: Recording) -> Iterator[PreparedMotion]:
+    """Pieces in the band of the estimate."""
+    conditioner = Conditioner.survey(recording, identification.robot)
+    structure = identification.structure
+    return iter(Dataset([conditioner], identification.robot, structure.base, identification.cutoff_hz))

@@ -1,0 +1,117 @@
+"""Measured against predicted torque of one joint, and what is left, next to the noise."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from tauscope.recording.recording import Array
+from tauscope.report.decimation import envelope_indices
+from tauscope.report.series import TorqueSeries
+from tauscope.report.svg import BAND, INK, MEASURED, MUTED, PREDICTED, RESIDUAL, draw_svg
+
+HEIGHT_INCHES = 3.5
+MOST_POINTS = 1400
+"""Points a curve over the whole width; two a pixel."""
+
+MOST_POINTS_ENLARGED = 700
+ENLARGED_SHARE = 0.1
+"""Part of the time that is enlarged: where the residual's mean square is greatest."""
+
+
+def torque_figure(name: str, series: TorqueSeries, joint: int, noise_std: float, unit: str) -> str:
+    """Draw one joint's torque and residual, whole and enlarged where they differ most.
+
+    Parameters
+    ----------
+    name : str
+        unique on the page
+    series : TorqueSeries
+        what to draw
+    joint : int
+        joint index, from 0
+    noise_std : float
+        σ of the sensor noise [Nm or N]
+    unit : str
+        of the torque
+
+    Returns
+    -------
+    str
+        inline SVG
+    """
+    enlarged = worst_part(series.residual[:, joint], ENLARGED_SHARE)
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots(2, 2, sharex="col", sharey="row", height_ratios=(1.7, 1.0), width_ratios=(2.4, 1.0))
+        everything = slice(0, len(series.time))
+        for column, (rows, most) in enumerate(((everything, MOST_POINTS), (enlarged, MOST_POINTS_ENLARGED))):
+            _draw_torque(axes[0, column], series, joint, rows, most)
+            _draw_residual(axes[1, column], series, joint, rows, most, noise_std)
+        start, stop = series.time[enlarged.start], series.time[enlarged.stop - 1]
+        for axis in axes[:, 0]:
+            axis.axvspan(start, stop, color=MUTED, alpha=0.12, linewidth=0)
+        axes[0, 0].set_ylabel(f"torque [{unit}]")
+        axes[1, 0].set_ylabel(f"residual [{unit}]")
+        axes[0, 0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.0, borderpad=0.2)
+        axes[0, 1].set_title("where they differ most", color=INK)
+        axes[1, 0].legend(loc="upper left", bbox_to_anchor=(0.0, 1.22), ncols=2, borderaxespad=0.0, borderpad=0.1)
+        for axis in axes[1]:
+            axis.set_xlabel("time [s]")
+
+    return draw_svg(name, HEIGHT_INCHES, draw)
+
+
+def torque_columns(series: TorqueSeries, joint: int) -> dict[str, list[float]]:
+    """Numbers of the drawing: the samples that keep the residual's look.
+
+    Parameters
+    ----------
+    series : TorqueSeries
+        what is drawn
+    joint : int
+        joint index, from 0
+    """
+    kept = envelope_indices(series.residual[:, joint], MOST_POINTS_ENLARGED)
+    columns = {"time": series.time, "measured": series.measured[:, joint], "model": series.predicted[:, joint]}
+    return {name: values[kept].tolist() for name, values in columns.items()}
+
+
+def worst_part(residual: Array, share: float) -> slice:
+    """The stretch of this share of a residual whose mean square is greatest.
+
+    Parameters
+    ----------
+    residual : (N,) float64
+        NaN where nothing was measured
+    share : float
+        length of the stretch, as a part of N
+
+    Returns
+    -------
+    slice
+        start and stop are set
+    """
+    length = min(max(int(len(residual) * share), 2), len(residual))
+    total = np.concatenate([[0.0], np.cumsum(np.nan_to_num(residual) ** 2)])
+    start = int(np.argmax(total[length:] - total[:-length]))
+    return slice(start, start + length)
+
+
+def _draw_torque(axis: Axes, series: TorqueSeries, joint: int, rows: slice, most: int) -> None:
+    """Measured below, predicted above."""
+    time = series.time[rows]
+    measured, predicted = series.measured[rows, joint], series.predicted[rows, joint]
+    kept = envelope_indices(measured, most)
+    axis.plot(time[kept], measured[kept], color=MEASURED, linewidth=0.9, label="measured")
+    kept = envelope_indices(predicted, most)
+    axis.plot(time[kept], predicted[kept], color=PREDICTED, linewidth=1.2, label="model")
+    axis.margins(x=0.0)
+
+
+def _draw_residual(axis: Axes, series: TorqueSeries, joint: int, rows: slice, most: int, noise_std: float) -> None:
+    """The residual within twice the noise, were there nothing else in it."""
+    time, residual = series.time[rows], series.residual[rows, joint]
+    kept = envelope_indices(residual, most)
+    axis.axhspan(-2.0 * noise_std, 2.0 * noise_std, color=BAND, linewidth=0, label="± 2 σ of the noise")
+    axis.plot(time[kept], residual[kept], color=RESIDUAL, linewidth=0.7, label="measured − model")
+    axis.margins(x=0.0)

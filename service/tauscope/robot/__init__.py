@@ -1,0 +1,56 @@
+"""What the arm is: joints, chain, limits, and what the user's simulation believes; the robot file."""
+
+from tauscope.robot.check import JointSummary, RobotReport, check_robot
+from tauscope.robot.denavit_hartenberg import DenavitHartenbergRow, modified_segments, standard_segments
+from tauscope.robot.finding import Finding, Severity
+from tauscope.robot.kinematics import homogeneous, link_placements
+from tauscope.robot.physical import Defect, find_defect, pseudo_inertia
+from tauscope.robot.robot import (
+    STANDARD_PARAMETERS,
+    FrictionCoefficients,
+    FrictionShape,
+    Joint,
+    JointLimits,
+    JointType,
+    LinkInertia,
+    Model,
+    Placement,
+    Robot,
+    Segment,
+)
+from tauscope.robot.robot_data import robot_from_dict, robot_from_yaml, robot_to_dict
+from tauscope.robot.robot_file import read_robot
+from tauscope.robot.urdf import UrdfChain, read_urdf_chain
+
+__all__ = [
+    "STANDARD_PARAMETERS",
+    "Defect",
+    "DenavitHartenbergRow",
+    "Finding",
+    "FrictionCoefficients",
+    "FrictionShape",
+    "Joint",
+    "JointLimits",
+    "JointSummary",
+    "JointType",
+    "LinkInertia",
+    "Model",
+    "Placement",
+    "Robot",
+    "RobotReport",
+    "Segment",
+    "Severity",
+    "UrdfChain",
+    "check_robot",
+    "find_defect",
+    "homogeneous",
+    "link_placements",
+    "modified_segments",
+    "pseudo_inertia",
+    "read_robot",
+    "read_urdf_chain",
+    "robot_from_dict",
+    "robot_from_yaml",
+    "robot_to_dict",
+    "standard_segments",
+]

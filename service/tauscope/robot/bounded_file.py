@@ -1,0 +1,72 @@
+"""Reading a user's small text file: regular, of bounded size, UTF-8."""
+
+import stat
+from pathlib import Path
+
+from tauscope.errors import RobotFileError
+from tauscope.robot.messages import one_line
+
+
+def read_bounded(path: Path, limit: int) -> bytes:
+    """All bytes of a regular file of at most `limit` bytes.
+
+    Parameters
+    ----------
+    path : Path
+        the file
+    limit : int
+        largest size that is accepted [bytes]
+
+    Raises
+    ------
+    RobotFileError
+        if the file is missing, not a regular file, empty, too large or not readable
+    """
+    try:
+        mode = path.stat().st_mode
+        # A pipe or a device might never end: only regular files are opened.
+        data = _first_bytes(path, limit + 1) if stat.S_ISREG(mode) else None
+    except FileNotFoundError:
+        raise RobotFileError(one_line(f"{path}: no such file; check the path")) from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise RobotFileError(one_line(f"{path}: cannot be read: {reason}")) from error
+    if data is None:
+        kind = "a directory" if stat.S_ISDIR(mode) else "not a regular file"
+        raise RobotFileError(one_line(f"{path}: is {kind}; give the path of a file"))
+    if not data:
+        raise RobotFileError(one_line(f"{path}: the file is empty"))
+    if len(data) > limit:
+        raise RobotFileError(one_line(f"{path}: the file is larger than {limit // 1024} KiB; is it the right file?"))
+    return data
+
+
+def _first_bytes(path: Path, count: int) -> bytes:
+    """The first bytes of a file."""
+    with path.open("rb") as file:
+        return file.read(count)
+
+
+def decode_utf8(data: bytes, label: str) -> str:
+    """Text of UTF-8 bytes, without a byte order mark.
+
+    Parameters
+    ----------
+    data : bytes
+        content of a file
+    label : str
+        name of the file, for the message
+
+    Raises
+    ------
+    RobotFileError
+        if the bytes are not UTF-8
+    """
+    try:
+        return data.decode("utf-8").removeprefix("\ufeff")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        byte = data[error.start]
+        raise RobotFileError(
+            one_line(f"{label}:{line}: byte 0x{byte:02x} is not UTF-8 text; save the file as UTF-8")
+        ) from None

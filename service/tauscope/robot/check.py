@@ -1,0 +1,165 @@
+"""What can be said about a robot file before any motion: a summary, and everything doubtful in it."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tauscope.robot.finding import Finding, Severity
+from tauscope.robot.kinematics import homogeneous
+from tauscope.robot.robot import Joint, JointLimits, JointType, Robot, Segment
+from tauscope.robot.robot_file import load_robot
+
+EARTH = (9.7, 9.9)
+"""Acceleration of gravity on the ground, with room for altitude and latitude [m/s²]."""
+
+
+@dataclass(frozen=True)
+class JointSummary:
+    """One joint in the report.
+
+    number : int
+        from 1, base first
+    name : str
+        of the joint
+    type : JointType
+        how it moves
+    limits : JointLimits
+        what it may do
+    gear_ratio : float or None
+        motor turns per joint turn
+    torque_constant : float
+        joint Nm (N) per recorded unit
+    sign : int
+        -1 where the recorded torque is wired the other way round
+    origin : tuple of three float
+        origin of the link frame at q = 0, in the frame of the link before [m]
+    axis : tuple of three float
+        unit vector of the joint axis, in the frame of the link before
+    mass : float or None
+        of the link that the joint carries, as the model believes [kg]
+    before, after : tuple of 16 float
+        homogeneous transforms, row by row: link frame = frame of the link before · before · motion about z · after
+    """
+
+    number: int
+    name: str
+    type: JointType
+    limits: JointLimits
+    gear_ratio: float | None
+    torque_constant: float
+    sign: int
+    origin: tuple[float, float, float]
+    axis: tuple[float, float, float]
+    mass: float | None
+    before: tuple[float, ...]
+    after: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class RobotReport:
+    """A robot file at a glance.
+
+    name : str
+        of the robot
+    source : str
+        path of the robot file
+    joints : tuple of JointSummary
+        base first
+    gravity : tuple of three float
+        in the base frame [m/s²]
+    total_mass : float or None
+        of all moving links, as the model believes [kg]; None without a model
+    findings : tuple of Finding
+        errors first, then warnings, then what is good to know
+    """
+
+    name: str
+    source: str
+    joints: tuple[JointSummary, ...]
+    gravity: tuple[float, float, float]
+    total_mass: float | None
+    findings: tuple[Finding, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every other command accepts the file."""
+        return all(finding.severity is not Severity.ERROR for finding in self.findings)
+
+
+def check_robot(path: Path | str) -> RobotReport:
+    """The report on a robot file; a model that no rigid body can have is among its findings.
+
+    Parameters
+    ----------
+    path : Path or str
+        the robot file
+
+    Raises
+    ------
+    RobotFileError
+        if the file or its URDF cannot be read or is not valid
+    """
+    robot = load_robot(path)
+    rank = list(Severity)
+    findings = sorted((*robot.findings, *_remarks(robot, str(path))), key=lambda finding: rank.index(finding.severity))
+    links = robot.model.links
+    return RobotReport(
+        name=robot.name,
+        source=str(path),
+        joints=tuple(
+            _summary(number, joint, segment, None if links is None else links[number - 1].mass)
+            for number, (joint, segment) in enumerate(zip(robot.joints, robot.segments, strict=True), start=1)
+        ),
+        gravity=_triple(robot.gravity),
+        total_mass=None if links is None else float(sum(link.mass for link in links)),
+        findings=tuple(findings),
+    )
+
+
+def _summary(number: int, joint: Joint, segment: Segment, mass: float | None) -> JointSummary:
+    """The row of one joint."""
+    before, after = segment.before, segment.after
+    return JointSummary(
+        number=number,
+        name=joint.name,
+        type=joint.type,
+        limits=joint.limits,
+        gear_ratio=joint.gear_ratio,
+        torque_constant=joint.torque_constant,
+        sign=joint.sign,
+        origin=_triple(before.translation + before.rotation @ after.translation),
+        axis=_triple(before.rotation[:, 2]),
+        mass=mass,
+        before=tuple(float(value) for value in homogeneous(before).ravel()),
+        after=tuple(float(value) for value in homogeneous(after).ravel()),
+    )
+
+
+def _remarks(robot: Robot, source: str) -> Iterator[Finding]:
+    """What other commands will miss or stumble over."""
+    size = float(np.linalg.norm(robot.gravity))
+    if not EARTH[0] <= size <= EARTH[1]:
+        yield Finding(
+            Severity.WARNING, f"{source}: gravity", f"is {size:g} m/s², not 9.81: is the arm's weight balanced?"
+        )
+    for key in ("position", "velocity"):
+        without = [joint.name for joint in robot.joints if getattr(joint.limits, key) is None]
+        if without:
+            text = f"no {key} limits for {', '.join(without)}; excite and run need them, identify and diagnose do not"
+            yield Finding(Severity.INFO, f"{source}: joints", text)
+    for number, friction in enumerate(robot.model.friction or (), start=1):
+        place = f"{source}: model friction of joint {number} ({robot.joints[number - 1].name})"
+        if friction.viscous < 0.0 or friction.stiction < 0.0 or friction.stiction + friction.stribeck < 0.0:
+            yield Finding(Severity.WARNING, place, "friction drives the joint instead of braking it; check the signs")
+    missing = " and ".join(f"no {part}" for part in ("links", "friction") if getattr(robot.model, part) is None)
+    if missing:
+        text = f"{missing} stated; diagnose --against model compares only what the model states"
+        yield Finding(Severity.INFO, f"{source}: model", text)
+
+
+def _triple(vector: np.ndarray) -> tuple[float, float, float]:
+    """Three numbers as a tuple."""
+    x, y, z = (float(value) for value in vector)
+    return (x, y, z)

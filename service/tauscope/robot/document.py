@@ -1,0 +1,292 @@
+"""The robot file as CONTRACT.md defines it, one class a mapping; what the fields mean stands there."""
+
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from tauscope.robot.document_fields import (
+    Document,
+    Motion,
+    Name,
+    Nonzero,
+    Number,
+    PlainMapping,
+    Positive,
+    Range,
+    Rotation,
+    Sign,
+    Vector,
+    refusal,
+)
+from tauscope.robot.messages import shown
+from tauscope.robot.robot import JointType
+
+MOST_JOINTS = 100
+
+
+class DenavitHartenbergRowDocument(Document):
+    """One row of ``dh`` or ``mdh``.
+
+    theta : float
+        θ [rad]
+    d : float
+        along z [m]
+    a : float
+        along x [m]
+    alpha : float
+        α [rad]
+    type : JointType
+        revolute where not stated
+    """
+
+    theta: Number
+    d: Number
+    a: Number
+    alpha: Number
+    type: Motion = JointType.REVOLUTE
+
+
+class UrdfDocument(Document):
+    """Where the URDF is, and between which of its links the chain runs.
+
+    file : str
+        path, seen from the robot file
+    base : str
+        link that stands still
+    tip : str
+        last link of the chain
+    """
+
+    file: Name
+    base: Name
+    tip: Name
+
+
+Rows = list[DenavitHartenbergRowDocument]
+
+
+class KinematicsDocument(Document):
+    """The chain, described in exactly one way.
+
+    dh : list of rows, or None
+        standard Denavit-Hartenberg parameters
+    mdh : list of rows, or None
+        modified Denavit-Hartenberg parameters
+    urdf : UrdfDocument or None
+        a chain of a URDF
+    """
+
+    dh: Rows | None = Field(default=None, min_length=1, max_length=MOST_JOINTS)
+    mdh: Rows | None = Field(default=None, min_length=1, max_length=MOST_JOINTS)
+    urdf: UrdfDocument | None = None
+
+    @model_validator(mode="after")
+    def _check_one(self) -> Self:
+        """Exactly one description."""
+        known = type(self).model_fields
+        given = [name for name in known if getattr(self, name) is not None]
+        if len(given) != 1:
+            found = " and ".join(given) if given else "none"
+            raise refusal(f"must hold exactly one of {', '.join(known)}, but holds {found}")
+        return self
+
+
+class LimitsDocument(Document):
+    """What a joint may do.
+
+    position : list of two float, or None
+        lowest and highest position [rad or m]
+    velocity : float or None
+        largest speed [rad/s or m/s]
+    acceleration : float or None
+        largest acceleration [rad/s² or m/s²]
+    torque : float or None
+        largest torque [Nm] or force [N]
+    """
+
+    position: Range | None = None
+    velocity: Positive | None = None
+    acceleration: Positive | None = None
+    torque: Positive | None = None
+
+
+class FrictionShapeDocument(Document):
+    """Shape constants of the friction curve.
+
+    k_v : float or None
+        K_v of equation (8) [s/rad or s/m]
+    delta : float or None
+        δ of equation (7) [s/rad or s/m]
+    """
+
+    k_v: Positive | None = None
+    delta: Positive | None = None
+
+
+class JointDocument(Document):
+    """One joint.
+
+    name : str
+        unique in the arm
+    limits : LimitsDocument or None
+        what it may do
+    gear_ratio : float or None
+        motor turns per joint turn
+    torque_constant : float or None
+        joint Nm (N) per recorded unit
+    sign : int or None
+        1 or -1
+    friction_shape : FrictionShapeDocument or None
+        shape of its friction curve
+    drive : dict or None
+        plain data for the driver
+    """
+
+    name: Name
+    limits: LimitsDocument | None = None
+    gear_ratio: Nonzero | None = None
+    torque_constant: Nonzero | None = None
+    sign: Sign | None = None
+    friction_shape: FrictionShapeDocument | None = None
+    drive: PlainMapping | None = None
+
+
+class InertiaDocument(Document):
+    """The six entries of an inertia matrix about the link frame's origin.
+
+    xx, yy, zz, xy, xz, yz : float
+        entries [kg m²]
+    """
+
+    xx: Number
+    yy: Number
+    zz: Number
+    xy: Number
+    xz: Number
+    yz: Number
+
+
+class LinkDocument(Document):
+    """Inertial parameters of one link.
+
+    mass : float
+        m [kg]
+    first_moment : list of three float
+        m s [kg m]
+    inertia : InertiaDocument
+        about the link frame's origin [kg m²]
+    """
+
+    mass: Number
+    first_moment: Vector
+    inertia: InertiaDocument
+
+
+class FrictionDocument(Document):
+    """Friction coefficients of one joint.
+
+    stiction : float
+        τ_s [Nm or N]
+    stribeck : float
+        τ_sc [Nm or N]
+    viscous : float
+        τ_v [Nm s/rad or N s/m]
+    """
+
+    stiction: Number
+    stribeck: Number
+    viscous: Number
+
+
+class ModelDocument(Document):
+    """What the user's simulation believes.
+
+    links : list of LinkDocument, or None
+        one a link
+    friction : list of FrictionDocument, or None
+        one a joint
+    """
+
+    links: list[LinkDocument] | None = Field(default=None, min_length=1, max_length=MOST_JOINTS)
+    friction: list[FrictionDocument] | None = Field(default=None, min_length=1, max_length=MOST_JOINTS)
+
+
+class RobotDocument(Document):
+    """The whole robot file.
+
+    name : str
+        of the robot
+    kinematics : KinematicsDocument
+        the chain
+    gravity : list of three float
+        in the base frame [m/s²]
+    joints : list of JointDocument, or None
+        in chain order
+    model : ModelDocument or None
+        what the simulation believes
+    """
+
+    name: Name
+    kinematics: KinematicsDocument
+    gravity: Vector = Field(default=[0.0, 0.0, -9.81])
+    joints: list[JointDocument] | None = Field(default=None, min_length=1, max_length=MOST_JOINTS)
+    model: ModelDocument | None = None
+
+    @model_validator(mode="after")
+    def _check_names(self) -> Self:
+        """A joint name may stand once."""
+        names = [joint.name for joint in self.joints or ()]
+        for index, name in enumerate(names):
+            if name in names[:index]:
+                first, second = names.index(name) + 1, index + 1
+                raise refusal(f"joints {first} and {second} are both named {shown(name)}; rename one", "joints")
+        return self
+
+
+class PlacementDocument(Document):
+    """A fixed rigid displacement x ↦ R x + p.
+
+    rotation : list of three rows of three float
+        R
+    translation : list of three float
+        p [m]
+    """
+
+    rotation: Rotation
+    translation: Vector
+
+
+class SegmentDocument(Document):
+    """One joint of the chain.
+
+    type : JointType
+        how the joint moves
+    before : PlacementDocument
+        up to the joint's motion
+    after : PlacementDocument
+        from the joint's motion on
+    """
+
+    type: Motion
+    before: PlacementDocument
+    after: PlacementDocument
+
+
+class PlainKinematicsDocument(KinematicsDocument):
+    """The chain of a robot made from plain data: also as placements, which need no file beside it.
+
+    segments : list of SegmentDocument, or None
+        the chain as placements
+    """
+
+    segments: list[SegmentDocument] | None = Field(default=None, min_length=1, max_length=MOST_JOINTS)
+
+
+class PlainRobotDocument(RobotDocument):
+    """A robot made from plain data.
+
+    kinematics : PlainKinematicsDocument
+        the chain
+    """
+
+    kinematics: PlainKinematicsDocument

@@ -1,0 +1,164 @@
+"""Fields of the robot file: strict numbers and names, each refusal worded for the user."""
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, model_validator
+from pydantic_core import PydanticCustomError
+
+from tauscope.robot.messages import nearest, shown
+from tauscope.robot.robot import JointType
+
+LARGEST_NUMBER = 1e9
+LONGEST_NAME = 200
+DEEPEST_DRIVE = 16
+
+
+def refusal(text: str, key: str | None = None) -> PydanticCustomError:
+    """The error of a field, worded by us.
+
+    Parameters
+    ----------
+    text : str
+        what is wrong and what to do
+    key : str or None
+        the key of the mapping that the error is about, where the field is the whole mapping
+    """
+    return PydanticCustomError("refused", "{text}", {"text": text, "key": key})
+
+
+class Document(BaseModel):
+    """A mapping of the robot file: no type is converted, no key is overlooked."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _refuse_unknown_keys(cls, data: Any) -> Any:
+        """Name the first unknown key and the nearest known one, before a missing key is complained of."""
+        if isinstance(data, Mapping):
+            for key in data:
+                if key not in cls.model_fields:
+                    name = key if isinstance(key, str) else repr(key)
+                    hint = nearest(name, cls.model_fields)
+                    raise refusal(f"unknown key {shown(key)}; {hint}", key if isinstance(key, str) else None)
+        return data
+
+
+def _number(value: Any) -> float:
+    """A finite number of a size that SI quantities of an arm have."""
+    if isinstance(value, str):
+        raise refusal(f"{shown(value)} is text; write a number without quotes and without a unit")
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise refusal(f"must be a number, but is {shown(value)}")
+    if isinstance(value, float) and not math.isfinite(value):
+        raise refusal(f"must be a finite number, but is {value}")
+    if abs(value) > LARGEST_NUMBER:
+        raise refusal(f"{shown(value)} is beyond {LARGEST_NUMBER:g}; check the unit (SI: rad, m, s, kg, Nm)")
+    return float(value)
+
+
+def _positive(value: float) -> float:
+    """A number above zero."""
+    if value <= 0.0:
+        raise refusal(f"must be above zero, but is {value:g}; leave it out where it is not known")
+    return value
+
+
+def _nonzero(value: float) -> float:
+    """A number other than zero."""
+    if value == 0.0:
+        raise refusal("must not be zero; leave it out where it is not known")
+    return value
+
+
+def _name(value: Any) -> str:
+    """A name that can stand in a message and in a file name's place."""
+    if not isinstance(value, str):
+        raise refusal(f"must be text, but is {shown(value)}; put it in quotes")
+    if not value.strip():
+        raise refusal("must not be empty")
+    if len(value) > LONGEST_NAME or not value.isprintable():
+        raise refusal(f"{shown(value)} must be printable text of at most {LONGEST_NAME} characters")
+    return value
+
+
+def _sign(value: Any) -> int:
+    """1 or -1."""
+    if isinstance(value, bool) or not isinstance(value, int) or value not in (1, -1):
+        raise refusal(f"must be 1 or -1, but is {shown(value)}")
+    return int(value)
+
+
+def _motion(value: Any) -> JointType:
+    """How a joint moves."""
+    if not isinstance(value, str) or value not in set(JointType):
+        raise refusal(f"{shown(value)} is not a joint type; write revolute or prismatic")
+    return JointType(value)
+
+
+def _range(value: list[float]) -> list[float]:
+    """A lower and an upper bound, in this order."""
+    if len(value) != 2:
+        raise refusal(f"must be two numbers [lower, upper], but holds {len(value)}")
+    lower, upper = value
+    if lower > upper:
+        raise refusal(f"lower bound {lower:g} is not below upper bound {upper:g}; swap them")
+    if lower == upper:
+        raise refusal(f"lower and upper bound are both {lower:g}; leave the limits out where they are not known")
+    return value
+
+
+def _vector(value: list[float]) -> list[float]:
+    """Three numbers."""
+    if len(value) != 3:
+        raise refusal(f"must be three numbers [x, y, z], but holds {len(value)}")
+    return value
+
+
+def _rotation(value: list[list[float]]) -> list[list[float]]:
+    """A right-handed orthonormal matrix, row by row."""
+    if [len(row) for row in value] != [3, 3, 3]:
+        raise refusal("must be three rows of three numbers")
+    gram = [[sum(a * b for a, b in zip(p, q, strict=True)) for q in value] for p in value]
+    if any(abs(gram[i][j] - (i == j)) > 1e-9 for i in range(3) for j in range(3)):
+        raise refusal("is not a rotation: its rows are not orthonormal")
+    (a, b, c), (d, e, f), (g, h, i) = value
+    if a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) < 0.0:
+        raise refusal("is not a rotation: it mirrors")
+    return value
+
+
+def _plain(value: Any, depth: int = 0) -> Any:
+    """Data that JSON can hold, in plain containers."""
+    if depth > DEEPEST_DRIVE:
+        raise refusal(f"is nested deeper than {DEEPEST_DRIVE} levels")
+    if isinstance(value, float) and not math.isfinite(value):
+        raise refusal(f"must hold finite numbers, but holds {value}")
+    if value is None or isinstance(value, str | bool | int | float):
+        return value
+    if isinstance(value, list | tuple):
+        return [_plain(item, depth + 1) for item in value]
+    if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
+        return {key: _plain(item, depth + 1) for key, item in value.items()}
+    raise refusal("must hold plain data only: text, numbers, lists, and mappings with text as keys")
+
+
+def _plain_mapping(value: Any) -> dict[str, Any]:
+    """A mapping of plain data."""
+    if not isinstance(value, Mapping):
+        raise refusal(f"must be a mapping, but is {shown(value)}")
+    return _plain(value)
+
+
+Number = Annotated[float, BeforeValidator(_number)]
+Positive = Annotated[Number, AfterValidator(_positive)]
+Nonzero = Annotated[Number, AfterValidator(_nonzero)]
+Name = Annotated[str, BeforeValidator(_name)]
+Motion = Annotated[JointType, BeforeValidator(_motion)]
+Sign = Annotated[int, BeforeValidator(_sign)]
+Range = Annotated[list[Number], AfterValidator(_range)]
+Vector = Annotated[list[Number], AfterValidator(_vector)]
+Rotation = Annotated[list[list[Number]], AfterValidator(_rotation)]
+PlainMapping = Annotated[dict[str, Any], BeforeValidator(_plain_mapping)]

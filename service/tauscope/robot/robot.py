@@ -1,0 +1,229 @@
+"""What the arm is: an open chain of joints, and what the user's simulation believes about its links."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.robot.finding import Finding
+
+STANDARD_PARAMETERS = ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz", "m", "msx", "msy", "msz")
+"""Names of a link's ten standard parameters, in the order of the seed paper's equation (3)."""
+
+
+class JointType(StrEnum):
+    """How a joint moves along or about its axis."""
+
+    REVOLUTE = "revolute"
+    PRISMATIC = "prismatic"
+
+
+@dataclass(frozen=True)
+class JointLimits:
+    """What a joint may do; None where nothing is stated.
+
+    position : tuple of two float, or None
+        lowest and highest position [rad or m]
+    velocity : float or None
+        largest speed [rad/s or m/s]
+    acceleration : float or None
+        largest acceleration [rad/s² or m/s²]
+    torque : float or None
+        largest torque [Nm] or force [N]
+    """
+
+    position: tuple[float, float] | None = None
+    velocity: float | None = None
+    acceleration: float | None = None
+    torque: float | None = None
+
+
+@dataclass(frozen=True)
+class FrictionShape:
+    """Shape constants of the friction curve (7), (8); None where the data shall tell.
+
+    k_v : float or None
+        steepness K_v of the sign's smooth stand-in, equation (8) [s/rad or s/m]
+    delta : float or None
+        steepness δ of the Stribeck part, equation (7) [s/rad or s/m]
+    """
+
+    k_v: float | None = None
+    delta: float | None = None
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One joint: its name, its limits and what turns a recorded drive signal into joint torque.
+
+    name : str
+        unique in the arm
+    type : JointType
+        how it moves
+    limits : JointLimits
+        what it may do
+    gear_ratio : float or None
+        motor turns per joint turn; None where not stated
+    torque_constant : float
+        joint torque per recorded unit [Nm or N, per recorded unit]
+    sign : int
+        -1 where the recorded torque is wired the other way round, else 1
+    friction_shape : FrictionShape
+        shape of its friction curve
+    drive : mapping or None
+        what its drive needs to know, as plain data: see the driver's own documentation
+    """
+
+    name: str
+    type: JointType = JointType.REVOLUTE
+    limits: JointLimits = JointLimits()
+    gear_ratio: float | None = None
+    torque_constant: float = 1.0
+    sign: int = 1
+    friction_shape: FrictionShape = FrictionShape()
+    drive: Mapping[str, Any] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """A fixed rigid displacement x ↦ R x + p.
+
+    rotation : (3, 3) float64
+        R, orthonormal, right-handed
+    translation : (3,) float64
+        p [m]
+    """
+
+    rotation: NDArray[np.float64] = field(default_factory=lambda: np.eye(3))
+    translation: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """One joint of the chain: link frame j seen from link frame j-1 is ``before · motion_z(q_j) · after``.
+
+    The joint turns about, or slides along, the z axis between the two placements. Standard DH puts a and α into
+    `after`, modified DH into `before`; a URDF puts the axis' orientation into both, so that the link frame stays the
+    URDF's own.
+
+    type : JointType
+        how the joint moves
+    before : Placement
+        joint frame at rest, seen from the link frame before
+    after : Placement
+        link frame, seen from the moved joint frame
+    """
+
+    type: JointType
+    before: Placement
+    after: Placement
+
+
+@dataclass(frozen=True, eq=False)
+class LinkInertia:
+    """Inertial parameters of one link, in its link frame.
+
+    mass : float
+        m [kg]
+    first_moment : (3,) float64
+        m s [kg m]
+    inertia : (3, 3) float64
+        about the link frame's origin, the paper's equation (5) [kg m²]
+    """
+
+    mass: float
+    first_moment: NDArray[np.float64]
+    inertia: NDArray[np.float64]
+
+    def to_vector(self) -> NDArray[np.float64]:
+        """The ten standard parameters in the order of `STANDARD_PARAMETERS`, shape (10,)."""
+        i = self.inertia
+        return np.array([i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2], self.mass, *self.first_moment])
+
+    @staticmethod
+    def from_vector(vector: NDArray[np.float64]) -> "LinkInertia":
+        """The link of ten standard parameters.
+
+        Parameters
+        ----------
+        vector : (10,) float64
+            in the order of `STANDARD_PARAMETERS`
+        """
+        xx, yy, zz, xy, xz, yz, mass, *first_moment = (float(value) for value in vector)
+        inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        return LinkInertia(mass, np.array(first_moment), inertia)
+
+
+@dataclass(frozen=True)
+class FrictionCoefficients:
+    """Friction of one joint, the seed paper's equation (7).
+
+    stiction : float
+        τ_s [Nm or N]
+    stribeck : float
+        τ_sc, the Coulomb level less the stiction [Nm or N]
+    viscous : float
+        τ_v [Nm s/rad or N s/m]
+    """
+
+    stiction: float = 0.0
+    stribeck: float = 0.0
+    viscous: float = 0.0
+
+
+@dataclass(frozen=True)
+class Model:
+    """What the user's simulation believes; None where the robot file says nothing.
+
+    links : tuple of LinkInertia, or None
+        one a link
+    friction : tuple of FrictionCoefficients, or None
+        one a joint
+    """
+
+    links: tuple[LinkInertia, ...] | None = None
+    friction: tuple[FrictionCoefficients, ...] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """A robot arm as its robot file describes it.
+
+    name : str
+        as the robot file calls it
+    joints : tuple of Joint
+        base first
+    segments : tuple of Segment
+        one a joint: the chain
+    gravity : (3,) float64
+        acceleration of gravity in the base frame [m/s²]
+    model : Model
+        what the user's simulation believes
+    source : Path or None
+        the robot file, for messages and for the files that it names
+    urdf : Path or None
+        the URDF, where the kinematics come from one
+    urdf_links : tuple of tuples of str
+        for each link the URDF links that move with it as one body, its own first; empty without a URDF
+    findings : tuple of Finding
+        what the reader left out, took as zero or found doubtful: worth showing beside any result
+    """
+
+    name: str
+    joints: tuple[Joint, ...]
+    segments: tuple[Segment, ...]
+    gravity: NDArray[np.float64] = field(default_factory=lambda: np.array([0.0, 0.0, -9.81]))
+    model: Model = Model()
+    source: Path | None = None
+    urdf: Path | None = None
+    urdf_links: tuple[tuple[str, ...], ...] = ()
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def joint_count(self) -> int:
+        """Number of joints n."""
+        return len(self.joints)

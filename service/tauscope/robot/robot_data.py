@@ -1,0 +1,152 @@
+"""A robot without a file system: from uploaded bytes, to plain data for JSON and back, under one validation."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from tauscope.errors import RobotFileError
+from tauscope.robot.document import PlainRobotDocument
+from tauscope.robot.document_origin import DocumentOrigin
+from tauscope.robot.messages import nearest, one_line, shown
+from tauscope.robot.robot import Joint, LinkInertia, Model, Placement, Robot
+from tauscope.robot.robot_building import UrdfSource, build_robot
+from tauscope.robot.robot_file import parse_robot_file, refuse_unphysical
+from tauscope.robot.urdf_xml import LARGEST_URDF
+
+
+def robot_from_dict(
+    data: Mapping[str, Any], label: str = "robot", urdf_files: Mapping[str, bytes] | None = None
+) -> Robot:
+    """The robot of plain data: the robot file's form, or that of `robot_to_dict`.
+
+    No file is opened: a URDF that the data name is taken from `urdf_files`.
+
+    Parameters
+    ----------
+    data : mapping
+        the robot file's content; `kinematics` may hold ``segments`` instead, as `robot_to_dict` writes them
+    label : str
+        what messages call the data
+    urdf_files : mapping of str to bytes or None
+        content of URDF files by the name that the data give them
+
+    Raises
+    ------
+    RobotFileError
+        if the data are not valid; one line naming the JSON path and joint
+    UnphysicalModelError
+        if no rigid body can have the mass and inertia of a link of the model
+    """
+    origin = DocumentOrigin(label, data)
+    document = origin.validated(PlainRobotDocument)
+    return refuse_unphysical(build_robot(document, origin, _given(origin, urdf_files or {})))
+
+
+def robot_from_yaml(data: bytes, label: str = "robot", urdf_files: Mapping[str, bytes] | None = None) -> Robot:
+    """The robot of an uploaded robot file; as `robot_from_dict` this opens no file.
+
+    Parameters
+    ----------
+    data : bytes
+        content of the robot file
+    label : str
+        what messages call it
+    urdf_files : mapping of str to bytes or None
+        content of URDF files by the name that the robot file gives them
+
+    Raises
+    ------
+    RobotFileError
+        if the robot file or its URDF is not valid; one line naming line, place and joint
+    UnphysicalModelError
+        if no rigid body can have the mass and inertia of a link of the model
+    """
+    document, origin = parse_robot_file(data, label)
+    return refuse_unphysical(build_robot(document, origin, _given(origin, urdf_files or {})))
+
+
+def robot_to_dict(robot: Robot) -> dict[str, Any]:
+    """Everything that computing with the robot needs, as plain data without files beside it.
+
+    `robot_from_dict` gives the same robot back, but for the paths of its files, the URDF's link names and its findings.
+
+    Parameters
+    ----------
+    robot : Robot
+        the robot
+    """
+    segments = [
+        {"type": s.type.value, "before": _placement(s.before), "after": _placement(s.after)} for s in robot.segments
+    ]
+    data: dict[str, Any] = {
+        "name": robot.name,
+        "kinematics": {"segments": segments},
+        "gravity": robot.gravity.tolist(),
+        "joints": [_joint(joint) for joint in robot.joints],
+    }
+    model = _model(robot.model)
+    return {**data, "model": model} if model else data
+
+
+def _given(origin: DocumentOrigin, urdf_files: Mapping[str, bytes]) -> UrdfSource:
+    """Looks a URDF up among the given files."""
+
+    def look_up(file: str) -> tuple[bytes, str, Path | None]:
+        place = ("kinematics", "urdf", "file")
+        if file not in urdf_files:
+            hint = nearest(file, urdf_files) if urdf_files else "no URDF was given"
+            raise origin.error(place, f"the URDF {shown(file)} is not among the given files; {hint}")
+        data = urdf_files[file]
+        if not 0 < len(data) <= LARGEST_URDF:
+            limit = LARGEST_URDF // 1024
+            raise RobotFileError(one_line(f"{file}: a URDF holds 1 byte to {limit} KiB, this one {len(data)} bytes"))
+        return data, file, None
+
+    return look_up
+
+
+def _placement(placement: Placement) -> dict[str, Any]:
+    """A placement as lists."""
+    return {"rotation": placement.rotation.tolist(), "translation": placement.translation.tolist()}
+
+
+def _joint(joint: Joint) -> dict[str, Any]:
+    """A joint as a mapping, without what is not stated."""
+    limits = {
+        "position": None if joint.limits.position is None else list(joint.limits.position),
+        "velocity": joint.limits.velocity,
+        "acceleration": joint.limits.acceleration,
+        "torque": joint.limits.torque,
+    }
+    return _stated(
+        {
+            "name": joint.name,
+            "limits": _stated(limits) or None,
+            "gear_ratio": joint.gear_ratio,
+            "torque_constant": joint.torque_constant,
+            "sign": joint.sign,
+            "friction_shape": _stated({"k_v": joint.friction_shape.k_v, "delta": joint.friction_shape.delta}) or None,
+            "drive": None if joint.drive is None else dict(joint.drive),
+        }
+    )
+
+
+def _model(model: Model) -> dict[str, Any]:
+    """The model block as mappings."""
+    links = None if model.links is None else [_link(link) for link in model.links]
+    friction = None
+    if model.friction is not None:
+        friction = [{"stiction": f.stiction, "stribeck": f.stribeck, "viscous": f.viscous} for f in model.friction]
+    return _stated({"links": links, "friction": friction})
+
+
+def _link(link: LinkInertia) -> dict[str, Any]:
+    """A link's inertial parameters as a mapping."""
+    xx, yy, zz, xy, xz, yz = (float(value) for value in link.to_vector()[:6])
+    inertia = {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "xz": xz, "yz": yz}
+    return {"mass": float(link.mass), "first_moment": link.first_moment.tolist(), "inertia": inertia}
+
+
+def _stated(mapping: Mapping[str, Any]) -> dict[str, Any]:
+    """The entries that are not None."""
+    return {key: value for key, value in mapping.items() if value is not None}

@@ -1,0 +1,192 @@
+"""Elements of a URDF: their place for messages, and the numbers in their attributes."""
+
+import math
+import re
+from typing import Any
+
+import numpy as np
+from lxml import etree
+from numpy.typing import NDArray
+
+from tauscope.errors import RobotFileError
+from tauscope.robot.document_fields import LARGEST_NUMBER
+from tauscope.robot.finding import Finding, Severity
+from tauscope.robot.messages import one_line, shown
+from tauscope.robot.placement import rotation_of_roll_pitch_yaw
+from tauscope.robot.robot import Placement
+
+NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
+
+Element = Any
+"""lxml's `_Element`, which carries no types."""
+
+
+def where(label: str, element: Element) -> str:
+    """File, line and name of an element.
+
+    Parameters
+    ----------
+    label : str
+        the file
+    element : Element
+        the element
+    """
+    name = element.get("name")
+    kind = etree.QName(element).localname
+    return f"{label}:{element.sourceline}: {kind}" + (f" {shown(name)}" if name else "")
+
+
+def urdf_error(label: str, element: Element, text: str) -> RobotFileError:
+    """The error of an element.
+
+    Parameters
+    ----------
+    label : str
+        the file
+    element : Element
+        the element
+    text : str
+        what is wrong and what to do
+    """
+    return RobotFileError(one_line(f"{where(label, element)}: {text}"))
+
+
+def children(element: Element, kind: str) -> list[Element]:
+    """Child elements of one kind, whatever their namespace.
+
+    Parameters
+    ----------
+    element : Element
+        the parent
+    kind : str
+        local name of the children
+    """
+    return [child for child in element if isinstance(child.tag, str) and etree.QName(child).localname == kind]
+
+
+def only_child(label: str, element: Element, kind: str, findings: list[Finding]) -> Element | None:
+    """The child of one kind, or None; of several the first counts, as in ROS' own parser, and a finding says so.
+
+    Parameters
+    ----------
+    label : str
+        the file
+    element : Element
+        the parent
+    kind : str
+        local name of the child
+    findings : list of Finding
+        where the remark is added
+    """
+    found = children(element, kind)
+    if len(found) > 1:
+        text = f"holds {len(found)} <{kind}> elements; the first counts, as in ROS' own parser: remove the others"
+        findings.append(Finding(Severity.WARNING, one_line(where(label, element)), text))
+    return found[0] if found else None
+
+
+def number(label: str, element: Element, key: str, default: float | None = None) -> float:
+    """A finite number in an attribute.
+
+    Parameters
+    ----------
+    label : str
+        the file
+    element : Element
+        the element
+    key : str
+        name of the attribute
+    default : float or None
+        value where the attribute is absent; None where it must be there
+
+    Raises
+    ------
+    RobotFileError
+        if the attribute is missing or not a finite number
+    """
+    text = element.get(key)
+    if text is None:
+        if default is None:
+            raise urdf_error(label, element, f"the attribute {shown(key)} is missing; add it")
+        return default
+    return _real(label, element, key, text)
+
+
+def bounded_number(label: str, element: Element, key: str) -> float:
+    """A number in an attribute that must be there, of a size that SI quantities of an arm have.
+
+    Parameters
+    ----------
+    label : str
+        the file
+    element : Element
+        the element
+    key : str
+        name of the attribute
+
+    Raises
+    ------
+    RobotFileError
+        if the attribute is missing, not a number or beyond 1e9
+    """
+    return _bounded(label, element, key, number(label, element, key))
+
+
+def vector(label: str, element: Element | None, key: str, default: tuple[float, float, float]) -> NDArray[np.float64]:
+    """Three numbers in an attribute, shape (3,).
+
+    Parameters
+    ----------
+    label : str
+        the file
+    element : Element or None
+        the element; None where the whole element is absent
+    key : str
+        name of the attribute
+    default : tuple of three float
+        value where the attribute is absent
+
+    Raises
+    ------
+    RobotFileError
+        if the attribute does not hold three numbers
+    """
+    text = None if element is None else element.get(key)
+    if text is None:
+        return np.array(default)
+    words = text.split()
+    if len(words) != 3:
+        raise urdf_error(label, element, f"{key}={shown(text)} must hold three numbers, but holds {len(words)}")
+    return np.array([_bounded(label, element, key, _real(label, element, key, word)) for word in words])
+
+
+def origin(label: str, element: Element, findings: list[Finding]) -> Placement:
+    """The placement of an element's ``<origin>``, the identity where it has none.
+
+    Parameters
+    ----------
+    label : str
+        the file
+    element : Element
+        a joint or an inertial
+    findings : list of Finding
+        where remarks are added
+    """
+    node = only_child(label, element, "origin", findings)
+    roll, pitch, yaw = (float(angle) for angle in vector(label, node, "rpy", (0.0, 0.0, 0.0)))
+    return Placement(rotation_of_roll_pitch_yaw(roll, pitch, yaw), vector(label, node, "xyz", (0.0, 0.0, 0.0)))
+
+
+def _real(label: str, element: Element, key: str, text: str) -> float:
+    """A finite number; Python's own extras (1_0, other digits than 0-9) are refused."""
+    value = float(text.strip()) if NUMBER.fullmatch(text.strip()) else math.nan
+    if not math.isfinite(value):
+        raise urdf_error(label, element, f"{key}={shown(text)} is not a finite number; write it plainly, as 0.125")
+    return value
+
+
+def _bounded(label: str, element: Element, key: str, value: float) -> float:
+    """A number of a size that SI quantities of an arm have."""
+    if abs(value) > LARGEST_NUMBER:
+        raise urdf_error(label, element, f"{key}={value:g} is beyond {LARGEST_NUMBER:g}; check the unit (SI)")
+    return value

@@ -1,0 +1,202 @@
+"""YAML text to plain data, with the line of every entry; nothing that YAML can hide is accepted.
+
+Aliases are expanded up to a bound, duplicate keys, merge keys, tags and keys that are not text are refused.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+from ruamel.yaml import YAML
+from ruamel.yaml.composer import Composer
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
+
+from tauscope.errors import RobotFileError
+from tauscope.robot.messages import one_line, shown
+
+DEEPEST = 24
+MOST_ENTRIES = 20_000
+TAG = "tag:yaml.org,2002:"
+TRUE = frozenset({"true", "yes", "on", "y"})
+FALSE = frozenset({"false", "no", "off", "n"})
+
+Place = tuple[str | int, ...]
+"""Keys and indices that lead from the document's root to an entry."""
+
+
+@dataclass(frozen=True)
+class YamlContent:
+    """Plain data of a YAML document.
+
+    data : dict, list, str, int, float, bool or None
+        the document
+    lines : dict of tuple to int
+        for each entry's place the line, from 1, on which it stands
+    """
+
+    data: Any
+    lines: dict[Place, int]
+
+
+class _TooMuchError(Exception):
+    """The document is too large or too deep; `args` holds the reason and the line."""
+
+
+class _BoundedComposer(Composer):
+    """ruamel's composer, giving up at the bounds instead of after minutes."""
+
+    def __init__(self, loader: Any = None) -> None:
+        super().__init__(loader=loader)
+        self.warn_double_anchors = False
+        self.entries = 0
+        self.open_nodes = 0
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        """One node of the document, counted.
+
+        Parameters
+        ----------
+        parent : Node or None
+            the collection that holds the node
+        index : int, Node or None
+            where in the collection
+        """
+        line = self.parser.peek_event().start_mark.line + 1
+        self.entries += 1
+        if self.entries > MOST_ENTRIES:
+            raise _TooMuchError(f"more than {MOST_ENTRIES} entries", line)
+        if self.open_nodes >= DEEPEST:
+            raise _TooMuchError(f"nested deeper than {DEEPEST} levels", line)
+        self.open_nodes += 1
+        try:
+            return super().compose_node(parent, index)
+        finally:
+            self.open_nodes -= 1
+
+
+def read_yaml(text: str, label: str) -> YamlContent:
+    """Plain data of one YAML document.
+
+    Parameters
+    ----------
+    text : str
+        the document
+    label : str
+        name of the file, for messages
+
+    Raises
+    ------
+    RobotFileError
+        if the text is not one well-formed YAML document of plain data
+    """
+    root = _compose(text, label)
+    if root is None:
+        raise RobotFileError(one_line(f"{label}: the file holds no entries"))
+    builder = _PlainBuilder(label)
+    data = builder.value(root, (), root.start_mark.line + 1)
+    return YamlContent(data, builder.lines)
+
+
+def _compose(text: str, label: str) -> Any:
+    """The node graph of the text."""
+    yaml = YAML(typ="safe", pure=True)
+    yaml.Composer = _BoundedComposer
+    try:
+        return yaml.compose(text)
+    except _TooMuchError as error:
+        reason, line = error.args
+        raise RobotFileError(one_line(f"{label}:{line}: {reason}; this is no robot file")) from None
+    except MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        where = f"{label}:{mark.line + 1}" if mark is not None else label
+        reason = error.problem or error.context or "malformed"
+        raise RobotFileError(one_line(f"{where}: not valid YAML: {reason}")) from None
+    except (YAMLError, RecursionError) as error:
+        raise RobotFileError(one_line(f"{label}: not valid YAML: {error}")) from None
+    except Exception as error:
+        # ruamel lets builtins escape on malformed text: OverflowError for "\UFFFFFFFF", AttributeError, AssertionError.
+        raise RobotFileError(one_line(f"{label}: not valid YAML: {error or type(error).__name__}")) from error
+
+
+class _PlainBuilder:
+    """Nodes to plain data; aliases count each time that they are used."""
+
+    def __init__(self, label: str) -> None:
+        self.label = label
+        self.lines: dict[Place, int] = {}
+        self.entries = 0
+
+    def value(self, node: Any, place: Place, line: int) -> Any:
+        """Plain data of a node.
+
+        Parameters
+        ----------
+        node : Node
+            the node
+        place : tuple
+            where it stands
+        line : int
+            the line to name, that of its key where it has one
+        """
+        self.entries += 1
+        if self.entries > MOST_ENTRIES or len(place) > DEEPEST:
+            raise self._error(line, "aliases (*name) expand without end; write the entries out")
+        self.lines[place] = line
+        if isinstance(node, MappingNode) and node.tag == TAG + "map":
+            return self._mapping(node, place)
+        if isinstance(node, SequenceNode) and node.tag == TAG + "seq":
+            return [self.value(item, (*place, i), item.start_mark.line + 1) for i, item in enumerate(node.value)]
+        if isinstance(node, ScalarNode):
+            return self._scalar(node, line)
+        raise self._error(line, f"the tag {shown(str(node.tag))} is not accepted; write plain data")
+
+    def _mapping(self, node: MappingNode, place: Place) -> dict[str, Any]:
+        """Plain dict of a mapping node; a key may stand once."""
+        result: dict[str, Any] = {}
+        for key_node, value_node in node.value:
+            line = key_node.start_mark.line + 1
+            if key_node.tag == TAG + "merge":
+                raise self._error(line, "merge keys (<<) are not accepted; write the entries out")
+            key = self._scalar(key_node, line) if isinstance(key_node, ScalarNode) else None
+            if not isinstance(key, str):
+                raise self._error(line, "a key must be text; put it in quotes")
+            if key in result:
+                first = self.lines[(*place, key)]
+                raise self._error(line, f"the key {shown(key)} stands twice, first on line {first}; remove one")
+            result[key] = self.value(value_node, (*place, key), line)
+        return result
+
+    def _scalar(self, node: ScalarNode, line: int) -> Any:
+        """Plain data of a scalar node, by the tag that YAML resolved."""
+        kind, text = str(node.tag).removeprefix(TAG), str(node.value)
+        if kind in {"str", "timestamp", "value"}:
+            return text
+        if kind == "null":
+            return None
+        if kind == "bool" and text.lower() in TRUE | FALSE:
+            return text.lower() in TRUE
+        try:
+            if kind == "int":
+                return _integer(text)
+            if kind == "float":
+                return _real(text)
+        except ValueError:
+            raise self._error(line, f"{shown(text)} cannot be read as a number; write it plainly, as 12.5") from None
+        raise self._error(line, f"the tag {shown(str(node.tag))} is not accepted; write plain data")
+
+    def _error(self, line: int, text: str) -> RobotFileError:
+        """The error that names the line."""
+        return RobotFileError(one_line(f"{self.label}:{line}: {text}"))
+
+
+def _integer(text: str) -> int:
+    """The int of a YAML scalar; forms that YAML 1.1 and 1.2 read differently (010, 1:30) are refused."""
+    return int(text.replace("_", ""), 0)
+
+
+def _real(text: str) -> float:
+    """The float of a YAML scalar, `.inf` and `.nan` included: which field may not be so is for the field to say."""
+    plain = text.replace("_", "").lower()
+    if plain.lstrip("+-") in {".inf", ".nan"}:
+        return float(plain.replace(".", ""))
+    return float(plain)

@@ -1,0 +1,119 @@
+"""The process that moves an arm, and does nothing else: ``python -m tauscope.runtime.control FOLDER``.
+
+It reads ``order.json``, hears its owner on standard input (`tauscope.runtime.stop_listener`), tells events as JSON
+lines on standard output, and keeps ``run.json``. Anything that a library prints goes to standard error.
+"""
+
+import json
+import os
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from tauscope.errors import AcquisitionError, TauscopeError
+from tauscope.robot import read_robot
+from tauscope.runtime.backends import BACKENDS, BackendFactory, make_backend
+from tauscope.runtime.in_process import open_recorder
+from tauscope.runtime.order import RunOrder, read_order
+from tauscope.runtime.progress import end_event
+from tauscope.runtime.record import STOP_FILE, ProcessName, RunProblem, RunRecord, read_record
+from tauscope.runtime.record_keeper import RecordKeeper
+from tauscope.runtime.run import Run
+from tauscope.runtime.run_lock import RunLock
+from tauscope.runtime.states import RunState
+from tauscope.runtime.stop_listener import StopListener
+from tauscope.runtime.task import OpenRecorder, RunTask, Surroundings
+from tauscope.trajectory import read_trajectory
+
+_LARGEST_EVENT = 4096
+
+
+def control(
+    folder: Path,
+    *,
+    backends: Mapping[str, BackendFactory] = BACKENDS,
+    recorder: OpenRecorder = open_recorder,
+) -> int:
+    """Carry a run out, in the main thread of a process of its own.
+
+    Parameters
+    ----------
+    folder : Path
+        holds ``order.json`` and ``run.json``
+    backends : mapping of str to callable
+        the backends that there are
+    recorder : callable
+        opens the journal
+
+    Returns
+    -------
+    int
+        exit status: 0 where the run's end is told in ``run.json``
+    """
+    report = _event_pipe()
+    try:
+        lock = RunLock(folder)
+        order, record = read_order(folder), read_record(folder)
+        if record.state is not RunState.CREATED:
+            raise AcquisitionError(f"{folder}: the run is {record.state} already; a run is carried out once")
+    except TauscopeError as error:
+        sys.stderr.write(f"{error}\n")
+        return 1
+    stops = StopListener(sys.stdin.fileno(), folder / STOP_FILE, order.options.heartbeat_s)
+    keeper = RecordKeeper(folder)
+    record = record.model_copy(update={"control": ProcessName.of(os.getpid())})
+    keeper.keep(record)
+    try:
+        task = _task(order, folder, backends)
+        run = Run(task, record, Surroundings(folder, stops, keeper, recorder, report))
+    except TauscopeError as error:
+        stops.done()
+        record = _refused(record, error)
+        keeper.keep(record)
+        report(end_event(record))
+    else:
+        run.execute()
+    unkept = keeper.close()
+    if unkept is not None:
+        sys.stderr.write(f"{unkept}\n")
+    lock.release()
+    return 0 if unkept is None else 1
+
+
+def _task(order: RunOrder, folder: Path, backends: Mapping[str, BackendFactory]) -> RunTask:
+    """Read what the order names."""
+    robot = read_robot(order.robot)
+    trajectory = read_trajectory(order.trajectory, robot)
+    name, settings = order.backend.name, order.backend.settings
+    return RunTask(
+        robot, trajectory, order.options, lambda: make_backend(name, robot, settings, folder=folder, backends=backends)
+    )
+
+
+def _refused(record: RunRecord, error: TauscopeError) -> RunRecord:
+    """The record of a run that could not begin."""
+    problem = RunProblem(code=error.code, detail=str(error))
+    return record.moved(RunState.STOPPING, problem=problem).moved(RunState.FAILED)
+
+
+def _event_pipe() -> Callable[[Mapping[str, Any]], None]:
+    """Take standard output for events alone; an owner that does not read them misses them, and holds up nobody."""
+    pipe = os.dup(sys.stdout.fileno())
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    os.set_blocking(pipe, False)
+
+    def report(event: Mapping[str, Any]) -> None:
+        line = json.dumps(event).encode() + b"\n"
+        if len(line) > _LARGEST_EVENT:  # only so much is written as a whole or not at all
+            return
+        try:
+            os.write(pipe, line)
+        except (BlockingIOError, BrokenPipeError):
+            return
+
+    return report
+
+
+if __name__ == "__main__":
+    sys.exit(control(Path(sys.argv[1])))

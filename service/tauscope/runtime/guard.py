@@ -1,0 +1,235 @@
+"""The guard between the loop and the backend: nothing is sent to the arm that it has not passed."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.runtime.guard_limits import SPEED_MARGIN, GuardLimits
+from tauscope.runtime.violation import Rule, Violation
+from tauscope_drivers import ArmState, Setpoint
+
+Array = NDArray[np.float64]
+
+PERSISTENCE = 3
+"""Cycles in a row after which a measured speed counts: one noisy reading is no runaway."""
+
+_ROUNDING = 1e-9
+_NANOSECOND = 1e-9
+_COMMAND_RULES = (Rule.POSITION, Rule.POSITION, Rule.VELOCITY, Rule.TORQUE)
+_STATE_RULES = (Rule.POSITION, Rule.POSITION, Rule.FOLLOWING, Rule.TEMPERATURE)
+_SPEED_RULES = (Rule.VELOCITY, Rule.BRAKING, Rule.BRAKING)
+
+
+class Guard:
+    """Holds every command, and the state that it answers to, against the limits; objects for good once it objects.
+
+    It keeps the command before and counts, and reads no clock and no device: the same calls give the same verdicts.
+    """
+
+    def __init__(
+        self,
+        limits: GuardLimits,
+        *,
+        period_s: float,
+        watchdog_s: float,
+        enabled_ns: int,
+        stale_misses: int = 3,
+        stale_s: float = 0.05,
+    ) -> None:
+        """Prepare for the first command.
+
+        Parameters
+        ----------
+        limits : GuardLimits
+            what the arm is held to
+        period_s : float
+            nominal time between commands [s]
+        watchdog_s : float
+            time without a command after which the device stops by itself [s]
+        enabled_ns : int
+            when the arm was enabled, which started that time [ns]
+        stale_misses : int
+            readings in a row that a joint may not fail to answer
+        stale_s : float
+            time after which a joint that does not answer counts as lost, if that is sooner [s]
+        """
+        self.stale = np.zeros(len(limits.joints), dtype=np.int64)
+        self._limits = limits
+        self._period_s, self._watchdog_s = period_s, watchdog_s
+        self._stale_misses, self._stale_s = stale_misses, stale_s
+        self._now = self._due = enabled_ns
+        self._state_ns: int | None = None
+        self._previous: Array | None = None
+        n = len(limits.joints)
+        self._misses = np.zeros(n, dtype=np.int64)
+        self._answered = np.full(n, enabled_ns, dtype=np.int64)
+        self._fast = np.zeros((len(_SPEED_RULES), n), dtype=np.int64)
+        self._violation: Violation | None = None
+
+    def check(self, state: ArmState, setpoint: Setpoint, now_ns: int, due_ns: int) -> Violation | None:
+        """Judge a command before it is sent.
+
+        Parameters
+        ----------
+        state : ArmState
+            the arm as it was last read
+        setpoint : Setpoint
+            the command
+        now_ns : int
+            the present instant by the backend's clock [ns]
+        due_ns : int
+            when the command was to be sent; commands' speeds are judged by these instants, not by jitter [ns]
+
+        Returns
+        -------
+        Violation or None
+            None where the command may be sent
+        """
+        if self._violation is None:
+            with np.errstate(all="ignore"):  # absurd commands overflow, and are refused
+                self._violation = (
+                    self._check_time(state, now_ns, due_ns)
+                    or self._check_drives(state)
+                    or self._check_answers(state)
+                    or self._check_command(state, setpoint, due_ns)
+                    or self._check_state(state, setpoint)
+                )
+        if self._violation is None:
+            self._now, self._due, self._previous = now_ns, due_ns, setpoint.position
+            if state.fresh.any():
+                self._state_ns = state.time_ns
+        return self._violation
+
+    def _check_time(self, state: ArmState, now_ns: int, due_ns: int) -> Violation | None:
+        since, overdue = (now_ns - self._now) * _NANOSECOND, (now_ns - due_ns) * _NANOSECOND
+        if since < 0 or due_ns < self._due or (self._previous is not None and due_ns == self._due) or overdue < 0:
+            return _whole_arm(Rule.TIME, since, 0.0, "time stood still or ran backwards; check the backend's clock")
+        # A cycle without any answer has the host's time, which may be ahead of the device's.
+        if self._state_ns is not None and state.time_ns < self._state_ns and state.fresh.any():
+            age = (state.time_ns - self._state_ns) * _NANOSECOND
+            return _whole_arm(Rule.TIME, age, 0.0, "the arm's reading is older than the one before; check its clock")
+        late = max(since, overdue)
+        if late > self._watchdog_s:
+            advice = "use a quieter machine, a lower rate or a longer watchdog"
+            detail = (
+                f"the control loop is {late:.3g} s late, the device's watchdog allows {self._watchdog_s:g} s; {advice}"
+            )
+            return _whole_arm(Rule.LATE, late, self._watchdog_s, detail)
+        return None
+
+    def _check_drives(self, state: ArmState) -> Violation | None:
+        if state.faults:
+            fault = state.faults[0]
+            joint = None if fault.joint is None else self._limits.joints[fault.joint - 1]
+            more = f" (the first of {len(state.faults)} faults)" if len(state.faults) > 1 else ""
+            return Violation(Rule.FAULT, joint, None, None, f"{fault}{more}")
+        if not state.enabled.all():
+            joint = self._limits.joints[int(np.argmin(state.enabled))]
+            return Violation(
+                Rule.NOT_ENABLED, joint, None, None, f"{joint}: its drive is no longer enabled; look at the drive"
+            )
+        return None
+
+    def _check_answers(self, state: ArmState) -> Violation | None:
+        """A reading of the same instant as the one before is none."""
+        fresh = state.fresh & (state.time_ns != self._state_ns)
+        if fresh.all():
+            self._misses[:] = 0
+            self._answered[:] = state.time_ns
+            return None
+        self._answered[fresh] = state.time_ns
+        self._misses = np.where(fresh, 0, self._misses + 1)
+        self.stale += ~fresh
+        age = (state.time_ns - self._answered) * _NANOSECOND
+        # Where the arm stands has to be known before the first command.
+        most = self._stale_misses if self._previous is not None else 1
+        lost = (self._misses >= most) | (age > self._stale_s)
+        if not lost.any():
+            return None
+        j = int(np.argmax(lost))
+        name, misses = self._limits.joints[j], int(self._misses[j])
+        detail = f"{name}: no reading in {misses} cycles, for {age[j]:.3g} s; check its cable and its drive"
+        return Violation(Rule.STALE, name, float(misses), float(most), detail)
+
+    def _check_command(self, state: ArmState, setpoint: Setpoint, due_ns: int) -> Violation | None:
+        """Every comparison is written so that NaN fails it; the first command starts from where the arm stands."""
+        limits, target = self._limits, setpoint.position
+        elapsed = max((due_ns - self._due) * _NANOSECOND, self._period_s)
+        allowed = limits.velocity * elapsed
+        if self._previous is None:
+            step, allowed = np.abs(target - state.position), allowed + limits.position_margin
+        else:
+            step = np.abs(target - self._previous)
+        excess = np.stack(
+            [
+                limits.position_low - target,
+                target - limits.position_high,
+                step - allowed,
+                np.abs(setpoint.torque) - limits.torque,
+            ]
+        )
+        if (excess <= _ROUNDING).all():
+            return None
+        finite = np.isfinite(target) & np.isfinite(setpoint.torque)
+        if not finite.all():
+            j = int(np.argmin(finite))
+            name = limits.joints[j]
+            detail = f"{name}: the command is not a number; this is a fault of the controller, report it"
+            return Violation(Rule.NOT_FINITE, name, None, None, detail)
+        row, j = (int(index) for index in np.argwhere(~(excess <= _ROUNDING))[0])
+        found = (target, target, step / elapsed, np.abs(setpoint.torque))[row][j]
+        bound = (limits.position_low, limits.position_high, limits.velocity, limits.torque)[row][j]
+        return self._objection(_COMMAND_RULES[row], j, float(found), float(bound), "the command")
+
+    def _check_state(self, state: ArmState, setpoint: Setpoint) -> Violation | None:
+        """NaN is a sample that was missed, and passes: `_check_answers` counts those."""
+        limits, position = self._limits, state.position
+        error = np.abs(setpoint.position - position)
+        low, high = limits.position_low - limits.position_margin, limits.position_high + limits.position_margin
+        excess = np.stack(
+            [low - position, position - high, error - limits.following, state.temperature - limits.temperature_c]
+        )
+        if (excess > 0.0).any():
+            row, j = (int(index) for index in np.argwhere(excess > 0.0)[0])
+            found = (position, position, error, state.temperature)[row][j]
+            hottest = np.full_like(low, limits.temperature_c)
+            bound = (low, high, limits.following, hottest)[row][j]
+            return self._objection(_STATE_RULES[row], j, float(found), float(bound), "the arm")
+        return self._check_speed(state.position, state.velocity)
+
+    def _check_speed(self, position: Array, velocity: Array) -> Violation | None:
+        limits = self._limits
+        way = velocity * np.abs(velocity) / (2.0 * limits.acceleration)
+        speed_limit, rest = SPEED_MARGIN * limits.velocity, position + way
+        low, high = limits.position_low - limits.position_margin, limits.position_high + limits.position_margin
+        excess = np.stack([np.abs(velocity) - speed_limit, low - rest, rest - high])
+        over = excess > 0.0
+        if not over.any():
+            self._fast[:] = 0
+            return None
+        self._fast = np.where(over, self._fast + 1, 0)
+        if (self._fast < PERSISTENCE).all():
+            return None
+        row, j = (int(index) for index in np.argwhere(self._fast >= PERSISTENCE)[0])
+        found, bound = (np.abs(velocity), rest, rest)[row][j], (speed_limit, low, high)[row][j]
+        return self._objection(_SPEED_RULES[row], j, float(found), float(bound), "the arm")
+
+    def _objection(self, rule: Rule, joint: int, value: float, limit: float, who: str) -> Violation:
+        name, unit = self._limits.joints[joint], self._limits.units[joint]
+        force = "Nm" if unit == "rad" else "N"
+        what, advice = {
+            Rule.POSITION: (f"{who} is at {value:.4g} {unit}", "keep the motion within the robot file's limits"),
+            Rule.VELOCITY: (f"{who} moves at {value:.4g} {unit}/s", "slow the motion down"),
+            Rule.TORQUE: (f"{who} is {value:.4g} {force}", "slow the motion down or check the model"),
+            Rule.FOLLOWING: (
+                f"{who} is {value:.4g} {unit} away from where it was sent",
+                "look for an obstacle, a torque limit or a loose drive",
+            ),
+            Rule.BRAKING: (f"{who} would come to rest only at {value:.4g} {unit}", "keep away from the limit"),
+            Rule.TEMPERATURE: (f"its motor has {value:.4g} °C", "let it cool down"),
+        }[rule]
+        bound = {Rule.TORQUE: force, Rule.VELOCITY: f"{unit}/s", Rule.TEMPERATURE: "°C"}.get(rule, unit)
+        return Violation(rule, name, value, limit, f"{name}: {what}, the limit is {limit:.4g} {bound}; {advice}")
+
+
+def _whole_arm(rule: Rule, value: float, limit: float, detail: str) -> Violation:
+    return Violation(rule, None, value, limit, detail)

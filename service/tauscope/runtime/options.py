@@ -1,0 +1,124 @@
+"""How a run is to be made, as a caller states it; everything has a default."""
+
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+from pydantic import Field, FiniteFloat
+
+from tauscope.errors import AcquisitionError
+from tauscope.robot import Joint
+from tauscope.runtime.stored import StoredModel
+from tauscope_drivers import Capabilities, ControlMode, StopPolicy
+
+DEFAULT_RATE_HZ = 500.0
+"""Cycles a second where nothing is stated and the bus allows as many."""
+
+Positive = Annotated[FiniteFloat, Field(gt=0.0)]
+
+
+class RunOptions(StoredModel, strict=False):
+    """How a run is to be made."""
+
+    mode: ControlMode = Field(default=ControlMode.POSITION, description="who closes the loop: the drives, or the host")
+    rate_hz: Positive | None = Field(
+        default=None, le=10_000, description="cycles a second; null for 500, or what the bus allows where that is less"
+    )
+    stop_policy: StopPolicy | None = Field(
+        default=None, description="hold, damp or torque_off; null for what the robot file's drives say, else hold"
+    )
+    watchdog_s: Positive = Field(
+        default=0.1, le=10, description="time without a cycle after which the device stops itself"
+    )
+    heartbeat_s: Positive = Field(
+        default=1.0, le=60, description="silence of its owner after which a run is interrupted"
+    )
+    following_error: Positive | None = Field(
+        default=None, description="allowed distance of arm and target, rad or m; null for 0.2 rad or 0.05 m"
+    )
+    stale_misses: int = Field(
+        default=3, ge=1, le=1000, description="readings in a row that a joint may not fail to answer"
+    )
+    stale_s: Positive = Field(default=0.05, description="time after which a joint that does not answer counts as lost")
+    temperature_c: Positive = Field(default=80.0, description="hottest motor that is allowed")
+    feed_forward: bool = Field(
+        default=True, description="whether the drives get the torque that the robot's model predicts"
+    )
+    bandwidth_rad_s: Positive = Field(default=25.0, description="of the host's loop in torque mode")
+    settle_s: Annotated[FiniteFloat, Field(ge=0.0, le=60)] = Field(
+        default=0.25, description="pause between the ramp and the motion"
+    )
+    acknowledge_faults: bool = Field(
+        default=False,
+        description="whether faults that the drives have latched are cleared first, on the operator's word",
+    )
+
+
+def cycle_rate_hz(options: RunOptions, capabilities: Capabilities) -> float:
+    """Cycles a second of a run.
+
+    Parameters
+    ----------
+    options : RunOptions
+        what was asked for
+    capabilities : Capabilities
+        what the backend can do
+
+    Raises
+    ------
+    AcquisitionError
+        more is asked for than the bus allows
+    """
+    largest = capabilities.largest_rate_hz
+    if options.rate_hz is None:
+        return min(DEFAULT_RATE_HZ, largest)
+    if options.rate_hz > largest:
+        limit = f" ({capabilities.rate_limited_by})" if capabilities.rate_limited_by else ""
+        raise AcquisitionError(
+            f"{options.rate_hz:g} cycles a second are more than this arm's bus allows{limit}; ask for at most "
+            f"{largest:.4g}"
+        )
+    return options.rate_hz
+
+
+def chosen_stop_policy(
+    options: RunOptions, joints: Sequence[Joint], capabilities: Capabilities | None = None
+) -> StopPolicy:
+    """How the arm is stopped: as the run says, else as the robot file's drives say, else under power where it is.
+
+    Parameters
+    ----------
+    options : RunOptions
+        what was asked for
+    joints : sequence of Joint
+        the robot's, with ``stop_policy`` under ``drive`` where it is stated
+    capabilities : Capabilities or None
+        what the device can do by itself; None where it is not known yet
+
+    Raises
+    ------
+    AcquisitionError
+        the robot file states no policy, or several; or the device cannot do it by itself
+    """
+    policy = options.stop_policy or _stated_policy(joints)
+    if capabilities is not None and policy not in (able := capabilities.policies_in(options.mode)):
+        raise AcquisitionError(
+            f"stop policy {policy}: this arm's drives cannot do that by themselves in mode {options.mode}; "
+            f"choose {', '.join(sorted(able))}"
+        )
+    return policy
+
+
+def _stated_policy(joints: Sequence[Joint]) -> StopPolicy:
+    stated: dict[StopPolicy, str] = {}
+    for joint in joints:
+        value: Any = (joint.drive or {}).get("stop_policy")
+        if value is None:
+            continue
+        if value not in list(StopPolicy):
+            known = ", ".join(StopPolicy)
+            raise AcquisitionError(f"{joint.name}: drive.stop_policy is {str(value)[:60]!r}; choose one of {known}")
+        stated.setdefault(StopPolicy(value), joint.name)
+    if len(stated) > 1:
+        words = " and ".join(f"{policy} ({name})" for policy, name in stated.items())
+        raise AcquisitionError(f"the robot file's drives ask for different stop policies, {words}; let them agree")
+    return next(iter(stated), StopPolicy.HOLD)

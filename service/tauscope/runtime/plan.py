@@ -1,0 +1,188 @@
+"""What a run will play, worked out before the arm is under power: every target of every cycle, and the limits."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.errors import AcquisitionError
+from tauscope.recording.journal_rows import Phase
+from tauscope.robot import Robot
+from tauscope.runtime.feed_forward import predicted_torque
+from tauscope.runtime.guard_limits import GuardLimits, guard_limits
+from tauscope.runtime.options import RunOptions, cycle_rate_hz
+from tauscope.trajectory.limits import motion_limits
+from tauscope.trajectory.segments import MoveSegment
+from tauscope.trajectory.trajectory import Trajectory, ramp
+from tauscope_drivers import Capabilities, ControlMode
+
+Array = NDArray[np.float64]
+
+MOST_CYCLES = 4_000_000
+"""A longer run must be a mistake: it is more than two hours at 500 cycles a second."""
+
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Targets of every cycle, from where the arm stands to the end of the motion.
+
+    rate_hz : float
+        cycles a second [Hz]
+    period_ns : int
+        time between cycles [ns]
+    position, velocity : (N, n) float64
+        targets [rad or m, and per s]
+    torque : (N, n) float64
+        what the model predicts, within the torque limits; zero where there is no model [Nm or N]
+    period : (N,) float64
+        index of the excitation period, NaN outside the repeated part
+    phase : (N,) int64
+        ramp or motion, as in `tauscope.recording.journal_rows.Phase`
+    limits : GuardLimits
+        what the guard holds the run to
+    """
+
+    rate_hz: float
+    period_ns: int
+    position: Array
+    velocity: Array
+    torque: Array
+    period: Array
+    phase: NDArray[np.int64]
+    limits: GuardLimits
+
+    @property
+    def cycles(self) -> int:
+        """Number of cycles N."""
+        return len(self.position)
+
+    @property
+    def ramp_cycles(self) -> int:
+        """Number of cycles before the motion."""
+        return int(np.count_nonzero(self.phase == Phase.RAMP))
+
+    @property
+    def ramp_s(self) -> float:
+        """Time until the motion begins [s]."""
+        return self.ramp_cycles / self.rate_hz
+
+    @property
+    def motion_s(self) -> float:
+        """How long the motion lasts [s]."""
+        return (self.cycles - self.ramp_cycles) / self.rate_hz
+
+
+def make_plan(
+    robot: Robot, trajectory: Trajectory, start: Array, options: RunOptions, capabilities: Capabilities
+) -> Plan:
+    """Plan a run: a minimum-jerk ramp from where the arm stands, a pause, and the motion, all within the limits.
+
+    Parameters
+    ----------
+    robot : Robot
+        the arm
+    trajectory : Trajectory
+        the motion
+    start : (n,) float64
+        where the arm stands [rad or m]
+    options : RunOptions
+        how the run is to be made
+    capabilities : Capabilities
+        what the backend can do
+
+    Returns
+    -------
+    Plan
+        every target of which the guard will accept, if the arm follows
+
+    Raises
+    ------
+    AcquisitionError
+        the motion does not fit the arm or its limits, or the arm stands outside them
+    """
+    _require_fitting(robot, trajectory, start, capabilities)
+    rate_hz = cycle_rate_hz(options, capabilities)
+    if trajectory.duration_s * rate_hz > MOST_CYCLES:
+        raise AcquisitionError(
+            f"the motion lasts {trajectory.duration_s:.4g} s; at {rate_hz:g} cycles a second at most "
+            f"{MOST_CYCLES / rate_hz:.4g} s can be run"
+        )
+    motion = trajectory.samples(rate_hz)
+    speed = np.abs(np.diff(motion.position, axis=0)).max(axis=0, initial=0.0) * rate_hz
+    low, high = motion.position.min(axis=0), motion.position.max(axis=0)
+    limits = guard_limits(
+        robot, low, high, speed, following=options.following_error, temperature_c=options.temperature_c
+    )
+    _require_within(limits, robot, start, low, high, speed)
+    way = _ramp(robot, np.clip(start, limits.position_low, limits.position_high), trajectory, rate_hz)
+    ramp_cycles = round(way.duration_s * rate_hz)
+    moved = way.evaluate(np.arange(ramp_cycles) / rate_hz)
+    pause = round(options.settle_s * rate_hz)
+    rest = np.zeros((pause, robot.joint_count))
+    position = np.concatenate([moved.position, np.broadcast_to(way.end, rest.shape), motion.position])
+    velocity = np.concatenate([moved.velocity, rest, motion.velocity])
+    acceleration = np.concatenate([moved.acceleration, rest, motion.acceleration])
+    before = ramp_cycles + pause
+    return Plan(
+        rate_hz=rate_hz,
+        period_ns=round(1e9 / rate_hz),
+        position=position,
+        velocity=velocity,
+        torque=_feed_forward(robot, limits, options, capabilities, (position, velocity, acceleration)),
+        period=np.concatenate([np.full(before, np.nan), motion.period]),
+        phase=np.repeat([Phase.RAMP, Phase.MOTION], [before, len(motion.time)]).astype(np.int64),
+        limits=limits,
+    )
+
+
+def _require_fitting(robot: Robot, trajectory: Trajectory, start: Array, capabilities: Capabilities) -> None:
+    """Refuse a motion or an arm of another number of joints, and an arm that does not say where it stands."""
+    n = robot.joint_count
+    for count, what in (
+        (trajectory.joint_count, "the trajectory moves"),
+        (capabilities.joint_count, "the backend has"),
+    ):
+        if count != n:
+            raise AcquisitionError(f"{robot.name} has {n} joints, {what} {count}; give what belongs to this arm")
+    silent = [joint.name for joint, position in zip(robot.joints, start, strict=True) if not np.isfinite(position)]
+    if silent:
+        raise AcquisitionError(f"{silent[0]}: does not say where it stands; check its cable and its drive")
+
+
+def _ramp(robot: Robot, start: Array, trajectory: Trajectory, rate_hz: float) -> MoveSegment:
+    """The way to the motion's start, a whole number of cycles long."""
+    way = ramp(start, trajectory.start, motion_limits(robot))
+    return MoveSegment(way.start, way.end, float(np.ceil(way.duration_s * rate_hz)) / rate_hz)
+
+
+def _require_within(limits: GuardLimits, robot: Robot, start: Array, low: Array, high: Array, speed: Array) -> None:
+    """Refuse before it moves what the guard would stop while it moves."""
+    for j, joint in enumerate(robot.joints):
+        bounds, unit = (limits.position_low[j], limits.position_high[j]), limits.units[j]
+        words = f"{joint.name}: its limits are {bounds[0]:.4g} to {bounds[1]:.4g} {unit}"
+        outside = max(bounds[0] - start[j], start[j] - bounds[1])
+        if outside > limits.position_margin[j]:
+            raise AcquisitionError(f"{words}, and the arm stands at {start[j]:.4g} {unit}; move it inside by hand")
+        reach = low[j] if low[j] < bounds[0] - _ROUNDING else high[j]
+        if not bounds[0] - _ROUNDING <= reach <= bounds[1] + _ROUNDING:
+            raise AcquisitionError(f"{words}, and the motion goes to {reach:.4g} {unit}; design it within the limits")
+        if speed[j] > limits.velocity[j] * (1.0 + _ROUNDING):
+            raise AcquisitionError(
+                f"{joint.name}: the motion moves at {speed[j]:.4g} {unit}/s, its limit is {limits.velocity[j]:.4g} "
+                f"{unit}/s; design it within the limits"
+            )
+
+
+def _feed_forward(
+    robot: Robot,
+    limits: GuardLimits,
+    options: RunOptions,
+    capabilities: Capabilities,
+    motion: tuple[Array, Array, Array],
+) -> Array:
+    """What the model predicts, cut to the torque limits: a model may be wrong, the arm must not pay for it."""
+    wanted = options.mode is ControlMode.TORQUE or (options.feed_forward and capabilities.takes_feed_forward)
+    torque = predicted_torque(robot, *motion) if wanted else None
+    return np.zeros_like(motion[0]) if torque is None else np.clip(torque, -limits.torque, limits.torque)

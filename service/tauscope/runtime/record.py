@@ -1,0 +1,235 @@
+"""What is known of a run: its state, how it came to it, and what it left behind. Kept as ``run.json``."""
+
+import os
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Literal
+
+from pydantic import AwareDatetime, Field, ValidationError
+
+from tauscope.errors import AcquisitionError
+from tauscope.files import write_atomically
+from tauscope.runtime.real_time import RealTime
+from tauscope.runtime.spawning import process_start
+from tauscope.runtime.states import RunState, may_follow
+from tauscope.runtime.stored import StoredModel
+from tauscope.runtime.timing import Timing
+from tauscope.runtime.violation import Violation
+
+RUN_FILE = "run.json"
+ORDER_FILE = "order.json"
+JOURNAL_FILE = "journal.mcap"
+STOP_FILE = "stop"
+LOG_FILE = "control.log"
+PROCESS_FILE = ".control"
+RECORDING_STEM = "recording"
+
+
+class ProcessName(StoredModel):
+    """One process of this machine, told from a later one of the same number."""
+
+    pid: int = Field(description="number of the process")
+    start: int | None = Field(description="when it was started, in the kernel's ticks")
+
+    @staticmethod
+    def of(pid: int) -> "ProcessName":
+        """The name of a living process.
+
+        Parameters
+        ----------
+        pid : int
+            its number
+        """
+        return ProcessName(pid=pid, start=process_start(pid))
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether it still runs, or is stopped and might."""
+        start = process_start(self.pid)
+        return start is not None and self.start in (None, start)
+
+
+def write_process(folder: Path, pid: int) -> None:
+    """Keep which process was started for a run, as soon as it was: it may never come to say so itself.
+
+    Parameters
+    ----------
+    folder : Path
+        the run's
+    pid : int
+        number of the control process
+
+    Raises
+    ------
+    OSError
+        the disk does not take it
+    """
+    write_atomically(folder / PROCESS_FILE, ProcessName.of(pid).model_dump_json().encode())
+
+
+def read_process(folder: Path) -> ProcessName | None:
+    """The process that was started for a run; None where none was, or nobody knows.
+
+    Parameters
+    ----------
+    folder : Path
+        the run's
+    """
+    try:
+        return ProcessName.model_validate_json((folder / PROCESS_FILE).read_bytes())
+    except (OSError, ValidationError):
+        return None
+
+
+class Transition(StoredModel):
+    """When a run came into a state."""
+
+    state: RunState = Field(description="the state")
+    at: AwareDatetime = Field(description="the moment")
+
+
+class RunProblem(StoredModel):
+    """Why a run did not finish."""
+
+    code: str = Field(description="code of the error, as in tauscope.errors, or of the way the run ended")
+    detail: str = Field(description="one line: what is wrong, where, and what to do")
+    rule: str | None = Field(default=None, description="the guard's rule, where the guard objected")
+    joint: str | None = Field(default=None, description="the joint that it objected to")
+    value: float | None = Field(default=None, description="what it found")
+    limit: float | None = Field(default=None, description="what it would have allowed")
+
+    @staticmethod
+    def of(violation: Violation) -> "RunProblem":
+        """The problem that a violation is.
+
+        Parameters
+        ----------
+        violation : Violation
+            the guard's objection
+        """
+        return RunProblem(
+            code=AcquisitionError.code,
+            detail=str(violation),
+            rule=violation.rule.value,
+            joint=violation.joint,
+            value=violation.value,
+            limit=violation.limit,
+        )
+
+
+class RecordingFiles(StoredModel):
+    """What a run left behind."""
+
+    samples: int = Field(description="samples of the motion, without the ramp")
+    partial: bool = Field(description="whether the motion was not played to its end, or samples were lost")
+    lost_rows: int = Field(
+        description="cycles that the journal did not take because its disk was behind; -1 where unknown"
+    )
+    files: tuple[str, ...] = Field(description="files of the recording in the run's folder, beside the journal")
+    remarks: tuple[str, ...] = Field(default=(), description="what is missing, and why; one line each")
+
+
+class RunRecord(StoredModel):
+    """A run's state and what is known of it."""
+
+    form: Literal["tauscope.run/1"] = Field(default="tauscope.run/1", description="name and version of this form")
+    state: RunState = Field(description="where the run stands")
+    robot: str = Field(description="name of the arm")
+    backend: str = Field(description="name of the backend")
+    mode: str = Field(description="who closes the loop: position or torque")
+    history: tuple[Transition, ...] = Field(description="the states so far, in order")
+    owner: ProcessName | None = Field(default=None, description="the process that started the run")
+    control: ProcessName | None = Field(default=None, description="the process that moves the arm")
+    stop_policy: str | None = Field(default=None, description="how the arm is stopped")
+    ramp_s: float | None = Field(default=None, description="time from the first cycle to the motion's start")
+    motion_s: float | None = Field(default=None, description="length of the motion")
+    played: float = Field(default=0.0, description="part of ramp and motion that was played, 0 to 1")
+    timing: Timing | None = Field(default=None, description="how well the run kept its time")
+    real_time: RealTime | None = Field(default=None, description="what the loop was given of what it asked for")
+    worst_following: tuple[float, ...] = Field(
+        default=(), description="largest distance of arm and target, one number a joint"
+    )
+    stop: str | None = Field(default=None, description="who asked for the stop, and how; null where nobody did")
+    problem: RunProblem | None = Field(default=None, description="why the run did not finish")
+    recording: RecordingFiles | None = Field(default=None, description="what the run left behind")
+
+    def moved(self, state: RunState, now: datetime | None = None, **changes: object) -> "RunRecord":
+        """The record after a transition.
+
+        Parameters
+        ----------
+        state : RunState
+            the new state
+        now : datetime or None
+            the present moment; the machine's where None
+        changes : object
+            other fields that change with it
+
+        Raises
+        ------
+        ValueError
+            if that state may not follow: a fault of the caller's
+        """
+        if not may_follow(self.state, state):
+            raise ValueError(f"a run that is {self.state} cannot become {state}")
+        history = (*self.history, Transition(state=state, at=now or datetime.now(UTC)))
+        return self.model_copy(update={"state": state, "history": history, **changes})
+
+
+def new_record(robot: str, backend: str, mode: str, now: datetime | None = None) -> RunRecord:
+    """The record of a run that has not begun.
+
+    Parameters
+    ----------
+    robot, backend, mode : str
+        names of the arm, of the backend, and of who closes the loop
+    now : datetime or None
+        the present moment; the machine's where None
+    """
+    created = Transition(state=RunState.CREATED, at=now or datetime.now(UTC))
+    owner = ProcessName.of(os.getpid())
+    return RunRecord(state=RunState.CREATED, robot=robot, backend=backend, mode=mode, history=(created,), owner=owner)
+
+
+def write_record(folder: Path, record: RunRecord) -> None:
+    """Write ``run.json``, whole or not at all.
+
+    Parameters
+    ----------
+    folder : Path
+        the run's
+    record : RunRecord
+        what is known
+
+    Raises
+    ------
+    OSError
+        the disk does not take it
+    """
+    write_atomically(folder / RUN_FILE, record.model_dump_json(indent=1).encode())
+
+
+def read_record(folder: Path) -> RunRecord:
+    """Read ``run.json``.
+
+    Parameters
+    ----------
+    folder : Path
+        the run's
+
+    Raises
+    ------
+    AcquisitionError
+        there is none, or it is damaged
+    """
+    path = folder / RUN_FILE
+    try:
+        return RunRecord.model_validate_json(path.read_bytes())
+    except FileNotFoundError:
+        raise AcquisitionError(f"{path}: there is no such run") from None
+    except OSError as error:
+        raise AcquisitionError(f"{path}: cannot be read ({error.strerror or error})") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"]) or "document"
+        raise AcquisitionError(f"{path}: is not a run's record ({place}: {first['msg']})") from None

@@ -1,0 +1,230 @@
+"""One run from its beginning to its end. It fails closed: whatever happens, the arm is stopped and the state told."""
+
+import sys
+import traceback
+from contextlib import nullcontext, suppress
+from typing import Any
+
+from tauscope.errors import AcquisitionError, TauscopeError
+from tauscope.recording.journal_rows import Phase
+from tauscope.robot.messages import one_line
+from tauscope.runtime.guard import Guard
+from tauscope.runtime.loop import Cycles, GuardedArm
+from tauscope.runtime.options import chosen_stop_policy
+from tauscope.runtime.plan import Plan
+from tauscope.runtime.preparation import journal_header, prepare
+from tauscope.runtime.progress import ProgressReporter, end_event, state_event
+from tauscope.runtime.real_time import SIMULATED_TIME, real_time
+from tauscope.runtime.record import JOURNAL_FILE, RunProblem, RunRecord, Transition
+from tauscope.runtime.recorder import Recorder
+from tauscope.runtime.recording_files import save_recording
+from tauscope.runtime.states import RunState
+from tauscope.runtime.stop_request import StopAskedError, raise_if_requested
+from tauscope.runtime.task import RunTask, Surroundings
+from tauscope.runtime.timing import Metronome
+from tauscope.runtime.torque_control import torque_control
+from tauscope.runtime.violation import GuardViolationError
+from tauscope_drivers import Backend, ControlMode, DriverError
+
+INTERNAL = "internal"
+"""Code of a problem that is a fault of Tauscope's own."""
+
+
+class Run:
+    """Takes a run through its states."""
+
+    def __init__(self, task: RunTask, record: RunRecord, around: Surroundings) -> None:
+        """Prepare; nothing happens before `execute`.
+
+        Parameters
+        ----------
+        task : RunTask
+            what is to be run
+        record : RunRecord
+            the run as it was created
+        around : Surroundings
+            what it talks to
+        """
+        self.record = record
+        self._task, self._around = task, around
+        self._policy = chosen_stop_policy(task.options, task.robot.joints)
+        self._backend: Backend | None = None
+        self._recorder: Recorder | None = None
+        self._cycles: Cycles | None = None
+        self._is_stopped = False
+        self._unconfirmed: str | None = None
+        self._progress = ProgressReporter(self._tell)
+
+    def execute(self) -> RunRecord:
+        """Run to the end, whatever that is.
+
+        Returns
+        -------
+        RunRecord
+            in an end state
+        """
+        cause: BaseException | None = None
+        try:
+            self._move()
+        except BaseException as error:
+            # Whatever it is, the arm has to stop and the state be told.
+            cause = error
+        self._stop_arm()
+        end, changes = _outcome(cause)
+        self._enter(RunState.STOPPING, **changes, **self._account())
+        return self._conclude(end)
+
+    def _move(self) -> None:
+        """Everything up to the end of the motion."""
+        raise_if_requested(self._around.stops)
+        self._enter(RunState.CONNECTING)
+        connection = self._task.connect()
+        self._backend = backend = connection.backend
+        state = backend.connect()
+        raise_if_requested(self._around.stops)
+        plan = prepare(self._task, backend, state)
+        header = journal_header(self._task.robot, plan, backend, state, self._task.options.mode.value)
+        journal, stops = self._around.folder / JOURNAL_FILE, self._around.stops
+        self._recorder = recorder = self._around.open_recorder(journal, header, stops, connection.is_real_time)
+        with real_time() if connection.is_real_time else nullcontext(SIMULATED_TIME) as permitted:
+            self._enter(
+                RunState.ENABLING,
+                stop_policy=self._policy.value,
+                ramp_s=plan.ramp_s,
+                motion_s=plan.motion_s,
+                real_time=permitted,
+            )
+            try:
+                self._enable_and_play(plan, backend, recorder)
+            finally:
+                # While the thread is still a real-time one: nothing comes between the cause and the stop.
+                self._stop_arm()
+
+    def _enable_and_play(self, plan: Plan, backend: Backend, recorder: Recorder) -> None:
+        """The part in which the arm is under power."""
+        options, stops = self._task.options, self._around.stops
+        torque_mode = options.mode is ControlMode.TORQUE
+        control = torque_control(self._task.robot, plan, options.bandwidth_rad_s) if torque_mode else None
+        raise_if_requested(stops)
+        period_s = plan.period_ns * 1e-9
+        state = backend.enable(options.mode, plan.limits.drive_limits, self._policy, options.watchdog_s, period_s)
+        now = backend.clock.now_ns()
+        guard = Guard(
+            plan.limits,
+            period_s=period_s,
+            watchdog_s=options.watchdog_s,
+            enabled_ns=now,
+            stale_misses=options.stale_misses,
+            stale_s=options.stale_s,
+        )
+        metronome = Metronome(backend.clock, now + plan.period_ns, plan.period_ns, plan.cycles)
+        arm = GuardedArm(backend, guard, state)
+        self._cycles = Cycles(plan, arm, metronome, recorder, stops, control, self._each_cycle)
+        self._enter(RunState.RAMPING)
+        self._cycles.play()
+
+    def _each_cycle(self, cycles: Cycles) -> None:
+        """Follow the phase, and report from time to time."""
+        if self.record.state is RunState.RAMPING and cycles.plan.phase[cycles.metronome.index] == Phase.MOTION:
+            self._enter(RunState.RUNNING)
+        self._progress(cycles, self.record.state)
+
+    def _stop_arm(self) -> None:
+        """Stop the arm and let go of it, once; whoever is broken out of this before it is done begins anew."""
+        if self._is_stopped:
+            return
+        stops, backend = self._around.stops, self._backend
+        stops.acknowledge()
+        try:
+            if backend is not None and (faults := backend.stop(self._policy).faults):
+                self._unconfirmed = f"while the arm was stopped: {faults[0]}"
+        except BaseException as error:
+            # Then the device's watchdog stops the arm.
+            self._unconfirmed = f"the drives did not confirm the stop ({_reason(error)}): look at the arm"
+        try:
+            if backend is not None:
+                backend.disconnect()
+        except BaseException as error:
+            self._unconfirmed = self._unconfirmed or f"the bus was not let go of ({_reason(error)}): reconnect the arm"
+        stops.done()
+        self._is_stopped = True
+
+    def _conclude(self, end: RunState) -> RunRecord:
+        """Save what was recorded, and enter the end state."""
+        lost, recording, problem = 0, None, self.record.problem
+        if self._recorder is not None:
+            remark = self._recorder.close()
+            lost = self._recorder.lost
+            recording = save_recording(self._around.folder, is_whole=end is RunState.FINISHED, lost_rows=lost)
+            if remark is not None:
+                recording = recording.model_copy(update={"partial": True, "remarks": (*recording.remarks, remark)})
+            if end is RunState.FINISHED and not recording.files:
+                problem = RunProblem(code=AcquisitionError.code, detail=f"no recording: {recording.remarks[-1]}")
+        if self._unconfirmed is not None and problem is None:
+            problem = RunProblem(code=AcquisitionError.code, detail=self._unconfirmed)
+        if problem is not None and end is RunState.FINISHED:
+            end = RunState.FAILED
+        self._enter(end, problem=problem, recording=recording)
+        self._tell(end_event(self.record))
+        return self.record
+
+    def _account(self) -> dict[str, Any]:
+        """What the loop leaves behind."""
+        cycles = self._cycles
+        if cycles is None:
+            return {}
+        return {
+            "played": cycles.played,
+            "timing": cycles.metronome.timing(cycles.arm.stale + cycles.late),
+            "worst_following": tuple(float(value) for value in cycles.worst_following),
+        }
+
+    def _enter(self, state: RunState, **changes: Any) -> None:
+        """Change the state, have it kept and tell it."""
+        self.record = self.record.moved(state, **changes)
+        self._around.keeper.keep(self.record)
+        transition = self.record.history[-1]
+        self._tell(state_event(state, transition.at))
+        if self._recorder is not None and self._backend is not None and not state.is_end:
+            with suppress(AcquisitionError):  # a journal that takes nothing is found out by the next cycle
+                self._recorder.event(self._backend.clock.now_ns(), self._journal_event(transition))
+
+    def _journal_event(self, transition: Transition) -> dict[str, Any]:
+        """A transition and, where there is one, its reason."""
+        reason = self.record.stop if self.record.problem is None else self.record.problem.detail
+        event = state_event(transition.state, transition.at)
+        return event if reason is None else {**event, "reason": reason}
+
+    def _tell(self, event: Any) -> None:
+        """Tell the owner, who may not be there any more."""
+        try:
+            self._around.report(event)
+        except Exception:
+            # An owner that cannot listen is no reason to let an arm fall.
+            traceback.print_exc(file=sys.stderr)
+
+
+def _outcome(cause: BaseException | None) -> tuple[RunState, dict[str, Any]]:
+    """The end that a run comes to, and what the record says of its cause."""
+    if cause is None:
+        return RunState.FINISHED, {}
+    if isinstance(cause, StopAskedError):
+        return cause.request.end, {"stop": cause.request.detail}
+    return RunState.FAILED, {"problem": _problem(cause)}
+
+
+def _problem(error: BaseException) -> RunProblem:
+    """What went wrong, for the record; a fault of our own also with its traceback, for the log."""
+    if isinstance(error, GuardViolationError):
+        return RunProblem.of(error.violation)
+    if isinstance(error, DriverError):
+        return RunProblem(code=AcquisitionError.code, detail=f"{_reason(error)} ({error.kind})")
+    if isinstance(error, TauscopeError):
+        return RunProblem(code=error.code, detail=_reason(error))
+    traceback.print_exception(error, file=sys.stderr)
+    return RunProblem(code=INTERNAL, detail=f"{type(error).__name__}: {_reason(error)}; this is a fault of Tauscope's")
+
+
+def _reason(error: BaseException) -> str:
+    """The first line of what an error says."""
+    return one_line(str(error)) or type(error).__name__

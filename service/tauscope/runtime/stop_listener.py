@@ -1,0 +1,132 @@
+"""How a control process hears that it shall stop: a byte on its pipe, a file in its folder, a signal, or silence.
+
+Each way has a thread of its own or none, so that any of them works while the others are stuck. The loop looks at one
+attribute. Where the main thread does not take notice in time, because a call into a driver or the disk does not return,
+it is broken out of that call by a signal.
+"""
+
+import os
+import select
+import signal
+import threading
+import time
+from pathlib import Path
+from types import FrameType
+
+from tauscope.runtime.stop_request import StopAskedError, StopRequest, StopSource
+
+BEAT, STOP = b".", b"s"
+"""What an owner writes to its run's pipe: that it is alive, and that the run shall stop."""
+
+NOTICE_S = 0.25
+"""Time in which a run has to take notice of a request before it is broken out of what it does."""
+
+STOPPING_S = 2.0
+"""Time that the drives may take to confirm the stop before the run gives up waiting for them."""
+
+_POLL_S = 0.02
+_SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
+_BREAK = signal.SIGUSR1
+
+
+class StopListener:
+    """Requests to stop a run in a process of its own; made and used in the main thread."""
+
+    def __init__(self, command_pipe: int, stop_file: Path, heartbeat_s: float) -> None:
+        """Start to listen.
+
+        Parameters
+        ----------
+        command_pipe : int
+            descriptor on which the owner writes `BEAT` and `STOP`
+        stop_file : Path
+            a file whose existence is a request
+        heartbeat_s : float
+            silence on the pipe after which the owner counts as gone [s]
+        """
+        self.requested: StopRequest | None = None
+        self._pipe, self._stop_file, self._heartbeat_s = command_pipe, stop_file, heartbeat_s
+        self._asked_at: float | None = None
+        self._acknowledged_at: float | None = None
+        self._is_done = False
+        self._main = threading.main_thread().ident
+        for number in _SIGNALS:
+            signal.signal(number, self._on_signal)
+        signal.signal(_BREAK, self._on_break)
+        threading.Thread(target=self._listen, name="stop-pipe", daemon=True).start()
+        threading.Thread(target=self._watch_file, name="stop-file", daemon=True).start()
+
+    def acknowledge(self) -> None:
+        """The run has begun to stop: it is broken out only if the stop itself takes too long."""
+        self._acknowledged_at = time.monotonic()
+
+    def done(self) -> None:
+        """The arm is stopped, or nothing more can be done for it: nobody breaks into the run any more."""
+        self._is_done = True
+
+    def request(self, source: StopSource, detail: str) -> None:
+        """Ask; the first request counts.
+
+        Parameters
+        ----------
+        source : StopSource
+            who wants it
+        detail : str
+            one line: how it came
+        """
+        if self.requested is None:
+            self.requested = StopRequest(source, detail)
+            self._asked_at = time.monotonic()
+
+    def _listen(self) -> None:
+        """Hear the owner, or its silence; break the main thread out where it does not take notice."""
+        poll = select.poll()
+        poll.register(self._pipe, select.POLLIN | select.POLLHUP)
+        heard = time.monotonic()
+        is_open = True
+        while not self._is_done:
+            if not is_open:
+                time.sleep(_POLL_S)
+            elif poll.poll(_POLL_S * 1e3):
+                data = os.read(self._pipe, 4096)
+                heard, is_open = time.monotonic(), bool(data)
+                if STOP in data:
+                    self.request(StopSource.OPERATOR, "its owner asked it to stop")
+                elif not is_open:
+                    self.request(StopSource.OWNER_GONE, "the process that started it is gone")
+            elif time.monotonic() - heard > self._heartbeat_s:
+                silence = f"the process that started it has been silent for {self._heartbeat_s:g} s"
+                self.request(StopSource.OWNER_GONE, silence)
+            self._break_out_if_overdue()
+
+    def _break_out_if_overdue(self) -> None:
+        since, patience = self._asked_at, NOTICE_S
+        if self._acknowledged_at is not None:
+            since, patience = self._acknowledged_at, STOPPING_S
+        if since is None or self._main is None or self._is_done or time.monotonic() - since < patience:
+            return
+        if self._acknowledged_at is not None:
+            self._acknowledged_at = time.monotonic()
+        self._asked_at = time.monotonic()
+        signal.pthread_kill(self._main, _BREAK)
+
+    def _watch_file(self) -> None:
+        """Look for the stop file; a disk that is stuck holds up this thread only."""
+        while self.requested is None and not self._is_done:
+            if self._stop_file.exists():
+                self.request(StopSource.OPERATOR, f"the file {self._stop_file.name} was put into its folder")
+            time.sleep(_POLL_S)
+
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        del frame
+        self.request(StopSource.OPERATOR, f"it received {signal.Signals(number).name}")
+
+    def _on_break(self, number: int, frame: FrameType | None) -> None:
+        """Leave a call that does not return; runs in the main thread between two of its steps."""
+        del number, frame
+        if self._is_done or self.requested is None:
+            return
+        if self._acknowledged_at is not None:
+            raise TimeoutError(f"no answer within {STOPPING_S:g} s")
+        self.acknowledge()
+        raise StopAskedError(self.requested)

@@ -1,0 +1,76 @@
+"""What a run needs from whoever starts it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from tauscope.recording.journal_rows import JournalHeader
+from tauscope.robot import Robot
+from tauscope.runtime.backends import Connection
+from tauscope.runtime.options import RunOptions
+from tauscope.runtime.progress import Report
+from tauscope.runtime.record import RunRecord
+from tauscope.runtime.recorder import Recorder
+from tauscope.runtime.stop_request import Stops
+from tauscope.trajectory import Trajectory
+
+OpenRecorder = Callable[[Path, JournalHeader, Stops, bool], Recorder]
+"""Opens a journal: its path, its header, requests to stop, and whether the arm runs in real time."""
+
+
+class Keeper(Protocol):
+    """Takes a run's record whenever it changes."""
+
+    def keep(self, record: RunRecord) -> None:
+        """Keep the newest record; must not take time.
+
+        Parameters
+        ----------
+        record : RunRecord
+            what is known
+        """
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class RunTask:
+    """What is to be run.
+
+    robot : Robot
+        the arm
+    trajectory : Trajectory
+        the motion
+    options : RunOptions
+        how
+    connect : callable
+        makes the backend; called once
+    """
+
+    robot: Robot
+    trajectory: Trajectory
+    options: RunOptions
+    connect: Callable[[], Connection]
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What a run talks to while it runs.
+
+    folder : Path
+        where journal and recording go
+    stops : Stops
+        where requests to stop are found
+    keeper : Keeper
+        takes the record whenever it changes
+    open_recorder : callable
+        opens the journal
+    report : callable
+        takes the events
+    """
+
+    folder: Path
+    stops: Stops
+    keeper: Keeper
+    open_recorder: OpenRecorder
+    report: Report

@@ -1,0 +1,129 @@
+"""What every request passes before its route: who calls, whether they may, and not too often."""
+
+import math
+from dataclasses import dataclass, field
+from typing import cast
+
+from starlette.datastructures import Headers
+from starlette.types import ASGIApp, Receive, Send
+from starlette.types import Scope as AsgiScope
+
+from tauscope.server.auth.audit.log import AuditTrail
+from tauscope.server.auth.key_ring import LOCAL, Caller, KeyRing
+from tauscope.server.auth.rate_limit import RateLimit
+from tauscope.server.auth.scopes import is_stop, needed_scope
+from tauscope.server.problems import make_problem, problem_answer
+
+CALLER = "tauscope.caller"
+"""Where the request's ASGI scope holds its `Caller`."""
+
+FAILURES_PER_S, FAILURE_BURST = 0.5, 20.0
+"""How often an address may come with a wrong key before it is told to wait; right keys always pass."""
+
+
+@dataclass(frozen=True, eq=False)
+class Access:
+    """Who may call, and how often.
+
+    ring : KeyRing
+        the keys
+    rate : RateLimit
+        for each key
+    limits_local : bool
+        whether it holds for callers of a service without keys too
+    failures : RateLimit
+        for each address, of requests with a wrong key or none
+    """
+
+    ring: KeyRing
+    rate: RateLimit
+    limits_local: bool = False
+    failures: RateLimit = field(default_factory=lambda: RateLimit(FAILURES_PER_S, FAILURE_BURST))
+
+
+@dataclass(frozen=True)
+class _Refusal:
+    """Why a request goes no further."""
+
+    code: str
+    detail: str
+    headers: dict[str, str] = field(default_factory=dict)
+
+
+class Gate:
+    """Lets a request pass that comes with a key of the scope that it needs."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        """Wrap an application.
+
+        Parameters
+        ----------
+        app : ASGI application
+            what is wrapped; its state holds the services
+        """
+        self.app = app
+
+    async def __call__(self, scope: AsgiScope, receive: Receive, send: Send) -> None:
+        """Answer a request, or refuse it."""
+        if scope["type"] != "http":
+            return await self.app(scope, receive, send)
+        outcome = _admit(cast(Access, scope["app"].state.services.access), scope)
+        if isinstance(outcome, _Refusal):
+            _note_refusal(scope, outcome)
+            problem = make_problem(outcome.code, outcome.detail, scope["path"])
+            return await problem_answer(problem, outcome.headers)(scope, receive, send)
+        scope[CALLER] = outcome
+        return await self.app(scope, receive, send)
+
+
+def caller_of(scope: AsgiScope) -> Caller:
+    """Who makes a request.
+
+    Parameters
+    ----------
+    scope : ASGI scope
+        of a request that has passed the gate
+    """
+    return cast(Caller, scope.get(CALLER, LOCAL))
+
+
+def _admit(access: Access, scope: AsgiScope) -> Caller | _Refusal:
+    """Who calls, or why they may not."""
+    method, path = scope["method"], scope["path"]
+    needed = needed_scope(method, path)
+    if needed is None:
+        return LOCAL
+    stops = is_stop(method, path)
+    caller = access.ring.caller(_key(Headers(scope=scope)), may_be_expired=stops)
+    if isinstance(caller, str):
+        wait = access.failures.take((scope.get("client") or ("",))[0])
+        return _too_often(wait) if wait else _Refusal("unauthorized", caller, {"WWW-Authenticate": "Bearer"})
+    if not caller.scope.includes(needed):
+        text = f"{method} {path} needs a key of scope {needed}; the one of {caller.name} has {caller.scope}"
+        return _Refusal("forbidden", text)
+    # Whoever wants to stop an arm is never told to wait.
+    if stops or (caller.key is None and not access.limits_local):
+        return caller
+    wait = access.rate.take(caller.key or caller.name)
+    return _too_often(wait) if wait else caller
+
+
+def _note_refusal(scope: AsgiScope, refusal: _Refusal) -> None:
+    """Have it known who tried what; whoever only has to wait is not worth an entry."""
+    if refusal.code != "rate-limited":
+        audit, address = cast(AuditTrail, scope["app"].state.services.audit), (scope.get("client") or (None,))[0]
+        action = f"refused: {scope['method']} {scope['path'][:300]}"
+        audit.note("somebody", action, address=address, reason=refusal.code)
+
+
+def _key(headers: Headers) -> str | None:
+    """The key of a request; a header that came twice is none."""
+    values = headers.getlist("authorization")
+    scheme, _, key = values[0].partition(" ") if len(values) == 1 else ("", "", "")
+    return key.strip() if scheme.lower() == "bearer" and key.strip() else None
+
+
+def _too_often(wait_s: float) -> _Refusal:
+    """The caller has to wait."""
+    seconds = max(1, math.ceil(wait_s))
+    return _Refusal("rate-limited", f"too many requests; go on after {seconds} s", {"Retry-After": str(seconds)})

@@ -1,0 +1,208 @@
+"""API keys as they are kept: never the key itself, only a salted hash of it."""
+
+import fcntl
+import hashlib
+import hmac
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Literal
+
+from pydantic import AwareDatetime, Field, ValidationError
+
+from tauscope.errors import TauscopeError
+from tauscope.files import write_atomically
+from tauscope.robot.messages import one_line, shown
+from tauscope.server.auth.scopes import Scope
+from tauscope.server.models import StrictModel
+
+KEY_FILE = "keys.json"
+"""Name of the file, in the data folder."""
+
+_PREFIX = "tsk"
+_NOBODY = "0" * 64
+
+
+class ApiKey(StrictModel):
+    """One key, without its secret.
+
+    The secret is 256 random bits, so that one SHA-256 with a salt is enough: there is nothing to guess that a slow hash
+    would protect, and a slow one would let strangers keep the service busy.
+    """
+
+    id: str = Field(pattern="^[0-9a-f]{8}$", description="public part of the key")
+    name: str = Field(min_length=1, max_length=100, description="who has it")
+    scope: Scope = Field(strict=False, description="what it may do")
+    salt: str = Field(pattern="^[0-9a-f]{32}$", description="hashed before the secret, in hexadecimal")
+    hash: str = Field(pattern="^[0-9a-f]{64}$", description="SHA-256 of salt and secret, in hexadecimal")
+    created: AwareDatetime = Field(description="when it was made")
+    expires: AwareDatetime | None = Field(description="when it ends; null: never")
+    revoked: AwareDatetime | None = Field(default=None, description="when it was taken back")
+
+    def state(self, now: datetime) -> Literal["valid", "expired", "revoked"]:
+        """What the key is worth.
+
+        Parameters
+        ----------
+        now : datetime
+            the present moment
+        """
+        if self.revoked is not None:
+            return "revoked"
+        return "expired" if self.expires is not None and now >= self.expires else "valid"
+
+
+class _KeyList(StrictModel):
+    """What the file holds."""
+
+    form: Literal["tauscope.keys/1"] = "tauscope.keys/1"
+    keys: tuple[ApiKey, ...] = ()
+
+
+class KeyFile:
+    """The keys of a service, in one file that only its owner can read. Another store needs these four methods."""
+
+    def __init__(self, folder: Path) -> None:
+        """Look at the keys of a data folder; nothing is opened yet.
+
+        Parameters
+        ----------
+        folder : Path
+            the data folder
+        """
+        self.path = folder / KEY_FILE
+
+    def read(self) -> tuple[ApiKey, ...]:
+        """All keys ever made, revoked ones too; none where there is no file.
+
+        Raises
+        ------
+        TauscopeError
+            if the file is damaged or cannot be read
+        """
+        try:
+            return _KeyList.model_validate_json(self.path.read_bytes()).keys
+        except FileNotFoundError:
+            return ()
+        except (OSError, ValidationError):
+            hint = "restore it from a backup, or move it away and make new keys"
+            raise TauscopeError(f"{self.path}: the file of the API keys is damaged or not readable; {hint}") from None
+
+    def stamp(self) -> tuple[int, int, int] | None:
+        """Changes whenever the file does; None where there is none."""
+        try:
+            status = self.path.stat()
+        except FileNotFoundError:
+            return None
+        return status.st_mtime_ns, status.st_size, status.st_ino
+
+    def add(self, name: str, scope: Scope, now: datetime, life: timedelta | None) -> tuple[ApiKey, str]:
+        """Make a key.
+
+        Parameters
+        ----------
+        name : str
+            who gets it; unique among the keys that are not revoked
+        scope : Scope
+            what it may do
+        now : datetime
+            the present moment
+        life : timedelta or None
+            how long it holds; for good where None
+
+        Returns
+        -------
+        ApiKey
+            as it is kept
+        str
+            the key itself, which is not kept anywhere
+
+        Raises
+        ------
+        TauscopeError
+            if the name is in use, or none
+        """
+        if not (name.isprintable() and 0 < len(name.strip()) <= 100):
+            raise TauscopeError(one_line(f"name {shown(name)}: give 1 to 100 printable characters"))
+        secret, salt = secrets.token_urlsafe(32), secrets.token_hex(16)
+        expires = None if life is None else now + life
+        key = ApiKey(
+            id=secrets.token_hex(4),
+            name=name,
+            scope=scope,
+            salt=salt,
+            hash=_hashed(salt, secret),
+            created=now,
+            expires=expires,
+        )
+        with self._changing() as keys:
+            if any(other.name == name and other.revoked is None for other in keys):
+                raise TauscopeError(one_line(f"name {shown(name)}: another key has it; choose another, or revoke that"))
+            keys.append(key)
+        return key, f"{_PREFIX}_{key.id}_{secret}"
+
+    def revoke(self, name: str, now: datetime) -> ApiKey:
+        """Take a key back; a service that runs knows within seconds.
+
+        Parameters
+        ----------
+        name : str
+            name or identifier of the key
+        now : datetime
+            the present moment
+
+        Raises
+        ------
+        TauscopeError
+            if there is no such key
+        """
+        with self._changing() as keys:
+            for place, key in enumerate(keys):
+                if name in (key.name, key.id) and key.revoked is None:
+                    keys[place] = key.model_copy(update={"revoked": now})
+                    return keys[place]
+        raise TauscopeError(one_line(f"key {shown(name)}: there is none, or it was revoked; see tauscope key list"))
+
+    @contextmanager
+    def _changing(self) -> Iterator[list[ApiKey]]:
+        """The keys, written back at the end; two programs never undo each other's change."""
+        lock = os.open(self.path.with_name(f".{KEY_FILE}.lock"), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            keys = list(self.read())
+            yield keys
+            write_atomically(self.path, _KeyList(keys=tuple(keys)).model_dump_json(indent=1).encode())
+        finally:
+            fcntl.flock(lock, fcntl.LOCK_UN)  # closing does not: a process forked meanwhile holds the descriptor, too
+            os.close(lock)
+
+
+def matching_key(keys: tuple[ApiKey, ...], text: str) -> ApiKey | None:
+    """The key that a text is; takes the same time whatever is wrong with the text.
+
+    Parameters
+    ----------
+    keys : tuple of ApiKey
+        that are known
+    text : str
+        what a client sent
+    """
+    prefix, _, rest = text.partition("_")
+    identifier, _, secret = rest.partition("_")
+    found = next((key for key in keys if key.id == identifier), None)
+    salt, expected = (_NOBODY[:32], _NOBODY) if found is None else (found.salt, found.hash)
+    is_right = hmac.compare_digest(_hashed(salt, secret), expected)
+    return found if is_right and prefix == _PREFIX else None
+
+
+def utc_now() -> datetime:
+    """The present moment in UTC."""
+    return datetime.now(UTC)
+
+
+def _hashed(salt: str, secret: str) -> str:
+    """What is kept of a secret."""
+    return hashlib.sha256(bytes.fromhex(salt) + secret.encode("utf-8", "surrogatepass")).hexdigest()

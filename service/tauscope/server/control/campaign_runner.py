@@ -1,0 +1,323 @@
+"""Leads one campaign: design, run, held-out run, identification, each step a job or a run of its own."""
+
+import logging
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from tauscope.errors import NotFoundError, TauscopeError
+from tauscope.runtime.record import RunRecord
+from tauscope.runtime.states import RunState
+from tauscope.server.control.campaign_order import CampaignOrder
+from tauscope.server.control.campaign_workspace import CampaignWorkspace
+from tauscope.server.control.motions import StepFailedError, require_succeeded, wait_for_end
+from tauscope.server.control.permits import FREE, Permit
+from tauscope.server.control.run_manager import RunManager, run_recording_name
+from tauscope.server.control.run_order import RunRequestRecord
+from tauscope.server.control.run_submission import hand_in_run
+from tauscope.server.control.run_workspace import RunWorkspace
+from tauscope.server.queue.diagnosis_order import DiagnosisOptions
+from tauscope.server.queue.diagnosis_submission import hand_in_diagnosis
+from tauscope.server.queue.excitation_order import ExcitationDesignOptions
+from tauscope.server.queue.excitation_submission import hand_in_excitation
+from tauscope.server.queue.excitation_workspace import ExcitationWorkspace
+from tauscope.server.queue.identification_submission import hand_in_identification
+from tauscope.server.queue.queue import CANCELLED, INTERNAL, INTERRUPTED, JobQueue, QueueFullError
+from tauscope.server.queue.queued_job import JobKind
+from tauscope.server.queue.record import JobProblem
+from tauscope.server.queue.states import JobState
+from tauscope.server.queue.work import StoppedError
+from tauscope.server.queue.workspace import Workspace
+from tauscope.server.store.recordings import RecordingStore
+
+_log = logging.getLogger("tauscope.jobs")
+
+POLL_S = 0.2
+"""How often the progress of a run is told [s]."""
+
+ROOM_POLL_S = 0.5
+"""How often a queue, or a disk, that is full is asked again [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class CampaignDependencies:
+    """What a campaign works with.
+
+    jobs : JobQueue
+        designs and identifies
+    excitations, identifications, diagnoses : JobKind
+        kinds of its jobs
+    runs : RunManager
+        moves arms
+    recordings : RecordingStore
+        what was measured
+    """
+
+    jobs: JobQueue
+    excitations: JobKind
+    identifications: JobKind
+    diagnoses: JobKind
+    runs: RunManager
+    recordings: RecordingStore
+
+
+class CampaignRunner:
+    """One campaign on its way. `stop` takes no lock and touches no disk, and stops the arm first."""
+
+    def __init__(
+        self,
+        workspace: CampaignWorkspace,
+        order: CampaignOrder,
+        shop: CampaignDependencies,
+        release_arm: Callable[[], None],
+        permit: Permit = FREE,
+    ) -> None:
+        """Prepare; nothing happens before `lead`.
+
+        Parameters
+        ----------
+        workspace : CampaignWorkspace
+            of the campaign
+        order : CampaignOrder
+            what is wanted
+        shop : CampaignDependencies
+            what it works with
+        release_arm : callable
+            lets go of the arm; called when nothing more will move
+        permit : Permit
+            leave to move the arm
+        """
+        self.state = JobState.QUEUED
+        self._workspace = workspace
+        self._order = order
+        self._shop = shop
+        self._release_arm = release_arm
+        self._permit = permit
+        self._robot = (order.robot_file, order.robot_name)
+        self._run: str | None = None
+        self._stop_asked = threading.Event()
+        self._is_closing = False
+
+    @property
+    def holder(self) -> str:
+        """By what name it has the arm."""
+        return f"campaign {self._workspace.folder.name}"
+
+    def stop(self) -> None:
+        """Stop the campaign, in whatever step it is; the arm has to be armed again before it moves again."""
+        self._permit.stopped()
+        self._stop_asked.set()
+        # Whoever begins a run looks at the flag after it has told us of the run.
+        run = self._run
+        if run is not None:
+            self._shop.runs.stop(run)
+
+    def interrupt(self) -> None:
+        """Stop because the service ends: what is left of the analysis is done after the next start."""
+        self._is_closing = True
+        self.stop()
+
+    def lead(self) -> None:
+        """Take the campaign to its end; never raises."""
+        self._move(JobState.RUNNING)
+        try:
+            end = self._taken_to_its_end()
+        finally:
+            self._release_arm()
+        # a disk that is full now may take it later; else it becomes `interrupted` with the next start
+        while end is not None and not self._move(*end) and not self._is_closing:
+            threading.Event().wait(ROOM_POLL_S)
+
+    def _taken_to_its_end(self) -> tuple[JobState, JobProblem | None] | None:
+        """How it ended; None where it goes on after the next start."""
+        try:
+            self._go()
+        except StoppedError:
+            if self._is_closing and self._workspace.read_made().recordings:
+                return None  # the job that is in the queue goes on then, too
+            self._cancel_jobs()
+            if self._is_closing:
+                return JobState.INTERRUPTED, INTERRUPTED
+            return JobState.CANCELLED, CANCELLED
+        except StepFailedError as error:
+            return JobState.FAILED, error.problem
+        except TauscopeError as error:
+            return JobState.FAILED, JobProblem(code=error.code, detail=str(error))
+        except Exception:
+            _log.exception("campaign %s failed for an unforeseen reason", self._workspace.folder.name)
+            return JobState.FAILED, INTERNAL
+        return JobState.SUCCEEDED, None
+
+    def _go(self) -> None:
+        """Every step that is not done yet, one after the other."""
+        made, order = self._workspace.read_made(), self._order
+        if not made.recordings:
+            self._begin("design the motion")
+            excitation = self._design(order.excitation, "excitation")
+            held_out_options = order.held_out_options()
+            held_out = held_out_options and self._design(held_out_options, "held_out_excitation")
+            self._wait(ExcitationWorkspace, self._shop.excitations, excitation, "excitation")
+            self._begin("run the motion")
+            recordings = (self._run_motion(excitation, "run"),)
+            judges: tuple[str, ...] = ()
+            if held_out:
+                self._begin("design the held-out motion")
+                self._wait(ExcitationWorkspace, self._shop.excitations, held_out, "excitation")
+                self._begin("run the held-out motion")
+                judges = (self._run_motion(held_out, "held_out_run"),)
+            self._note(recordings=recordings, held_out=judges)
+        self._release_arm()
+        self._begin("identify")
+        self._identify()
+        if order.diagnosis is not None:
+            self._begin("diagnose")
+            self._diagnose(order.diagnosis)
+
+    def _design(self, options: ExcitationDesignOptions, link: str) -> str:
+        """Have a motion designed; returns at once."""
+        jobs, kind, folder = self._shop.jobs, self._shop.excitations, self._workspace.robot
+        identifier = self._when_there_is_room(lambda: hand_in_excitation(jobs, kind, folder, self._robot, options))
+        self._note(**{link: identifier})
+        return identifier
+
+    def _when_there_is_room(self, hand_in: Callable[[], str]) -> str:
+        """Hand a job in, as soon as the queue takes one."""
+        while True:
+            try:
+                return hand_in()
+            except QueueFullError:
+                if self._stop_asked.wait(ROOM_POLL_S):
+                    raise StoppedError from None
+
+    def _wait(self, workspace: type[Workspace], kind: JobKind, identifier: str, noun: str) -> None:
+        """Wait for a job to succeed."""
+        record = wait_for_end(workspace(kind.items.folder(identifier)), self._stop_asked)
+        if record is None:
+            raise StoppedError
+        require_succeeded(record, f"{noun} {identifier}")
+
+    def _run_motion(self, excitation: str, link: str) -> str:
+        """Run a motion to its end; the name of its recording."""
+        order, shop = self._order, self._shop
+        request = RunRequestRecord(
+            robot_file=order.robot_file,
+            robot_name=order.robot_name,
+            backend=order.backend_of(held_out=link == "held_out_run"),
+            device=order.backend.device(order.robot_name),
+            excitation=excitation,
+            campaign=self._workspace.folder.name,
+            options=order.run,
+        )
+        motion = ExcitationWorkspace(shop.excitations.items.folder(excitation))
+        self._run = hand_in_run(shop.runs, self._workspace.robot, request, motion, self.holder, self._permit)
+        self._note(**{link: self._run})
+        if self._stop_asked.is_set():
+            shop.runs.stop(self._run)
+        self._follow(self._run)
+        record = RunWorkspace(shop.runs.items.folder(self._run)).read_run()
+        if record is None or record.state is not RunState.FINISHED:
+            if self._stop_asked.is_set():
+                raise StoppedError
+            raise StepFailedError(_run_problem(self._run, record))
+        name, self._run = run_recording_name(self._run), None
+        return name
+
+    def _follow(self, run: str) -> None:
+        """Tell the progress of a run until it is over."""
+        told = None
+        while (live := self._shop.runs.live(run)) is not None:
+            if live.percent is not None and live.percent != told:
+                told = live.percent
+                self._workspace.write_progress(told, {"run": run, "state": live.state.value})
+            threading.Event().wait(POLL_S)
+
+    def _identify(self) -> None:
+        """From the recordings to the model."""
+        made, shop = self._workspace.read_made(), self._shop
+        identifier = self._handed_in(shop.identifications, made.identification) or self._when_there_is_room(
+            lambda: hand_in_identification(
+                shop.jobs,
+                shop.identifications,
+                shop.recordings,
+                self._workspace.robot,
+                self._robot,
+                train=made.recordings,
+                held_out=made.held_out,
+                options=self._order.identification,
+            )
+        )
+        self._note(identification=identifier)
+        self._wait(Workspace, shop.identifications, identifier, "identification")
+
+    def _diagnose(self, options: DiagnosisOptions) -> None:
+        """From the same recordings to what the model leaves out."""
+        made, shop = self._workspace.read_made(), self._shop
+        identifier = self._handed_in(shop.diagnoses, made.diagnosis) or self._when_there_is_room(
+            lambda: hand_in_diagnosis(
+                shop.jobs,
+                shop.diagnoses,
+                shop.recordings,
+                self._workspace.robot,
+                self._robot,
+                train=made.recordings,
+                held_out=made.held_out,
+                options=options,
+            )
+        )
+        self._note(diagnosis=identifier)
+        self._wait(Workspace, shop.diagnoses, identifier, "diagnosis")
+
+    def _handed_in(self, kind: JobKind, identifier: str | None) -> str | None:
+        """The job that this campaign handed in before the service was started again, where that one counts still."""
+        try:
+            record = None if identifier is None else Workspace(kind.items.folder(identifier)).read_record()
+        except NotFoundError:
+            return None
+        given_up = (JobState.CANCELLED, JobState.INTERRUPTED)
+        return None if record is None or record.state in given_up else identifier
+
+    def _begin(self, step: str) -> None:
+        """Tell a step, unless nobody wants to know any more."""
+        if self._stop_asked.is_set():
+            raise StoppedError
+        self._workspace.write_step(step)
+
+    def _note(self, **made: object) -> None:
+        """Keep what was made."""
+        self._workspace.write_made(self._workspace.read_made().model_copy(update=made))
+
+    def _cancel_jobs(self) -> None:
+        """Nobody waits for what is still designed, identified or diagnosed."""
+        made, shop = self._workspace.read_made(), self._shop
+        jobs = [(shop.excitations, made.excitation), (shop.excitations, made.held_out_excitation)]
+        jobs += [(shop.identifications, made.identification), (shop.diagnoses, made.diagnosis)]
+        for kind, identifier in jobs:
+            # one that a full disk does not let be cancelled is done for nobody
+            with suppress(NotFoundError, OSError):
+                if identifier is not None:
+                    shop.jobs.cancel(kind, identifier)
+
+    def _move(self, state: JobState, problem: JobProblem | None = None) -> bool:
+        """Write the campaign's new state, if it may follow the present one; False where the disk does not take it."""
+        record = self._workspace.read_record()
+        if record is None or not record.may_become(state):
+            return True
+        self.state = state
+        try:
+            self._workspace.write_record(record.moved(state, datetime.now(UTC), problem))
+        except OSError:
+            _log.exception("the state of campaign %s could not be written", self._workspace.folder.name)
+            return False
+        return True
+
+
+def _run_problem(identifier: str, record: RunRecord | None) -> JobProblem:
+    """Why a run brings a campaign to its end."""
+    if record is None:
+        return JobProblem(code="damaged", detail=f"run {identifier}: its files are missing or damaged; begin anew")
+    if record.problem is not None:
+        return JobProblem(code=record.problem.code, detail=f"run {identifier}: {record.problem.detail}")
+    asked = "" if record.stop is None else f" ({record.stop})"
+    return JobProblem(code="acquisition", detail=f"run {identifier}: was {record.state}{asked}; begin anew")

@@ -1,0 +1,307 @@
+"""Who controls which arm: exclusive leases that end by themselves unless they are renewed, numbered for fencing.
+
+Whether a lease holds is a comparison of the clock with its end, made by whoever asks: no thread has to be alive for a
+lease to expire. Its number is higher than that of every lease before it, also after a restart, so that the word of a
+former holder is never taken for that of the present one.
+"""
+
+import hmac
+import secrets
+import threading
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from tauscope.robot.messages import one_line
+from tauscope.server.control.device_claims import DeviceClaims
+from tauscope.server.control.lease import Lease
+from tauscope.server.control.lease_errors import LeasedError, LeaseLostError, LeaseNeededError
+from tauscope.server.control.lease_numbers import next_number
+from tauscope.server.control.lease_permits import LeasePermit, UnleasedPermit
+from tauscope.server.control.permits import Permit
+
+LeaseEnd = Callable[[Lease, str], None]
+"""Told that a lease has ended, and why; called by whoever notices, so that it must return at once."""
+
+
+class Leases:
+    """The leases of all arms. Reading takes no lock; every change does, and none of them waits but for `acquire`."""
+
+    def __init__(
+        self,
+        claims: DeviceClaims,
+        counter: Path,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+        on_end: LeaseEnd | None = None,
+    ) -> None:
+        """Begin with no lease.
+
+        Parameters
+        ----------
+        claims : DeviceClaims
+            which arms move now
+        counter : Path
+            file of the last number given
+        clock : callable
+            seconds that never run backwards
+        on_end : callable or None
+            told of each lease that ended
+        """
+        self._claims, self._counter, self._clock = claims, counter, clock
+        self._on_end = on_end or (lambda _lease, _why: None)
+        self._lock = threading.Lock()
+        self._active: Mapping[str, Lease] = {}
+
+    def active(self) -> list[Lease]:
+        """Leases that hold, the newest first."""
+        leases = [lease for lease in self._active.values() if self.end_of(lease) is None]
+        return sorted(leases, key=lambda lease: -lease.number)
+
+    def seconds_left(self, lease: Lease) -> float:
+        """How long a lease lasts without a further sign of life [s].
+
+        Parameters
+        ----------
+        lease : Lease
+            the lease
+        """
+        return max(0.0, lease.ends - self._clock())
+
+    def acquire(self, device: str, holder: str, owner: str, ttl_s: float, *, take: bool = False) -> Lease:
+        """Lease an arm that nobody has.
+
+        Parameters
+        ----------
+        device : str
+            the arm
+        holder : str
+            who wants it, in words
+        owner : str
+            who alone can use the lease
+        ttl_s : float
+            how long it lasts without a sign of life [s]
+        take : bool
+            take the arm from whoever has the lease; what moves by it stops
+
+        Raises
+        ------
+        LeasedError
+            if somebody has it and it is not taken
+        BusyError
+            if it moves without a lease
+        """
+        with self._lock:
+            present = self._present(device)
+            if present is not None:
+                if not take:
+                    raise self._leased(present)
+                self._finish(present, f"{holder} took the arm")
+            number = next_number(self._counter)
+            lease = Lease(
+                id=f"lease-{number}",
+                number=number,
+                device=device,
+                holder=holder,
+                owner=owner,
+                ttl_s=ttl_s,
+                secret=secrets.token_urlsafe(16),
+                ends=self._clock() + ttl_s,
+            )
+            # First the lease, then the look at what moves: whoever begins to move does both the other way round.
+            before = self._active
+            self._active = {**before, device: lease}
+            try:
+                if present is None:
+                    self._claims.require_free(device)
+            except BaseException:
+                self._active = before
+                raise
+        return lease
+
+    def renew(self, device: str, token: str, owner: str) -> Lease:
+        """Take a sign of life.
+
+        Parameters
+        ----------
+        device : str
+            the arm
+        token : str
+            of its lease
+        owner : str
+            who shows it
+
+        Raises
+        ------
+        LeaseLostError
+            if that is not the present lease: one that has ended is not renewed
+        """
+        with self._lock:
+            lease = self.require(device, token, owner)
+            lease.ends = self._clock() + lease.ttl_s
+        return lease
+
+    def arm(self, device: str, token: str, owner: str, *, armed: bool) -> Lease:
+        """Let the arm move, or not any more.
+
+        Parameters
+        ----------
+        device : str
+            the arm
+        token : str
+            of its lease
+        owner : str
+            who shows it
+        armed : bool
+            whether it may move
+
+        Raises
+        ------
+        LeaseLostError
+            if that is not the present lease
+        """
+        with self._lock:
+            lease = self.require(device, token, owner)
+            lease.is_armed = armed
+        return lease
+
+    def release(self, device: str, token: str, owner: str) -> None:
+        """Give an arm back; what moves by the lease stops.
+
+        Parameters
+        ----------
+        device : str
+            the arm
+        token : str
+            of its lease
+        owner : str
+            who shows it
+
+        Raises
+        ------
+        LeaseLostError
+            if that is not the present lease; nothing happens to the present one
+        """
+        with self._lock:
+            self._finish(self.require(device, token, owner), "it was released")
+
+    def disarm_all(self) -> None:
+        """Let no leased arm move before it is armed again; takes no lock."""
+        for lease in self._active.values():
+            lease.is_armed = False
+
+    def find(self, identifier: str) -> Lease | None:
+        """The lease of an identifier, while it holds.
+
+        Parameters
+        ----------
+        identifier : str
+            of the lease
+        """
+        return next((lease for lease in self.active() if lease.id == identifier), None)
+
+    def require(self, device: str, token: str, owner: str) -> Lease:
+        """The present lease of an arm, if it is the one that is shown.
+
+        Parameters
+        ----------
+        device : str
+            the arm
+        token : str
+            that is shown
+        owner : str
+            who shows it
+
+        Raises
+        ------
+        LeaseLostError
+            if it is not
+        """
+        lease = self._present(device)
+        shown = token.encode("utf-8", "surrogatepass")
+        if lease is None or not hmac.compare_digest(shown, lease.token.encode()) or owner != lease.owner:
+            now = "nobody has it" if lease is None else f"{lease.holder} has it by lease {lease.number}"
+            raise LeaseLostError(one_line(f"{device}: the lease that was shown does not hold, {now}; take a new one"))
+        return lease
+
+    def permit(self, device: str, token: str | None, owner: str, *, is_needed: bool) -> Permit:
+        """Leave to move an arm.
+
+        Parameters
+        ----------
+        device : str
+            the arm
+        token : str or None
+            of its lease, if one is shown
+        owner : str
+            who shows it
+        is_needed : bool
+            whether the arm moves with a lease only; else whoever asks first has it for one motion
+
+        Returns
+        -------
+        Permit
+            to be asked before the motion begins, and while it lasts
+
+        Raises
+        ------
+        LeaseError
+            if there is no such leave
+        """
+        if token is not None:
+            permit: Permit = LeasePermit(self.require(device, token, owner), self.end_of)
+        elif is_needed:
+            hint = "POST /api/v1/leases, arm the lease, and send its token as header Lease-Token"
+            raise LeaseNeededError(one_line(f"{device}: moves for whoever has its lease; {hint}"))
+        else:
+            permit = UnleasedPermit(device, self.require_unleased)
+        permit.require()
+        return permit
+
+    def end_of(self, lease: Lease) -> str | None:
+        """Why a lease does not hold; None while it does. Takes no lock.
+
+        Parameters
+        ----------
+        lease : Lease
+            the lease
+        """
+        if lease.lost is None and self._clock() >= lease.ends:
+            self._finish(lease, f"no sign of life for {lease.ttl_s:g} s")
+        return lease.lost
+
+    def require_unleased(self, device: str) -> None:
+        """Refuse an arm that somebody has a lease of.
+
+        Parameters
+        ----------
+        device : str
+            the arm
+
+        Raises
+        ------
+        LeasedError
+            if somebody has
+        """
+        present = self._present(device)
+        if present is not None:
+            raise self._leased(present)
+
+    def _present(self, device: str) -> Lease | None:
+        """The lease that holds for an arm."""
+        lease = self._active.get(device)
+        return None if lease is None or self.end_of(lease) is not None else lease
+
+    def _finish(self, lease: Lease, why: str) -> None:
+        """A lease ends, once."""
+        if lease.lost is None:
+            lease.lost = why
+            lease.is_armed = False
+            self._on_end(lease, why)
+
+    def _leased(self, lease: Lease) -> LeasedError:
+        """Somebody has the arm."""
+        left = self.seconds_left(lease)
+        return LeasedError(
+            one_line(f"{lease.device}: {lease.holder} has its lease, for {left:.1f} s more unless it is renewed")
+        )

@@ -1,0 +1,65 @@
+"""Starting the control process of a run whose folder holds everything that it needs."""
+
+import json
+import zlib
+from pathlib import Path
+from typing import Any
+
+from tauscope.errors import AcquisitionError
+from tauscope.robot import read_robot
+from tauscope.runtime.order import BackendOrder, RunOrder
+from tauscope.runtime.progress import Report
+from tauscope.runtime.run_process import RunProcess
+from tauscope.server.control.run_order import BackendChoice
+from tauscope.server.control.run_workspace import RunWorkspace
+
+
+def start_control(workspace: RunWorkspace, report: Report, *, sim_socket: Path | None = None) -> RunProcess:
+    """Start the control process.
+
+    Parameters
+    ----------
+    workspace : RunWorkspace
+        of the run
+    report : callable
+        takes the events
+    sim_socket : Path or None
+        where a simulated arm that runs by the clock listens; one is started for each run where None
+
+    Returns
+    -------
+    RunProcess
+        started; hears of its owner by `RunProcess.beat`
+
+    Raises
+    ------
+    RobotFileError
+        if the robot file was damaged meanwhile
+    AcquisitionError
+        if files are missing, or the process cannot be started
+    """
+    request, trajectory = workspace.read_request(), workspace.trajectory
+    if request is None or trajectory is None:
+        raise AcquisitionError("files of the run are missing or damaged; hand it in again")
+    robot_file = workspace.robot / request.robot_file
+    order = RunOrder(
+        robot=str(robot_file),
+        trajectory=str(trajectory),
+        backend=BackendOrder(name=request.backend.name, settings=_settings(workspace, request.backend, sim_socket)),
+        options=request.options,
+    )
+    return RunProcess(workspace.control, order, read_robot(robot_file), report=report, beats_by_itself=False)
+
+
+def _settings(workspace: RunWorkspace, backend: BackendChoice, sim_socket: Path | None) -> dict[str, Any]:
+    """The backend's own settings; for the simulated arm a scenario file, whose noise is this run's own."""
+    if backend.name != "sim":
+        return {}
+    scenario = {"seed": zlib.crc32(workspace.folder.name.encode()), **(backend.scenario or {})}
+    workspace.scenario.write_text(json.dumps(scenario, ensure_ascii=False), encoding="utf-8")
+    settings: dict[str, Any] = {"time": backend.time, "scenario": str(workspace.scenario)}
+    if backend.start is not None:
+        settings["start"] = list(backend.start)
+    if sim_socket is not None and backend.time == "real":
+        settings["socket"] = str(sim_socket)
+    return settings

@@ -1,0 +1,138 @@
+"""What a new model has to show before it takes the place of another; each gate says what it found and allows."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tauscope.identification.result import IdentificationDocument, LinkEntry
+from tauscope.server.history.policy import ModelPolicy
+
+
+@dataclass(frozen=True)
+class Gate:
+    """One condition.
+
+    name : str
+        ``held_out``, ``consistency``, ``excitation`` or ``structure``
+    passed : bool
+        whether it is met
+    reason : str
+        one line: what was found, what is allowed, and what to do where it is not met
+    """
+
+    name: str
+    passed: bool
+    reason: str
+
+
+def check_gates(
+    document: IdentificationDocument, policy: ModelPolicy, active: IdentificationDocument | None = None
+) -> tuple[Gate, ...]:
+    """Judge a model.
+
+    Parameters
+    ----------
+    document : IdentificationDocument
+        the new model
+    policy : ModelPolicy
+        the bounds
+    active : IdentificationDocument or None
+        the model whose place it would take
+    """
+    gates = [_held_out(document, policy), _consistency(document, policy), _excitation(document, policy)]
+    return tuple(gates if active is None else [*gates, _structure(document, active)])
+
+
+def passes(gates: Sequence[Gate]) -> bool:
+    """Whether all gates are met.
+
+    Parameters
+    ----------
+    gates : sequence of Gate
+        of a model
+    """
+    return all(gate.passed for gate in gates)
+
+
+def _held_out(document: IdentificationDocument, policy: ModelPolicy) -> Gate:
+    """The model explains motions that it was not made from about as well as those that it was made from."""
+    fit = document.fit.held_out
+    if fit is None:
+        return Gate("held_out", False, "no held-out recording: nothing shows that it holds on other motions; add one")
+    if fit.relative_error > policy.held_out_error:
+        found = f"relative error {fit.relative_error:.3g} on held-out motions, allowed {policy.held_out_error:.3g}"
+        return Gate("held_out", False, f"{found}; look for what changed between the recordings")
+    floor = [max(rms, noise) for rms, noise in zip(document.fit.train.rms, document.noise_std, strict=True)]
+    worst, joint = max(_ratios(fit.rms, floor, document.joints))
+    found = f"{joint}: held-out residual {worst:.2f} times that of the training, allowed {policy.held_out_ratio:.2f}"
+    if worst > policy.held_out_ratio:
+        return Gate("held_out", False, f"{found}; record a longer or richer motion")
+    return Gate("held_out", True, f"relative error {fit.relative_error:.3g}; {found}")
+
+
+def _consistency(document: IdentificationDocument, policy: ModelPolicy) -> Gate:
+    """Real bodies can have these parameters, and explain the data about as well as free ones."""
+    for number, link in enumerate(document.links, start=1):
+        if not is_physical(link):
+            return Gate("consistency", False, f"link {number}: no real body has this mass and inertia; identify anew")
+    fit, free = document.fit.links_held_out or document.fit.links_train, document.fit.held_out or document.fit.train
+    worst, joint = max(_ratios(fit.rms, free.rms, document.joints))
+    found = (
+        f"{joint}: residual of the physically consistent model {worst:.2f} times that of the free one,"
+        f" allowed {policy.consistency_ratio:.2f}"
+    )
+    if worst > policy.consistency_ratio:
+        return Gate("consistency", False, f"{found}; something is missing in the model: diagnose the recordings")
+    return Gate("consistency", True, found)
+
+
+def _excitation(document: IdentificationDocument, policy: ModelPolicy) -> Gate:
+    """The motion shows every parameter."""
+    if document.undetermined:
+        names = ", ".join(document.undetermined[:3])
+        return Gate("excitation", False, f"the recordings say nothing about {names}; record a richer motion")
+    found = f"condition number {document.condition_number:.3g}, allowed {policy.condition_number:.3g}"
+    if document.condition_number > policy.condition_number:
+        return Gate("excitation", False, f"{found}; record a motion of `tauscope excite`")
+    return Gate("excitation", True, found)
+
+
+def _structure(document: IdentificationDocument, active: IdentificationDocument) -> Gate:
+    """It is a model of the same arm."""
+    if document.joints != active.joints:
+        return Gate("structure", False, "other joints than the active model's; activate it by hand if the arm changed")
+    if _names(document) != _names(active):
+        reason = (
+            "other base parameters than the active model's: the kinematics differ; activate it by hand if that is so"
+        )
+        return Gate("structure", False, reason)
+    return Gate("structure", True, "the same joints and base parameters as the active model")
+
+
+def is_physical(link: LinkEntry) -> bool:
+    """Whether a link's pseudo-inertia [[½ tr(I) 1 − I, m s], [(m s)ᵀ, m]] has no negative eigenvalue.
+
+    Parameters
+    ----------
+    link : LinkEntry
+        mass, first moment, and inertia about the link frame's origin
+    """
+    i = link.inertia
+    inertia = np.array([[i.xx, i.xy, i.xz], [i.xy, i.yy, i.yz], [i.xz, i.yz, i.zz]])
+    pseudo = np.empty((4, 4))
+    pseudo[:3, :3] = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    pseudo[:3, 3] = pseudo[3, :3] = link.first_moment
+    pseudo[3, 3] = link.mass
+    eigenvalues = np.linalg.eigvalsh(pseudo)
+    return bool(eigenvalues[0] >= -1e-6 * max(eigenvalues[-1], 1e-12))
+
+
+def _ratios(rms: Sequence[float], floor: Sequence[float], joints: Sequence[str]) -> Iterator[tuple[float, str]]:
+    """For each joint how many times the floor its residual is."""
+    for value, reference, joint in zip(rms, floor, joints, strict=True):
+        yield (value / reference if reference > 0.0 else (1.0 if value == 0.0 else float("inf"))), joint
+
+
+def _names(document: IdentificationDocument) -> list[str]:
+    return [entry.name for entry in document.base_parameters]

@@ -1,0 +1,344 @@
+"""The history of models: every identification is judged once, and at most one model of a robot is active."""
+
+from datetime import datetime
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session, aliased, undefer
+
+from tauscope.errors import NotFoundError
+from tauscope.identification import IdentificationDocument
+from tauscope.robot.messages import nearest, one_line, shown
+from tauscope.server.history import Gate, ModelPolicy
+from tauscope.server.history.model_entries import ModelEntry, ModelEventEntry
+from tauscope.server.history.model_judgement import Candidate, choose, judge
+from tauscope.server.store.database.database import Database
+from tauscope.server.store.database.model_tables import Model, ModelEvent, RobotPolicy
+from tauscope.server.store.database.tables import Item, Robot
+
+
+class ModelHistory:
+    """Models of every robot. Every method is one short transaction, and may be called from any thread."""
+
+    def __init__(self, database: Database) -> None:
+        """Look at the history.
+
+        Parameters
+        ----------
+        database : Database
+            holds it
+        """
+        self._database = database
+
+    def unjudged(self, site: str) -> list[str]:
+        """Identifications that succeeded and were not judged yet, the oldest first.
+
+        Parameters
+        ----------
+        site : str
+            of the data folder that holds them
+        """
+        judged = select(Model.identifier).where(Model.site == site)
+        query = (
+            select(Item.identifier)
+            .where(Item.site == site, Item.kind == "identification", Item.state == "succeeded")
+            .where(Item.robot_id.is_not(None), Item.identifier.not_in(judged))
+            .order_by(Item.created)
+        )
+        with self._database.reading() as session:
+            return list(session.scalars(query))
+
+    def consider(self, candidate: Candidate, now: datetime) -> ModelEntry:
+        """Judge an identification: compare it, make it active where it passes, and raise what people should know.
+
+        Parameters
+        ----------
+        candidate : Candidate
+            the identification
+        now : datetime
+            the present moment
+
+        Returns
+        -------
+        ModelEntry
+            as it was judged
+
+        Raises
+        ------
+        NotFoundError
+            if its robot is not in the index
+        IntegrityError
+            if another service judged it meanwhile
+        """
+        with self._database.writing() as session:
+            robot = _robot(session, candidate.robot)
+            return _entry(judge(session, robot, candidate, _policy(session, robot), now))
+
+    def activate(self, identifier: str, role: str, reason: str, now: datetime) -> ModelEntry:
+        """Make a model the active one, or the one that drift is counted from, on somebody's word.
+
+        Parameters
+        ----------
+        identifier : str
+            of the model
+        role : str
+            ``active`` or ``reference``
+        reason : str
+            why; kept with the choice
+        now : datetime
+            the present moment
+
+        Raises
+        ------
+        NotFoundError
+            if there is no such model, or nobody could read it
+        """
+        with self._database.writing() as session:
+            model = _model(session, identifier)
+            if model.state == "unreadable":
+                raise NotFoundError(f"model {identifier}: its result could not be read; choose another one")
+            session.execute(select(Robot.id).where(Robot.id == model.robot_id).with_for_update())
+            choose(session, model, role, reason, now)
+            return _entry(model)
+
+    def relied_upon(self) -> frozenset[str]:
+        """Identifiers of the models that are active, or that drift is counted from."""
+        with self._database.reading() as session:
+            return frozenset(session.scalars(select(Model.identifier).where(Model.is_active | Model.is_reference)))
+
+    def find(self, identifier: str) -> ModelEntry:
+        """A model.
+
+        Parameters
+        ----------
+        identifier : str
+            of the identification
+
+        Raises
+        ------
+        NotFoundError
+            if no such identification was judged
+        """
+        with self._database.reading() as session:
+            return _entry(_model(session, identifier))
+
+    def document(self, identifier: str) -> IdentificationDocument:
+        """What a model says; also where its identification was removed.
+
+        Parameters
+        ----------
+        identifier : str
+            of the identification
+
+        Raises
+        ------
+        NotFoundError
+            if no such identification was judged, or its result could not be read
+        """
+        with self._database.reading() as session:
+            content = _model(session, identifier).document
+        if content is None:
+            raise NotFoundError(f"model {identifier}: its result could not be read; choose another one")
+        return IdentificationDocument.model_validate(content)
+
+    def active(self, robot: str) -> ModelEntry | None:
+        """The active model of a robot; None where none has passed yet.
+
+        Parameters
+        ----------
+        robot : str
+            its name
+        """
+        query = select(Model).join(Robot).where(Robot.name == robot, Model.is_active)
+        with self._database.reading() as session:
+            model = session.scalar(query)
+            return None if model is None else _entry(model)
+
+    def active_and_reference(self, site: str) -> dict[str, tuple[str, str]]:
+        """Identifiers of the active model and of the one that drift is counted from, by name of the robot.
+
+        Parameters
+        ----------
+        site : str
+            of the data folder that holds the active one
+        """
+        active, reference = aliased(Model), aliased(Model)
+        query = (
+            select(Robot.name, active.identifier, reference.identifier)
+            .join(active, (active.robot_id == Robot.id) & active.is_active & (active.site == site))
+            .join(reference, (reference.robot_id == Robot.id) & reference.is_reference)
+        )
+        with self._database.reading() as session:
+            return {name: (now, then) for name, now, then in session.execute(query)}
+
+    def models(self, robot: str | None, limit: int) -> list[ModelEntry]:
+        """Models, the newest first.
+
+        Parameters
+        ----------
+        robot : str or None
+            of this robot only
+        limit : int
+            most models
+        """
+        query = select(Model).join(Robot).order_by(Model.created.desc(), Model.id.desc()).limit(limit)
+        if robot is not None:
+            query = query.where(Robot.name == robot)
+        with self._database.reading() as session:
+            return [_entry(model) for model in session.scalars(query)]
+
+    def documents(self, robot: str, since: datetime | None = None) -> list[tuple[ModelEntry, IdentificationDocument]]:
+        """Every model of a robot that was ever active, with what it says; the oldest first.
+
+        Parameters
+        ----------
+        robot : str
+            its name
+        since : datetime or None
+            models of identifications that were handed in no earlier
+
+        Raises
+        ------
+        NotFoundError
+            if there is no such robot
+        """
+        query = select(Model).options(undefer(Model.document)).where(Model.state.in_(("active", "kept")))
+        if since is not None:
+            query = query.where(Model.created >= since)
+        with self._database.reading() as session:
+            models = session.scalars(query.where(Model.robot == _robot(session, robot)).order_by(Model.created))
+            return [(_entry(each), IdentificationDocument.model_validate(each.document)) for each in models]
+
+    def policy(self, robot: str) -> ModelPolicy:
+        """The bounds for a robot.
+
+        Parameters
+        ----------
+        robot : str
+            its name
+
+        Raises
+        ------
+        NotFoundError
+            if there is no such robot
+        """
+        with self._database.reading() as session:
+            return _policy(session, _robot(session, robot))
+
+    def set_policy(self, robot: str, policy: ModelPolicy) -> None:
+        """Set the bounds for a robot; models that were judged stay as they were judged.
+
+        Parameters
+        ----------
+        robot : str
+            its name
+        policy : ModelPolicy
+            the bounds
+
+        Raises
+        ------
+        NotFoundError
+            if there is no such robot
+        """
+        with self._database.writing() as session:
+            session.merge(RobotPolicy(robot_id=_robot(session, robot).id, document=policy.model_dump()))
+
+    def events(self, robot: str | None, *, only_open: bool, limit: int) -> list[ModelEventEntry]:
+        """What people should know, the newest first.
+
+        Parameters
+        ----------
+        robot : str or None
+            of this robot only
+        only_open : bool
+            only what nobody has taken note of
+        limit : int
+            most events
+        """
+        query = select(ModelEvent).join(Robot).order_by(ModelEvent.last_seen.desc(), ModelEvent.id.desc()).limit(limit)
+        if robot is not None:
+            query = query.where(Robot.name == robot)
+        if only_open:
+            query = query.where(ModelEvent.closed.is_(None))
+        with self._database.reading() as session:
+            return [_event(event) for event in session.scalars(query)]
+
+    def acknowledge(self, number: int, note: str, now: datetime) -> ModelEventEntry:
+        """Take note of an event; nothing happens to one that was closed before.
+
+        Parameters
+        ----------
+        number : int
+            of the event
+        note : str
+            kept with it
+        now : datetime
+            the present moment
+
+        Raises
+        ------
+        NotFoundError
+            if there is no such event
+        """
+        with self._database.writing() as session:
+            event = session.get(ModelEvent, number)
+            if event is None:
+                raise NotFoundError(f"there is no event {number}; list the events")
+            if event.closed is None:
+                event.closed, event.note = now, note
+            return _event(event)
+
+
+def _robot(session: Session, name: str) -> Robot:
+    """The row of a robot; locked until the transaction ends where the database can lock rows."""
+    robot = session.scalar(select(Robot).where(Robot.name == name).with_for_update(of=Robot))
+    if robot is None:
+        known = session.scalars(select(Robot.name).order_by(Robot.name).limit(1000)).all()
+        hint = nearest(name, known) if known else "identify one first"
+        raise NotFoundError(one_line(f"nothing is kept about a robot {shown(name)}; {hint}"))
+    return robot
+
+
+def _policy(session: Session, robot: Robot) -> ModelPolicy:
+    """The bounds for a robot: its own, or the general ones."""
+    row = session.get(RobotPolicy, robot.id)
+    return ModelPolicy() if row is None else ModelPolicy.model_validate(row.document)
+
+
+def _model(session: Session, identifier: str) -> Model:
+    """The row of a model."""
+    model = session.scalars(select(Model).where(Model.identifier == identifier).limit(1)).first()
+    if model is None:
+        hint = "list the models; an identification is judged within seconds of its end"
+        raise NotFoundError(one_line(f"no model {shown(identifier)} is kept here; {hint}"))
+    return model
+
+
+def _entry(model: Model) -> ModelEntry:
+    """What is given out of a model."""
+    return ModelEntry(
+        identifier=model.identifier,
+        site=model.site,
+        robot=model.robot.name,
+        created=model.created,
+        considered=model.considered,
+        source=model.source,
+        state=model.state,
+        gates=tuple(Gate(**gate) for gate in model.gates),
+        is_reference=model.is_reference,
+    )
+
+
+def _event(event: ModelEvent) -> ModelEventEntry:
+    """What is given out of an event."""
+    return ModelEventEntry(
+        number=event.id,
+        robot=event.robot.name,
+        kind=event.kind,
+        parameter=event.parameter,
+        text=event.text,
+        details=event.details,
+        raised=event.raised,
+        last_seen=event.last_seen,
+        closed=event.closed,
+        note=event.note,
+    )

@@ -1,0 +1,100 @@
+"""Sees to it that every identification that succeeds is judged, once, whoever handed it in."""
+
+import logging
+from collections.abc import Mapping
+from datetime import UTC, datetime
+
+from sqlalchemy.exc import IntegrityError
+
+from tauscope.errors import NotFoundError
+from tauscope.server.control.run_workspace import RunWorkspace
+from tauscope.server.history.model_entries import ModelEntry
+from tauscope.server.history.model_history import ModelHistory
+from tauscope.server.history.model_judgement import Candidate
+from tauscope.server.queue.identification_order import IdentificationOrder
+from tauscope.server.queue.identification_workspace import IdentificationWorkspace
+from tauscope.server.store.items import ItemStore
+
+_log = logging.getLogger("tauscope.jobs")
+
+
+class ModelRegistry:
+    """Brings identifications before the history of models, in the order in which they were handed in."""
+
+    def __init__(self, history: ModelHistory, site: str, items: Mapping[str, ItemStore]) -> None:
+        """Prepare; nothing is judged yet.
+
+        Parameters
+        ----------
+        history : ModelHistory
+            judges
+        site : str
+            identifier of this data folder
+        items : mapping of str to ItemStore
+            folders of each kind of item
+        """
+        self.history = history
+        self._site = site
+        self._identifications = items["identification"]
+        self._runs = items["run"]
+        self._strange: set[str] = set()
+
+    def consider_new(self) -> list[ModelEntry]:
+        """Judge every identification in the index that was not judged yet.
+
+        Returns
+        -------
+        list of ModelEntry
+            as they were judged
+
+        Raises
+        ------
+        StoreError
+            if the database does not answer; the next call goes on where this one ended
+        """
+        return [entry for identifier in self.history.unjudged(self._site) if (entry := self._consider(identifier))]
+
+    def _consider(self, identifier: str) -> ModelEntry | None:
+        """Judge one identification; None where it was removed or judged meanwhile, or names an unknown robot."""
+        try:
+            workspace = IdentificationWorkspace(self._identifications.folder(identifier))
+        except NotFoundError:
+            return None
+        order, record = workspace.read_order(), workspace.read_record()
+        if order is None or record is None:
+            return None
+        candidate = Candidate(
+            identifier=identifier,
+            site=self._site,
+            robot=order.robot_name,
+            created=record.created,
+            source=self._source(order),
+            result=workspace.read_result(),
+        )
+        try:
+            entry = self.history.consider(candidate, datetime.now(UTC))
+        except IntegrityError:
+            return None
+        except NotFoundError as error:  # the order was damaged; one such identification holds up no service
+            if identifier not in self._strange:
+                _log.warning("identification %s is not judged, its order may be damaged: %s", identifier, error)
+            self._strange.add(identifier)
+            return None
+        _log.info("model %s of %s is %s", identifier, entry.robot, entry.state)
+        return entry
+
+    def _source(self, order: IdentificationOrder) -> str:
+        """What was measured: one simulated recording makes all of it simulated."""
+        backends = {self._backend(entry.name) for entry in order.recordings if entry.origin == "server"} - {None}
+        if "sim" in backends:
+            return "simulated"
+        return "arm" if backends else "uploaded"
+
+    def _backend(self, recording: str) -> str | None:
+        """The backend of the run that a recording is of; None where it is of none that is kept here."""
+        identifier = recording.removeprefix("run-").removesuffix(".csv")
+        try:
+            request = RunWorkspace(self._runs.folder(identifier)).read_request()
+        except NotFoundError:
+            return None
+        return None if request is None else request.backend.name

@@ -1,0 +1,185 @@
+"""What is kept for how long: old items go, and what is still relied upon stays."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+
+from tauscope.errors import NotFoundError
+from tauscope.server.history.indexer import Indexer
+from tauscope.server.history.item_metadata import DAMAGED
+from tauscope.server.history.model_history import ModelHistory
+from tauscope.server.store.database.facts import ItemEntry, ItemQuery
+from tauscope.server.store.items import utc_now
+from tauscope.server.store.recordings import RecordingStore
+
+_ALL = 10**9
+
+
+@dataclass(frozen=True)
+class RetentionRule:
+    """What may go.
+
+    older_than : timedelta
+        items that ended, and recordings that were written, longer ago than this
+    kinds : frozenset of str
+        kinds of items that may go
+    recordings : bool
+        whether recordings may go too that no item which stays was made from
+    """
+
+    older_than: timedelta
+    kinds: frozenset[str]
+    recordings: bool = False
+
+
+@dataclass(frozen=True)
+class Removal:
+    """What goes.
+
+    items : tuple of ItemEntry
+        with all their files
+    recordings : tuple of str
+        names of recordings
+    """
+
+    items: tuple[ItemEntry, ...]
+    recordings: tuple[str, ...]
+
+
+def plan_removal(
+    keeper: Indexer, history: ModelHistory, recordings: RecordingStore, rule: RetentionRule, now: datetime
+) -> Removal:
+    """What a rule lets go.
+
+    The identification of an active model, or of one that drift is counted from, stays; so does what goes on, and what
+    is damaged: somebody should look at it.
+
+    Parameters
+    ----------
+    keeper : Indexer
+        knows the items
+    history : ModelHistory
+        knows the models
+    recordings : RecordingStore
+        recordings on the server
+    rule : RetentionRule
+        what may go
+    now : datetime
+        the present moment
+
+    Raises
+    ------
+    StoreError
+        if the database does not answer
+    """
+    keeper.sync(thorough=True)
+    relied_upon = history.relied_upon()
+    going = [
+        entry
+        for entry in keeper.index.search(ItemQuery(site=keeper.index.site, limit=_ALL))
+        if entry.kind in rule.kinds
+        and entry.ended is not None
+        and entry.ended < now - rule.older_than
+        and entry.state != DAMAGED
+        and not (entry.kind == "identification" and entry.identifier in relied_upon)
+    ]
+    names: tuple[str, ...] = ()
+    if rule.recordings:
+        used = keeper.index.recordings_used(except_by={(entry.kind, entry.identifier) for entry in going})
+        old = (entry for entry in recordings.entries() if entry.modified < now - rule.older_than)
+        names = tuple(entry.name for entry in old if entry.name not in used)
+    return Removal(tuple(going), names)
+
+
+def remove(
+    removal: Removal,
+    removers: Mapping[str, Callable[[str], object]],
+    recordings: RecordingStore,
+    keeper: Indexer,
+) -> Removal:
+    """Remove what was planned; what somebody else removed meanwhile is left out.
+
+    Parameters
+    ----------
+    removal : Removal
+        of `plan_removal`
+    removers : mapping of str to callable
+        for each kind of item what removes one, given its identifier
+    recordings : RecordingStore
+        recordings on the server
+    keeper : Indexer
+        brought up to date afterwards
+
+    Returns
+    -------
+    Removal
+        what went
+
+    Raises
+    ------
+    OSError
+        if something cannot be removed; what was removed before is gone
+    """
+    items = tuple(entry for entry in removal.items if _is_gone(removers[entry.kind], entry.identifier))
+    names = tuple(name for name in removal.recordings if _is_gone(recordings.remove, name))
+    keeper.sync(thorough=True)
+    return Removal(items, names)
+
+
+def _is_gone(remove_one: Callable[[str], object], name: str) -> bool:
+    """Whether it was there, and went."""
+    try:
+        remove_one(name)
+    except NotFoundError:
+        return False
+    return True
+
+
+class RetentionSweeper:
+    """A rule that is kept to while the service works, by the same ways by which its routes remove something."""
+
+    def __init__(
+        self,
+        rule: RetentionRule,
+        keeper: Indexer,
+        history: ModelHistory,
+        recordings: RecordingStore,
+        removers: Mapping[str, Callable[[str], object]],
+        on_removed: Callable[[str, str], None],
+    ) -> None:
+        """Prepare; nothing goes before `tidy`.
+
+        Parameters
+        ----------
+        rule : RetentionRule
+            what may go
+        keeper : Indexer
+            knows the items
+        history : ModelHistory
+            knows the models
+        recordings : RecordingStore
+            recordings on the server
+        removers : mapping of str to callable
+            for each kind of item what removes one, given its identifier
+        on_removed : callable
+            told the kind and the name of what went
+        """
+        self._rule, self._keeper, self._history = rule, keeper, history
+        self._recordings, self._removers, self._on_removed = recordings, removers, on_removed
+
+    def tidy(self) -> None:
+        """Remove what the rule lets go.
+
+        Raises
+        ------
+        StoreError
+            if the database does not answer; nothing goes then
+        OSError
+            if something cannot be removed
+        """
+        plan = plan_removal(self._keeper, self._history, self._recordings, self._rule, utc_now())
+        gone = remove(plan, self._removers, self._recordings, self._keeper)
+        for entry in gone.items:
+            self._on_removed(entry.kind, entry.identifier)
+        for name in gone.recordings:
+            self._on_removed("recording", name)

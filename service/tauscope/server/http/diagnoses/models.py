@@ -1,0 +1,88 @@
+"""Requests and answers about diagnoses."""
+
+from typing import Any, Self
+
+from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from tauscope.server.http.identifications.models import Names
+from tauscope.server.http.jobs.answers import JobAnswer
+from tauscope.server.http.jobs.submission import RobotRequest
+from tauscope.server.http.robots.models import EXAMPLE_ROBOT
+from tauscope.server.models import AnswerModel
+from tauscope.server.queue.diagnosis_order import DiagnosisOptions
+from tauscope.server.queue.identification_order import OrderedRecording
+
+
+class DiagnosisRequest(RobotRequest):
+    """What is to be diagnosed."""
+
+    recordings: Names | None = Field(
+        default=None,
+        description="names of the recordings that are to be explained: files of this form, or on the server; null: all"
+        " files sent as part `recordings`",
+    )
+    held_out: Names | None = Field(
+        default=None,
+        description="names of the recordings that confirm findings; null: all files sent as part `held_out`",
+    )
+    simulated: Names | None = Field(
+        default=None,
+        description="names of recordings made in your own simulator; null: all files sent as part `simulated`",
+    )
+    options: DiagnosisOptions = Field(default=DiagnosisOptions(), description="how it is diagnosed")
+
+    @model_validator(mode="after")
+    def _check_once(self) -> Self:
+        """A recording counts once."""
+        for names in (self.recordings or [], self.held_out or [], self.simulated or []):
+            twice = next((name for index, name in enumerate(names) if name in names[:index]), None)
+            if twice is not None:
+                raise PydanticCustomError("twice", "{name} is listed twice; list it once", {"name": twice})
+        return self
+
+
+EXAMPLES: dict[str, tuple[str, Any]] = {
+    "server": (
+        "Recordings that lie on the server",
+        {"robot": EXAMPLE_ROBOT, "recordings": ["monday.csv", "tuesday.csv"], "held_out": ["wednesday.mcap"]},
+    ),
+    "simulation": (
+        "What your own simulation has wrong, and what it lacks",
+        {
+            "robot": EXAMPLE_ROBOT,
+            "recordings": ["monday.csv"],
+            "simulated": ["simulated.csv"],
+            "options": {"against": "simulation"},
+        },
+    ),
+}
+
+
+class DiagnosisLinksAnswer(AnswerModel):
+    """Where to go on from a diagnosis."""
+
+    self_: str = Field(alias="self", description="its state")
+    events: str = Field(description="what happens to it, as server-sent events")
+    result: str | None = Field(default=None, description="its result, once it succeeded")
+    plots: str | None = Field(default=None, description="data of its figures, once it succeeded")
+    report: str | None = Field(default=None, description="its report as a page, once it succeeded")
+    model: str | None = Field(default=None, description="the model with all findings, once it succeeded")
+    next_trajectory: str | None = Field(default=None, description="the motion to record next, where one was planned")
+
+
+class DiagnosisAnswer(JobAnswer):
+    """The state of a diagnosis."""
+
+    robot: str | None = Field(default=None, description="name of the robot")
+    recordings: tuple[OrderedRecording, ...] = Field(default=(), description="what is explained")
+    held_out: tuple[OrderedRecording, ...] = Field(default=(), description="what findings are confirmed by")
+    simulated: tuple[OrderedRecording, ...] = Field(default=(), description="what the user's simulator recorded")
+    options: DiagnosisOptions | None = Field(default=None, description="how it is diagnosed")
+    links: DiagnosisLinksAnswer = Field(description="where to go on")
+
+
+class DiagnosisListAnswer(AnswerModel):
+    """Diagnoses that are kept."""
+
+    diagnoses: list[DiagnosisAnswer] = Field(description="the newest first")

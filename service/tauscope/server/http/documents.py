@@ -1,0 +1,106 @@
+"""JSON bodies: of one media type, of bounded size, strict."""
+
+import json
+from typing import Any, TypeVar
+
+from fastapi import Request
+from pydantic import BaseModel, ValidationError
+
+from tauscope.errors import LimitExceededError
+from tauscope.server.problems import ProblemError, invalid_request
+
+JSON = "application/json"
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def media_type(request: Request) -> str:
+    """The media type of a request's body, without parameters.
+
+    Parameters
+    ----------
+    request : Request
+        with or without a body
+    """
+    return request.headers.get("content-type", "").partition(";")[0].strip().lower()
+
+
+def refuse_media_type(request: Request, *accepted: str) -> ProblemError:
+    """The problem of a body of another media type.
+
+    Parameters
+    ----------
+    request : Request
+        the request
+    accepted : str
+        media types that would do
+    """
+    found = media_type(request) or "of no stated media type"
+    headers = {"Accept-Post": ", ".join(accepted)}
+    return ProblemError("media-type", f"the body is {found}; send {' or '.join(accepted)}", headers=headers)
+
+
+async def read_document(request: Request, kind: type[Model], limit: int) -> Model:
+    """The JSON body of a request.
+
+    Parameters
+    ----------
+    request : Request
+        the request
+    kind : type
+        model of the body
+    limit : int
+        largest body [bytes]
+
+    Raises
+    ------
+    ProblemError
+        if the body is not as the model wants it
+    LimitExceededError
+        if it is too large
+    """
+    content = bytearray()
+    async for piece in request.stream():
+        content += piece
+        if len(content) > limit:
+            raise LimitExceededError(f"the JSON is larger than the {limit} bytes accepted here; send files as a form")
+    return parse_document(bytes(content), kind, within="body")
+
+
+def parse_document(content: bytes, kind: type[Model], *, within: str) -> Model:
+    """A model from JSON text.
+
+    Parameters
+    ----------
+    content : bytes
+        JSON
+    kind : type
+        the model
+    within : str
+        where the text stands in the request, for messages
+
+    Raises
+    ------
+    ProblemError
+        if it is not as the model wants it
+    """
+    try:
+        return kind.model_validate_json(content)
+    except ValidationError as error:
+        raise invalid_request(error, within=within) from None
+
+
+def to_json_text(value: Any) -> str | None:
+    """Plain data as JSON; None where it holds NaN or infinity, or text that is not Unicode.
+
+    Parameters
+    ----------
+    value : dict, list, str, int, float, bool or None
+        plain data
+    """
+    try:
+        text = json.dumps(value, ensure_ascii=False, allow_nan=False)
+        text.encode()
+    except (ValueError, RecursionError):
+        return None
+    return text

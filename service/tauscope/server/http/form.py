@@ -1,0 +1,226 @@
+"""A multipart form, streamed: files go to the disk and are hashed as they arrive; none is held in memory."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from fastapi import Request
+from python_multipart.exceptions import FormParserError
+from python_multipart.multipart import MultipartParser, parse_options_header
+from starlette.concurrency import run_in_threadpool
+
+from tauscope.errors import LimitExceededError
+from tauscope.robot.messages import one_line, shown
+from tauscope.server.problems import ProblemError
+from tauscope.server.store.incoming import IncomingFile, KeptFile
+from tauscope.server.store.names import FILE_NAME_RULE, is_file_name
+
+if TYPE_CHECKING:
+    from python_multipart.multipart import MultipartCallbacks
+
+FORM = "multipart/form-data"
+
+
+@dataclass(frozen=True)
+class PartRule:
+    """What a part of a form may be.
+
+    limit : int
+        largest size [bytes]
+    folder : Path or None
+        where its files are written; None for text that is kept in memory
+    most : int
+        how many parts of that name there may be
+    default_name : str or None
+        name of a file that was sent without one; None where it has to have one
+    """
+
+    limit: int
+    folder: Path | None = None
+    most: int = 1
+    default_name: str | None = None
+
+
+@dataclass
+class ReceivedForm:
+    """A form that arrived as a whole.
+
+    texts : dict of str to bytes
+        content of the text parts, by part name
+    files : dict of str to list of KeptFile
+        files by part name, each in its folder under its own name
+    """
+
+    texts: dict[str, bytes] = field(default_factory=dict)
+    files: dict[str, list[KeptFile]] = field(default_factory=dict)
+
+    def file(self, name: str) -> KeptFile | None:
+        """The only file of a part, or None.
+
+        Parameters
+        ----------
+        name : str
+            of the part
+        """
+        files = self.files.get(name, [])
+        return files[0] if files else None
+
+
+async def receive_form(request: Request, rules: Mapping[str, PartRule]) -> ReceivedForm:
+    """Read the form of a request; two files of one part never share a name.
+
+    Parameters
+    ----------
+    request : Request
+        with a multipart body
+    rules : mapping of str to PartRule
+        the parts that the form may have
+
+    Returns
+    -------
+    ReceivedForm
+        all parts; the caller owns the files
+
+    Raises
+    ------
+    ProblemError
+        if the body is no form, or has a part that is not foreseen, or a file of a name that is not allowed
+    LimitExceededError
+        if a part is too large
+    """
+    receiver = _Receiver(rules)
+    with _form_errors():
+        _, options = parse_options_header(request.headers.get("content-type"))
+        parser = MultipartParser(options.get(b"boundary") or b"", receiver.callbacks())
+    try:
+        async for piece in request.stream():
+            if piece:
+                await run_in_threadpool(_feed, parser, piece)
+        with _form_errors():
+            parser.finalize()
+        if not receiver.has_ended:
+            raise ProblemError("bad-request", "the form is cut off; send it again")
+        return receiver.form
+    except BaseException:
+        receiver.discard()
+        raise
+
+
+def _feed(parser: MultipartParser, piece: bytes) -> None:
+    """Parse and write the next bytes, outside the event loop because the disk may be slow."""
+    with _form_errors():
+        parser.write(piece)
+
+
+@contextmanager
+def _form_errors() -> Iterator[None]:
+    """The parser's complaints as problems."""
+    try:
+        yield
+    except FormParserError as error:
+        raise ProblemError("bad-request", f"the body is no multipart form: {error}") from None
+
+
+class _Receiver:
+    """Takes the parser's events and makes a form of them."""
+
+    def __init__(self, rules: Mapping[str, PartRule]) -> None:
+        self.form = ReceivedForm()
+        self.has_ended = False
+        self._rules = rules
+        self._header = [b"", b""]
+        self._headers: dict[bytes, bytes] = {}
+        self._part = ""
+        self._rule = PartRule(0)
+        self._text: bytearray | None = None
+        self._file: IncomingFile | None = None
+
+    def callbacks(self) -> "MultipartCallbacks":
+        """What the parser calls."""
+        return {
+            "on_part_begin": self._part_begin,
+            "on_header_field": self._header_field,
+            "on_header_value": self._header_value,
+            "on_header_end": self._header_end,
+            "on_headers_finished": self._headers_finished,
+            "on_part_data": self._part_data,
+            "on_part_end": self._part_end,
+            "on_end": self._end,
+        }
+
+    def discard(self) -> None:
+        """Remove everything that was written."""
+        if self._file is not None:
+            self._file.discard()
+        for file in (file for files in self.form.files.values() for file in files):
+            file.path.unlink(missing_ok=True)
+
+    def _part_begin(self) -> None:
+        self._headers = {}
+
+    def _header_field(self, data: bytes, start: int, end: int) -> None:
+        self._header[0] += data[start:end]
+
+    def _header_value(self, data: bytes, start: int, end: int) -> None:
+        self._header[1] += data[start:end]
+
+    def _header_end(self) -> None:
+        self._headers[self._header[0].lower()] = self._header[1]
+        self._header = [b"", b""]
+
+    def _headers_finished(self) -> None:
+        """A part begins: look its rule up, and open its file."""
+        _, options = parse_options_header(self._headers.get(b"content-disposition"))
+        self._part = options.get(b"name", b"").decode("utf-8", "replace")
+        rule = self._rules.get(self._part)
+        if rule is None:
+            known = ", ".join(self._rules)
+            text = f"the form has a part {shown(self._part)}; known parts: {known}"
+            raise ProblemError("invalid-request", text)
+        self._rule = rule
+        if rule.folder is None:
+            if self._part in self.form.texts:
+                raise ProblemError("invalid-request", f"part {self._part}: is there twice; send it once")
+            self._text = bytearray()
+            return
+        filename = options.get(b"filename")
+        name = rule.default_name if filename is None else filename.decode("utf-8", "replace")
+        self._file = IncomingFile(rule.folder, self._accepted_name(name), rule.limit)
+
+    def _accepted_name(self, name: str | None) -> str:
+        """The name of a file, if the form may have such a file."""
+        files = self.form.files.setdefault(self._part, [])
+        if name is None:
+            raise ProblemError("invalid-request", f"part {self._part}: is not a file; send it with a file name")
+        if not is_file_name(name):
+            raise ProblemError("invalid-request", f"part {self._part}: file name {shown(name)}: {FILE_NAME_RULE}")
+        if self._rule.folder is not None and (self._rule.folder / name).exists():
+            raise ProblemError("invalid-request", f"part {self._part}: two files are named {name}; rename one")
+        if len(files) >= self._rule.most:
+            raise LimitExceededError(one_line(f"part {self._part}: more than {self._rule.most} files; send fewer"))
+        return name
+
+    def _part_data(self, data: bytes, start: int, end: int) -> None:
+        if self._file is not None:
+            self._file.write(data[start:end])
+        elif self._text is not None:
+            self._text += data[start:end]
+            if len(self._text) > self._rule.limit:
+                limit = self._rule.limit
+                raise LimitExceededError(f"part {self._part}: is larger than the {limit} bytes accepted here")
+
+    def _part_end(self) -> None:
+        """A part is complete: give its file its name."""
+        if self._file is not None:
+            kept = self._file.finish()
+            path = kept.path.rename(kept.path.with_name(kept.name))
+            self.form.files[self._part].append(KeptFile(path, kept.name, kept.size, kept.sha256))
+            self._file = None
+        elif self._text is not None:
+            self.form.texts[self._part] = bytes(self._text)
+            self._text = None
+
+    def _end(self) -> None:
+        self.has_ended = True

@@ -1,0 +1,59 @@
+"""Whether the service is there, whether it can work, and its metrics."""
+
+from typing import Literal
+
+import anyio
+from anyio import to_thread
+from fastapi import APIRouter, Response
+from pydantic import Field
+from starlette.concurrency import run_in_threadpool
+
+from tauscope.server.http.operations.metrics import CONTENT_TYPE
+from tauscope.server.http.operations.readiness import PATIENCE_S, obstacles
+from tauscope.server.http.services import ServicesDep
+from tauscope.server.models import AnswerModel
+from tauscope.server.problems import ProblemError, problem_responses
+from tauscope.version import tauscope_version
+
+router = APIRouter(tags=["health"])
+
+
+class HealthAnswer(AnswerModel):
+    """The service is there."""
+
+    status: Literal["ok"] = Field(description="always ok: a service that cannot answer does not")
+    version: str = Field(description="of Tauscope", examples=["0.1.0"])
+
+
+class ReadyAnswer(AnswerModel):
+    """The service can work."""
+
+    status: Literal["ready"] = Field(description="always ready: else the answer is a problem")
+
+
+@router.get("/healthz", summary="Ask whether the service is there")
+async def get_health() -> HealthAnswer:
+    """Answers without touching the disk."""
+    return HealthAnswer(status="ok", version=tauscope_version())
+
+
+@router.get("/readyz", summary="Ask whether the service can work", responses=problem_responses("not-ready"))
+async def get_readiness(services: ServicesDep) -> ReadyAnswer:
+    """Writes to the disk and looks at its room; a disk that hangs is an answer too."""
+    found = [f"the disk has not answered within {PATIENCE_S:g} s"]
+    with anyio.move_on_after(PATIENCE_S):
+        found = await to_thread.run_sync(obstacles, services, abandon_on_cancel=True, limiter=services.followers)
+    if found:
+        raise ProblemError("not-ready", "; ".join(found), headers={"Retry-After": "5"})
+    return ReadyAnswer(status="ready")
+
+
+@router.get(
+    "/metrics",
+    summary="Fetch the metrics",
+    response_class=Response,
+    responses={200: {"content": {"text/plain": {}}, "description": "in Prometheus' text format"}},
+)
+async def get_metrics(services: ServicesDep) -> Response:
+    """For Prometheus: requests, jobs, runs, and how well the control loops kept their time."""
+    return Response(await run_in_threadpool(services.metrics.text), headers={"content-type": CONTENT_TYPE})

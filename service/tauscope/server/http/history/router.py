@@ -1,0 +1,185 @@
+"""Routes about models over time."""
+
+from datetime import UTC, datetime
+from typing import Annotated, Any, TypeVar
+
+from fastapi import APIRouter, Path, Query, Request, Response
+from starlette.concurrency import run_in_threadpool
+
+from tauscope.errors import NotFoundError
+from tauscope.identification import IdentificationDocument
+from tauscope.server.history import ModelPolicy
+from tauscope.server.http.documents import JSON, media_type, read_document, refuse_media_type
+from tauscope.server.http.history.answers import comparison_answer, model_answer, trend_answer
+from tauscope.server.http.history.models import (
+    ComparisonAnswer,
+    EventAnswer,
+    EventListAnswer,
+    ModelAnswer,
+    ModelListAnswer,
+    ReasonRequest,
+    TrendAnswer,
+)
+from tauscope.server.http.jobs.routes import Identifier, Limit, collection
+from tauscope.server.http.openapi import Examples, json_body
+from tauscope.server.http.services import Services, ServicesDep
+from tauscope.server.models import StrictModel
+from tauscope.server.problems import problem_responses
+
+router = APIRouter(tags=["models"], responses=problem_responses("invalid-request", "store"))
+
+RobotName = Annotated[str, Query(alias="robot", min_length=1, max_length=1000, description="name of the robot")]
+AnyRobot = Annotated[
+    str | None, Query(alias="robot", max_length=1000, description="name of the robot; any where absent")
+]
+Number = Annotated[int, Path(ge=1, le=2**31 - 1, description="number of the event")]
+
+Body = TypeVar("Body", ReasonRequest, ModelPolicy)
+
+_REASON = {"why": ("Why", {"reason": "gear oil changed on 3 November"})}
+_BODY_PROBLEMS = ("bad-request", "limit-exceeded", "media-type", "not-found")
+
+
+def _body(kind: type[StrictModel] | type[ModelPolicy], examples: Examples) -> dict[str, Any]:
+    """A JSON body, for the OpenAPI document."""
+    return {"requestBody": {"required": True, "content": json_body(kind, examples)}}
+
+
+@router.get("/models", summary="List models")
+def list_models(request: Request, services: ServicesDep, robot: AnyRobot = None, limit: Limit = 100) -> ModelListAnswer:
+    """Every identification that was judged: the active one of each robot, those that were, those that were refused."""
+    _bring_up_to_date(services)
+    entries = services.models.history.models(robot, limit)
+    return ModelListAnswer(models=[model_answer(entry, request.url.path) for entry in entries])
+
+
+@router.get("/models/{identifier}", summary="Look a model up", responses=problem_responses("not-found"))
+def get_model(request: Request, identifier: Identifier, services: ServicesDep) -> ModelAnswer:
+    """Its state and the gates that it had to pass; the identifier is the identification's."""
+    _bring_up_to_date(services)
+    return model_answer(services.models.history.find(identifier), collection(request, 1))
+
+
+@router.get(
+    "/models/{identifier}/document",
+    summary="Fetch what a model says",
+    response_class=Response,
+    responses={
+        200: {"model": IdentificationDocument, "description": "the identification's document"},
+        **problem_responses("not-found"),
+    },
+)
+def get_model_document(identifier: Identifier, services: ServicesDep) -> Response:
+    """Kept with the history, also where the identification itself was removed."""
+    content = services.models.history.document(identifier).model_dump_json(by_alias=True)
+    return Response(content, media_type="application/json")
+
+
+@router.get("/models/{identifier}/drift", summary="Compare a model", responses=problem_responses("not-found"))
+def get_model_drift(
+    identifier: Identifier,
+    services: ServicesDep,
+    since: Annotated[str | None, Query(max_length=100, description="identifier of the model before it")] = None,
+) -> ComparisonAnswer:
+    """The change of every parameter, in joint standard errors; since the reference where no other model is named."""
+    history = services.models.history
+    after, robot = history.document(identifier), history.find(identifier).robot
+    before = since or next((each.identifier for each in history.models(robot, 10_000) if each.is_reference), None)
+    if before is None:
+        raise NotFoundError("no model of this robot has passed yet, so there is no reference; name one with since")
+    return comparison_answer(before, history.document(before), identifier, after)
+
+
+@router.post(
+    "/models/{identifier}/activate",
+    summary="Make a model the active one",
+    responses=problem_responses(*_BODY_PROBLEMS),
+    openapi_extra=_body(ReasonRequest, _REASON),
+)
+async def activate_model(request: Request, identifier: Identifier, services: ServicesDep) -> ModelAnswer:
+    """Also one that was refused; the one before is kept. The reason is kept with the choice."""
+    return await _choose(request, identifier, services, "active")
+
+
+@router.post(
+    "/models/{identifier}/make-reference",
+    summary="Count drift from a model",
+    responses=problem_responses(*_BODY_PROBLEMS),
+    openapi_extra=_body(ReasonRequest, _REASON),
+)
+async def make_reference(request: Request, identifier: Identifier, services: ServicesDep) -> ModelAnswer:
+    """After maintenance, say; drifts that are open are closed."""
+    return await _choose(request, identifier, services, "reference")
+
+
+@router.get("/trend", summary="Follow the parameters of a robot", responses=problem_responses("not-found"))
+def get_trend(services: ServicesDep, robot: RobotName) -> TrendAnswer:
+    """Every parameter in every model that was ever active, and the straight line through it."""
+    _bring_up_to_date(services)
+    return trend_answer(robot, services.models.history.documents(robot))
+
+
+@router.get("/model-policy", summary="Look up the bounds of a robot", responses=problem_responses("not-found"))
+def get_policy(services: ServicesDep, robot: RobotName) -> ModelPolicy:
+    """By which its new models are judged, and beyond which a drift is told."""
+    return services.models.history.policy(robot)
+
+
+@router.put(
+    "/model-policy",
+    summary="Set the bounds of a robot",
+    responses=problem_responses(*_BODY_PROBLEMS),
+    openapi_extra=_body(ModelPolicy, {"drift": ("Tell smaller changes", {"drift_share": 0.1, "drift_std": 5.0})}),
+)
+async def set_policy(request: Request, services: ServicesDep, robot: RobotName) -> ModelPolicy:
+    """They hold for models that are judged from now on; what is left out takes its default."""
+    policy = await _read(request, ModelPolicy, services)
+    await run_in_threadpool(services.models.history.set_policy, robot, policy)
+    return policy
+
+
+@router.get("/events", summary="Read what people should know")
+def list_events(
+    services: ServicesDep,
+    robot: AnyRobot = None,
+    only_open: Annotated[bool, Query(alias="open", description="only what nobody has taken note of")] = False,
+    limit: Limit = 100,
+) -> EventListAnswer:
+    """Parameters that have drifted beyond the bounds; one event for each, brought up to date while it is open."""
+    _bring_up_to_date(services)
+    events = services.models.history.events(robot, only_open=only_open, limit=limit)
+    return EventListAnswer(events=[EventAnswer.model_validate(event) for event in events])
+
+
+@router.post(
+    "/events/{number}/acknowledge",
+    summary="Take note of an event",
+    responses=problem_responses(*_BODY_PROBLEMS),
+    openapi_extra=_body(ReasonRequest, _REASON),
+)
+async def acknowledge_event(request: Request, number: Number, services: ServicesDep) -> EventAnswer:
+    """It is closed; another one is raised when the parameter is found beyond its bounds again."""
+    body = await _read(request, ReasonRequest, services)
+    history, now = services.models.history, datetime.now(UTC)
+    return EventAnswer.model_validate(await run_in_threadpool(history.acknowledge, number, body.reason, now))
+
+
+async def _choose(request: Request, identifier: str, services: Services, role: str) -> ModelAnswer:
+    """Carry out a choice between models."""
+    body = await _read(request, ReasonRequest, services)
+    history, now = services.models.history, datetime.now(UTC)
+    entry = await run_in_threadpool(history.activate, identifier, role, body.reason, now)
+    return model_answer(entry, collection(request, 2))
+
+
+async def _read(request: Request, kind: type[Body], services: Services) -> Body:
+    """The JSON body of a request."""
+    if media_type(request) != JSON:
+        raise refuse_media_type(request, JSON)
+    return await read_document(request, kind, services.settings.max_document_bytes)
+
+
+def _bring_up_to_date(services: Services) -> None:
+    """What ended a moment ago counts already."""
+    services.index.sync()
+    services.models.consider_new()

@@ -1,0 +1,159 @@
+"""A POST with the header Idempotency-Key is done once, however often it comes, crash of the service included."""
+
+import base64
+import re
+from typing import cast
+
+from starlette.concurrency import run_in_threadpool
+from starlette.datastructures import Headers
+from starlette.responses import Response
+from starlette.types import ASGIApp, Message, Receive, Send
+from starlette.types import Scope as AsgiScope
+
+from tauscope.server.auth.gate import caller_of
+from tauscope.server.http.idempotency.answers import Answers, KeptAnswer, request_name
+from tauscope.server.http.idempotency.fingerprint import Fingerprint
+from tauscope.server.http.services import Services
+from tauscope.server.problems import make_problem, problem_answer
+
+HEADER = "Idempotency-Key"
+
+LONGEST_KEY = 200
+"""Most characters of the header's value."""
+
+_LEASES = "/api/v1/leases"
+_REPEATABLE = re.compile(
+    r"/api/v1/(runs|campaigns|identifications|diagnoses|excitations|recordings|leases|schedules/[^/]+/run)"
+)
+_KEY = re.compile(rf"[\x21-\x7e]{{1,{LONGEST_KEY}}}")
+
+
+class Repeatable:
+    """Answers a request that came before with the answer of then."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        """Wrap an application.
+
+        Parameters
+        ----------
+        app : ASGI application
+            what is wrapped; its state holds the services
+        """
+        self.app = app
+        self._underway: set[str] = set()
+
+    async def __call__(self, scope: AsgiScope, receive: Receive, send: Send) -> None:
+        """Answer a request."""
+        key = Headers(scope=scope).get(HEADER) if scope["type"] == "http" else None
+        if key is None or scope["method"] != "POST" or not is_repeatable(scope["path"]):
+            return await self.app(scope, receive, send)
+        if not _KEY.fullmatch(key):
+            text = f"header {HEADER}: give 1 to {LONGEST_KEY} characters without blanks, for example a UUID"
+            return await problem_answer(make_problem("invalid-request", text, scope["path"]))(scope, receive, send)
+        store = _answers_of(scope)
+        name = request_name(caller_of(scope).key or "local", scope["path"], key)
+        is_underway = name in self._underway
+        try:
+            is_new = not is_underway and await run_in_threadpool(store.begin, name)
+        except OSError:
+            text = "the request could not be written down, so that it was not begun; make room on the disk"
+            return await problem_answer(make_problem("storage-full", text, scope["path"]))(scope, receive, send)
+        if not is_new:
+            return await (await _repeated(scope, receive, store, name, is_underway))(scope, receive, send)
+        self._underway.add(name)
+        try:
+            await self._answer_first(scope, receive, send, name)
+        finally:
+            self._underway.discard(name)
+
+    async def _answer_first(self, scope: AsgiScope, receive: Receive, send: Send, name: str) -> None:
+        """Answer a request that is new, and keep the answer before it is sent."""
+        store = _answers_of(scope)
+        fingerprint = Fingerprint(Headers(scope=scope).get("content-type", ""))
+        answer = _Captured()
+        await self.app(scope, _counted(receive, fingerprint), answer.take)
+        kept = None
+        # What was refused has done nothing, and may be corrected and sent again.
+        if not 400 <= answer.status < 500:
+            body = base64.b64encode(bytes(answer.body)).decode()
+            kept = KeptAnswer(
+                fingerprint=fingerprint.digest(), status=answer.status, headers=answer.header_texts(), body=body
+            )
+        await run_in_threadpool(store.finish, name, kept)
+        for message in answer.messages:
+            await send(message)
+
+
+def is_repeatable(path: str) -> bool:
+    """Whether a POST to a path creates or moves something, and is done once for an Idempotency-Key.
+
+    Parameters
+    ----------
+    path : str
+        of the request
+    """
+    return _REPEATABLE.fullmatch(path) is not None
+
+
+def _answers_of(scope: AsgiScope) -> Answers:
+    """Where the answers to a request are kept: a lease's secret never on the disk, it ends with the service anyway."""
+    services = cast(Services, scope["app"].state.services)
+    return services.lease_answers if scope["path"] == _LEASES else services.answers
+
+
+class _Captured:
+    """An answer that is not sent yet; those of repeatable requests are short."""
+
+    def __init__(self) -> None:
+        self.messages: list[Message] = []
+        self.status = 500
+        self.body = bytearray()
+        self._headers: list[tuple[bytes, bytes]] = []
+
+    async def take(self, message: Message) -> None:
+        """Take a part of it."""
+        self.messages.append(message)
+        if message["type"] == "http.response.start":
+            self.status, self._headers = message["status"], list(message["headers"])
+        elif message["type"] == "http.response.body":
+            self.body += message.get("body", b"")
+
+    def header_texts(self) -> tuple[tuple[str, str], ...]:
+        """Its headers as text."""
+        return tuple((name.decode("latin-1"), value.decode("latin-1")) for name, value in self._headers)
+
+
+def _counted(receive: Receive, fingerprint: Fingerprint) -> Receive:
+    """The body on its way to the application."""
+
+    async def received() -> Message:
+        message = await receive()
+        fingerprint.add(message.get("body", b"") or b"")
+        return message
+
+    return received
+
+
+async def _repeated(scope: AsgiScope, receive: Receive, store: Answers, name: str, is_underway: bool) -> Response:
+    """The answer to a request that came before."""
+    fingerprint = Fingerprint(Headers(scope=scope).get("content-type", ""))
+    more = True
+    while more:
+        message = await receive()
+        fingerprint.add(message.get("body", b"") or b"")
+        more = message["type"] == "http.request" and message.get("more_body", False)
+    kept = await run_in_threadpool(store.find, name)
+    if kept is None:
+        text = "the first request with this Idempotency-Key is still being answered; ask again"
+        if not is_underway:
+            text = "the service ended while it answered the first request with this Idempotency-Key; look into the list"
+            text += " whether it was done, and use a new key if not"
+        headers = {"Retry-After": "1"} if is_underway else {}
+        return problem_answer(make_problem("not-repeatable", text, scope["path"]), headers)
+    if kept.status < 500 and kept.fingerprint != fingerprint.digest():
+        text = "this Idempotency-Key was sent with another body before; use a new key for a new request"
+        return problem_answer(make_problem("key-reused", text, scope["path"]))
+    answer = Response(kept.content(), kept.status)
+    answer.raw_headers = [(k.encode("latin-1"), v.encode("latin-1")) for k, v in kept.headers]
+    answer.headers["Idempotency-Replayed"] = "true"
+    return answer

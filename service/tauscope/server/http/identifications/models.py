@@ -1,0 +1,94 @@
+"""Requests and answers about identifications."""
+
+from typing import Annotated, Any, Self
+
+from pydantic import AfterValidator, Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from tauscope.server.http.jobs.answers import JobAnswer
+from tauscope.server.http.jobs.submission import RobotRequest
+from tauscope.server.http.robots.models import EXAMPLE_ROBOT
+from tauscope.server.models import AnswerModel
+from tauscope.server.queue.identification_order import IdentificationOptions, OrderedRecording
+from tauscope.server.store.names import FILE_NAME_PATTERN, FILE_NAME_RULE, is_file_name
+
+
+def _file_name(value: str) -> str:
+    """A name that could belong to a recording."""
+    if not is_file_name(value):
+        raise PydanticCustomError("file_name", "is no name of a recording; {rule}", {"rule": FILE_NAME_RULE})
+    return value
+
+
+FileName = Annotated[str, AfterValidator(_file_name), Field(json_schema_extra={"pattern": FILE_NAME_PATTERN})]
+Names = Annotated[list[FileName], Field(max_length=1000)]
+
+
+class IdentificationRequest(RobotRequest):
+    """What is to be identified."""
+
+    recordings: Names | None = Field(
+        default=None,
+        description="names of the recordings that the model is made from: files of this form, or on the server;"
+        " null: all files sent as part `recordings`",
+    )
+    held_out: Names | None = Field(
+        default=None,
+        description="names of the recordings that it is judged by; null: all files sent as part `held_out`",
+    )
+    options: IdentificationOptions = Field(default=IdentificationOptions(), description="how it is identified")
+
+    @model_validator(mode="after")
+    def _check_once(self) -> Self:
+        """A recording counts once."""
+        for names in (self.recordings or [], self.held_out or []):
+            twice = next((name for index, name in enumerate(names) if name in names[:index]), None)
+            if twice is not None:
+                raise PydanticCustomError("twice", "{name} is listed twice; list it once", {"name": twice})
+        return self
+
+
+EXAMPLES: dict[str, tuple[str, Any]] = {
+    "server": (
+        "Recordings that lie on the server",
+        {"robot": EXAMPLE_ROBOT, "recordings": ["monday.csv", "tuesday.csv"], "held_out": ["wednesday.mcap"]},
+    ),
+    "options": (
+        "Ordinary least squares without a filter",
+        {
+            "robot": EXAMPLE_ROBOT,
+            "recordings": ["monday.csv"],
+            "options": {"estimator": "ls", "cutoff_hz": None, "rotor_inertia": False},
+        },
+    ),
+}
+
+
+class LinksAnswer(AnswerModel):
+    """Where to go on from an identification."""
+
+    self_: str = Field(alias="self", description="its state")
+    events: str = Field(description="what happens to it, as server-sent events")
+    result: str | None = Field(default=None, description="its result, once it succeeded")
+    plots: str | None = Field(default=None, description="data of its figures, once it succeeded")
+    report: str | None = Field(default=None, description="its report as a page, once it succeeded")
+    exports: dict[str, str] = Field(default={}, description="its exports by format, once it succeeded")
+
+
+class IdentificationAnswer(JobAnswer):
+    """The state of an identification."""
+
+    robot: str | None = Field(default=None, description="name of the robot")
+    recordings: tuple[OrderedRecording, ...] = Field(default=(), description="what the model is made from")
+    held_out: tuple[OrderedRecording, ...] = Field(default=(), description="what it is judged by")
+    options: IdentificationOptions | None = Field(default=None, description="how it is identified")
+    refused_exports: dict[str, str] = Field(
+        default={}, description="formats that cannot hold this model, each with the reason"
+    )
+    links: LinksAnswer = Field(description="where to go on")
+
+
+class IdentificationListAnswer(AnswerModel):
+    """Identifications that are kept."""
+
+    identifications: list[IdentificationAnswer] = Field(description="the newest first")

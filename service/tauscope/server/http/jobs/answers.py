@@ -1,0 +1,120 @@
+"""What is said of a job, whatever kind it is."""
+
+from datetime import datetime
+from typing import Any, Literal
+
+from pydantic import Field
+
+from tauscope.server.models import AnswerModel
+from tauscope.server.problems import Problem, ProblemError, make_problem
+from tauscope.server.queue.record import JobProblem
+from tauscope.server.queue.states import JobState
+from tauscope.server.queue.workspace import Workspace
+
+
+class JobAnswer(AnswerModel):
+    """The state of a job."""
+
+    id: str = Field(description="identifier", examples=["20261103T101502Z-1f2e3d4c"])
+    state: JobState | Literal["damaged"] = Field(
+        description="where it stands; interrupted: the service ended first; damaged: its files are missing or damaged"
+    )
+    step: str | None = Field(default=None, description="what is being done, while it is running")
+    created: datetime | None = Field(default=None, description="when it was handed in, UTC")
+    started: datetime | None = Field(default=None, description="when its work began, UTC")
+    ended: datetime | None = Field(default=None, description="when it ended, UTC")
+    problem: Problem | None = Field(default=None, description="why it did not succeed")
+
+
+def job_fields(workspace: Workspace, here: str) -> dict[str, Any]:
+    """The fields of `JobAnswer`; a job whose state cannot be read is said to be damaged.
+
+    Parameters
+    ----------
+    workspace : Workspace
+        of the job
+    here : str
+        path of the job's resource
+    """
+    identifier, record = workspace.folder.name, workspace.read_record()
+    if record is None:
+        return damaged_fields(identifier, here)
+    return {
+        "id": identifier,
+        "state": record.state,
+        "step": workspace.read_step() if record.state is JobState.RUNNING else None,
+        "created": record.created,
+        "started": record.started,
+        "ended": record.ended,
+        "problem": shown_problem(record.problem, here),
+    }
+
+
+def damaged_fields(identifier: str, here: str) -> dict[str, Any]:
+    """The fields of `JobAnswer` of a job whose files are missing or damaged.
+
+    Parameters
+    ----------
+    identifier : str
+        of the job
+    here : str
+        path of the job's resource
+    """
+    detail = f"files of {identifier} are missing or damaged; remove it and hand it in again"
+    return {"id": identifier, "state": "damaged", "problem": make_problem("damaged", detail, here)}
+
+
+def shown_problem(problem: JobProblem | None, here: str) -> Problem | None:
+    """The problem that a job ended in, as answers hold it.
+
+    Parameters
+    ----------
+    problem : JobProblem or None
+        as it is kept
+    here : str
+        path of the job's resource
+    """
+    return None if problem is None else make_problem(problem.code, problem.detail, here)
+
+
+def require_success(workspace: Workspace) -> None:
+    """Refuse to go on with a job that has no result.
+
+    Parameters
+    ----------
+    workspace : Workspace
+        of the job
+
+    Raises
+    ------
+    ProblemError
+        if it has not succeeded: the problem that it ended in, or that it has not ended
+    """
+    identifier, record = workspace.folder.name, workspace.read_record()
+    if record is None:
+        raise ProblemError("damaged", f"the state of {identifier} is missing or damaged; remove it")
+    if not record.state.is_end:
+        text = f"{identifier} is {record.state}; ask for its state until that is an end state"
+        raise ProblemError("not-finished", text, headers={"Retry-After": "2"})
+    if record.problem is not None:
+        raise ProblemError(record.problem.code, record.problem.detail)
+
+
+def require_document(content: bytes | None, identifier: str) -> bytes:
+    """The result of a job that succeeded.
+
+    Parameters
+    ----------
+    content : bytes or None
+        as its folder holds it; None where it is damaged
+    identifier : str
+        of the job
+
+    Raises
+    ------
+    ProblemError
+        if it is damaged
+    """
+    if content is None:
+        raise ProblemError("damaged", f"the result of {identifier} is missing or damaged; hand it in again")
+    return content

@@ -1,0 +1,135 @@
+"""A request that hands a job in: JSON, or a form with the JSON as part `request` and files beside it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from fastapi import Request
+from pydantic import Field
+
+from tauscope.server.http.documents import JSON, media_type, parse_document, read_document, refuse_media_type
+from tauscope.server.http.form import FORM, PartRule, ReceivedForm, receive_form
+from tauscope.server.http.openapi import Examples, binary_part, form_body, json_body, model_reference
+from tauscope.server.http.robots.files import keep_inline_robot, robot_part_rules
+from tauscope.server.http.settings import Settings
+from tauscope.server.models import StrictModel
+from tauscope.server.problems import ProblemError
+
+
+class RobotRequest(StrictModel):
+    """What a request says about a robot."""
+
+    robot: dict[str, Any] | None = Field(
+        default=None, description="content of a robot file; in a form, the part `robot` may hold the file instead"
+    )
+
+
+Document = TypeVar("Document", bound=RobotRequest)
+
+
+@dataclass(frozen=True)
+class Received(Generic[Document]):
+    """A request as it arrived.
+
+    document : RobotRequest
+        what it says
+    form : ReceivedForm
+        the files that came with it
+    """
+
+    document: Document
+    form: ReceivedForm
+
+
+async def receive_request(
+    request: Request,
+    kind: type[Document],
+    settings: Settings,
+    robot_folder: Path,
+    further_parts: Mapping[str, PartRule] | None = None,
+) -> Received[Document]:
+    """Read the body, whichever of the two media types it is.
+
+    Parameters
+    ----------
+    request : Request
+        JSON, or a form with the parts request, robot, urdf and further ones
+    kind : type
+        model of the JSON
+    settings : Settings
+        of the operator
+    robot_folder : Path
+        where the robot file and its URDF are written
+    further_parts : mapping of str to PartRule, or None
+        further parts that the form may have
+
+    Raises
+    ------
+    ProblemError
+        if the request is not as documented
+    LimitExceededError
+        if something is too large
+    """
+    if media_type(request) == JSON:
+        return Received(await read_document(request, kind, settings.max_document_bytes), ReceivedForm())
+    if media_type(request) != FORM:
+        raise refuse_media_type(request, JSON, FORM)
+    rules = {
+        "request": PartRule(settings.max_document_bytes),
+        **robot_part_rules(robot_folder),
+        **(further_parts or {}),
+    }
+    form = await receive_form(request, rules)
+    return Received(parse_document(form.texts.get("request", b"{}"), kind, within="part request"), form)
+
+
+def keep_robot(received: Received[Any], folder: Path) -> str:
+    """Name of the robot file in the job's folder, written there if it came as JSON.
+
+    Parameters
+    ----------
+    received : Received
+        a request
+    folder : Path
+        where its robot file was written, if it came as a file
+
+    Raises
+    ------
+    ProblemError
+        if there is no robot, or two
+    RobotFileError
+        if its content is not plain data
+    """
+    file, inline = received.form.file("robot"), received.document.robot
+    if file is not None and inline is not None:
+        raise ProblemError("invalid-request", "the robot came twice, as part robot and in part request; send it once")
+    if file is not None:
+        return file.name
+    if inline is None:
+        raise ProblemError("invalid-request", "no robot was sent; send part robot, or the field robot in the JSON")
+    return keep_inline_robot(folder, inline)
+
+
+def request_body(
+    kind: type[RobotRequest], examples: Examples, further_parts: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
+    """The body of such a request, for the OpenAPI document.
+
+    Parameters
+    ----------
+    kind : type
+        model of the JSON
+    examples : mapping of str to (str, plain data)
+        summary and value by name
+    further_parts : mapping of str to dict, or None
+        schemas of further parts of the form
+    """
+    parts = {
+        "request": model_reference(kind),
+        "robot": binary_part("the robot file (YAML)"),
+        "urdf": binary_part("the URDF that the robot file names, by its bare name"),
+        **(further_parts or {}),
+    }
+    form = form_body(parts, required=[], encoding={"request": {"contentType": JSON}})
+    return {"requestBody": {"required": True, "content": {**json_body(kind, examples), **form}}}

@@ -1,0 +1,164 @@
+"""The OpenAPI document: bodies that the framework does not see, and models that only they refer to."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from fastapi import FastAPI
+from fastapi.openapi.utils import get_openapi
+from pydantic import BaseModel
+from pydantic.json_schema import models_json_schema
+
+from tauscope.server.auth.audit.recorder import is_noted
+from tauscope.server.auth.scopes import is_stop, needed_scope
+from tauscope.server.http.idempotency.repeatable import HEADER as ONCE
+from tauscope.server.http.idempotency.repeatable import LONGEST_KEY, is_repeatable
+from tauscope.server.problems import MEDIA_TYPE, problem_responses
+
+_REFERENCE = "#/components/schemas/{model}"
+
+Examples = Mapping[str, tuple[str, Any]]
+"""For each example its summary and its value."""
+
+
+def json_body(model: type[BaseModel], examples: Examples) -> dict[str, Any]:
+    """A JSON body of an operation.
+
+    Parameters
+    ----------
+    model : type
+        of the body; to be given to `install_openapi` too
+    examples : mapping of str to (str, plain data)
+        summary and value by name
+    """
+    shown = {name: {"summary": summary, "value": value} for name, (summary, value) in examples.items()}
+    return {"application/json": {"schema": model_reference(model), "examples": shown}}
+
+
+def form_body(
+    parts: Mapping[str, Any], required: Sequence[str], encoding: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
+    """A multipart body of an operation.
+
+    Parameters
+    ----------
+    parts : mapping of str to dict
+        schema of each part
+    required : sequence of str
+        parts that must be there
+    encoding : mapping of str to dict, or None
+        media types of parts
+    """
+    schema = {"type": "object", "properties": dict(parts), "additionalProperties": False}
+    if required:
+        schema["required"] = list(required)
+    return {"multipart/form-data": {"schema": schema, **({"encoding": dict(encoding)} if encoding else {})}}
+
+
+def binary_part(description: str) -> dict[str, Any]:
+    """The schema of a file in a form.
+
+    Parameters
+    ----------
+    description : str
+        what the file is
+    """
+    return {"type": "string", "contentMediaType": "application/octet-stream", "description": description}
+
+
+def model_reference(model: type[BaseModel]) -> dict[str, str]:
+    """A reference to a model of the document.
+
+    Parameters
+    ----------
+    model : type
+        the model
+    """
+    return {"$ref": _REFERENCE.format(model=model.__name__)}
+
+
+def install_openapi(app: FastAPI, models: Sequence[type[BaseModel]]) -> None:
+    """Have the application's OpenAPI document hold further models.
+
+    Parameters
+    ----------
+    app : FastAPI
+        the application
+    models : sequence of type
+        models that bodies and problems refer to
+    """
+
+    def document() -> dict[str, Any]:
+        if app.openapi_schema is None:
+            app.openapi_schema = _document(app, models)
+        return app.openapi_schema
+
+    app.openapi = document
+
+
+def _document(app: FastAPI, models: Sequence[type[BaseModel]]) -> dict[str, Any]:
+    """The document with all models, sorted so that it changes only where the interface does."""
+    document = get_openapi(
+        title=app.title, version=app.version, summary=app.summary, description=app.description, routes=app.routes
+    )
+    _, definitions = models_json_schema([(model, "validation") for model in models], ref_template=_REFERENCE)
+    components = document.setdefault("components", {}).setdefault("schemas", {})
+    components.update(definitions.get("$defs", {}))
+    _add_common_answers(document)
+    # The framework's own form of validation errors is never sent.
+    for unused in ("HTTPValidationError", "ValidationError"):
+        components.pop(unused, None)
+    document["components"]["schemas"] = dict(sorted(components.items()))
+    return document
+
+
+_COMMON = ("bad-request", "host", "origin", "unauthorized", "forbidden", "rate-limited", "internal")
+"""Problems that any request to the interface may meet, before its route or in it."""
+
+_REPEATED = ("invalid-request", "not-repeatable", "key-reused")
+"""Further problems of a request that comes with the header `ONCE`."""
+
+_ONCE_PARAMETER = {
+    "name": ONCE,
+    "in": "header",
+    "required": False,
+    "schema": {"type": "string", "minLength": 1, "maxLength": LONGEST_KEY, "pattern": f"^[!-~]{{1,{LONGEST_KEY}}}$"},
+    "description": "of the client's choice, for example a UUID: for a day, the same request with the same key is done"
+    " once, and answered as it was the first time",
+}
+
+
+def _add_common_answers(document: dict[str, Any]) -> None:
+    """Say of every operation that a key may be asked for, whether it is done once, and what may come of any request."""
+    document["components"]["securitySchemes"] = {
+        "key": {
+            "type": "http",
+            "scheme": "bearer",
+            "description": "an API key (`tauscope key add`); not asked for by a service on loopback that has no keys",
+        }
+    }
+    for path, operations in document["paths"].items():
+        for method, operation in operations.items():
+            scope = needed_scope(method.upper(), path)
+            if scope is None:
+                continue
+            operation["security"] = [{"key": []}, {}]
+            operation["x-tauscope-scope"] = scope.value
+            met: list[str] = list(_COMMON)
+            if is_noted(method.upper(), path) and not is_stop(method.upper(), path):
+                met.append("storage-full")  # of the audit log, if of nothing else
+            if method == "post" and is_repeatable(path):
+                operation.setdefault("parameters", []).append(_ONCE_PARAMETER)
+                met += _REPEATED
+            for status, answer in problem_responses(*met).items():
+                _merge_answer(operation["responses"], str(status), answer)
+            operation["responses"] = dict(sorted(operation["responses"].items()))
+
+
+def _merge_answer(responses: dict[str, Any], status: str, answer: dict[str, Any]) -> None:
+    """Add what a status may mean to what it means already."""
+    present = responses.setdefault(status, answer)
+    if present is not answer:
+        examples = present["content"][MEDIA_TYPE]["examples"]
+        new = {code: value for code, value in answer["content"][MEDIA_TYPE]["examples"].items() if code not in examples}
+        examples.update(new)
+        present["description"] = "; ".join([present["description"], *(value["summary"] for value in new.values())])

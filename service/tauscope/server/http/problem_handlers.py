@@ -1,0 +1,87 @@
+"""Which problem each exception becomes."""
+
+import logging
+from collections.abc import Mapping
+
+from fastapi import FastAPI, Request, Response
+from fastapi.exceptions import RequestValidationError
+from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
+
+from tauscope.errors import TauscopeError
+from tauscope.files import is_disk_full
+from tauscope.server.control.device_claims import BusyError
+from tauscope.server.control.lease_errors import LeasedError, LeaseLostError, LeaseNeededError, NotArmedError
+from tauscope.server.problems import ProblemError, answer_code, field_errors, make_problem, problem_answer, summarised
+from tauscope.server.queue.queue import QueueFullError
+from tauscope.server.store.recordings import NameTakenError
+
+_log = logging.getLogger("tauscope.api")
+
+_OF_LEASE: Mapping[type[Exception], str] = {
+    LeasedError: "leased",
+    LeaseNeededError: "lease-needed",
+    LeaseLostError: "lease-lost",
+    NotArmedError: "not-armed",
+}
+_OF_STATUS: Mapping[int, str] = {404: "not-found", 405: "method-not-allowed", 413: "limit-exceeded", 415: "media-type"}
+
+
+def install_problem_handlers(app: FastAPI) -> None:
+    """Have every exception of a route answered with a problem.
+
+    Parameters
+    ----------
+    app : FastAPI
+        the application
+    """
+    app.add_exception_handler(TauscopeError, _tauscope_error)
+    app.add_exception_handler(RequestValidationError, _validation_error)
+    app.add_exception_handler(HTTPException, _http_exception)
+    app.add_exception_handler(OSError, _system_error)
+    app.add_exception_handler(ClientDisconnect, _client_gone)
+
+
+async def _tauscope_error(request: Request, error: Exception) -> Response:
+    """A failure that Tauscope foresees."""
+    if isinstance(error, QueueFullError):
+        return problem_answer(make_problem("queue-full", str(error), request.url.path), {"Retry-After": "10"})
+    if isinstance(error, BusyError):
+        return problem_answer(make_problem("busy", str(error), request.url.path), {"Retry-After": "10"})
+    if isinstance(error, NameTakenError):
+        return answer_code(request, "name-taken", str(error))
+    code = _OF_LEASE.get(type(error)) or (error.code if isinstance(error, TauscopeError) else "internal")
+    return answer_code(request, code, str(error))
+
+
+async def _validation_error(request: Request, error: Exception) -> Response:
+    """Path or query parameters that are not as documented."""
+    assert isinstance(error, RequestValidationError)  # noqa: S101 - Starlette looks handlers up by type
+    fields = field_errors(error.errors())
+    return problem_answer(make_problem("invalid-request", summarised(fields), request.url.path, fields))
+
+
+async def _http_exception(request: Request, error: Exception) -> Response:
+    """A problem that only a service meets: one of ours, or one of the framework's."""
+    assert isinstance(error, HTTPException)  # noqa: S101 - Starlette looks handlers up by type
+    path = request.url.path
+    if isinstance(error, ProblemError):
+        return problem_answer(make_problem(error.code, error.detail, path, error.errors), error.headers)
+    detail = {
+        404: f"there is nothing at {path}; see /docs",
+        405: f"{request.method} is not known at {path}; see /docs",
+    }.get(error.status_code, error.detail)
+    return problem_answer(make_problem(_OF_STATUS.get(error.status_code, "bad-request"), detail, path), error.headers)
+
+
+async def _system_error(request: Request, error: Exception) -> Response:
+    """A full disk is said; any other failure of the system is a fault to look into."""
+    if isinstance(error, OSError) and is_disk_full(error):
+        _log.error("the disk is full")
+        return answer_code(request, "storage-full", "the service's disk is full; remove recordings or identifications")
+    raise error
+
+
+async def _client_gone(_request: Request, _error: Exception) -> Response:
+    """Nobody reads the answer."""
+    return Response(status_code=400)

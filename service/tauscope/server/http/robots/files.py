@@ -1,0 +1,123 @@
+"""Robot files that a request brings: kept in a folder of their own, and never leading out of it."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from tauscope.errors import RobotFileError
+from tauscope.robot import Robot, RobotReport, check_robot, read_robot
+from tauscope.robot.bounded_file import decode_utf8, read_bounded
+from tauscope.robot.messages import one_line, shown
+from tauscope.robot.robot_file import LARGEST_ROBOT_FILE
+from tauscope.robot.urdf_xml import LARGEST_URDF
+from tauscope.robot.yaml_text import read_yaml
+from tauscope.server.http.documents import to_json_text
+from tauscope.server.http.form import PartRule
+from tauscope.server.queue.messages import without_folders
+
+INLINE_NAME = "robot.json"
+"""File name of a robot that came as JSON; YAML readers read JSON."""
+
+
+def robot_part_rules(folder: Path) -> dict[str, PartRule]:
+    """Parts of a form that bring a robot.
+
+    Parameters
+    ----------
+    folder : Path
+        where the robot file and its URDF are written, beside each other
+    """
+    return {
+        "robot": PartRule(LARGEST_ROBOT_FILE, folder, default_name="robot.yaml"),
+        "urdf": PartRule(LARGEST_URDF, folder),
+    }
+
+
+def keep_inline_robot(folder: Path, robot: Mapping[str, Any]) -> str:
+    """Write a robot that came as JSON to a robot file.
+
+    Parameters
+    ----------
+    folder : Path
+        where it is written
+    robot : mapping
+        content of the robot file
+
+    Returns
+    -------
+    str
+        name of the file
+
+    Raises
+    ------
+    RobotFileError
+        if the content is not plain data, or larger than a robot file may be
+    """
+    text = to_json_text(robot)
+    if text is None:
+        raise RobotFileError("robot: holds NaN, infinity or text that is not Unicode; write plain numbers and text")
+    (folder / INLINE_NAME).write_text(text, encoding="utf-8")
+    return INLINE_NAME
+
+
+def read_received_robot(folder: Path, file_name: str) -> Robot:
+    """The robot of a received file.
+
+    Parameters
+    ----------
+    folder : Path
+        of the robot file and its URDF
+    file_name : str
+        of the robot file
+
+    Raises
+    ------
+    RobotFileError
+        if it is not valid, or names a file that was not sent with it
+    """
+    try:
+        _confine_urdf(folder, file_name)
+        return read_robot(folder / file_name)
+    except RobotFileError as error:
+        raise type(error)(_in_user_terms(str(error), folder)) from None
+
+
+def check_received_robot(folder: Path, file_name: str) -> RobotReport:
+    """The report on a received file.
+
+    Parameters
+    ----------
+    folder : Path
+        of the robot file and its URDF
+    file_name : str
+        of the robot file
+
+    Raises
+    ------
+    RobotFileError
+        if it cannot be read at all, or names a file that was not sent with it
+    """
+    try:
+        _confine_urdf(folder, file_name)
+        report = check_robot(folder / file_name)
+    except RobotFileError as error:
+        raise type(error)(_in_user_terms(str(error), folder)) from None
+    findings = (replace(finding, where=_in_user_terms(finding.where, folder)) for finding in report.findings)
+    return replace(report, source=file_name, findings=tuple(findings))
+
+
+def _confine_urdf(folder: Path, file_name: str) -> None:
+    """Refuse a robot file that names a file that did not come with it: no path of the server is opened for a client."""
+    path = folder / file_name
+    data = read_yaml(decode_utf8(read_bounded(path, LARGEST_ROBOT_FILE), file_name), file_name).data
+    for key in ("kinematics", "urdf", "file"):
+        data = data.get(key) if isinstance(data, dict) else None
+    if isinstance(data, str) and data not in {entry.name for entry in folder.iterdir()} - {file_name}:
+        hint = "send that file as part urdf, and write its bare name into the robot file"
+        raise RobotFileError(one_line(f"{file_name}: kinematics.urdf.file: {shown(data)} was not sent; {hint}"))
+
+
+def _in_user_terms(text: str, folder: Path) -> str:
+    """A message without the server's folder; an inline robot has no file and no lines."""
+    return without_folders(text, folder).replace(f"{INLINE_NAME}:1: ", "robot: ").replace(f"{INLINE_NAME}: ", "robot: ")

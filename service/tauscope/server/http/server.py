@@ -1,0 +1,109 @@
+"""The application behind a socket."""
+
+import gc
+import socket
+import ssl
+from collections.abc import Callable
+
+import uvicorn
+from fastapi import FastAPI
+from uvicorn.config import LOGGING_CONFIG
+
+from tauscope.errors import TauscopeError
+from tauscope.server.http.app import create_app
+from tauscope.server.http.assembly import require_data_folder
+from tauscope.server.http.operations.logs import log_as_json
+from tauscope.server.http.services import Services
+from tauscope.server.http.settings import Settings
+
+GRACE_S = 5
+"""How long open requests may take when the service is asked to stop."""
+
+
+def serve(settings: Settings, announce: Callable[[str], None]) -> None:
+    """Answer requests until SIGINT or SIGTERM.
+
+    Parameters
+    ----------
+    settings : Settings
+        of the operator
+    announce : callable
+        told the service's address once it listens
+
+    Raises
+    ------
+    TauscopeError
+        if the address cannot be had, others could reach it and there is no API key, or another service works with the
+        data folder; or the certificate cannot be used
+    """
+    _require_certificate(settings)
+    require_data_folder(settings)
+    if settings.log_format == "json":
+        log_as_json()
+    with _listening(settings) as listener:
+        app = create_app(settings)
+        config = uvicorn.Config(
+            app,
+            log_level="warning" if settings.log_format == "text" else None,
+            log_config=LOGGING_CONFIG if settings.log_format == "text" else None,
+            access_log=False,
+            server_header=False,
+            # Nobody's word on an address is believed but that of proxies that the operator named.
+            proxy_headers=bool(settings.trusted_proxies),
+            forwarded_allow_ips=list(settings.trusted_proxies),
+            ssl_certfile=settings.tls_certificate,
+            ssl_keyfile=settings.tls_key,
+            timeout_graceful_shutdown=GRACE_S,
+        )
+        host, port = listener.getsockname()[:2]
+        scheme = "http" if settings.tls_certificate is None else "https"
+        # What there is now stays until the end: to look through all of it again and again would hold up everything, a
+        # stop too, for a fifth of a second each time.
+        gc.collect()
+        gc.freeze()
+        announce(f"{scheme}://{f'[{host}]' if ':' in host else host}:{port}")
+        _Server(config, app).run(sockets=[listener])
+
+
+class _Server(uvicorn.Server):
+    """Stops the arms as soon as it is asked to end, before it waits for open requests."""
+
+    def __init__(self, config: uvicorn.Config, app: FastAPI) -> None:
+        super().__init__(config)
+        self._app = app
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Stop the arms, then everything else."""
+        services: Services | None = getattr(self._app.state, "services", None)
+        if services is not None:
+            services.begin_to_close()
+        await super().shutdown(sockets)
+
+
+def _require_certificate(settings: Settings) -> None:
+    """Refuse a certificate without key, or files that are neither."""
+    if (settings.tls_certificate is None) != (settings.tls_key is None):
+        raise TauscopeError("TLS: certificate and key belong together; give --tls-certificate and --tls-key")
+    if settings.tls_certificate is None:
+        return
+    try:
+        ssl.create_default_context(ssl.Purpose.CLIENT_AUTH).load_cert_chain(settings.tls_certificate, settings.tls_key)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise TauscopeError(f"{settings.tls_certificate}: no usable certificate with its key ({reason})") from None
+
+
+def _listening(settings: Settings) -> socket.socket:
+    """A socket that listens at the address."""
+    family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
+    # With the protocol named, answers are sent at once (TCP_NODELAY); asyncio would let them wait for each other else.
+    listener = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
+    try:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind((settings.host.strip("[]"), settings.port))
+        listener.listen()
+    except OSError as error:
+        listener.close()
+        where = f"{settings.host}:{settings.port}"
+        raise TauscopeError(f"{where}: cannot listen there ({error.strerror}); give another port") from None
+    return listener

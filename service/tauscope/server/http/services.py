@@ -1,0 +1,107 @@
+"""What the routes work with, made once an application."""
+
+import threading
+from concurrent.futures import Executor
+from dataclasses import dataclass, field
+from typing import Annotated, cast
+
+from anyio import CapacityLimiter
+from fastapi import Depends, Request
+
+from tauscope.server.auth.audit.log import AuditTrail
+from tauscope.server.auth.gate import Access
+from tauscope.server.control.campaign_manager import CampaignManager
+from tauscope.server.control.leases import Leases
+from tauscope.server.control.run_manager import RunManager
+from tauscope.server.history.indexer import Indexer
+from tauscope.server.history.model_registry import ModelRegistry
+from tauscope.server.http.heartbeat import Heartbeat
+from tauscope.server.http.idempotency.answers import Answers
+from tauscope.server.http.operations.metrics import Metrics
+from tauscope.server.http.settings import Settings
+from tauscope.server.queue.queue import JobQueue
+from tauscope.server.queue.queued_job import JobKind
+from tauscope.server.schedules.scheduler import Scheduler
+from tauscope.server.store.recordings import RecordingStore
+
+
+@dataclass(frozen=True)
+class Services:
+    """What the routes work with.
+
+    settings : Settings
+        of the operator
+    recordings : RecordingStore
+        recordings on the server
+    identifications, diagnoses, excitations : JobKind
+        identifications, diagnoses and designed motions, each a folder
+    jobs : JobQueue
+        waiting and running jobs of every kind
+    runs : RunManager
+        runs, each a folder
+    campaigns : CampaignManager
+        campaigns, each a folder
+    checks : Executor
+        where uploaded recordings are looked into
+    followers : CapacityLimiter
+        threads that read events for those who follow them: however many follow, the other routes' threads stay free
+    access : Access
+        who may call, and how often
+    leases : Leases
+        who controls which arm
+    audit : AuditTrail
+        who did what
+    answers : Answers
+        answers to requests that may be repeated
+    lease_answers : Answers
+        answers to those who take leases, which hold a secret
+    metrics : Metrics
+        what is counted
+    index : Indexer
+        what is kept, for searches
+    models : ModelRegistry
+        models of each robot over time
+    schedules : Scheduler
+        what is repeated at set times
+    pulse : Heartbeat
+        whether requests are answered: while they are not, nobody could stop a run, and no run goes on
+    closing : threading.Event
+        set when the service is asked to end: whoever follows events lets go
+    """
+
+    settings: Settings
+    recordings: RecordingStore
+    identifications: JobKind
+    diagnoses: JobKind
+    excitations: JobKind
+    jobs: JobQueue
+    runs: RunManager
+    campaigns: CampaignManager
+    checks: Executor
+    access: Access
+    leases: Leases
+    audit: AuditTrail
+    answers: Answers
+    lease_answers: Answers
+    metrics: Metrics
+    pulse: Heartbeat
+    index: Indexer
+    models: ModelRegistry
+    schedules: Scheduler
+    followers: CapacityLimiter = field(default_factory=lambda: CapacityLimiter(4))
+    closing: threading.Event = field(default_factory=threading.Event)
+
+    def begin_to_close(self) -> None:
+        """Stop every arm, and let go of whoever follows events; returns at once."""
+        self.closing.set()
+        self.campaigns.stop_all()
+        self.runs.stop_all()
+
+
+async def _services_of(request: Request) -> Services:
+    """The services of the application that answers; a coroutine, so that no thread has to be free for it."""
+    return cast(Services, request.app.state.services)
+
+
+ServicesDep = Annotated[Services, Depends(_services_of)]
+"""The services, as an argument of a route."""

@@ -1,0 +1,155 @@
+"""How the service is set up."""
+
+import ipaddress
+import os
+from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field, SecretStr
+
+from tauscope.server.store.database.database import FILE_NAME
+from tauscope.server.store.layout import FOLDERS, RECORDINGS
+
+MEBIBYTE = 2**20
+
+
+class Settings(BaseModel):
+    """What the operator decides, and the bounds that keep one request from harming the others."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    data_folder: Path = Field(description="holds everything that is kept")
+    database: SecretStr | None = Field(
+        default=None,
+        description="URL of a PostgreSQL database (it may hold a password); SQLite in the data folder where None",
+    )
+    host: str = Field(default="127.0.0.1", description="address to listen at")
+    port: int = Field(default=8000, ge=0, le=65535, description="port to listen at; 0 takes any free one")
+    max_upload_bytes: int = Field(default=256 * MEBIBYTE, gt=0, description="largest body of a request [bytes]")
+    max_document_bytes: int = Field(default=4 * MEBIBYTE, gt=0, description="largest JSON body or part [bytes]")
+    max_recordings: int = Field(default=100, gt=0, description="most recordings of one request")
+    max_waiting: int = Field(default=100, gt=0, description="most jobs that wait")
+    workers: int = Field(default=1, gt=0, description="jobs that are worked on at a time, a process each")
+    max_arms: int = Field(default=4, gt=0, description="arms that may move at a time, a control process each")
+    fires_schedules: bool = Field(default=True, description="whether what schedules repeat is started when it is due")
+    backend: Literal["sim", "dynamixel", "canopen"] = Field(
+        default="sim", description="what moves the arm where a request names no backend"
+    )
+    sim_time: Literal["virtual", "real"] = Field(
+        default="virtual", description="of the simulated arm, where a request does not say"
+    )
+    sim_socket: Path | None = Field(
+        default=None,
+        description="where a simulated arm that runs by the clock listens; one is started for each run where None",
+    )
+
+    require_lease: bool = Field(
+        default=False,
+        description="whether an arm moves by a lease only; where keys are asked for, it always does",
+    )
+    prune_older_than_days: float | None = Field(
+        default=None, ge=0, description="what ended longer ago is removed, hour after hour [days]; null: nothing is"
+    )
+    prune_kinds: tuple[Literal["excitation", "run", "identification", "diagnosis", "campaign"], ...] = Field(
+        default=(), description="kinds of items that it is said of; empty: every kind"
+    )
+    prune_recordings: bool = Field(
+        default=False, description="whether recordings go too that nothing which stays was made from"
+    )
+    names: tuple[str, ...] = Field(default=(), description="further host names by which the service may be called")
+    requests_per_s: float | None = Field(
+        default=None,
+        gt=0,
+        description="how often a caller may call [1/s], twice that at once; null: 200 with keys, no limit without",
+    )
+    tls_certificate: Path | None = Field(default=None, description="PEM file of the certificate; null: plain HTTP")
+    tls_key: Path | None = Field(default=None, description="PEM file of the certificate's private key")
+    log_format: Literal["text", "json"] = Field(
+        default="text", description="json: one object a line on standard error, requests included"
+    )
+    trusted_proxies: tuple[str, ...] = Field(
+        default=(), description="addresses of reverse proxies whose word on the client's address is believed"
+    )
+
+    @property
+    def database_address(self) -> Path | str:
+        """The database, as `Database` takes it."""
+        return self.data_folder / FILE_NAME if self.database is None else self.database.get_secret_value()
+
+    @property
+    def recordings_folder(self) -> Path:
+        """Recordings that requests may name; an operator may put files here."""
+        return self.data_folder / RECORDINGS
+
+    @property
+    def identifications_folder(self) -> Path:
+        """Identifications, each a folder."""
+        return self.data_folder / FOLDERS["identification"]
+
+    @property
+    def diagnoses_folder(self) -> Path:
+        """Diagnoses, each a folder."""
+        return self.data_folder / FOLDERS["diagnosis"]
+
+    @property
+    def excitations_folder(self) -> Path:
+        """Designed motions, each a folder."""
+        return self.data_folder / FOLDERS["excitation"]
+
+    @property
+    def runs_folder(self) -> Path:
+        """Runs, each a folder."""
+        return self.data_folder / FOLDERS["run"]
+
+    @property
+    def campaigns_folder(self) -> Path:
+        """Campaigns, each a folder."""
+        return self.data_folder / FOLDERS["campaign"]
+
+    @property
+    def is_local(self) -> bool:
+        """Whether only this machine can reach the service."""
+        return is_loopback(self.host)
+
+    def answers_for(self, name: str | None) -> bool:
+        """Whether a request for a host is meant for this service; a name that merely leads here (DNS rebinding) is not.
+
+        Parameters
+        ----------
+        name : str or None
+            of the header ``Host``, in lower case and without port
+        """
+        own = {"localhost", "127.0.0.1", "::1", self.host.lower(), *(other.lower() for other in self.names)}
+        # No page of somebody else's can have an address of ours for its name: addresses are not rebound.
+        return name in own or (not self.is_local and name is not None and _is_address(name))
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine can reach an address.
+
+    Parameters
+    ----------
+    host : str
+        name or address
+    """
+    if host.lower() == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host.strip("[]")).is_loopback
+    except ValueError:
+        return False
+
+
+def _is_address(name: str) -> bool:
+    """Whether a host is given as a number."""
+    try:
+        ipaddress.ip_address(name.strip("[]"))
+    except ValueError:
+        return False
+    return True
+
+
+def default_data_folder() -> Path:
+    """Where data are kept when the operator names no folder: tauscope/ below $XDG_DATA_HOME or ~/.local/share."""
+    base = os.environ.get("XDG_DATA_HOME", "")
+    return (Path(base) if os.path.isabs(base) else Path.home() / ".local" / "share") / "tauscope"

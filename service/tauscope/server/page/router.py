@@ -1,0 +1,94 @@
+"""The page and its files."""
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import distribution
+from pathlib import Path
+
+from fastapi import APIRouter, Request, Response
+
+from tauscope.errors import NotFoundError
+from tauscope.robot.messages import one_line, shown
+
+router = APIRouter(include_in_schema=False)
+
+STATIC = Path(__file__).parent / "static"
+
+MEDIA_TYPES: Mapping[str, str] = {
+    ".html": "text/html; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".svg": "image/svg+xml",
+}
+
+PLOT_LIBRARY: Mapping[str, str] = {"uplot.js": "uplot/static/uPlot.iife.js", "uplot.css": "uplot/static/uPlot.min.css"}
+"""Files of the installed package uplot-python, by the names that the page knows them by."""
+
+HEADERS: Mapping[str, str] = {
+    "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:;"
+    " connect-src 'self'; form-action 'none'; base-uri 'none'; frame-ancestors 'none'",
+    "Cache-Control": "no-cache",
+}
+
+
+@dataclass(frozen=True)
+class Asset:
+    """A file of the page.
+
+    content : bytes
+        as it is sent
+    media_type : str
+        of it
+    tag : str
+        changes with the content
+    """
+
+    content: bytes
+    media_type: str
+    tag: str
+
+
+@router.get("/")
+def show_page(request: Request) -> Response:
+    """The page."""
+    return _answer(request, "index.html")
+
+
+@router.get("/page/{name}")
+def show_asset(request: Request, name: str) -> Response:
+    """A file of the page.
+
+    Parameters
+    ----------
+    name : str
+        of the file
+    """
+    return _answer(request, name)
+
+
+def _answer(request: Request, name: str) -> Response:
+    """A file, or that the browser has it already."""
+    asset = assets().get(name)
+    if asset is None:
+        raise NotFoundError(one_line(f"the page has no file {shown(name)}; open / instead"))
+    headers = {**HEADERS, "ETag": asset.tag}
+    if request.headers.get("if-none-match") == asset.tag:
+        return Response(status_code=304, headers=headers)
+    return Response(asset.content, media_type=asset.media_type, headers=headers)
+
+
+@cache
+def assets() -> Mapping[str, Asset]:
+    """All files of the page by name: ours, and the plotting library's."""
+    package = distribution("uplot-python")
+    paths = {path.name: path for path in sorted(STATIC.iterdir()) if path.suffix in MEDIA_TYPES}
+    paths |= {name: Path(str(package.locate_file(file))) for name, file in PLOT_LIBRARY.items()}
+    return {name: _read(path) for name, path in paths.items()}
+
+
+def _read(path: Path) -> Asset:
+    """A file with its tag."""
+    content = path.read_bytes()
+    return Asset(content, MEDIA_TYPES[path.suffix], f'"{hashlib.sha256(content).hexdigest()[:24]}"')

@@ -1,0 +1,202 @@
+"""A Dask cluster as an executor: it may be away for a while, and whoever works with it goes on when it is back."""
+
+import logging
+import threading
+from collections.abc import Callable
+from concurrent.futures import BrokenExecutor, Executor, Future
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+
+from tauscope.errors import StoreError
+from tauscope.server.queue.loop_thread import LoopThread
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+Arguments = ParamSpec("Arguments")
+Result = TypeVar("Result")
+
+_log = logging.getLogger("tauscope.jobs")
+
+SCHEDULER = "DASK_SCHEDULER_ADDRESS"
+"""Environment variable that names the scheduler of a Dask cluster, as in ``tcp://scheduler:8786``."""
+
+PATIENCE_S = 10
+"""How long a scheduler may take to answer [s]."""
+
+LOOK_S = 1.0
+"""How often the scheduler is looked at: whether it is there, and how many workers it has [s]."""
+
+
+class ClusterAwayError(BrokenExecutor):
+    """The scheduler was lost, with whatever it had in hand. Nothing is said against the task: it can be done again."""
+
+
+class ClusterExecutor(Executor):
+    """A Dask cluster; a task whose worker dies again and again ends with BrokenExecutor, as in a pool of processes.
+
+    Dask's own client gives up for good where the scheduler is away for longer than it waits. A thread reaches the
+    scheduler again then, as often as it takes; meanwhile `is_there` says no, and tasks end with `ClusterAwayError`.
+    """
+
+    def __init__(self, address: str, wait_s: float = 0.0) -> None:
+        """Reach the scheduler.
+
+        Parameters
+        ----------
+        address : str
+            as in ``tcp://scheduler:8786``
+        wait_s : float
+            how long `submit` waits for a scheduler that is away [s]
+
+        Raises
+        ------
+        StoreError
+            if it does not answer, or Dask is not installed
+        """
+        self._address, self._wait_s = address, wait_s
+        self._width = 1
+        self._closing = threading.Event()
+        self._there = threading.Event()
+        self._loop = LoopThread("cluster loop")
+        try:
+            self._client = self._open_client()
+            self._executor = _executor_of(self._client)
+            self._look()
+        except (ImportError, OSError, ValueError) as error:
+            self._loop.stop(PATIENCE_S)
+            raise _not_reached(address, error) from None
+        self._watcher = threading.Thread(target=self._watch, name="cluster", daemon=True)
+        self._watcher.start()
+
+    @property
+    def width(self) -> int:
+        """Tasks that the cluster did at a time when it was last looked at, at least one; asks nobody."""
+        return self._width
+
+    def is_there(self) -> bool:
+        """Whether the scheduler answers; asks nobody."""
+        return self._client.status == "running"
+
+    def submit(
+        self, fn: Callable[Arguments, Result], /, *args: Arguments.args, **kwargs: Arguments.kwargs
+    ) -> "Future[Result]":
+        """Have a function called by a worker.
+
+        Parameters
+        ----------
+        fn : callable
+            a function of a module, not a closure
+        args : tuple
+            its arguments; anything that pickle takes
+        kwargs : dict
+            its arguments by name
+
+        Returns
+        -------
+        Future
+            of its result; it ends with `ClusterAwayError` where the scheduler is lost meanwhile
+
+        Raises
+        ------
+        ClusterAwayError
+            if the scheduler is away
+        RuntimeError
+            after `shutdown`
+        """
+        if self._closing.is_set():
+            raise RuntimeError("the cluster was left")
+        if not self.is_there():
+            self._there.wait(self._wait_s)
+        try:
+            inner: Future[Result] = self._executor.submit(fn, *args, **kwargs)
+        except Exception as error:
+            if self.is_there():
+                raise
+            raise ClusterAwayError(f"{self._address}: is away") from error
+        outer: Future[Result] = Future()
+        outer.add_done_callback(lambda done: inner.cancel() if done.cancelled() else None)
+        inner.add_done_callback(lambda done: self._hand_on(done, outer))
+        return outer
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """Leave the cluster.
+
+        Parameters
+        ----------
+        wait : bool
+            whether to return only when all tasks have ended
+        cancel_futures : bool
+            take back what was not begun; a worker that is in the middle of a task finishes it for nobody
+        """
+        self._closing.set()
+        self._watcher.join(2 * PATIENCE_S)
+        try:
+            self._executor.shutdown(wait=wait and not cancel_futures and self.is_there())
+            self._client.close()
+        except Exception:  # a scheduler that is away holds up nobody who leaves
+            if self.is_there():
+                raise
+        finally:
+            self._loop.stop(PATIENCE_S)
+
+    def _open_client(self) -> "Client":
+        """A connection of its own; raises what Dask raises."""
+        from distributed import Client
+
+        return Client(self._address, self._loop.open(), timeout=PATIENCE_S, set_as_default=False)
+
+    def _watch(self) -> None:
+        """Look at the scheduler until it is left."""
+        while not self._closing.wait(LOOK_S):
+            try:
+                self._look()
+            except Exception:  # whatever Dask raises of a scheduler that goes and comes: the next look tells
+                _log.debug("the cluster could not be looked at", exc_info=True)
+
+    def _look(self) -> None:
+        """Count the workers, or reach a scheduler anew that was given up."""
+        if self._client.status == "closed":
+            self._there.clear()
+            self._client = self._open_client()
+            self._executor = _executor_of(self._client)
+            _log.warning("the Dask scheduler at %s is back", self._address)
+        if self.is_there():
+            # `Client.nthreads` asks the same, and waits for ever where the scheduler is lost meanwhile.
+            scheduler: Any = self._client.scheduler
+            threads: Any = self._client.sync(scheduler.ncores, callback_timeout=PATIENCE_S)
+            self._width = max(1, sum(threads.values()))
+            self._there.set()
+        else:
+            self._there.clear()
+
+    def _hand_on(self, inner: "Future[Any]", outer: "Future[Any]") -> None:
+        """Give the end of a task to who waits for it."""
+        from distributed import KilledWorker
+
+        if outer.cancelled():
+            return
+        if inner.cancelled():
+            if self._closing.is_set():
+                outer.cancel()
+            else:
+                outer.set_exception(ClusterAwayError(f"{self._address}: was lost"))
+            return
+        error = inner.exception()
+        if isinstance(error, KilledWorker):
+            outer.set_exception(BrokenExecutor(str(error)))
+        elif error is not None:
+            outer.set_exception(error)
+        else:
+            outer.set_result(inner.result())
+
+
+def _not_reached(address: str, error: Exception) -> StoreError:
+    if isinstance(error, ImportError):
+        return StoreError(f"{SCHEDULER}: Dask is not installed; install tauscope[fleet], or leave the variable out")
+    hint = "start the scheduler, or leave the variable out"
+    return StoreError(f"{SCHEDULER}={address}: does not answer ({type(error).__name__}); {hint}")
+
+
+def _executor_of(client: "Client") -> Executor:
+    """Dask's own executor. The same function of the same folder is no known result: its files may be others by now."""
+    return client.get_executor(pure=False)

@@ -1,0 +1,48 @@
+"""Having a motion designed for a robot whose files lie in a folder already."""
+
+import shutil
+from pathlib import Path
+
+from tauscope.server.queue.excitation_order import ExcitationDesignOptions, ExcitationOrder
+from tauscope.server.queue.excitation_workspace import ExcitationWorkspace
+from tauscope.server.queue.queue import JobQueue
+from tauscope.server.queue.queued_job import JobKind
+
+
+def hand_in_excitation(
+    jobs: JobQueue, kind: JobKind, robot_folder: Path, robot: tuple[str, str], options: ExcitationDesignOptions
+) -> str:
+    """Hand an excitation in.
+
+    Parameters
+    ----------
+    jobs : JobQueue
+        takes it
+    kind : JobKind
+        excitations
+    robot_folder : Path
+        holds the robot file and its URDF
+    robot : tuple of str
+        name of the robot file, and what it calls the robot
+    options : ExcitationDesignOptions
+        how the motion is designed
+
+    Returns
+    -------
+    str
+        the excitation's identifier
+
+    Raises
+    ------
+    QueueFullError
+        if too many jobs are waiting
+    """
+    staged = kind.items.stage()
+    try:
+        workspace = ExcitationWorkspace(staged)
+        shutil.copytree(robot_folder, workspace.robot)
+        robot_file, robot_name = robot
+        workspace.write_order(ExcitationOrder(robot_file=robot_file, robot_name=robot_name, options=options))
+        return jobs.submit(kind, staged)
+    finally:
+        kind.items.discard(staged)

@@ -1,0 +1,28 @@
+"""Where analysis is done: in processes of this service, or on the machines of a Dask cluster."""
+
+import os
+from concurrent.futures import Executor
+
+from tauscope.server.queue.cluster_executor import SCHEDULER, ClusterExecutor
+from tauscope.server.queue.worker_pool import WorkerPool
+
+
+def open_executor(workers: int, wait_s: float = 0.0) -> Executor:
+    """Where analysis is done: on the cluster that the environment names, else in processes of our own.
+
+    The workers of a cluster have to see the data folder under the same path.
+
+    Parameters
+    ----------
+    workers : int
+        largest number of processes of our own
+    wait_s : float
+        how long a task waits for a cluster that is away before it ends [s]
+
+    Raises
+    ------
+    StoreError
+        if the cluster does not answer, or Dask is not installed
+    """
+    address = os.environ.get(SCHEDULER, "")
+    return ClusterExecutor(address, wait_s) if address else WorkerPool(workers)

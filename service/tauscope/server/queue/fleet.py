@@ -1,0 +1,197 @@
+"""The same analysis for many robots: on any executor, one row a robot, a failure is that robot's alone."""
+
+import csv
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from tauscope.errors import RecordingError
+from tauscope.robot.messages import one_line, shown
+from tauscope.server.queue.cluster_executor import ClusterAwayError
+from tauscope.server.store.names import FILE_NAME_RULE, is_file_name
+
+COLUMNS = ("name", "robot", "recordings", "held_out")
+SEPARATOR = ";"
+LOST = "the process that worked on it ended unexpectedly, perhaps for want of memory; send less data"
+AWAY = "the Dask cluster was away for too long; see to its scheduler, and give this robot once more"
+
+
+@dataclass(frozen=True)
+class FleetEntry:
+    """A robot of a manifest.
+
+    row : int
+        line of the manifest
+    name : str
+        of the result
+    robot : Path
+        robot file
+    recordings, held_out : tuple of Path
+        what it is analysed from, and judged by
+    """
+
+    row: int
+    name: str
+    robot: Path
+    recordings: tuple[Path, ...]
+    held_out: tuple[Path, ...]
+
+
+@dataclass(frozen=True)
+class FleetResult:
+    """What came of a robot.
+
+    entry : FleetEntry
+        the robot
+    figures : dict
+        columns of the table; empty where it failed
+    error : str or None
+        why it failed
+    seconds : float
+        how long it took
+    """
+
+    entry: FleetEntry
+    figures: dict[str, str]
+    error: str | None
+    seconds: float = 0.0
+
+
+FleetWork = Callable[[FleetEntry, Path], FleetResult]
+"""Analyses a robot, writes its result into a folder, and returns a row; called by a worker."""
+
+
+def read_manifest(path: Path) -> Iterator[FleetEntry]:
+    """The robots of a manifest, line by line; paths are relative to it.
+
+    A CSV file with the columns `COLUMNS`; several recordings are separated by ``;``, `held_out` may be empty.
+
+    Parameters
+    ----------
+    path : Path
+        of the manifest
+
+    Raises
+    ------
+    RecordingError
+        naming the line
+    """
+    names: dict[str, int] = {}
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            reader = csv.DictReader(file)
+            if tuple(reader.fieldnames or ()) != COLUMNS:
+                found = ",".join(reader.fieldnames or ()) or "nothing"
+                raise RecordingError(one_line(f"{path}: line 1: begins with {found}; write {','.join(COLUMNS)}"))
+            for row in reader:
+                yield _entry(path, reader.line_num, row, names)
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise RecordingError(one_line(f"{path}: cannot be read ({error}); write a CSV file in UTF-8")) from None
+
+
+def analyse_fleet(
+    entries: Iterator[FleetEntry], work: FleetWork, folder: Path, executor: Executor, width: int
+) -> Iterator[FleetResult]:
+    """Analyse every robot; results come as they are done.
+
+    No more robots than `width` and as many again wait in the executor, so that the memory that is needed here does not
+    grow with the fleet. Where a worker dies, or a cluster goes away, those that were in the executor are done again one
+    by one: what kills its worker then is to blame itself.
+
+    Parameters
+    ----------
+    entries : iterator of FleetEntry
+        the fleet
+    work : callable
+        of one robot
+    folder : Path
+        where results go; the workers see it under the same path
+    executor : Executor
+        does the work
+    width : int
+        robots at a time
+
+    Yields
+    ------
+    FleetResult
+        of each robot, once
+    """
+    pending: dict[Future[FleetResult], FleetEntry] = {}
+    suspects: list[FleetEntry] = []
+    is_exhausted = False
+    while pending or not is_exhausted:
+        while len(pending) < 2 * width and not is_exhausted:
+            entry = next(entries, None)
+            if entry is None:
+                is_exhausted = True
+            else:
+                pending[_submitted(executor, work, entry, folder)] = entry
+        done, _ = wait(pending, return_when=FIRST_COMPLETED)
+        for future in done:
+            entry = pending.pop(future)
+            if isinstance(future.exception(), BrokenExecutor):
+                suspects.append(entry)
+            else:
+                yield _result(future, entry)
+    for entry in suspects:
+        yield _result(_submitted(executor, work, entry, folder), entry)
+
+
+def _submitted(executor: Executor, work: FleetWork, entry: FleetEntry, folder: Path) -> "Future[FleetResult]":
+    """A robot in the executor; where that takes nothing, a future that says so."""
+    try:
+        return executor.submit(work, entry, folder)
+    except BrokenExecutor as error:
+        refused: Future[FleetResult] = Future()
+        refused.set_exception(error)
+        return refused
+
+
+def _result(future: "Future[FleetResult]", entry: FleetEntry) -> FleetResult:
+    """What came of a robot, whatever it was."""
+    try:
+        return future.result()
+    except ClusterAwayError:
+        return FleetResult(entry, {}, AWAY)
+    except BrokenExecutor:
+        return FleetResult(entry, {}, LOST)
+    except Exception as error:
+        return FleetResult(entry, {}, f"a fault of Tauscope's own ({type(error).__name__}: {one_line(str(error))})")
+
+
+def timed(work: Callable[[], FleetResult]) -> FleetResult:
+    """A result with how long it took.
+
+    Parameters
+    ----------
+    work : callable
+        makes it
+    """
+    begin = time.monotonic()
+    result = work()
+    return replace(result, seconds=time.monotonic() - begin)
+
+
+def _entry(path: Path, line: int, row: dict[str, str], names: dict[str, int]) -> FleetEntry:
+    """A line of a manifest."""
+    place = f"{path}: line {line}"
+    if None in row or None in row.values():
+        raise RecordingError(f"{place}: has not {len(COLUMNS)} columns; separate recordings by {SEPARATOR}")
+    name = row["name"].strip()
+    if not is_file_name(name):
+        raise RecordingError(one_line(f"{place}: name {shown(name)}: {FILE_NAME_RULE}"))
+    if name in names:
+        raise RecordingError(f"{place}: name {name} is that of line {names[name]} too; give each robot its own")
+    names[name] = line
+    recordings, held_out = (_paths(path.parent, row[column]) for column in ("recordings", "held_out"))
+    if not recordings or not row["robot"].strip():
+        raise RecordingError(f"{place}: names no {'recording' if row['robot'].strip() else 'robot file'}; name one")
+    return FleetEntry(line, name, path.parent / row["robot"].strip(), recordings, held_out)
+
+
+def _paths(folder: Path, text: str) -> tuple[Path, ...]:
+    """Files that a cell names."""
+    words: Sequence[str] = [word.strip() for word in text.split(SEPARATOR)]
+    return tuple(folder / word for word in words if word)

@@ -1,0 +1,91 @@
+"""Handing an identification in whose recordings lie on the server already."""
+
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+from tauscope.server.queue.identification_order import IdentificationOptions, IdentificationOrder, OrderedRecording
+from tauscope.server.queue.identification_workspace import IdentificationWorkspace
+from tauscope.server.queue.queue import JobQueue
+from tauscope.server.queue.queued_job import JobKind
+from tauscope.server.store.recordings import RecordingStore
+
+
+def hand_in_identification(
+    jobs: JobQueue,
+    kind: JobKind,
+    recordings: RecordingStore,
+    robot_folder: Path,
+    robot: tuple[str, str],
+    *,
+    train: Sequence[str],
+    held_out: Sequence[str],
+    options: IdentificationOptions,
+) -> str:
+    """Hand an identification in.
+
+    Parameters
+    ----------
+    jobs : JobQueue
+        takes it
+    kind : JobKind
+        identifications
+    recordings : RecordingStore
+        where the recordings lie
+    robot_folder : Path
+        holds the robot file and its URDF
+    robot : tuple of str
+        name of the robot file, and what it calls the robot
+    train, held_out : sequence of str
+        names of the recordings that the model is made from, and judged by
+    options : IdentificationOptions
+        how it is identified
+
+    Returns
+    -------
+    str
+        the identification's identifier
+
+    Raises
+    ------
+    NotFoundError
+        if a recording does not lie there
+    QueueFullError
+        if too many jobs are waiting
+    """
+    staged = kind.items.stage()
+    try:
+        workspace = IdentificationWorkspace(staged)
+        workspace.prepare()
+        shutil.copytree(robot_folder, workspace.robot, dirs_exist_ok=True)
+        robot_file, robot_name = robot
+        workspace.write_order(
+            IdentificationOrder(
+                robot_file=robot_file,
+                robot_name=robot_name,
+                recordings=ordered_on_server(recordings, train),
+                held_out=ordered_on_server(recordings, held_out),
+                options=options,
+            )
+        )
+        return jobs.submit(kind, staged)
+    finally:
+        kind.items.discard(staged)
+
+
+def ordered_on_server(recordings: RecordingStore, names: Sequence[str]) -> tuple[OrderedRecording, ...]:
+    """Recordings that lie on the server, as an order holds them.
+
+    Parameters
+    ----------
+    recordings : RecordingStore
+        where they lie
+    names : sequence of str
+        their names
+
+    Raises
+    ------
+    NotFoundError
+        if one does not lie there
+    """
+    return tuple(OrderedRecording(name=name, origin="server", sha256=recordings.digest(name)) for name in names)

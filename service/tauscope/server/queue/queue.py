@@ -1,0 +1,299 @@
+"""The queue of jobs: one after the other into an executor; what a restart leaves unfinished is done again."""
+
+import logging
+import threading
+from collections import deque
+from collections.abc import Callable, Sequence
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
+from dataclasses import dataclass
+from pathlib import Path
+
+from tauscope.errors import LimitExceededError, NotFoundError
+from tauscope.server.queue.cluster_executor import ClusterAwayError
+from tauscope.server.queue.queued_job import MOST_ATTEMPTS, JobKind, QueuedJob
+from tauscope.server.queue.record import JobProblem, JobRecord
+from tauscope.server.queue.states import JobState
+from tauscope.server.queue.workspace import Workspace
+
+_log = logging.getLogger("tauscope.jobs")
+
+INTERRUPTED = JobProblem(code="interrupted", detail="the service ended before this job did; hand it in again")
+CANCELLED = JobProblem(code="cancelled", detail="the job was cancelled on request")
+WORKER_LOST = JobProblem(
+    code="worker-lost",
+    detail="the process that worked on this job ended unexpectedly, perhaps for want of memory; send less data",
+)
+INTERNAL = JobProblem(code="internal", detail="the job met a fault of Tauscope's own; the service's log says more")
+
+
+class QueueFullError(LimitExceededError):
+    """So many jobs are waiting that no further one is accepted."""
+
+
+@dataclass(frozen=True)
+class _End:
+    """How a job ended."""
+
+    state: JobState
+    problem: JobProblem | None
+
+
+class JobQueue:
+    """Jobs waiting for an executor, and jobs in it; the only writer of their states.
+
+    Every method may be called from any thread.
+    """
+
+    def __init__(
+        self,
+        kinds: Sequence[JobKind],
+        executor: Executor,
+        *,
+        slots: int | Callable[[], int],
+        most_waiting: int,
+        is_there: Callable[[], bool] = lambda: True,
+    ) -> None:
+        """Make the queue; jobs that an earlier service left unfinished are done again, in their order.
+
+        Parameters
+        ----------
+        kinds : sequence of JobKind
+            every kind of job that will be handed in
+        executor : Executor
+            where the work is done; shut down by `close`
+        slots : int or callable
+            jobs that are in the executor at a time; a callable tells how many at present, and waits for nothing
+        most_waiting : int
+            jobs that may wait
+        is_there : callable
+            whether the executor can work at present, and waits for nothing; jobs wait until it can
+        """
+        self._executor = executor
+        self._slots = slots if callable(slots) else lambda: slots
+        self._is_there = is_there
+        self._most_waiting = most_waiting
+        self._lock = threading.RLock()
+        self._waiting: deque[QueuedJob] = deque()
+        self._running: dict[QueuedJob, Future[JobProblem | None]] = {}
+        self._unwritten: dict[QueuedJob, _End] = {}
+        self._is_hindered = False
+        self._is_closed = False
+        for kind in kinds:
+            kind.items.tidy()
+        jobs = [QueuedJob(kind, identifier) for kind in kinds for identifier in kind.items.identifiers()]
+        unfinished = [(record.created, job) for job in jobs if (record := job.take_up()) is not None]
+        with self._lock:
+            self._waiting.extend(job for _, job in sorted(unfinished, key=lambda pair: pair[0]))
+            self._go_on()
+
+    def submit(self, kind: JobKind, staged: Path) -> str:
+        """Take a job.
+
+        Parameters
+        ----------
+        kind : JobKind
+            of the job
+        staged : Path
+            staged folder that holds the job's input
+
+        Returns
+        -------
+        str
+            the job's identifier
+
+        Raises
+        ------
+        QueueFullError
+            if too many jobs are waiting; the folder stays staged
+        """
+        with self._lock:
+            if self._is_closed or len(self._waiting) >= self._most_waiting:
+                raise QueueFullError(f"{len(self._waiting)} jobs are waiting already; try again when one has ended")
+            Workspace(staged).write_record(JobRecord(state=JobState.QUEUED, created=kind.items.clock()))
+            job = QueuedJob(kind, kind.items.publish(staged))
+            self._waiting.append(job)
+            self._go_on()
+            return job.identifier
+
+    def cancel_or_remove(self, kind: JobKind, identifier: str) -> bool:
+        """Cancel a job that has not ended; remove one that has, or whose record is damaged.
+
+        Cancelled work stops at its next step; what it still does until then is dropped.
+
+        Parameters
+        ----------
+        kind : JobKind
+            of the job
+        identifier : str
+            of the job
+
+        Returns
+        -------
+        bool
+            True where the job was removed
+
+        Raises
+        ------
+        NotFoundError
+            if there is no such job
+        """
+        with self._lock:
+            if self.cancel(kind, identifier):
+                return False
+            self._pass_over(QueuedJob(kind, identifier))
+            kind.items.remove(identifier)
+            return True
+
+    def cancel(self, kind: JobKind, identifier: str) -> bool:
+        """Cancel a job that has not ended.
+
+        Parameters
+        ----------
+        kind : JobKind
+            of the job
+        identifier : str
+            of the job
+
+        Returns
+        -------
+        bool
+            False where it had ended, or its record is damaged
+
+        Raises
+        ------
+        NotFoundError
+            if there is no such job
+        """
+        with self._lock:
+            job, workspace = QueuedJob(kind, identifier), Workspace(kind.items.folder(identifier))
+            if workspace.has_ended() or not job.move(JobState.CANCELLED, CANCELLED):
+                return False
+            self._pass_over(job)
+            try:
+                workspace.ask_to_stop()
+            except OSError:
+                _log.warning("the work of job %s could not be told that nobody wants it", identifier, exc_info=True)
+            return True
+
+    def waiting(self) -> int:
+        """How many jobs wait."""
+        return len(self._waiting)
+
+    def can_work(self) -> bool:
+        """Whether the executor can work at present; jobs wait where it cannot."""
+        return self._is_there()
+
+    def settle(self) -> None:
+        """Do what was hindered by a full disk or an executor that was away: write ends, and begin what waits.
+
+        To be called again and again; while nothing is in the way there is nothing to do.
+
+        Raises
+        ------
+        OSError
+            if the disk is in the way still
+        """
+        with self._lock:
+            try:
+                self._write_ends()
+            finally:
+                self._fill_slots()
+
+    def close(self) -> None:
+        """End the work; whatever has not ended by itself waits for the next start."""
+        with self._lock:
+            self._is_closed = True
+            self._waiting.clear()
+            for job in self._running:
+                job.give_up()
+        self._executor.shutdown(wait=True, cancel_futures=True)
+
+    def _pass_over(self, job: QueuedJob) -> None:
+        """A job does not wait any more."""
+        if job in self._waiting:
+            self._waiting.remove(job)
+
+    def _go_on(self) -> None:
+        """As `settle`, where nobody can be told: what cannot be written now is written by a later call."""
+        try:
+            self.settle()
+            self._is_hindered = False
+        except OSError:
+            if not self._is_hindered:
+                _log.exception("the state of a job could not be written; it is tried again")
+            self._is_hindered = True
+
+    def _fill_slots(self) -> None:
+        """Hand waiting jobs to the executor while it has room."""
+        while self._waiting and len(self._running) < self._slots() and not self._is_closed and self._is_there():
+            is_wanted = self._waiting[0].move(JobState.RUNNING)
+            job = self._waiting.popleft()
+            if is_wanted:  # else it is damaged, or somebody removed it by hand
+                self._hand_over(job)
+
+    def _hand_over(self, job: QueuedJob) -> None:
+        """Have the executor do a job."""
+        try:
+            future = self._executor.submit(job.kind.work, job.folder)
+        except NotFoundError:
+            return
+        except ClusterAwayError:  # it went a moment ago
+            job.give_up()
+            self._waiting.appendleft(job)
+            return
+        except (BrokenExecutor, RuntimeError, OSError):
+            _log.exception("job %s could not be handed to a worker", job.identifier)
+            self._unwritten[job] = _End(JobState.FAILED, WORKER_LOST)
+            self._write_ends()
+            return
+        self._running[job] = future
+        future.add_done_callback(lambda done: self._end(job, done))
+
+    def _end(self, job: QueuedJob, future: "Future[JobProblem | None]") -> None:
+        """Take note that the work of a job has ended, and begin the next."""
+        end = self._end_of(job, future)
+        with self._lock:
+            self._running.pop(job, None)
+            self._unwritten[job] = end
+            self._go_on()
+
+    def _write_ends(self) -> None:
+        """Write how jobs ended; what fails is left for the next time, or done again after the next start."""
+        for job, end in list(self._unwritten.items()):
+            has_moved = job.move(end.state, end.problem)
+            del self._unwritten[job]
+            if has_moved and end.state is JobState.QUEUED and not self._is_closed:
+                self._waiting.appendleft(job)
+
+    def _end_of(self, job: QueuedJob, future: "Future[JobProblem | None]") -> _End:
+        """How a job ended by what came of its work."""
+        try:
+            problem = self._problem_of(job, future)
+        except ClusterAwayError as error:
+            return self._end_of_lost(job, error)
+        return _End(JobState.SUCCEEDED if problem is None else JobState.FAILED, problem)
+
+    def _end_of_lost(self, job: QueuedJob, error: ClusterAwayError) -> _End:
+        """A job that was lost with its cluster waits again, unless that happened too often: it may be the cause."""
+        if job.attempts() >= MOST_ATTEMPTS:
+            _log.error("job %s: lost with its cluster %d times", job.identifier, MOST_ATTEMPTS)
+            return _End(JobState.FAILED, WORKER_LOST)
+        _log.warning("job %s waits again: %s", job.identifier, error)
+        return _End(JobState.QUEUED, None)
+
+    def _problem_of(self, job: QueuedJob, future: "Future[JobProblem | None]") -> JobProblem | None:
+        """Why the work of a job has no result; None where it has one. Raises ClusterAwayError."""
+        try:
+            return future.result()
+        except ClusterAwayError:
+            raise
+        except CancelledError:
+            return INTERRUPTED
+        except BrokenExecutor:
+            if self._is_closed:  # its process was ended with the service
+                return INTERRUPTED
+            _log.error("job %s: its worker process ended unexpectedly", job.identifier)
+            return WORKER_LOST
+        except Exception:
+            _log.exception("job %s failed for an unforeseen reason", job.identifier)
+            return INTERNAL

@@ -1,0 +1,79 @@
+"""Plain data that jobs keep as JSON files: strict, written as a whole, and read back or found damaged."""
+
+import json
+from pathlib import Path
+from typing import TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from tauscope.files import write_atomically
+
+
+class StoredModel(BaseModel):
+    """Base of what jobs keep as JSON: no type is converted, no key is overlooked."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+
+Stored = TypeVar("Stored", bound=StoredModel)
+
+
+def read_stored(path: Path, kind: type[Stored]) -> Stored | None:
+    """A stored model, or None where the file is missing or damaged.
+
+    Parameters
+    ----------
+    path : Path
+        of the file
+    kind : type
+        the model
+    """
+    try:
+        return kind.model_validate_json(path.read_bytes())
+    except (OSError, ValidationError):
+        return None
+
+
+def write_stored(path: Path, model: StoredModel) -> None:
+    """Keep a model.
+
+    Parameters
+    ----------
+    path : Path
+        of the file
+    model : StoredModel
+        what it shall hold
+    """
+    write_atomically(path, model.model_dump_json(indent=1).encode())
+
+
+def read_document(path: Path, schema: str) -> bytes | None:
+    """A JSON document as it was written, or None where the file is missing, damaged or of another schema.
+
+    Parameters
+    ----------
+    path : Path
+        of the file
+    schema : str
+        name and version that the document has to state, as in ``tauscope.identification/1``
+    """
+    try:
+        content = path.read_bytes()
+        document = json.loads(content)
+    except (OSError, ValueError, RecursionError):
+        return None
+    return content if isinstance(document, dict) and document.get("schema") == schema else None
+
+
+def read_bytes(path: Path) -> bytes | None:
+    """A file as it was written, or None where it is missing.
+
+    Parameters
+    ----------
+    path : Path
+        of the file
+    """
+    try:
+        return path.read_bytes()
+    except OSError:
+        return None

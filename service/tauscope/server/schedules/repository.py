@@ -1,0 +1,280 @@
+"""The book of schedules: who takes a firing on has it alone, however many services look at the same database."""
+
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import ColumnElement, delete, or_, select, update
+from sqlalchemy.orm import Session
+
+from tauscope.errors import NotFoundError
+from tauscope.robot.messages import nearest, one_line, shown
+from tauscope.server.schedules.entries import FiringEntry, ScheduleEntry, firing_entry, schedule_entry
+from tauscope.server.store.database.database import Database
+from tauscope.server.store.database.schedule_tables import Firing, Schedule
+
+
+class ScheduleRepository:
+    """Schedules and their firings, as one site sees them. Every method is one short transaction."""
+
+    def __init__(self, database: Database, site: str, boot: str) -> None:
+        """Look at the book.
+
+        Parameters
+        ----------
+        database : Database
+            holds it
+        site : str
+            identifier of this data folder
+        boot : str
+            of this start of the service: tells its claims from those of earlier starts
+        """
+        self._database = database
+        self.site = site
+        self._boot = boot
+
+    def put(self, entry: ScheduleEntry) -> None:
+        """Set a schedule up, or replace one of the same name; its firings stay.
+
+        Parameters
+        ----------
+        entry : ScheduleEntry
+            the schedule; of one that is replaced, `created` stays as it was
+        """
+        with self._database.writing() as session:
+            row = session.scalar(select(Schedule).where(Schedule.name == entry.name))
+            if row is None:
+                row = Schedule(name=entry.name, created=entry.created)
+                session.add(row)
+            row.site, row.next_due = entry.site, entry.next_due
+            row.definition, row.order, row.files = dict(entry.definition), dict(entry.order), dict(entry.files)
+
+    def remove(self, name: str) -> None:
+        """Remove a schedule and its firings; what they started stays.
+
+        Parameters
+        ----------
+        name : str
+            of the schedule
+
+        Raises
+        ------
+        NotFoundError
+            if there is none
+        """
+        with self._database.writing() as session:
+            session.execute(delete(Schedule).where(Schedule.id == _schedule(session, name).id))
+
+    def find(self, name: str) -> ScheduleEntry:
+        """A schedule.
+
+        Parameters
+        ----------
+        name : str
+            of it
+
+        Raises
+        ------
+        NotFoundError
+            if there is none
+        """
+        with self._database.reading() as session:
+            return schedule_entry(_schedule(session, name))
+
+    def schedules(self) -> list[ScheduleEntry]:
+        """All schedules of all sites, by name."""
+        with self._database.reading() as session:
+            return [schedule_entry(row) for row in session.scalars(select(Schedule).order_by(Schedule.name))]
+
+    def due(self, now: datetime) -> list[ScheduleEntry]:
+        """Schedules that this site may do and that are due, the longest first.
+
+        Parameters
+        ----------
+        now : datetime
+            the present moment
+        """
+        query = select(Schedule).where(Schedule.next_due <= now, self._is_mine()).order_by(Schedule.next_due)
+        with self._database.reading() as session:
+            return [schedule_entry(row) for row in session.scalars(query)]
+
+    def claim(self, entry: ScheduleEntry, next_due: datetime | None, now: datetime) -> int | None:
+        """Take the firing of a schedule on that is due; once only, whoever else tries.
+
+        Parameters
+        ----------
+        entry : ScheduleEntry
+            of `due`
+        next_due : datetime or None
+            when it is due afterwards
+        now : datetime
+            the present moment
+
+        Returns
+        -------
+        int or None
+            number of the firing; None where somebody else has it, or the schedule was changed meanwhile
+        """
+        with self._database.writing() as session:
+            moved = session.execute(
+                update(Schedule)
+                .where(Schedule.name == entry.name, Schedule.next_due == entry.next_due)
+                .values(next_due=next_due)
+                .returning(Schedule.id)
+            ).scalar_one_or_none()
+            if moved is None:
+                return None
+            firing = Firing(schedule_id=moved, due=entry.next_due, is_asked=False, state="claimed")
+            firing.claimed, firing.site, firing.boot = now, self.site, self._boot
+            session.add(firing)
+            session.flush()
+            return firing.id
+
+    def ask(self, name: str, now: datetime) -> int:
+        """Ask the service of a schedule's site to do it now.
+
+        Parameters
+        ----------
+        name : str
+            of the schedule
+        now : datetime
+            the present moment
+
+        Returns
+        -------
+        int
+            number of the firing
+
+        Raises
+        ------
+        NotFoundError
+            if there is no such schedule
+        """
+        with self._database.writing() as session:
+            firing = Firing(schedule_id=_schedule(session, name).id, due=now, is_asked=True, state="asked")
+            session.add(firing)
+            session.flush()
+            return firing.id
+
+    def claim_asked(self, now: datetime, number: int | None = None) -> tuple[int, ScheduleEntry] | None:
+        """Take a firing on that was asked for; once only, whoever else tries.
+
+        Parameters
+        ----------
+        now : datetime
+            the present moment
+        number : int or None
+            of the firing; any that this site may do where None
+
+        Returns
+        -------
+        (int, ScheduleEntry) or None
+            number and schedule; None where there is none
+        """
+        query = select(Firing).join(Schedule).where(Firing.state == "asked", self._is_mine()).order_by(Firing.id)
+        if number is not None:
+            query = query.where(Firing.id == number)
+        with self._database.writing() as session:
+            firing = session.scalars(query.limit(1).with_for_update(of=Firing, skip_locked=True)).first()
+            if firing is None:
+                return None
+            firing.state, firing.claimed, firing.site, firing.boot = "claimed", now, self.site, self._boot
+            return firing.id, schedule_entry(firing.schedule)
+
+    def withdraw(self, number: int) -> bool:
+        """Take back what was asked for; False where somebody has taken it on.
+
+        Parameters
+        ----------
+        number : int
+            of the firing
+        """
+        return self._move(Firing.id == number, "asked", state="withdrawn", reason="nobody took it on in time") > 0
+
+    def finish(self, number: int, state: str, reason: str | None = None, item: tuple[str, str] | None = None) -> None:
+        """Write down what came of a firing.
+
+        Parameters
+        ----------
+        number : int
+            of the firing
+        state : str
+            ``started``, ``skipped``, ``missed`` or ``failed``
+        reason : str or None
+            why nothing was started
+        item : (str, str) or None
+            kind and identifier of what was started
+        """
+        kind, identifier = item or (None, None)
+        values = {"reason": reason, "item_kind": kind, "item_identifier": identifier}
+        self._move(Firing.id == number, "claimed", state=state, **values)
+
+    def interrupt_claims(self) -> int:
+        """Give firings an end that an earlier start of this site's service left undecided; none of them is repeated.
+
+        Returns
+        -------
+        int
+            how many there were
+        """
+        reason = "the service ended while it was being started; look whether it was, nothing is repeated by itself"
+        mine = (Firing.site == self.site) & (Firing.boot != self._boot)
+        return self._move(mine, "claimed", state="interrupted", reason=reason)
+
+    def firing(self, number: int) -> FiringEntry:
+        """A firing.
+
+        Parameters
+        ----------
+        number : int
+            of it
+
+        Raises
+        ------
+        NotFoundError
+            if there is none
+        """
+        with self._database.reading() as session:
+            firing = session.get(Firing, number)
+            if firing is None:
+                raise NotFoundError(f"there is no firing {number}; list those of the schedule")
+            return firing_entry(session, firing)
+
+    def firings(self, name: str, limit: int) -> list[FiringEntry]:
+        """The firings of a schedule, the newest first.
+
+        Parameters
+        ----------
+        name : str
+            of the schedule
+        limit : int
+            most firings
+
+        Raises
+        ------
+        NotFoundError
+            if there is no such schedule
+        """
+        with self._database.reading() as session:
+            query = select(Firing).where(Firing.schedule_id == _schedule(session, name).id)
+            rows = session.scalars(query.order_by(Firing.id.desc()).limit(limit)).all()
+            return [firing_entry(session, row) for row in rows]
+
+    def _is_mine(self) -> ColumnElement[bool]:
+        """Of schedules that this site may do."""
+        return or_(Schedule.site == self.site, Schedule.site.is_(None))
+
+    def _move(self, where: ColumnElement[bool], before: str, **values: Any) -> int:
+        """Change firings of a state; how many there were."""
+        statement = update(Firing).where(where, Firing.state == before).values(**values).returning(Firing.id)
+        with self._database.writing() as session:
+            return len(session.scalars(statement).all())
+
+
+def _schedule(session: Session, name: str) -> Schedule:
+    """The row of a schedule."""
+    row = session.scalar(select(Schedule).where(Schedule.name == name))
+    if row is None:
+        known = session.scalars(select(Schedule.name).order_by(Schedule.name).limit(1000)).all()
+        hint = nearest(name, known) if known else "there are none yet"
+        raise NotFoundError(one_line(f"no schedule {shown(name)}; {hint}"))
+    return row

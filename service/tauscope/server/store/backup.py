@@ -1,0 +1,249 @@
+"""Backups: one file with everything of a data folder and its database, also while a service works with them."""
+
+import gzip
+import hashlib
+import io
+import json
+import os
+import secrets
+import shutil
+import tarfile
+import tempfile
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import IO, Any
+
+from sqlalchemy.exc import SQLAlchemyError
+
+from tauscope.errors import StoreError
+from tauscope.files import sync_folder
+from tauscope.server.store.database.database import FILE_NAME, Database
+from tauscope.server.store.database.dump import dump_lines, load_lines
+from tauscope.server.store.database.engine import open_engine
+
+FORM = "tauscope.backup/1"
+_DATABASE, _MANIFEST, _DATA = "database.jsonl", "manifest.json", "data"
+_STATES = ("state.json", "run.json")
+_PIECE = 2**20
+
+
+def write_backup(data_folder: Path, database: Database, target: Path, version: str) -> int:
+    """Write a backup; the file appears under its name only when it is complete.
+
+    The database comes first, and in every folder the state before what it speaks of: what is copied later can only be
+    newer, and the start of a service puts that right as it does after a crash.
+
+    Parameters
+    ----------
+    data_folder : Path
+        holds everything that is kept
+    database : Database
+        its database
+    target : Path
+        the file to make
+    version : str
+        of this program
+
+    Returns
+    -------
+    int
+        number of files in it
+
+    Raises
+    ------
+    OSError
+        if it cannot be written
+    """
+    partial = target.with_name(f".{target.name}-{secrets.token_hex(4)}.partial")
+    hashes: dict[str, dict[str, Any]] = {}
+    try:
+        with partial.open("xb") as file:
+            with gzip.open(file, "wb", compresslevel=3) as packed, tarfile.open(fileobj=packed, mode="w|") as archive:
+                with tempfile.TemporaryFile() as lines:
+                    lines.writelines(dump_lines(database.engine))
+                    _add(archive, _DATABASE, lines, hashes)
+                for path in _files(data_folder):
+                    _add_file(archive, path, data_folder, hashes)
+                manifest = {"form": FORM, "created": datetime.now(UTC).isoformat(), "version": version, "files": hashes}
+                _add(archive, _MANIFEST, io.BytesIO(json.dumps(manifest, indent=1).encode()), {})
+            file.flush()
+            os.fsync(file.fileno())
+        partial.rename(target)
+        sync_folder(target.parent)
+    finally:
+        partial.unlink(missing_ok=True)
+    return len(hashes) - 1
+
+
+def restore_backup(source: Path, data_folder: Path, address: str | None) -> int:
+    """Make a data folder and its database from a backup; nothing appears before everything was found sound.
+
+    Parameters
+    ----------
+    source : Path
+        of `write_backup`
+    data_folder : Path
+        is made; may be an empty folder
+    address : str or None
+        URL of an empty PostgreSQL database; SQLite in the data folder where None
+
+    Returns
+    -------
+    int
+        number of files
+
+    Raises
+    ------
+    StoreError
+        if the backup is damaged or of a newer program, or there is something already
+    OSError
+        if it cannot be written
+    """
+    if data_folder.exists() and (not data_folder.is_dir() or any(data_folder.iterdir())):
+        raise StoreError(f"{data_folder}: there is something already; name a folder that is not there yet")
+    data_folder.parent.mkdir(parents=True, exist_ok=True)
+    staged = Path(tempfile.mkdtemp(prefix=f".{data_folder.name}-", dir=data_folder.parent))
+    try:
+        hashes = _unpack(source, staged)
+        content = staged / _DATA
+        content.mkdir(exist_ok=True)
+        _fill_database(staged / _DATABASE, content / FILE_NAME if address is None else address)
+        if data_folder.exists():
+            data_folder.rmdir()
+        content.rename(data_folder)
+        sync_folder(data_folder.parent)
+    finally:
+        shutil.rmtree(staged, ignore_errors=True)
+    return len(hashes) - 1
+
+
+def _files(data_folder: Path) -> Iterator[Path]:
+    """Regular files, each folder's state first; neither the database nor what is half made."""
+    for root, folders, names in os.walk(data_folder):
+        folders[:] = sorted(name for name in folders if not name.startswith("."))
+        for name in sorted(names, key=lambda name: (name not in _STATES, name)):
+            path = Path(root) / name
+            is_database = Path(root) == data_folder and name.startswith(FILE_NAME)
+            if not name.startswith(".") and not is_database and not path.is_symlink() and path.is_file():
+                yield path
+
+
+def _add_file(archive: tarfile.TarFile, path: Path, data_folder: Path, hashes: dict[str, dict[str, Any]]) -> None:
+    """Add a file as far as it goes now; one that was removed meanwhile is left out."""
+    try:
+        file = path.open("rb")
+    except FileNotFoundError:
+        return
+    with file:
+        status = os.fstat(file.fileno())
+        name = f"{_DATA}/{path.relative_to(data_folder).as_posix()}"
+        _add(archive, name, file, hashes, status.st_mtime)
+
+
+def _add(
+    archive: tarfile.TarFile, name: str, file: IO[bytes], hashes: dict[str, dict[str, Any]], modified: float = 0.0
+) -> None:
+    """Add the bytes of a file up to its present end, and note what they were."""
+    size = file.seek(0, os.SEEK_END)
+    file.seek(0)
+    entry = tarfile.TarInfo(name)
+    entry.size, entry.mode, entry.mtime = size, 0o640, modified
+    reader = _Hashing(file, size)
+    archive.addfile(entry, reader)  # pyright: ignore[reportArgumentType] - `read` is all that is used
+    hashes[name] = {"size": size, "sha256": reader.digest(), "modified": modified}
+
+
+class _Hashing:
+    """Reads a file no further than it went at first, and hashes what is read."""
+
+    def __init__(self, file: IO[bytes], size: int) -> None:
+        self._file, self._left, self._hash = file, size, hashlib.sha256()
+
+    def read(self, count: int) -> bytes:
+        """The next bytes; a file that was cut off meanwhile is filled up with zeros, and found damaged later."""
+        wanted = min(count, self._left)
+        piece = self._file.read(wanted).ljust(wanted, b"\0")
+        self._left -= len(piece)
+        self._hash.update(piece)
+        return piece
+
+    def digest(self) -> str:
+        """The sha256 of what was read, in hexadecimal."""
+        return self._hash.hexdigest()
+
+
+def _unpack(source: Path, staged: Path) -> dict[str, Any]:
+    """Unpack a backup; what it holds is what its manifest says, or nothing of it is used."""
+    try:
+        found, manifest = {}, None
+        with tarfile.open(source, "r|gz") as archive:
+            for entry in archive:
+                if not entry.isreg() or not _is_confined(entry.name) or entry.name in found:
+                    raise _damaged(source, f"{entry.name}: does not belong there")
+                if entry.name == _MANIFEST:
+                    manifest = json.loads(_content(archive, entry).read())
+                    continue
+                found[entry.name] = _write(_content(archive, entry), staged / entry.name)
+    except (tarfile.TarError, EOFError, OSError, ValueError) as error:
+        if isinstance(error, OSError) and error.errno is not None and not isinstance(error, gzip.BadGzipFile):
+            raise
+        raise _damaged(source, str(error)) from None
+    if manifest is None or manifest.get("form") != FORM:
+        raise _damaged(source, "its manifest is missing, or of another form")
+    expected = {name: (entry["size"], entry["sha256"]) for name, entry in manifest["files"].items()}
+    wrong = sorted(name for name in expected.keys() | found.keys() if expected.get(name) != found.get(name))
+    if wrong:
+        raise _damaged(source, f"{wrong[0]} is not what was written")
+    for name, entry in manifest["files"].items():
+        os.utime(staged / name, (entry["modified"], entry["modified"]))
+    return expected
+
+
+def _content(archive: tarfile.TarFile, entry: tarfile.TarInfo) -> IO[bytes]:
+    """The bytes of a regular file in an archive."""
+    file = archive.extractfile(entry)
+    assert file is not None  # noqa: S101 - it is a regular file
+    return file
+
+
+def _write(file: IO[bytes], path: Path) -> tuple[int, str]:
+    """Write a file; its size and its sha256."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    digest, size = hashlib.sha256(), 0
+    with path.open("xb") as target:
+        while piece := file.read(_PIECE):
+            digest.update(piece)
+            size += len(piece)
+            target.write(piece)
+        target.flush()
+        os.fsync(target.fileno())
+    path.chmod(0o640)
+    return size, digest.hexdigest()
+
+
+def _is_confined(name: str) -> bool:
+    """Whether a name leads to where backups put things."""
+    parts = name.split("/")
+    return name in (_DATABASE, _MANIFEST) or (
+        parts[0] == _DATA and len(parts) > 1 and all(part not in ("", ".", "..") and "\0" not in part for part in parts)
+    )
+
+
+def _fill_database(lines: Path, address: Path | str) -> None:
+    """Fill an empty database."""
+    engine = open_engine(address)
+    try:
+        with lines.open("rb") as file:
+            load_lines(engine, file)
+    except SQLAlchemyError as error:
+        raise StoreError(
+            f"the database cannot be filled ({str(error).splitlines()[0]}); give it an empty one"
+        ) from None
+    finally:
+        engine.dispose()
+
+
+def _damaged(source: Path, reason: str) -> StoreError:
+    """A backup that is not used."""
+    return StoreError(f"{source}: is damaged or no backup of Tauscope's ({reason}); use another one")

@@ -1,0 +1,1 @@
+"""The database: an index of the folders, and what has no folder."""

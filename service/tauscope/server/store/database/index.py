@@ -1,0 +1,256 @@
+"""Reading and writing the index: what lies in the folder of one site, and the search over all sites."""
+
+from collections.abc import Collection, Iterable, Mapping
+from datetime import datetime
+
+from sqlalchemy import delete, select, update
+from sqlalchemy.orm import Session
+
+from tauscope.server.store.database.database import Database
+from tauscope.server.store.database.facts import FileMetadata, ItemEntry, ItemMetadata, ItemQuery, RobotEntry
+from tauscope.server.store.database.tables import ITEM_CLASSES, Artefact, Item, Recording, RecordingUse, Robot, Site
+from tauscope.server.store.recordings import StoredRecording
+
+FIGURES: Mapping[str, tuple[str, ...]] = {
+    "run": ("backend",),
+    "identification": ("relative_error", "held_out_error"),
+    "diagnosis": ("verdict",),
+}
+"""For each kind of item, the columns of its own."""
+
+
+class Index:
+    """The part of the index that one data folder fills, and the search over all of it."""
+
+    def __init__(self, database: Database, site: str) -> None:
+        """Look at the index.
+
+        Parameters
+        ----------
+        database : Database
+            holds it
+        site : str
+            identifier of the data folder
+        """
+        self._database = database
+        self.site = site
+
+    def register(self, label: str, now: datetime) -> None:
+        """Make the site known, before anything of it is put into the index.
+
+        Parameters
+        ----------
+        label : str
+            what people call it
+        now : datetime
+            the present moment
+        """
+        with self._database.writing() as session:
+            session.merge(Site(identifier=self.site, label=label, last_seen=now))
+
+    def stamps(self, kind: str) -> dict[str, tuple[str, bool]]:
+        """What is indexed of this site.
+
+        Parameters
+        ----------
+        kind : str
+            of the items
+
+        Returns
+        -------
+        dict of str to (str, bool)
+            stamp of each item, and whether it is final, by identifier
+        """
+        query = select(Item.identifier, Item.stamp, Item.is_final).where(Item.site == self.site, Item.kind == kind)
+        with self._database.reading() as session:
+            return {identifier: (stamp, is_final) for identifier, stamp, is_final in session.execute(query)}
+
+    def put(self, facts: ItemMetadata) -> None:
+        """Index an item, in place of what was known of it.
+
+        Parameters
+        ----------
+        facts : ItemMetadata
+            what its folder shows
+        """
+        with self._database.writing() as session:
+            row = session.scalar(self._row(facts.kind, facts.identifier))
+            if row is None:
+                row = ITEM_CLASSES[facts.kind](site=self.site, kind=facts.kind, identifier=facts.identifier)
+                session.add(row)
+            else:
+                for table in (Artefact, RecordingUse):
+                    session.execute(delete(table).where(table.item_id == row.id))
+            _fill(row, facts)
+            row.robot_id = None if facts.robot is None else _robot_id(session, facts.robot, facts.created)
+            session.flush()
+            session.add_all(
+                Artefact(item_id=row.id, path=file.path, size=file.size, sha256=file.sha256) for file in facts.artefacts
+            )
+            session.add_all(
+                RecordingUse(item_id=row.id, role=use.role, name=use.name, origin=use.origin, sha256=use.sha256)
+                for use in facts.recordings
+            )
+
+    def forget(self, kind: str, identifiers: Collection[str]) -> None:
+        """Take items out of the index whose folders are gone.
+
+        Parameters
+        ----------
+        kind : str
+            of the items
+        identifiers : collection of str
+            of the items
+        """
+        with self._database.writing() as session:
+            for identifier in identifiers:
+                session.execute(
+                    delete(Item).where(Item.site == self.site, Item.kind == kind, Item.identifier == identifier)
+                )
+
+    def damaged(self, kind: str) -> frozenset[str]:
+        """Identifiers of the damaged items of this site.
+
+        Parameters
+        ----------
+        kind : str
+            of the items
+        """
+        query = select(Item.identifier).where(Item.site == self.site, Item.kind == kind, Item.state == "damaged")
+        with self._database.reading() as session:
+            return frozenset(session.scalars(query))
+
+    def mark_damaged(self, kind: str, identifier: str, detail: str) -> None:
+        """Say of an item that a file of it is not what it was.
+
+        Parameters
+        ----------
+        kind, identifier : str
+            of the item
+        detail : str
+            one line: which file, and what to do
+        """
+        where = (Item.site == self.site, Item.kind == kind, Item.identifier == identifier)
+        values = {"state": "damaged", "problem_code": "damaged", "problem_detail": detail}
+        with self._database.writing() as session:
+            session.execute(update(Item).where(*where).values(**values))
+
+    def artefacts(self, kind: str, identifier: str) -> tuple[FileMetadata, ...]:
+        """The files of an item as they were when it ended.
+
+        Parameters
+        ----------
+        kind, identifier : str
+            of the item
+        """
+        query = (
+            select(Artefact).join(Item).where(Item.site == self.site, Item.kind == kind, Item.identifier == identifier)
+        )
+        with self._database.reading() as session:
+            rows = session.scalars(query.order_by(Artefact.path))
+            return tuple(FileMetadata(row.path, row.size, row.sha256) for row in rows)
+
+    def put_recordings(self, entries: Iterable[StoredRecording]) -> None:
+        """Index the recordings of this site; those that are not among them any more are forgotten.
+
+        Parameters
+        ----------
+        entries : iterable of StoredRecording
+            all that lie in the folder
+        """
+        present = {entry.name: entry for entry in entries}
+        with self._database.writing() as session:
+            known = {row.name: row for row in session.scalars(select(Recording).where(Recording.site == self.site))}
+            for name in known.keys() - present.keys():
+                session.delete(known[name])
+            for name, entry in present.items():
+                row = known.get(name)
+                if row is None:
+                    row = Recording(site=self.site, name=name)
+                    session.add(row)
+                row.size, row.modified, row.sha256 = entry.size, entry.modified, entry.sha256
+
+    def recordings_used(self, except_by: Collection[tuple[str, str]] = ()) -> frozenset[str]:
+        """Names of the recordings on the server that items of this site were made from or judged by.
+
+        Parameters
+        ----------
+        except_by : collection of (str, str)
+            kind and identifier of items that do not count
+        """
+        query = select(Item.kind, Item.identifier, RecordingUse.name).join(RecordingUse)
+        query = query.where(Item.site == self.site, RecordingUse.origin == "server")
+        with self._database.reading() as session:
+            uses = session.execute(query)
+            return frozenset(name for kind, identifier, name in uses if (kind, identifier) not in except_by)
+
+    def search(self, query: ItemQuery) -> list[ItemEntry]:
+        """Items of all sites, the newest first.
+
+        Parameters
+        ----------
+        query : ItemQuery
+            which ones
+        """
+        statement = select(Item).outerjoin(Robot)
+        for column, value in (
+            (Item.kind, query.kind),
+            (Item.state, query.state),
+            (Item.site, query.site),
+            (Robot.name, query.robot),
+        ):
+            if value is not None:
+                statement = statement.where(column == value)
+        if query.before is not None:
+            statement = statement.where(Item.created < query.before)
+        if query.recording_sha256 is not None:
+            statement = statement.where(Item.recordings.any(RecordingUse.sha256 == query.recording_sha256))
+        statement = statement.order_by(Item.created.desc(), Item.identifier.desc()).limit(query.limit)
+        with self._database.reading() as session:
+            return [_entry(row) for row in session.scalars(statement)]
+
+    def robots(self) -> list[RobotEntry]:
+        """Every robot that an item is or was about, by name."""
+        with self._database.reading() as session:
+            rows = session.scalars(select(Robot).order_by(Robot.name))
+            return [RobotEntry(row.name, row.first_seen, row.last_seen) for row in rows]
+
+    def _row(self, kind: str, identifier: str):
+        """The query of an item's row."""
+        return select(Item).where(Item.site == self.site, Item.kind == kind, Item.identifier == identifier)
+
+
+def _fill(row: Item, facts: ItemMetadata) -> None:
+    """Write what is known of an item into its row."""
+    row.state, row.is_final, row.stamp = facts.state, facts.is_final, facts.stamp
+    row.created, row.ended = facts.created, facts.ended
+    row.problem_code, row.problem_detail = facts.problem or (None, None)
+    for column in FIGURES.get(facts.kind, ()):
+        setattr(row, column, facts.figures.get(column))
+
+
+def _robot_id(session: Session, name: str, seen: datetime) -> int:
+    """The row of a robot, made where it is missing."""
+    row = session.scalar(select(Robot).where(Robot.name == name))
+    if row is None:
+        row = Robot(name=name, first_seen=seen, last_seen=seen)
+        session.add(row)
+        session.flush()
+    row.first_seen, row.last_seen = min(row.first_seen, seen), max(row.last_seen, seen)
+    return row.id
+
+
+def _entry(row: Item) -> ItemEntry:
+    """What a search gives out."""
+    return ItemEntry(
+        kind=row.kind,
+        identifier=row.identifier,
+        site=row.site,
+        state=row.state,
+        created=row.created,
+        ended=row.ended,
+        robot=None if row.robot is None else row.robot.name,
+        problem_code=row.problem_code,
+        problem_detail=row.problem_detail,
+        figures={column: getattr(row, column) for column in FIGURES.get(row.kind, ())},
+    )

@@ -1,0 +1,267 @@
+"""Recordings on the server: regular files in one folder, known by name, never overwritten."""
+
+import os
+import shutil
+import stat
+import tempfile
+import threading
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from tauscope.errors import NotFoundError, RecordingError
+from tauscope.files import sync_folder
+from tauscope.robot.messages import one_line, shown
+from tauscope.server.store.incoming import KeptFile, hash_file
+from tauscope.server.store.names import FILE_NAME_RULE, is_file_name
+from tauscope.server.store.recording_hashes import RecordingHashes
+
+_HASHES = ".sha256"
+_INCOMING = ".incoming-"
+
+
+class NameTakenError(RecordingError):
+    """Another recording of that name is kept; recordings are never overwritten."""
+
+
+@dataclass(frozen=True)
+class StoredRecording:
+    """A recording that lies on the server.
+
+    name : str
+        by which requests refer to it
+    size : int
+        number of bytes
+    modified : datetime
+        when it was last written, in UTC
+    sha256 : str or None
+        of its bytes, in hexadecimal; None where it was not computed yet
+    is_damaged : bool
+        whether it was sent or recorded, and its bytes are not those any more
+    """
+
+    name: str
+    size: int
+    modified: datetime
+    sha256: str | None
+    is_damaged: bool = False
+
+
+class RecordingStore:
+    """The folder of recordings; files that an operator puts there by hand belong to it too.
+
+    Only regular files are seen: a symbolic link could lead out of the folder.
+    """
+
+    def __init__(self, root: Path) -> None:
+        """Open the store; its folder is made where it is missing.
+
+        Parameters
+        ----------
+        root : Path
+            holds the recordings
+        """
+        self.root = root
+        self._hashes = RecordingHashes(root / _HASHES)
+        self._naming = threading.Lock()
+
+    def stage(self) -> Path:
+        """A new hidden folder on the same disk, for a file that is still arriving; `discard` it in the end."""
+        return Path(tempfile.mkdtemp(prefix=_INCOMING, dir=self.root))
+
+    def discard(self, staged: Path) -> None:
+        """Remove a staged folder and what is in it.
+
+        Parameters
+        ----------
+        staged : Path
+            of `stage`
+        """
+        shutil.rmtree(staged, ignore_errors=True)
+
+    def keep(self, file: KeptFile) -> tuple[StoredRecording, bool]:
+        """Give a file in a staged folder its place among the recordings.
+
+        Parameters
+        ----------
+        file : KeptFile
+            in a folder of `stage`
+
+        Returns
+        -------
+        StoredRecording
+            the recording
+        bool
+            False where the very same bytes were already kept under that name
+
+        Raises
+        ------
+        RecordingError
+            if the name is not allowed
+        NameTakenError
+            if other bytes are kept under that name
+        """
+        if not is_file_name(file.name):
+            raise RecordingError(one_line(f"{shown(file.name)}: no name for a recording; {FILE_NAME_RULE}"))
+        is_new = self._give_name(file)
+        return self.find(file.name), is_new
+
+    def path(self, name: str) -> Path:
+        """Where a recording lies.
+
+        Parameters
+        ----------
+        name : str
+            of the recording; any text that a client sent
+
+        Raises
+        ------
+        NotFoundError
+            if no regular file of this name is in the folder
+        """
+        self._status(name)
+        return self.root / name
+
+    def holds(self, name: str) -> bool:
+        """Whether there is a recording of a name.
+
+        Parameters
+        ----------
+        name : str
+            any text
+        """
+        try:
+            self._status(name)
+        except NotFoundError:
+            return False
+        return True
+
+    def find(self, name: str) -> StoredRecording:
+        """A recording with its sha256, which is computed where it is not known.
+
+        Parameters
+        ----------
+        name : str
+            of the recording
+
+        Raises
+        ------
+        NotFoundError
+            if there is no such recording
+        """
+        status = self._status(name)
+        known = self._hashes.of(name, status)
+        if known is None:
+            known = self._hashes.remember(name, status, hash_file(self.root / name))
+        return StoredRecording(name, status.st_size, _modified(status), known.sha256, known.is_damaged)
+
+    def digest(self, name: str) -> str:
+        """The sha256 of a recording's bytes, in hexadecimal, for who will work with them.
+
+        Parameters
+        ----------
+        name : str
+            of the recording
+
+        Raises
+        ------
+        NotFoundError
+            if there is no such recording
+        RecordingError
+            if it is damaged
+        """
+        found = self.find(name)
+        if found.sha256 is None or found.is_damaged:
+            hint = "restore it from a backup, or remove it and send it again"
+            raise RecordingError(f"{name}: is damaged, its bytes are not those that were kept; {hint}")
+        return found.sha256
+
+    def entries(self) -> list[StoredRecording]:
+        """All recordings, by name; of those that were sent or recorded, and changed since, the hash is looked at."""
+        found = []
+        for entry in sorted(self.root.iterdir()):
+            try:
+                status = self._status(entry.name)
+                known = self._hashes.of(entry.name, status)
+                if known is None and self._hashes.is_kept(entry.name):
+                    found.append(self.find(entry.name))
+                    continue
+            except (NotFoundError, FileNotFoundError):
+                continue
+            sha256, is_damaged = (None, False) if known is None else (known.sha256, known.is_damaged)
+            found.append(StoredRecording(entry.name, status.st_size, _modified(status), sha256, is_damaged))
+        return found
+
+    def damaged(self, *, deep: bool) -> list[str]:
+        """Names of the recordings that were sent or recorded and whose bytes are not those any more.
+
+        Parameters
+        ----------
+        deep : bool
+            whether every byte is looked at, or only at what has another size or another time
+        """
+        if deep:
+            for entry in self.entries():
+                with suppress(NotFoundError, FileNotFoundError):  # removed meanwhile
+                    self._hashes.remember(entry.name, self._status(entry.name), hash_file(self.root / entry.name))
+        return [entry.name for entry in self.entries() if entry.is_damaged]
+
+    def remove(self, name: str) -> None:
+        """Remove a recording.
+
+        Parameters
+        ----------
+        name : str
+            of the recording
+
+        Raises
+        ------
+        NotFoundError
+            if there is no such recording
+        """
+        self.path(name).unlink(missing_ok=True)
+        self._hashes.forget(name)
+        sync_folder(self.root)
+
+    def tidy(self) -> None:
+        """Remove what a crash left of uploads; to be called before anything arrives."""
+        for entry in self.root.glob(f"{_INCOMING}*"):
+            self.discard(entry)
+        self._hashes.tidy(self.holds)
+
+    def _status(self, name: str) -> os.stat_result:
+        """Size and times of a recording, which has to be a regular file directly in the folder."""
+        status = None
+        if is_file_name(name):
+            try:
+                status = os.lstat(self.root / name)
+            except OSError:
+                status = None
+        if status is None or not stat.S_ISREG(status.st_mode):
+            hint = "check the name, or list the recordings"
+            raise NotFoundError(one_line(f"no recording {shown(name)} lies on the server; {hint}"))
+        return status
+
+    def _give_name(self, file: KeptFile) -> bool:
+        """Link the file to its name, which fails where the name is in use; True where it is new.
+
+        What its bytes are is written down first: no recording is ever there of which that is not known.
+        """
+        target = self.root / file.name
+        with self._naming:
+            if os.path.lexists(target):
+                if target.is_symlink() or not target.is_file() or hash_file(target) != file.sha256:
+                    text = f"{file.name}: another recording of this name lies on the server; choose another name"
+                    raise NameTakenError(text)
+                return False
+            file.path.chmod(0o640)
+            self._hashes.keep(file.name, file.path.stat(), file.sha256)
+            os.link(file.path, target)
+            sync_folder(self.root)
+        return True
+
+
+def _modified(status: os.stat_result) -> datetime:
+    """When a file was last written."""
+    return datetime.fromtimestamp(status.st_mtime, UTC)

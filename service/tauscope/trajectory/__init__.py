@@ -1,0 +1,27 @@
+"""What an arm can be asked to play: segments of motion, the limits that they keep, and the files that hold them."""
+
+from tauscope.trajectory.files import parse_trajectory_json, read_trajectory, trajectory_json, write_trajectory
+from tauscope.trajectory.fourier_series import FourierSeries, MotionSamples
+from tauscope.trajectory.limits import MotionLimits, motion_limits
+from tauscope.trajectory.segments import FourierSegment, MoveSegment, PathSegment, SampledSegment, Segment
+from tauscope.trajectory.trajectory import DesignRecord, Trajectory, TrajectorySamples, ramp
+
+__all__ = [
+    "DesignRecord",
+    "FourierSegment",
+    "FourierSeries",
+    "MotionLimits",
+    "MotionSamples",
+    "MoveSegment",
+    "PathSegment",
+    "SampledSegment",
+    "Segment",
+    "Trajectory",
+    "TrajectorySamples",
+    "motion_limits",
+    "parse_trajectory_json",
+    "ramp",
+    "read_trajectory",
+    "trajectory_json",
+    "write_trajectory",
+]

@@ -1,0 +1,167 @@
+"""Trajectory files: JSON with exact coefficients, or CSV with samples, by their suffix."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, Field, ValidationError
+
+from tauscope.errors import ExcitationError, RobotFileError
+from tauscope.robot import Robot
+from tauscope.robot.bounded_file import decode_utf8, read_bounded
+from tauscope.robot.messages import one_line, shown
+from tauscope.trajectory.csv_format import parse_trajectory_csv, trajectory_csv
+from tauscope.trajectory.document import TrajectoryDocument, trajectory_document, trajectory_of
+from tauscope.trajectory.excitation_document import EXCITATION_SCHEMA, ExcitationDocument
+from tauscope.trajectory.trajectory import Trajectory
+
+LARGEST_FILE = 256 * 2**20
+"""Bytes of the largest trajectory file that is read."""
+
+DEFAULT_RATE_HZ = 500.0
+"""Rate of CSV samples where none is asked for [Hz]."""
+
+
+def read_trajectory(path: str | Path, robot: Robot) -> Trajectory:
+    """Read a trajectory for a robot: JSON (``.json``) or CSV (anything else).
+
+    Parameters
+    ----------
+    path : str or Path
+        the file
+    robot : Robot
+        the arm that is to play it: its number of joints must agree
+
+    Returns
+    -------
+    Trajectory
+        at rest at both ends; whether it keeps the arm's limits is asked by `require_within_limits`
+
+    Raises
+    ------
+    ExcitationError
+        naming the file and the key, or the line and the column
+    """
+    path = Path(path)
+    try:
+        text = decode_utf8(read_bounded(path, LARGEST_FILE), str(path))
+    except RobotFileError as error:  # the same reader, another kind of file
+        raise ExcitationError(str(error)) from None
+    if path.suffix.lower() == ".json":
+        return parse_trajectory_json(text, str(path), robot)
+    joints = tuple(joint.name for joint in robot.joints)
+    return _one_line_errors(lambda: parse_trajectory_csv(text, str(path), robot.name, joints))
+
+
+def parse_trajectory_json(text: str | bytes, name: str, robot: Robot) -> Trajectory:
+    """The trajectory of a JSON document.
+
+    Parameters
+    ----------
+    text : str or bytes
+        the document, schema ``tauscope.trajectory/1``, or an excitation's, ``tauscope.excitation/1``, that holds one
+    name : str
+        what messages call it
+    robot : Robot
+        the arm that is to play it
+
+    Returns
+    -------
+    Trajectory
+        equal to the one that was written, to the last digit
+
+    Raises
+    ------
+    ExcitationError
+        naming the key
+    """
+    try:
+        document = _document(text)
+    except ValidationError as error:
+        raise ExcitationError(one_line(f"{name}: {_first_fault(error)}")) from None
+
+    def build() -> Trajectory:
+        if len(document.joints) != robot.joint_count:
+            raise ExcitationError(
+                f"joints: the trajectory moves {len(document.joints)} joints, robot {robot.name!r} has "
+                f"{robot.joint_count}; take one that was made for it"
+            )
+        return trajectory_of(document)
+
+    return _one_line_errors(build, f"{name}: ")
+
+
+def trajectory_json(trajectory: Trajectory) -> str:
+    """A trajectory as a JSON document, schema ``tauscope.trajectory/1``.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        the motion
+    """
+    return trajectory_document(trajectory).model_dump_json(by_alias=True, indent=1) + "\n"
+
+
+def write_trajectory(trajectory: Trajectory, path: str | Path, *, rate_hz: float = DEFAULT_RATE_HZ) -> None:
+    """Write a trajectory: JSON (``.json``) or CSV (``.csv``).
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        the motion
+    path : str or Path
+        the file; replaced where it exists
+    rate_hz : float
+        samples a second of a CSV file [Hz]
+
+    Raises
+    ------
+    ExcitationError
+        for another suffix, or where the file cannot be written
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix not in (".json", ".csv"):
+        raise ExcitationError(f"{path}: a trajectory file ends in .json or .csv; rename it")
+    text = trajectory_json(trajectory) if suffix == ".json" else trajectory_csv(trajectory, rate_hz)
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ExcitationError(f"{path}: cannot be written ({error.strerror or error}); choose another place") from error
+
+
+def _document(text: str | bytes) -> TrajectoryDocument:
+    """The trajectory's document, by itself or within an excitation's."""
+    if _Schema.model_validate_json(text).schema_ == EXCITATION_SCHEMA:
+        return ExcitationDocument.model_validate_json(text).trajectory
+    return TrajectoryDocument.model_validate_json(text)
+
+
+class _Schema(BaseModel):
+    """Which kind of document it is; a trajectory's where it says nothing that we know."""
+
+    schema_: Any = Field(default=None, alias="schema")
+
+
+def _one_line_errors(build: Callable[[], Trajectory], prefix: str = "") -> Trajectory:
+    """Whatever a user's file holds, a message about it stays one line."""
+    try:
+        return build()
+    except ExcitationError as error:
+        raise ExcitationError(one_line(f"{prefix}{error}")) from None
+
+
+def _first_fault(error: ValidationError) -> str:
+    """The first fault as ``segments[2].cosine[0]: what is wrong``."""
+    fault = error.errors(include_url=False, include_context=False)[0]
+    kinds = ("fourier", "path", "move", "sampled")
+    key = ""
+    for part in fault["loc"]:
+        if isinstance(part, int):
+            key += f"[{part}]"
+        elif part not in kinds:  # pydantic also names the chosen kind of segment
+            key += f".{part}" if key else str(part)
+    message = fault["msg"][:1].lower() + fault["msg"][1:]
+    value = fault.get("input")
+    hint = "" if fault["type"] in ("missing", "json_invalid") else f" (it is {shown(value)})"
+    return f"{key or 'the document'}: {message}{hint}"

@@ -1,0 +1,120 @@
+"""Finite Fourier series of the joint positions: the form of excitation of the seed paper's section 5.2."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.errors import ExcitationError
+
+Array = NDArray[np.float64]
+
+LEAST_HARMONICS = 2
+"""One harmonic alone cannot be at rest, with zero acceleration, at the ends of its period."""
+
+
+@dataclass(frozen=True, eq=False)
+class MotionSamples:
+    """A motion at given instants.
+
+    position, velocity, acceleration : (N, n) float64
+        q, q̇, q̈ [rad or m, and per s, per s²]
+    """
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+
+@dataclass(frozen=True, eq=False)
+class FourierSeries:
+    """One finite Fourier series a joint about a centre, M harmonics of ω_f = 2π/T, the seed paper's section 5.2.
+
+        q̇_i(t) = Σ_l a_l cos(ω_f l t) + b_l sin(ω_f l t)
+
+    period_s : float
+        fundamental period T [s]
+    centre : (n,) float64
+        mean position [rad or m]
+    cosine : (n, M) float64
+        a_l, velocity amplitude of the cosine of harmonic l [rad/s or m/s]
+    sine : (n, M) float64
+        b_l, velocity amplitude of the sine of harmonic l [rad/s or m/s]
+    """
+
+    period_s: float
+    centre: Array
+    cosine: Array
+    sine: Array
+
+    def __post_init__(self) -> None:
+        """Refuse arrays that do not belong together."""
+        if not (np.isfinite(self.period_s) and self.period_s > 0.0):
+            raise ExcitationError(f"the period is {self.period_s} s; give a positive duration")
+        joints = len(self.centre)
+        if self.cosine.shape != self.sine.shape or self.cosine.ndim != 2 or len(self.cosine) != joints:
+            raise ExcitationError(
+                f"Fourier coefficients of shapes {self.cosine.shape} and {self.sine.shape} do not fit {joints} joints; "
+                "give one row a joint and one column a harmonic in both"
+            )
+
+    @property
+    def joint_count(self) -> int:
+        """Number of joints n."""
+        return len(self.centre)
+
+    @property
+    def harmonics(self) -> int:
+        """Number of harmonics M."""
+        return self.cosine.shape[1]
+
+    @property
+    def frequencies(self) -> Array:
+        """ω_f l of every harmonic [rad/s], shape (M,)."""
+        return 2.0 * np.pi / self.period_s * np.arange(1.0, self.harmonics + 1.0)
+
+    def evaluate(self, time: Array) -> MotionSamples:
+        """Exact position, velocity and acceleration.
+
+        Parameters
+        ----------
+        time : (N,) float64
+            instants since the start of a period [s]
+
+        Returns
+        -------
+        MotionSamples
+            q, q̇, q̈ at these instants
+        """
+        omega = self.frequencies
+        phase = np.multiply.outer(time, omega)
+        cosine, sine = np.cos(phase), np.sin(phase)
+        return MotionSamples(
+            position=self.centre + sine @ (self.cosine / omega).T - cosine @ (self.sine / omega).T,
+            velocity=cosine @ self.cosine.T + sine @ self.sine.T,
+            acceleration=cosine @ (self.sine * omega).T - sine @ (self.cosine * omega).T,
+        )
+
+    def rest_error(self) -> tuple[float, float]:
+        """Largest speed and acceleration at the ends of a period: |Σ a_l| and ω_f |Σ l b_l| [rad/s, rad/s²]."""
+        speed = np.abs(self.cosine.sum(axis=1))
+        acceleration = np.abs(self.sine @ self.frequencies)
+        return float(speed.max(initial=0.0)), float(acceleration.max(initial=0.0))
+
+
+def between_samples(harmonics: int, samples: int) -> float:
+    """Factor by which a trigonometric polynomial may exceed its largest equispaced sample: 1/cos(π M / K).
+
+    Ehlich and Zeller's bound for degree M and K > 2 M samples a period: what holds at the samples with this factor to
+    spare holds at every instant.
+
+    Parameters
+    ----------
+    harmonics : int
+        degree M
+    samples : int
+        number K of equispaced samples a period
+    """
+    if samples <= 2 * harmonics:
+        raise ExcitationError(f"{samples} samples a period cannot bound {harmonics} harmonics; take more samples")
+    return float(1.0 / np.cos(np.pi * harmonics / samples))

@@ -1,0 +1,97 @@
+"""What every joint may do during an excitation: the robot file's limits, and stated defaults where it has none."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.robot import JointType, Robot
+
+Array = NDArray[np.float64]
+
+DEFAULT_RANGE = {JointType.REVOLUTE: np.pi, JointType.PRISMATIC: 0.25}
+"""Positions from minus to plus this where no range is stated [rad or m]."""
+
+DEFAULT_SPEED = {JointType.REVOLUTE: 1.0, JointType.PRISMATIC: 0.25}
+"""Speed where no limit is stated [rad/s or m/s]."""
+
+DEFAULT_ACCELERATION = {JointType.REVOLUTE: 4.0, JointType.PRISMATIC: 1.0}
+"""Acceleration where no limit is stated [rad/s² or m/s²]."""
+
+
+@dataclass(frozen=True, eq=False)
+class MotionLimits:
+    """Limits of every joint.
+
+    position_low, position_high : (n,) float64
+        range of the position [rad or m]
+    velocity : (n,) float64
+        largest speed [rad/s or m/s]
+    acceleration : (n,) float64
+        largest acceleration [rad/s² or m/s²]
+    torque : (n,) float64
+        largest torque, infinite where none is stated [Nm or N]
+    assumed : tuple of str
+        limits that nobody stated, as sentences fit for a report
+    """
+
+    position_low: Array
+    position_high: Array
+    velocity: Array
+    acceleration: Array
+    torque: Array
+    assumed: tuple[str, ...] = ()
+
+    @property
+    def middle(self) -> Array:
+        """Middle of the position range [rad or m], shape (n,)."""
+        return 0.5 * (self.position_low + self.position_high)
+
+    @property
+    def half_range(self) -> Array:
+        """Half the position range [rad or m], shape (n,)."""
+        return 0.5 * (self.position_high - self.position_low)
+
+    def scaled(self, fraction: float) -> "MotionLimits":
+        """A part of every limit, positions about the middle of their range.
+
+        Parameters
+        ----------
+        fraction : float
+            part of each limit, in (0, 1]
+        """
+        return MotionLimits(
+            self.middle - fraction * self.half_range,
+            self.middle + fraction * self.half_range,
+            fraction * self.velocity,
+            fraction * self.acceleration,
+            fraction * self.torque,
+            self.assumed,
+        )
+
+
+def motion_limits(robot: Robot) -> MotionLimits:
+    """The limits of a robot's joints; where none is stated a careful default, named in `MotionLimits.assumed`.
+
+    Parameters
+    ----------
+    robot : Robot
+        the arm
+    """
+    assumed: list[str] = []
+    low, high, velocity, acceleration, torque = (np.empty(robot.joint_count) for _ in range(5))
+    for j, joint in enumerate(robot.joints):
+        unit = "rad" if joint.type is JointType.REVOLUTE else "m"
+        limits = joint.limits
+        reach = DEFAULT_RANGE[joint.type]
+        low[j], high[j] = limits.position or (-reach, reach)
+        velocity[j] = DEFAULT_SPEED[joint.type] if limits.velocity is None else limits.velocity
+        acceleration[j] = DEFAULT_ACCELERATION[joint.type] if limits.acceleration is None else limits.acceleration
+        torque[j] = np.inf if limits.torque is None else limits.torque
+        if limits.position is None:
+            assumed.append(f"{joint.name}: position assumed within ±{reach:.4g} {unit}")
+        if limits.velocity is None:
+            assumed.append(f"{joint.name}: velocity assumed up to {velocity[j]:.4g} {unit}/s")
+        if limits.acceleration is None:
+            assumed.append(f"{joint.name}: acceleration assumed up to {acceleration[j]:.4g} {unit}/s²")
+    return MotionLimits(low, high, velocity, acceleration, torque, tuple(assumed))

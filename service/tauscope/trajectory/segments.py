@@ -1,0 +1,302 @@
+"""The pieces that a trajectory is made of.
+
+Each begins and ends at rest with zero acceleration: any two that share a posture join twice continuously
+differentiable.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.errors import ExcitationError
+from tauscope.trajectory.fourier_series import FourierSeries, MotionSamples
+
+Array = NDArray[np.float64]
+
+PEAK_SPEED = 1.875
+"""Largest speed of the minimum-jerk move over distance and duration one."""
+
+PEAK_ACCELERATION = 10.0 / np.sqrt(3.0)
+"""Largest acceleration of the minimum-jerk move over distance and duration one."""
+
+
+class Segment(Protocol):
+    """A piece of a trajectory."""
+
+    @property
+    def joint_count(self) -> int:
+        """Number of joints n."""
+        ...
+
+    @property
+    def duration_s(self) -> float:
+        """How long it lasts [s]."""
+        ...
+
+    def evaluate(self, time: Array) -> MotionSamples:
+        """Exact position, velocity and acceleration.
+
+        Parameters
+        ----------
+        time : (N,) float64
+            instants since its start [s]
+        """
+        ...
+
+    def period(self, time: Array) -> Array:
+        """Index of the repeated excitation period, NaN where the motion is no part of it, shape (N,).
+
+        Parameters
+        ----------
+        time : (N,) float64
+            instants since its start [s]
+        """
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class FourierSegment:
+    """Whole periods of a Fourier series.
+
+    series : FourierSeries
+        at rest at the ends of its period
+    repeats : int
+        how often it is played
+    first_period : int or None
+        index of the first repeat in a recording's column `period`; None where it is not to be counted
+    """
+
+    series: FourierSeries
+    repeats: int = 1
+    first_period: int | None = None
+
+    @property
+    def joint_count(self) -> int:
+        """Number of joints n."""
+        return self.series.joint_count
+
+    @property
+    def duration_s(self) -> float:
+        """How long it lasts [s]."""
+        return self.repeats * self.series.period_s
+
+    def evaluate(self, time: Array) -> MotionSamples:
+        """Exact position, velocity and acceleration.
+
+        Parameters
+        ----------
+        time : (N,) float64
+            instants since its start [s]
+        """
+        return self.series.evaluate(time)
+
+    def period(self, time: Array) -> Array:
+        """Index of the repeat, shape (N,).
+
+        Parameters
+        ----------
+        time : (N,) float64
+            instants since its start [s]
+        """
+        if self.first_period is None:
+            return np.full(len(time), np.nan)
+        # Rounding of the instants must not put the first sample of a period into the one before.
+        repeat = np.floor(time / self.series.period_s + 1e-9)
+        return self.first_period + np.clip(repeat, 0, self.repeats - 1)
+
+
+@dataclass(frozen=True, eq=False)
+class MoveSegment:
+    """A straight minimum-jerk move from posture to posture: q = q_0 + (q_1 - q_0)(10 s³ - 15 s⁴ + 6 s⁵), s = t/T.
+
+    start, end : (n,) float64
+        postures [rad or m]
+    duration_s : float
+        T [s]
+    """
+
+    start: Array
+    end: Array
+    duration_s: float
+
+    @property
+    def joint_count(self) -> int:
+        """Number of joints n."""
+        return len(self.start)
+
+    def evaluate(self, time: Array) -> MotionSamples:
+        """Exact position, velocity and acceleration.
+
+        Parameters
+        ----------
+        time : (N,) float64
+            instants since its start [s]
+        """
+        progress, rate, bend = minimum_jerk(time, self.duration_s)
+        way = self.end - self.start
+        # The last sample is the end itself, not the end but for rounding.
+        from_end = progress[:, None] > 0.5
+        position = np.where(from_end, self.end - (1.0 - progress)[:, None] * way, self.start + progress[:, None] * way)
+        return MotionSamples(position, rate[:, None] * way, bend[:, None] * way)
+
+    def period(self, time: Array) -> Array:
+        """NaN: no part of the repeated excitation, shape (N,).
+
+        Parameters
+        ----------
+        time : (N,) float64
+            instants since its start [s]
+        """
+        return np.full(len(time), np.nan)
+
+
+@dataclass(frozen=True, eq=False)
+class PathSegment:
+    """A move along the path of a Fourier series at a pace of its own: q = F(σ(t)), σ minimum-jerk.
+
+    It visits only postures that the series visits: where that keeps clear of obstacles, so does this.
+
+    series : FourierSeries
+        F
+    from_s, to_s : float
+        instants of the series at which it begins and ends [s]
+    duration_s : float
+        how long it takes [s]
+    """
+
+    series: FourierSeries
+    from_s: float
+    to_s: float
+    duration_s: float
+
+    @property
+    def joint_count(self) -> int:
+        """Number of joints n."""
+        return self.series.joint_count
+
+    def evaluate(self, time: Array) -> MotionSamples:
+        """Exact position, velocity and acceleration: q̇ = F' σ̇, q̈ = F'' σ̇² + F' σ̈.
+
+        Parameters
+        ----------
+        time : (N,) float64
+            instants since its start [s]
+        """
+        progress, rate, bend = minimum_jerk(time, self.duration_s)
+        way = self.to_s - self.from_s
+        sigma = np.where(progress > 0.5, self.to_s - (1.0 - progress) * way, self.from_s + progress * way)
+        path = self.series.evaluate(sigma)
+        pace, change = (way * rate)[:, None], (way * bend)[:, None]
+        return MotionSamples(path.position, path.velocity * pace, path.acceleration * pace**2 + path.velocity * change)
+
+    def period(self, time: Array) -> Array:
+        """NaN: no part of the repeated excitation, shape (N,).
+
+        Parameters
+        ----------
+        time : (N,) float64
+            instants since its start [s]
+        """
+        return np.full(len(time), np.nan)
+
+
+@dataclass(frozen=True, eq=False)
+class SampledSegment:
+    """A motion given by samples, between them the quintic that meets position, velocity and acceleration at both.
+
+    time : (K,) float64
+        instants of the samples, from 0, increasing [s]
+    motion : MotionSamples
+        q, q̇, q̈ at these instants
+    label : (K,) float64 or None
+        index of the repeated excitation period from each sample on, NaN outside; None where there is none
+    """
+
+    time: Array
+    motion: MotionSamples
+    label: Array | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse samples that are no motion."""
+        if len(self.time) < 2 or self.time[0] != 0.0 or not (np.diff(self.time) > 0.0).all():
+            raise ExcitationError("a sampled motion needs two or more instants that increase from 0")
+
+    @property
+    def joint_count(self) -> int:
+        """Number of joints n."""
+        return self.motion.position.shape[1]
+
+    @property
+    def duration_s(self) -> float:
+        """How long it lasts [s]."""
+        return float(self.time[-1])
+
+    def evaluate(self, time: Array) -> MotionSamples:
+        """Position, velocity and acceleration of the interpolating quintics; the samples themselves at their instants.
+
+        Parameters
+        ----------
+        time : (N,) float64
+            instants since its start [s]
+        """
+        left = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, len(self.time) - 2)
+        width = (self.time[left + 1] - self.time[left])[:, None]
+        share = (np.clip(time, 0.0, self.time[-1]) - self.time[left])[:, None] / width
+        ends = [
+            (values[left + side] * width**order)
+            for order, values in enumerate((self.motion.position, self.motion.velocity, self.motion.acceleration))
+            for side in (0, 1)
+        ]
+        orders = (_quintic(share, ends, order) / width**order for order in range(3))
+        return MotionSamples(*orders)
+
+    def period(self, time: Array) -> Array:
+        """The label of the sample before each instant, shape (N,).
+
+        Parameters
+        ----------
+        time : (N,) float64
+            instants since its start [s]
+        """
+        if self.label is None:
+            return np.full(len(time), np.nan)
+        slack = 1e-9 * max(self.duration_s, 1.0)
+        return self.label[np.clip(np.searchsorted(self.time, time + slack, side="right") - 1, 0, len(self.label) - 1)]
+
+
+def minimum_jerk(time: Array, duration_s: float) -> tuple[Array, Array, Array]:
+    """Progress 10 s³ - 15 s⁴ + 6 s⁵ of a move from 0 to 1 and its first two derivatives, s = t/T.
+
+    Parameters
+    ----------
+    time : (N,) float64
+        instants since its start [s]
+    duration_s : float
+        T [s]
+
+    Returns
+    -------
+    tuple of (N,) float64
+        progress [1], its rate [1/s] and the rate's rate [1/s²]
+    """
+    s = np.clip(time / duration_s, 0.0, 1.0)
+    progress = s**3 * (10.0 + s * (6.0 * s - 15.0))
+    rate = 30.0 * (s * (1.0 - s)) ** 2 / duration_s
+    bend = 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / duration_s**2
+    return progress, rate, bend
+
+
+def _quintic(s: Array, ends: list[Array], order: int) -> Array:
+    """Derivative of the Hermite quintic by s; `ends` are q, q̇, q̈ at both sides, each per unit of s."""
+    q0, q1, v0, v1, a0, a1 = ends
+    rise = q1 - q0
+    c3 = 10.0 * rise - 6.0 * v0 - 4.0 * v1 - 1.5 * a0 + 0.5 * a1
+    c4 = -15.0 * rise + 8.0 * v0 + 7.0 * v1 + 1.5 * a0 - a1
+    c5 = 6.0 * rise - 3.0 * (v0 + v1) - 0.5 * (a0 - a1)
+    if order == 0:
+        return q0 + s * (v0 + s * (0.5 * a0 + s * (c3 + s * (c4 + s * c5))))
+    if order == 1:
+        return v0 + s * (a0 + s * (3.0 * c3 + s * (4.0 * c4 + s * 5.0 * c5)))
+    return a0 + s * (6.0 * c3 + s * (12.0 * c4 + s * 20.0 * c5))

@@ -1,0 +1,299 @@
+"""A trajectory: what a run plays and what trajectory files hold."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.errors import ExcitationError
+from tauscope.trajectory.fourier_series import MotionSamples
+from tauscope.trajectory.limits import MotionLimits
+from tauscope.trajectory.segments import (
+    PEAK_ACCELERATION,
+    PEAK_SPEED,
+    FourierSegment,
+    MoveSegment,
+    SampledSegment,
+    Segment,
+)
+
+Array = NDArray[np.float64]
+
+JOIN_TOLERANCE = 1e-9
+"""Largest jump between segments that rounding explains [rad or m, and per s, per s²]."""
+
+SAMPLED_REST = 1e-3
+"""Speed and acceleration at the ends of a motion given by samples that still count as rest [rad/s, rad/s²]."""
+
+RAMP_FRACTION = 0.5
+"""Part of the velocity and acceleration limits that a ramp uses: nobody has seen this motion before."""
+
+SHORTEST_RAMP_S = 0.5
+"""A ramp lasts at least this long, also where there is no way to go [s]."""
+
+TIME_STEP_S = 0.01
+"""Durations of moves are a whole number of these [s]."""
+
+MOST_SAMPLES = 50_000_000
+"""Samples beyond which the asked rate must be a mistake."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrajectorySamples:
+    """A trajectory at given instants.
+
+    time : (N,) float64
+        instants since the start [s]
+    position, velocity, acceleration : (N, n) float64
+        q, q̇, q̈ [rad or m, and per s, per s²]
+    period : (N,) float64
+        index of the repeated excitation period, counted from 0; NaN outside the repeated part
+    """
+
+    time: Array
+    position: Array
+    velocity: Array
+    acceleration: Array
+    period: Array
+
+
+@dataclass(frozen=True)
+class DesignRecord:
+    """How a trajectory was made and what it is good for.
+
+    criterion : str
+        what was minimised
+    value : float
+        its value
+    condition_number : float
+        of the stacked, unweighted regressor of the repeated part
+    margins : mapping of str to tuple of float or None
+        for each kind of limit (``position``, ``velocity``, ``acceleration``, ``torque``) the part of the limit that is
+        left, one a joint; None where there is no limit
+    seed : int
+        of the optimiser's starts
+    """
+
+    criterion: str
+    value: float
+    condition_number: float
+    margins: Mapping[str, tuple[float | None, ...]]
+    seed: int
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """A motion of all joints, piece after piece, twice continuously differentiable, at rest at both ends.
+
+    robot : str
+        name of the robot that it was made for
+    joints : tuple of str
+        names of the joints
+    segments : tuple of Segment
+        the pieces in order
+    limits : MotionLimits or None
+        limits that it was made to keep; None where nobody knows
+    design : DesignRecord or None
+        how it was made; None for a motion from elsewhere
+    """
+
+    robot: str
+    joints: tuple[str, ...]
+    segments: tuple[Segment, ...]
+    limits: MotionLimits | None = None
+    design: DesignRecord | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse pieces that do not make one motion of these joints."""
+        if not self.segments:
+            raise ExcitationError("a trajectory needs at least one segment")
+        for place, segment in enumerate(self.segments):
+            if segment.joint_count != len(self.joints):
+                raise ExcitationError(
+                    f"segments[{place}] moves {segment.joint_count} joints, the trajectory names {len(self.joints)}"
+                )
+            if not (np.isfinite(segment.duration_s) and segment.duration_s > 0.0):
+                raise ExcitationError(f"segments[{place}] lasts {segment.duration_s} s; give a positive duration")
+        _require_joined(self.segments, self.joints)
+
+    @property
+    def joint_count(self) -> int:
+        """Number of joints n."""
+        return len(self.joints)
+
+    @property
+    def duration_s(self) -> float:
+        """How long it lasts [s]."""
+        return float(sum(segment.duration_s for segment in self.segments))
+
+    @property
+    def start(self) -> Array:
+        """Posture in which it begins [rad or m], shape (n,)."""
+        return self.segments[0].evaluate(np.zeros(1)).position[0]
+
+    @property
+    def end(self) -> Array:
+        """Posture in which it ends [rad or m], shape (n,)."""
+        last = self.segments[-1]
+        return last.evaluate(np.array([last.duration_s])).position[0]
+
+    @property
+    def period_s(self) -> float | None:
+        """Length of the repeated period [s]; None where nothing repeats."""
+        lengths = (s.series.period_s for s in self.segments if isinstance(s, FourierSegment) and s.repeats > 1)
+        return next(lengths, None)
+
+    def samples(self, rate_hz: float) -> TrajectorySamples:
+        """The trajectory at a constant rate, from its start to its end.
+
+        Parameters
+        ----------
+        rate_hz : float
+            samples a second [Hz]
+
+        Returns
+        -------
+        TrajectorySamples
+            instants k / rate from 0 to the first one at which the motion has ended
+
+        Raises
+        ------
+        ExcitationError
+            for a rate that is not positive, or absurd
+        """
+        if not (np.isfinite(rate_hz) and rate_hz > 0.0):
+            raise ExcitationError(f"the sampling rate is {rate_hz} Hz; give a positive number")
+        count = self.duration_s * rate_hz
+        if count > MOST_SAMPLES:
+            raise ExcitationError(
+                f"{self.duration_s:.4g} s at {rate_hz:.4g} Hz are {count:.2g} samples; ask for a lower rate"
+            )
+        return self.evaluate(np.arange(int(np.ceil(count - 1e-6)) + 1) / rate_hz)
+
+    def evaluate(self, time: Array) -> TrajectorySamples:
+        """The trajectory at given instants; before its start and after its end it stands still.
+
+        Parameters
+        ----------
+        time : (N,) float64
+            ascending instants since the start [s]
+
+        Returns
+        -------
+        TrajectorySamples
+            q, q̇, q̈ and the period index
+        """
+        shape = (len(time), self.joint_count)
+        result = TrajectorySamples(time, np.empty(shape), np.empty(shape), np.empty(shape), np.full(len(time), np.nan))
+        starts = np.concatenate([[0.0], np.cumsum([segment.duration_s for segment in self.segments])])
+        # An instant that rounding puts before a segment's start belongs to that segment.
+        edges = np.searchsorted(time, starts - 1e-9 * max(1.0, self.duration_s))
+        edges[0], edges[-1] = 0, len(time)
+        for segment, begin, (first, last) in zip(self.segments, starts, pairwise(edges), strict=False):
+            local = np.clip(time[first:last] - begin, 0.0, segment.duration_s)
+            motion = segment.evaluate(local)
+            result.position[first:last] = motion.position
+            result.velocity[first:last] = motion.velocity
+            result.acceleration[first:last] = motion.acceleration
+            result.period[first:last] = segment.period(local)
+        slack = 1e-9 * max(1.0, self.duration_s)
+        beyond = (time < -slack) | (time > self.duration_s + slack)
+        result.velocity[beyond], result.acceleration[beyond] = 0.0, 0.0
+        result.period[beyond | (time > self.duration_s - slack)] = np.nan  # the end is the next period's first instant
+        return result
+
+    def with_ramp_from(self, posture: Array, limits: MotionLimits) -> "Trajectory":
+        """The same trajectory with a ramp before it, from wherever the arm stands.
+
+        Parameters
+        ----------
+        posture : (n,) float64
+            where the arm stands [rad or m]
+        limits : MotionLimits
+            velocity and acceleration of which the ramp uses `RAMP_FRACTION`
+        """
+        return replace(self, segments=(ramp(posture, self.start, limits), *self.segments))
+
+
+def ramp(start: Array, end: Array, limits: MotionLimits, *, fraction: float = RAMP_FRACTION) -> MoveSegment:
+    """A straight minimum-jerk move between postures within the limits of velocity and acceleration.
+
+    Its duration is known before it runs, and it stays between the two postures: where both are within the position
+    limits, so is all of it.
+
+    Parameters
+    ----------
+    start, end : (n,) float64
+        postures [rad or m]
+    limits : MotionLimits
+        limits of every joint
+    fraction : float
+        part of the velocity and acceleration limits that it may use, in (0, 1]
+
+    Returns
+    -------
+    MoveSegment
+        at least `SHORTEST_RAMP_S` long
+
+    Raises
+    ------
+    ExcitationError
+        for a posture that is not finite or has another number of joints
+    """
+    start, end = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
+    joints = len(limits.velocity)
+    if start.shape != (joints,) or end.shape != (joints,) or not (np.isfinite(start) & np.isfinite(end)).all():
+        raise ExcitationError(f"a ramp goes between two finite postures of {joints} joints; read the arm again")
+    way = np.abs(end - start)
+    by_speed = PEAK_SPEED * way / (fraction * limits.velocity)
+    by_acceleration = np.sqrt(PEAK_ACCELERATION * way / (fraction * limits.acceleration))
+    shortest = max(SHORTEST_RAMP_S, by_speed.max(), by_acceleration.max())
+    return MoveSegment(start, end, whole_steps(float(shortest)))
+
+
+def whole_steps(duration_s: float) -> float:
+    """A duration rounded up to `TIME_STEP_S`, so that what follows begins at a sample of all usual rates.
+
+    Parameters
+    ----------
+    duration_s : float
+        shortest duration [s]
+    """
+    steps_a_second = round(1.0 / TIME_STEP_S)
+    return float(np.ceil(duration_s * steps_a_second - 1e-9) / steps_a_second)
+
+
+def _require_joined(segments: tuple[Segment, ...], joints: tuple[str, ...]) -> None:
+    """Each piece begins where the one before ended, and all rest where they meet."""
+    previous: MotionSamples | None = None
+    for place, segment in enumerate(segments):
+        ends = segment.evaluate(np.array([0.0, segment.duration_s]))
+        size = 1.0 + np.abs(ends.position).max()
+        for values, what, unit in ((ends.velocity, "velocity", "1/s"), (ends.acceleration, "acceleration", "1/s²")):
+            rest = np.abs(values)
+            if not (rest <= _rest_tolerance(segment, size)).all():
+                side, joint = (int(i) for i in np.argwhere(~(rest <= _rest_tolerance(segment, size)))[0])
+                raise ExcitationError(
+                    f"segments[{place}], {joints[joint]}: {what} is {values[side, joint]:.3g} {unit} at its "
+                    f"{('start', 'end')[side]}; every segment has to begin and end at rest"
+                )
+        if previous is not None:
+            jump = np.abs(ends.position[0] - previous.position[1])
+            if not (jump <= JOIN_TOLERANCE * size).all():
+                joint = int(np.argmax(~(jump <= JOIN_TOLERANCE * size)))
+                raise ExcitationError(
+                    f"segments[{place}], {joints[joint]}: begins {jump[joint]:.3g} away from where "
+                    f"segments[{place - 1}] ends; let them meet"
+                )
+        previous = ends
+
+
+def _rest_tolerance(segment: Segment, size: float) -> float:
+    """Speed and acceleration that rounding leaves at the ends of a segment."""
+    if isinstance(segment, FourierSegment):
+        top = float(segment.series.frequencies[-1])
+        amplitude = float(np.abs(segment.series.cosine).sum() + np.abs(segment.series.sine).sum())
+        return JOIN_TOLERANCE * (1.0 + top) * (1.0 + amplitude)
+    return SAMPLED_REST if isinstance(segment, SampledSegment) else JOIN_TOLERANCE * size

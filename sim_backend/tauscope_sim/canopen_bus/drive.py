@@ -1,0 +1,296 @@
+"""One emulated CiA 402 drive: object dictionary, power state, cyclic modes, heartbeats and emergencies.
+
+Time is passed in, frames go in and come out; what moves is behind `AxisDemand` and `AxisMeasurement`.
+"""
+
+from collections.abc import Iterator
+
+from tauscope_sim.canopen_bus.axis import AxisDemand, AxisMeasurement, AxisMode, AxisScale
+from tauscope_sim.canopen_bus.object_dictionary import Abort, AbortError, ObjectDictionary
+from tauscope_sim.canopen_bus.power_state import PowerState, PowerStateMachine
+from tauscope_sim.canopen_bus.process_data import ProcessData
+from tauscope_sim.canopen_bus.sdo_server import answer_request
+
+Frame = tuple[int, bytes]
+
+CYCLIC_POSITION = 8
+CYCLIC_TORQUE = 10
+
+HEARTBEAT_LOST = 0x8130
+_BUS_OFF_RECOVERED = 0x8140
+
+_SYNC, _NMT = 0x080, 0x000
+_PRE_OPERATIONAL, _OPERATIONAL, _STOPPED = 0x7F, 0x05, 0x04
+_NMT_COMMANDS = {0x01: _OPERATIONAL, 0x02: _STOPPED, 0x80: _PRE_OPERATIONAL}
+_NMT_RESETS = (0x81, 0x82)
+_RATED = 1000
+_QUICK_STOP_STAYS = range(5, 9)
+_ABORT_QUICK_STOP = 3
+_ABORT_DISABLE = 2
+_ABORT_FAULT = 1
+_STANDING = 1e-3
+_EXPONENTS = range(-6, 1)
+
+
+class EmulatedDrive:
+    """A drive with its node on the bus."""
+
+    def __init__(self, node_id: int, scale: AxisScale) -> None:
+        """Power up.
+
+        Parameters
+        ----------
+        node_id : int
+            1 to 127
+        scale : AxisScale
+            its counts and per mille
+        """
+        self.node_id = node_id
+        self.scale = scale
+        self.power_up()
+
+    def power_up(self) -> None:
+        """Come up as after a power dip: everything that a master wrote is forgotten."""
+        self.power = PowerStateMachine()
+        self.dictionary = self._dictionary()
+        self.process_data = ProcessData(self.dictionary, self.node_id)
+        self._nmt = _PRE_OPERATIONAL
+        self._is_off_bus = False
+        self._mode_taken = 0
+        self._next_heartbeat_s = 0.0
+        self._last_master_s: float | None = None
+        self._outbox: list[Frame] = [(0x700 + self.node_id, b"\0")]
+
+    def receive(self, frame: Frame, now_s: float) -> list[Frame]:
+        """Answers to a frame of the bus.
+
+        Parameters
+        ----------
+        frame : tuple of int and bytes
+            identifier and payload
+        now_s : float
+            when it came [s]
+        """
+        identifier, payload = frame
+        if identifier == _NMT and len(payload) == 2 and payload[1] in (0, self.node_id):
+            self._follow_network(payload[0])
+        elif identifier == 0x600 + self.node_id and self._nmt != _STOPPED:
+            answer = answer_request(self.dictionary, payload)
+            return [] if answer is None else [(0x580 + self.node_id, answer)]
+        elif identifier == 0x700 + self._watched_node:
+            self._last_master_s = now_s
+        elif self._nmt == _OPERATIONAL and identifier == _SYNC:
+            return self.process_data.synchronise()
+        elif self._nmt == _OPERATIONAL:
+            self.process_data.take(identifier, payload)
+        return []
+
+    def tick(self, now_s: float) -> list[Frame]:
+        """What the drive sends by itself by an instant: boot-up, heartbeat, emergencies.
+
+        Parameters
+        ----------
+        now_s : float
+            present instant [s]
+        """
+        self._watch_master(now_s)
+        frames, self._outbox = self._outbox, []
+        period_s = self.dictionary.get(0x1017) / 1e3
+        if period_s and now_s >= self._next_heartbeat_s:
+            self._next_heartbeat_s = now_s + period_s
+            frames.append((0x700 + self.node_id, bytes([self._nmt])))
+        return frames
+
+    def demand(self) -> AxisDemand:
+        """What the drive wants of its joint now."""
+        cap = self.dictionary.get(0x6072) * self.scale.torque_per_permille
+        if self.power.state is PowerState.QUICK_STOP_ACTIVE:
+            return AxisDemand(AxisMode.HOLDING, torque_cap=cap)
+        if self.power.state is not PowerState.OPERATION_ENABLED:
+            return AxisDemand(AxisMode.RELEASED)
+        if self._mode_taken == CYCLIC_POSITION:
+            low, high = (self.dictionary.get(0x607D, end) for end in (1, 2))
+            target = min(max(self.dictionary.get(0x607A), low), high)
+            place = target / self.scale.counts_per_radian
+            return AxisDemand(AxisMode.POSITION, position=place, torque_cap=cap, interpolation_s=self._interpolation_s)
+        if self._mode_taken == CYCLIC_TORQUE:
+            torque = self.dictionary.get(0x6071) * self.scale.torque_per_permille
+            return AxisDemand(AxisMode.TORQUE, torque=min(max(torque, -cap), cap), torque_cap=cap)
+        return AxisDemand(AxisMode.HOLDING, torque_cap=cap)
+
+    def measure(self, measurement: AxisMeasurement) -> None:
+        """Let the sensors see the joint.
+
+        Parameters
+        ----------
+        measurement : AxisMeasurement
+            of the joint now
+        """
+        put, scale = self.dictionary.put, self.scale
+        put(0x6064, round(measurement.position * scale.counts_per_radian))
+        put(0x606C, round(measurement.velocity * scale.counts_per_radian))
+        put(0x6077, round(measurement.torque / scale.torque_per_permille))
+        if abs(measurement.velocity) < _STANDING:
+            self.power.end_quick_stop()
+        self._show_status()
+
+    def fail(self, error_code: int) -> None:
+        """Go into fault and say so.
+
+        Parameters
+        ----------
+        error_code : int
+            0x603F
+        """
+        self.power.fail()
+        self._report(error_code)
+
+    def leave_bus(self) -> None:
+        """Its controller has seen too many errors: the drive does what 0x6007 says, and nobody hears of it yet."""
+        self._is_off_bus = True
+        self._nmt = _PRE_OPERATIONAL
+        self._abort_connection()
+
+    def return_to_bus(self) -> None:
+        """Its controller was restarted: the drive tells that it was away."""
+        if self._is_off_bus:
+            self._is_off_bus = False
+            self._report(_BUS_OFF_RECOVERED)
+
+    @property
+    def _watched_node(self) -> int:
+        """Node whose heartbeat is watched; -1 for none."""
+        word = self.dictionary.get(0x1016, 1)
+        return (word >> 16 & 0x7F) if word & 0xFFFF and word >> 16 & 0x7F else -1
+
+    @property
+    def _interpolation_s(self) -> float:
+        """Time from one target to the next; 0 where the drive has no such object and finds it from SYNC."""
+        if (0x60C2, 1) not in self.dictionary.entries:
+            return 0.0
+        return self.dictionary.get(0x60C2, 1) * 10.0 ** self.dictionary.get(0x60C2, 2)
+
+    def _watch_master(self, now_s: float) -> None:
+        """React to a master that stays away, also to one that was never heard since the watch began."""
+        timeout_s = (self.dictionary.get(0x1016, 1) & 0xFFFF) / 1e3
+        if self._watched_node < 0:
+            self._last_master_s = None
+            return
+        if self._last_master_s is None:
+            self._last_master_s = now_s
+        if now_s - self._last_master_s <= timeout_s:
+            return
+        self._last_master_s = now_s
+        if self.power.state is PowerState.OPERATION_ENABLED:
+            self._abort_connection()
+            self._report(HEARTBEAT_LOST)
+        self._nmt = _PRE_OPERATIONAL
+
+    def _abort_connection(self) -> None:
+        """Do what 0x6007 says of a connection that is gone."""
+        if self.power.state is not PowerState.OPERATION_ENABLED:
+            return
+        match self.dictionary.get(0x6007):
+            case value if value == _ABORT_QUICK_STOP:
+                self.power.quick_stop()
+            case value if value == _ABORT_DISABLE:
+                self.power.disable()
+            case value if value == _ABORT_FAULT:
+                self.power.fail()
+
+    def _report(self, error_code: int) -> None:
+        """Keep the error code and send an emergency."""
+        self.dictionary.put(0x603F, error_code)
+        register = 0x11 if error_code in (HEARTBEAT_LOST, _BUS_OFF_RECOVERED) else 0x01
+        self.dictionary.put(0x1001, register)
+        payload = error_code.to_bytes(2, "little") + bytes([register]) + bytes(5)
+        self._outbox.append((0x080 + self.node_id, payload))
+        self._show_status()
+
+    def _follow_network(self, command: int) -> None:
+        """Follow a network-management command."""
+        if command in _NMT_RESETS:
+            self.power_up()
+        else:
+            self._nmt = _NMT_COMMANDS.get(command, self._nmt)
+        if self._nmt != _OPERATIONAL:
+            self.power.quick_stop()
+
+    def _show_status(self) -> None:
+        """Compose the statusword."""
+        word = self.power.state.value
+        if self.power.state not in (PowerState.QUICK_STOP_ACTIVE, PowerState.NOT_READY):
+            word |= 0x20 if word & 0x07 else 0
+        follows = self.power.state is PowerState.OPERATION_ENABLED and self._mode_taken in (8, 10)
+        self.dictionary.put(0x6041, word | 0x0200 | (0x1000 if follows else 0))
+
+    def _take_controlword(self, word: int) -> None:
+        was = self.power.state
+        self.power.command(word)
+        if was is PowerState.FAULT and self.power.state is not PowerState.FAULT:
+            self.dictionary.put(0x603F, 0)
+            self.dictionary.put(0x1001, 0)
+        if self.power.state is PowerState.OPERATION_ENABLED and was is not PowerState.OPERATION_ENABLED:
+            self.dictionary.put(0x603F, 0)
+            self.dictionary.put(0x1001, 0)
+        self._show_status()
+
+    def _take_consumer(self, _: int) -> None:
+        """The time of silence is counted anew from here."""
+        self._last_master_s = None
+
+    def _take_mode(self, mode: int) -> None:
+        if mode not in (CYCLIC_POSITION, CYCLIC_TORQUE):
+            raise AbortError(Abort.VALUE_RANGE)
+        self._mode_taken = mode
+        self.dictionary.put(0x6061, mode)
+
+    def _take_quick_stop_option(self, option: int) -> None:
+        self.power.quick_stop_stays = option in _QUICK_STOP_STAYS
+
+    def _take_interpolation(self, value: int) -> None:
+        if value == 0:
+            raise AbortError(Abort.VALUE_RANGE)
+
+    def _take_exponent(self, exponent: int) -> None:
+        if exponent not in _EXPONENTS:
+            raise AbortError(Abort.VALUE_RANGE)
+
+    def _dictionary(self) -> ObjectDictionary:
+        """Entries at power-up; the target position is stale on purpose, as it is on a real drive after a run."""
+        dictionary = ObjectDictionary()
+        for place in self._entries():
+            dictionary.add(*place[:4], signed=place[4], writable=place[5], hook=place[6])
+        dictionary.put(0x6041, PowerState.SWITCH_ON_DISABLED.value | 0x0200)
+        return dictionary
+
+    def _entries(self) -> Iterator[tuple]:
+        """Index, subindex, bytes, value, signed, writable, hook."""
+        yield from (
+            (0x1000, 0, 4, 0x00020192, False, False, None),
+            (0x1001, 0, 1, 0, False, False, None),
+            (0x1016, 1, 4, 0, False, True, self._take_consumer),
+            (0x1017, 0, 2, 0, False, True, None),
+            (0x1018, 1, 4, 0x00000000, False, False, None),
+            (0x6007, 0, 2, 1, True, True, None),
+            (0x603F, 0, 2, 0, False, False, None),
+            (0x6040, 0, 2, 0, False, True, self._take_controlword),
+            (0x6041, 0, 2, 0, False, False, None),
+            (0x605A, 0, 2, 2, True, True, self._take_quick_stop_option),
+            (0x605E, 0, 2, 0, True, True, None),
+            (0x6060, 0, 1, 0, True, True, self._take_mode),
+            (0x6061, 0, 1, 0, True, False, None),
+            (0x6064, 0, 4, 0, True, False, None),
+            (0x606C, 0, 4, 0, True, False, None),
+            (0x6071, 0, 2, 0, True, True, None),
+            (0x6072, 0, 2, 3 * _RATED, False, True, None),
+            (0x6075, 0, 4, 1000, False, False, None),
+            (0x6076, 0, 4, self.scale.rated_torque_mnm, False, False, None),
+            (0x6077, 0, 2, 0, True, False, None),
+            (0x607A, 0, 4, 0x00100000, True, True, None),
+            (0x607D, 1, 4, -(2**31), True, True, None),
+            (0x607D, 2, 4, 2**31 - 1, True, True, None),
+            (0x60C2, 1, 1, 1, False, True, self._take_interpolation),
+            (0x60C2, 2, 1, -3, True, True, self._take_exponent),
+            (0x6502, 0, 4, 1 << (CYCLIC_POSITION - 1) | 1 << (CYCLIC_TORQUE - 1), False, False, None),
+        )

@@ -1,0 +1,224 @@
+"""Drives, the arm that they move, the wire and the adapter: everything but the port."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from tauscope_sim.canopen_bus.drive import EmulatedDrive
+from tauscope_sim.canopen_bus.driven_arm import DrivenArm
+from tauscope_sim.canopen_bus.line import Line
+from tauscope_sim.canopen_bus.power_state import PowerState
+from tauscope_sim.canopen_bus.wire import Wire
+from tauscope_sim.emulation.device_clock import MOST_STEPS, STEP_S, DeviceClock
+from tauscope_sim.emulation.fault_kit import FaultKind, FaultSchedule, InjectedFault, faults_from
+
+_TICKS_PER_MEASUREMENT = 10
+"""While nobody asks: a drive that has stopped has to see that it stands."""
+
+_SYNC = 0x080
+_OVER_TEMPERATURE, _OVERLOAD = 0x4310, 0x7121
+
+
+class CanEmulator:
+    """An arm of emulated drives; the instants are those of the caller's clock."""
+
+    def __init__(
+        self, drives: Sequence[EmulatedDrive], driven: DrivenArm, now_s: float, bit_rate: float, line: Line
+    ) -> None:
+        """Everything at rest.
+
+        Parameters
+        ----------
+        drives : sequence of EmulatedDrive
+            in the order of the joints
+        driven : DrivenArm
+            what they move, in periods of `STEP_S` of the device clock
+        now_s : float
+            present instant [s]
+        bit_rate : float
+            of the bus; infinite where frames shall arrive at once [bit/s]
+        line : Line
+            frames as the master's end takes and gives them
+        """
+        self.drives = tuple(drives)
+        self.driven = driven
+        self.schedule = FaultSchedule()
+        self._wire = Wire(bit_rate)
+        self._line = line
+        self._answers = b""
+        self._clock = DeviceClock(now_s)
+        self._away_until_s = {drive.node_id: 0.0 for drive in drives}
+        self._ailing: dict[int, tuple[int, float]] = {}
+        self._stopped_s: list[float | None] = [None for _ in drives]
+
+    @property
+    def now_s(self) -> float:
+        """Instant up to which the devices have come [s]."""
+        return self._clock.now_s
+
+    @property
+    def next_due_s(self) -> float:
+        """When the next frame reaches the master [s]."""
+        return self.now_s if self._answers else self._wire.next_arrival_s
+
+    def hears(self, baud: int) -> bool:
+        """Any rate: an adapter on USB takes no notice of it.
+
+        Parameters
+        ----------
+        baud : int
+            of the master's port [bit/s]
+        """
+        return baud > 0
+
+    def receive(self, data: bytes, now_s: float) -> None:
+        """Take text of the host.
+
+        Drives hear it before they catch up: it may have waited while this process slept, and its sleep is no silence of
+        the master. SYNC is different: they sample when it comes, and the time of interpolation is counted from then.
+
+        Parameters
+        ----------
+        data : bytes
+            as it came
+        now_s : float
+            when [s]
+        """
+        frames, answers = self._line.take(data)
+        self._answers += answers
+        self.driven.measure()
+        for frame in frames:
+            self._wire.occupy(frame, now_s)
+            if frame[0] == _SYNC:
+                self.advance_to(now_s)
+                self.driven.measure(min(1.0, max(0.0, (now_s - self.now_s) / STEP_S)))
+            come_s = self.now_s
+            for drive in self.drives:
+                if self._is_there(drive, come_s):
+                    self._wire.carry(drive.receive(frame, come_s), now_s)
+            if frame[0] == _SYNC:
+                self.driven.take_targets(now_s - self._clock.lost_s)
+        self.advance_to(now_s)
+
+    def advance_to(self, now_s: float, most_steps: int = MOST_STEPS) -> None:
+        """Let time pass: not all at once where the machine stood still, so that the master is heard in between.
+
+        Parameters
+        ----------
+        now_s : float
+            present instant [s]
+        most_steps : int
+            after which it waits to be asked again
+        """
+        self._clock.catch_up(now_s, self._step, most_steps)
+
+    def due(self, now_s: float) -> bytes:
+        """Text that has reached the host by now.
+
+        Parameters
+        ----------
+        now_s : float
+            present instant [s]
+        """
+        text, self._answers = self._answers, b""
+        return text + b"".join(map(self._line.text, self._wire.arrived(now_s)))
+
+    def describe(self) -> dict[str, Any]:
+        """Where the arm is and what its drives do."""
+        position, velocity = self.driven.motion
+        return {
+            "time": self.now_s,
+            "position": position.tolist(),
+            "velocity": velocity.tolist(),
+            "torque": self.driven.torque.tolist(),
+            "state": [drive.power.state.name for drive in self.drives],
+            "commanded": [drive.power.state is PowerState.OPERATION_ENABLED for drive in self.drives],
+            "stopped_at": self._stopped_s,
+            "on_stand": self.driven.stands_on_stand,
+            "lost": self._clock.lost_s,
+        }
+
+    def answer(self, request: dict[str, Any]) -> dict[str, int] | None:
+        """Do what a test asks.
+
+        Parameters
+        ----------
+        request : dict
+            ``{"inject": [fault, …]}``, ``{"get": [node, [index, subindex]]}``, ``{"put": [node, [index, subindex],
+            value]}``, ``{"stand": bool}`` (put the stand under it, or take it away), or nothing of these
+        """
+        if "inject" in request:
+            self.schedule.add(faults_from(request["inject"], self.now_s))
+            self.schedule.run(self.now_s, self._carry_out)
+            for drive in self.drives:
+                self._let_ail(drive)
+        elif "get" in request:
+            node, (index, subindex) = request["get"]
+            return {"value": self._drive(node).dictionary.get(index, subindex)}
+        elif "put" in request:
+            node, (index, subindex), value = request["put"]
+            self._drive(node).dictionary.put(index, value, subindex)
+        elif "stand" in request:
+            self.driven.stands_on_stand = request["stand"]
+        return None
+
+    def _step(self) -> None:
+        """One period of the drives' loops."""
+        now_s = self.now_s
+        self.schedule.run(now_s, self._carry_out)
+        self.driven.step(self._clock.tick)
+        if self._clock.tick % _TICKS_PER_MEASUREMENT == 0:
+            self.driven.measure()
+        for place, drive in enumerate(self.drives):
+            was_enabled = drive.power.state is PowerState.OPERATION_ENABLED
+            self._let_ail(drive)
+            is_there = self._is_there(drive, now_s)
+            if is_there:
+                drive.return_to_bus()
+            frames = drive.tick(now_s)
+            if was_enabled and drive.power.state is not PowerState.OPERATION_ENABLED:
+                self._stopped_s[place] = now_s
+            if is_there:
+                self._wire.carry(frames, now_s)
+
+    def _carry_out(self, fault: InjectedFault) -> None:
+        """Do what a fault does."""
+        until_s = self.now_s + fault.seconds
+        concerned = [self._drive(fault.device)] if fault.device else list(self.drives)
+        match fault.kind:
+            case FaultKind.SILENT:
+                for drive in concerned:
+                    self._away_until_s[drive.node_id] = until_s
+            case FaultKind.BUS_OFF:
+                for drive in concerned:
+                    drive.leave_bus()
+                    self._away_until_s[drive.node_id] = until_s
+            case FaultKind.RESET | FaultKind.POWER_DIP:
+                for drive in self.drives if fault.kind is FaultKind.POWER_DIP else concerned:
+                    drive.power_up()
+                    self._away_until_s[drive.node_id] = until_s
+            case FaultKind.OVER_TEMPERATURE | FaultKind.OVERLOAD:
+                code = _OVERLOAD if fault.kind is FaultKind.OVERLOAD else _OVER_TEMPERATURE
+                self._ailing |= {drive.node_id: (code, until_s) for drive in concerned}
+            case FaultKind.ENCODER_JUMP:
+                for drive in concerned:
+                    joint = self.drives.index(drive)
+                    self.driven.encoder_offset[joint] += fault.counts / drive.scale.counts_per_radian
+            case _:
+                for drive in concerned:
+                    self._wire.disturb(drive.node_id, fault.kind, fault.count, fault.seconds)
+
+    def _let_ail(self, drive: EmulatedDrive) -> None:
+        """A drive goes into fault, again and again, as long as its cause persists."""
+        code, until_s = self._ailing.get(drive.node_id, (0, 0.0))
+        if not code:
+            return
+        if drive.power.state is not PowerState.FAULT:
+            drive.fail(code)
+        if self.now_s >= until_s:
+            del self._ailing[drive.node_id]
+
+    def _is_there(self, drive: EmulatedDrive, now_s: float) -> bool:
+        return now_s >= self._away_until_s[drive.node_id]
+
+    def _drive(self, node: int) -> EmulatedDrive:
+        return next(drive for drive in self.drives if drive.node_id == node)

@@ -1,0 +1,111 @@
+"""The order that starts emulated drives as a process, as JSON."""
+
+import json
+import math
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import ClassVar
+
+from tauscope.robot import read_robot
+from tauscope_sim.canopen_bus.axis import AxisScale
+from tauscope_sim.canopen_bus.can_socket import CanSocket, SocketLine
+from tauscope_sim.canopen_bus.drive import EmulatedDrive
+from tauscope_sim.canopen_bus.driven_arm import DrivenArm
+from tauscope_sim.canopen_bus.emulator import CanEmulator
+from tauscope_sim.canopen_bus.serial_line import SerialLine
+from tauscope_sim.emulation.device_clock import STEP_S
+from tauscope_sim.emulation.emulator import Port
+from tauscope_sim.emulation.pseudo_terminal import PseudoTerminal
+from tauscope_sim.scenario import Scenario
+from tauscope_sim.scenario_file import read_scenario
+
+_SOCKET = "socketcan:"
+
+
+@dataclass(frozen=True)
+class CanOrder:
+    """What to emulate.
+
+    robot : str
+        robot file whose ``drive`` blocks say which drives there are, and whose links they move
+    start : tuple of float
+        where the joints stand [rad or m]
+    port : str
+        where the name of the pseudo terminal is linked to, or the SocketCAN interface behind ``socketcan:``
+    control : str
+        Unix socket for the test
+    scenario : str or None
+        scenario file of what is concealed in the arm
+    rated_torque_mnm : tuple of int
+        object 0x6076 of each drive, at the motor shaft [mNm]
+    torque_noise : float
+        standard deviation of what the drives measure of the torque [Nm or N]
+    bit_rate : int
+        of the bus [bit/s]
+    stepped : bool
+        whether time passes only when `EmulatorProcess.advance_to` says so, and frames arrive at once; else it is the
+        machine's
+    trace : str or None
+        file that what the drives do is appended to
+    """
+
+    module: ClassVar[str] = "tauscope_sim.canopen_bus"
+
+    robot: str
+    start: tuple[float, ...]
+    port: str
+    control: str
+    rated_torque_mnm: tuple[int, ...]
+    scenario: str | None = None
+    torque_noise: float = 0.0
+    bit_rate: int = 1_000_000
+    stepped: bool = False
+    trace: str | None = None
+
+    def to_json(self) -> str:
+        """The order as text."""
+        return json.dumps(asdict(self))
+
+    @staticmethod
+    def from_json(text: str) -> "CanOrder":
+        """The order in a text.
+
+        Parameters
+        ----------
+        text : str
+            as `to_json` writes it
+        """
+        document = json.loads(text)
+        tuples = {name: tuple(document[name]) for name in ("start", "rated_torque_mnm")}
+        return CanOrder(**{**document, **tuples})
+
+    def open_port(self) -> Port:
+        """A serial adapter on a pseudo terminal, or the kernel's CAN bus."""
+        return PseudoTerminal(self.port) if self._interface is None else CanSocket(self._interface)
+
+    def build(self, now_s: float) -> CanEmulator:
+        """The emulator.
+
+        Parameters
+        ----------
+        now_s : float
+            present instant [s]
+        """
+        robot = read_robot(Path(self.robot))
+        scenario = Scenario() if self.scenario is None else read_scenario(Path(self.scenario), robot)
+        drives = []
+        for joint, rated in zip(robot.joints, self.rated_torque_mnm, strict=True):
+            block, ratio = joint.drive or {}, joint.gear_ratio or 1.0
+            turns = block["counts_per_turn"] * ratio * block.get("direction", 1)
+            scale = AxisScale(turns / (2.0 * math.pi), rated, abs(ratio))
+            drives.append(EmulatedDrive(block["node_id"], scale))
+        driven = DrivenArm(drives, robot, scenario, self.start, STEP_S, self.torque_noise)
+        # the kernel's virtual bus and a stepped clock take their time by themselves
+        bit_rate = math.inf if self.stepped or self._interface is not None else self.bit_rate
+        line = SerialLine() if self._interface is None else SocketLine()
+        return CanEmulator(drives, driven, now_s, bit_rate, line)
+
+    @property
+    def _interface(self) -> str | None:
+        """Of SocketCAN; None for a serial adapter."""
+        return self.port.removeprefix(_SOCKET) if self.port.startswith(_SOCKET) else None

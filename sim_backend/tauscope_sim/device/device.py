@@ -1,0 +1,340 @@
+"""The simulated drives with the arm that they move: everything on the far side of the bus, in its own time."""
+
+from collections import deque
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tauscope.errors import ScenarioError
+from tauscope.robot.robot import Robot
+from tauscope_drivers import ArmState, Capabilities, ControlMode, DriveLimits, DriverError, Setpoint, StopPolicy
+from tauscope_drivers.errors import DriverErrorKind
+from tauscope_sim.device.activity import COMMANDED, POWERED, Activity, commanded_by, stopped_by
+from tauscope_sim.device.disturbances import Disturbances
+from tauscope_sim.device.drives import Drives, Motion
+from tauscope_sim.device.faults import FaultCode, FaultLatch, Injection, device_fault
+from tauscope_sim.device.limits import checked_limits, checked_setpoint, refused
+from tauscope_sim.device.mechanism import Mechanism
+from tauscope_sim.scenario import Scenario
+
+Array = NDArray[np.float64]
+
+TICK_NS = 500_000
+"""Time between two ticks of the drives: 2 kHz [ns]."""
+
+HOTTEST = 85.0
+"""Temperature of a motor above which its drive reports a fault [°C]."""
+
+WATCHDOG_RANGE_S = (0.005, 10.0)
+"""Shortest and longest time of the watchdog [s]."""
+
+_TICK_S = TICK_NS * 1e-9
+_TICKS_PER_TEMPERATURE = 64
+
+
+@dataclass(frozen=True)
+class _Enabling:
+    """What the host left behind when it enabled the arm."""
+
+    stop_policy: StopPolicy
+    watchdog_ns: int
+
+
+class SimulatedDevice:
+    """Drives and arm as a pure object: time passes only in `advance_to`, and the same calls give the same readings.
+
+    The drives run at ticks of `TICK_NS`; a reading is that of the last tick. Setpoints count from the next tick on, or
+    later by the scenario's latency; a stop has no latency.
+
+    An arm that was never under power is braked: it stands still, and the time of the scenario's physics does not run.
+    Enabling takes the load over from the brakes. There are no brakes afterwards: a stop with `StopPolicy.HOLD` brings
+    all joints to rest within `tauscope_sim.device.target.STOP_TIME_S` and keeps them under power, one with
+    `StopPolicy.TORQUE_OFF` lets the arm fall. In torque control the arm is held until the first setpoint comes, and the
+    drives stop it by its policy, with a fault, before it leaves its range or its speed limit; in position control they
+    keep the target within both.
+
+    Parameters
+    ----------
+    robot : Robot
+        the arm; its model block has to hold the links
+    scenario : Scenario
+        what is concealed, the noise and the latency
+    start_position : (n,) float64 or None
+        where the arm stands; None is `tauscope_sim.device.posture.resting_posture` [rad or m]
+    start_ns : int
+        device time at which it begins to exist [ns]
+
+    Raises
+    ------
+    RobotFileError
+        where the robot file lacks what a simulation needs
+    ScenarioError
+        where the scenario does not fit the arm
+    """
+
+    def __init__(
+        self, robot: Robot, scenario: Scenario, *, start_position: ArrayLike | None = None, start_ns: int = 0
+    ) -> None:
+        count = robot.joint_count
+        self._mechanism = Mechanism(robot, scenario, start_position, _TICK_S)
+        self._disturbances = Disturbances(count)
+        self._drives = Drives(robot, scenario, self._motion(), _TICK_S)
+        self._latency_ticks = scenario.command_latency_s / _TICK_S
+        self._pending: deque[tuple[float, Setpoint]] = deque()
+        self._latch = FaultLatch()
+        self._activity = Activity.BRAKED
+        self._enabling: _Enabling | None = None
+        self._start_ns, self._tick = start_ns, 0
+        self._sample_ns = self._fed_ns = start_ns
+        self.capabilities = Capabilities(
+            joint_count=count,
+            modes=frozenset(ControlMode),
+            stop_policies=frozenset(StopPolicy),
+            largest_rate_hz=1.0 / _TICK_S,
+            watchdog_range_s=WATCHDOG_RANGE_S,
+            takes_feed_forward=True,
+        )
+
+    @property
+    def time_ns(self) -> int:
+        """Device time of the last tick [ns]."""
+        return self._sample_ns
+
+    @property
+    def activity(self) -> Activity:
+        """What the drives are doing."""
+        return self._activity
+
+    @property
+    def fault_codes(self) -> tuple[str, ...]:
+        """Codes of the latched faults."""
+        return tuple(fault.code for fault in self._latch.faults)
+
+    @property
+    def true_motion(self) -> tuple[Array, Array]:
+        """True position and velocity of the links, each (n,): what an onlooker sees."""
+        return self._mechanism.true.link_position, self._mechanism.true.link_velocity
+
+    def advance_to(self, time_ns: int) -> None:
+        """Let time pass: every tick up to and at an instant is carried out.
+
+        Parameters
+        ----------
+        time_ns : int
+            device time; one that has passed changes nothing [ns]
+        """
+        last = (time_ns - self._start_ns) // TICK_NS
+        while self._tick <= last:
+            if self._activity is Activity.BRAKED and not self._disturbances.waiting:
+                self._tick = last
+            self._carry_out_tick()
+            self._tick += 1
+
+    def read(self) -> ArmState:
+        """What the drives report now."""
+        position, velocity, effort = self._mechanism.reading()
+        temperature = self._mechanism.true.temperature
+        if self._disturbances.any:
+            position = position + self._disturbances.slip
+            temperature = temperature + self._disturbances.heat
+            lost = self._disturbances.lost
+            position, velocity, effort, temperature = (
+                np.where(lost, np.nan, values) for values in (position, velocity, effort, temperature)
+            )
+        enabled = np.full(len(position), self._activity in POWERED)
+        return ArmState(self._sample_ns, position, velocity, effort, temperature, enabled, self._latch.faults)
+
+    def enable(self, mode: ControlMode, limits: DriveLimits, stop_policy: StopPolicy, watchdog_s: float) -> None:
+        """Take the arm under power where it stands.
+
+        Parameters
+        ----------
+        mode : ControlMode
+            who closes the loop
+        limits : DriveLimits
+            what the drives enforce
+        stop_policy : StopPolicy
+            what they do when the watchdog fires
+        watchdog_s : float
+            time without setpoints after which it does [s]
+
+        Raises
+        ------
+        DriverError
+            ``refused`` or ``fault``
+        """
+        if self._activity in COMMANDED:
+            raise refused("the arm is enabled already; stop it before enabling it again")
+        self._refuse_faults()
+        shortest, longest = WATCHDOG_RANGE_S
+        if not shortest <= watchdog_s <= longest:
+            raise refused(f"the watchdog's time {watchdog_s} s is not within {shortest} to {longest} s; choose another")
+        motion = self._motion()
+        self._drives.enable(self._activity, motion, checked_limits(limits, motion.position))
+        self._enabling = _Enabling(stop_policy, round(watchdog_s * 1e9))
+        self._activity = commanded_by(mode)
+        self._fed_ns = self._sample_ns
+
+    def command(self, setpoint: Setpoint, sent_ns: int | None = None) -> None:
+        """Take the host's setpoint, and feed the watchdog; drives that stopped by a fault do not follow it.
+
+        Parameters
+        ----------
+        setpoint : Setpoint
+            finite targets for every joint
+        sent_ns : int or None
+            when it was sent, by the device's clock; None for now [ns]
+
+        Raises
+        ------
+        DriverError
+            ``not-enabled`` or ``refused``
+        """
+        if self._enabling is None:
+            raise DriverError(DriverErrorKind.NOT_ENABLED, "the arm is not enabled; enable it before sending setpoints")
+        kept = checked_setpoint(setpoint, self.capabilities.joint_count)
+        if self._activity in COMMANDED:
+            sent_ns = self._sample_ns if sent_ns is None else sent_ns
+            # a device that makes up for lost time has not come as far as the host yet
+            self._fed_ns = max(self._sample_ns, sent_ns)
+            self._pending.append(((sent_ns - self._start_ns) / TICK_NS + self._latency_ticks, kept))
+
+    def stop(self, policy: StopPolicy | None = None) -> None:
+        """Stop the arm; legal at any time. Setpoints that are still on their way are forgotten.
+
+        Parameters
+        ----------
+        policy : StopPolicy or None
+            how; None is the policy that the arm was enabled with, and changes nothing on an arm that is not enabled
+        """
+        if policy is None and self._enabling is not None and self._activity in COMMANDED:
+            policy = self._enabling.stop_policy
+        self._enabling = None
+        if policy is not None:
+            self._stop(policy)
+
+    def lose_host(self, detail: str) -> None:
+        """The host is gone: what the watchdog would find out in its time.
+
+        Parameters
+        ----------
+        detail : str
+            how the device knows, in one line
+        """
+        if self._activity in COMMANDED:
+            self._trip(FaultCode.WATCHDOG, None, detail)
+        self._enabling = None
+
+    def acknowledge_faults(self) -> None:
+        """Clear the latched faults.
+
+        Raises
+        ------
+        DriverError
+            ``fault`` where the cause of one persists
+        """
+        self._latch.clear()
+        self._look_for_faults()
+        self._refuse_faults()
+
+    def put_back(self) -> None:
+        """Carry the arm back to where it began and set its brakes: nobody's order to the drives, but a hand's work.
+
+        Faults and disturbances are gone afterwards.
+
+        Raises
+        ------
+        DriverError
+            ``refused`` while the arm is enabled
+        """
+        if self._activity in COMMANDED:
+            raise refused("the arm is enabled; stop it before carrying it back")
+        self._enabling = None
+        self._activity = Activity.BRAKED
+        self._latch.clear()
+        self._disturbances = Disturbances(self.capabilities.joint_count)
+        self._mechanism.put_back(self._tick)
+
+    def inject(self, injection: Injection) -> None:
+        """Make a disturbance happen.
+
+        Parameters
+        ----------
+        injection : Injection
+            which, to which joint, and when
+
+        Raises
+        ------
+        DriverError
+            ``refused``: no such joint
+        """
+        if not 1 <= injection.joint <= self.capabilities.joint_count:
+            raise refused(
+                f"joint {injection.joint}: the arm has {self.capabilities.joint_count} joints; name one of them"
+            )
+        begins = max(injection.start_ns, self._sample_ns + TICK_NS)
+        self._disturbances.add(replace(injection, start_ns=begins))
+
+    def _carry_out_tick(self) -> None:
+        """Run the drives at the present tick, take the reading, and move the arm on to the next."""
+        self._sample_ns = self._start_ns + self._tick * TICK_NS
+        if self._disturbances.waiting or self._tick % _TICKS_PER_TEMPERATURE == 0:
+            self._disturbances.update(self._sample_ns)
+            self._look_for_faults()
+        if self._activity is Activity.BRAKED:
+            self._mechanism.rest(self._tick)
+            return
+        motion = self._motion()
+        if self._enabling is not None and self._activity in COMMANDED:
+            self._serve_host(self._enabling, motion)
+        try:
+            self._mechanism.move(self._drives.torque(self._activity, motion, self._tick), self._tick)
+        except ScenarioError as error:
+            # no arm moves like this: it is put to rest where it was, as if it had never been under power
+            self._activity = Activity.BRAKED
+            self._latch.latch(device_fault(FaultCode.UNSTABLE, None, str(error)))
+
+    def _serve_host(self, enabling: _Enabling, motion: Motion) -> None:
+        """Take the setpoints that are due; stop where none has come for too long, or where one leads too far."""
+        while self._pending and self._pending[0][0] <= self._tick:
+            arrival, setpoint = self._pending.popleft()
+            self._drives.command(self._activity, setpoint, arrival)
+        silence_ns = self._sample_ns - self._fed_ns
+        if silence_ns >= enabling.watchdog_ns:
+            self._trip(FaultCode.WATCHDOG, None, f"no setpoint for {silence_ns * 1e-6:.1f} ms")
+        elif self._activity is Activity.TORQUE and (overrun := self._drives.overrun(motion)) is not None:
+            self._trip(*overrun)
+
+    def _motion(self) -> Motion:
+        """What the drives' loop sees of the motors."""
+        true = self._mechanism.true
+        position = true.motor_position + self._disturbances.slip if self._disturbances.any else true.motor_position
+        return Motion(position, true.motor_velocity)
+
+    def _stop(self, policy: StopPolicy) -> None:
+        """Carry out a stop policy."""
+        before, self._activity = self._activity, stopped_by(self._activity, policy)
+        self._pending.clear()
+        if self._activity is Activity.HOLDING and before is not Activity.HOLDING:
+            self._drives.hold(before, self._motion())
+
+    def _trip(self, code: FaultCode, joint: int | None, detail: str) -> None:
+        """Latch a fault; where the host has the arm, stop by the policy that it left."""
+        self._latch.latch(device_fault(code, joint, detail))
+        if self._enabling is not None and self._activity in COMMANDED:
+            self._stop(self._enabling.stop_policy)
+
+    def _look_for_faults(self) -> None:
+        """Latch what is wrong with the motors now."""
+        temperature = self._mechanism.true.temperature + self._disturbances.heat
+        for column in np.flatnonzero(temperature > HOTTEST).tolist():
+            detail = f"motor at {temperature[column]:.0f} °C, above {HOTTEST:.0f} °C"
+            self._trip(FaultCode.OVER_TEMPERATURE, column + 1, detail)
+        for column in np.flatnonzero(self._disturbances.overloaded).tolist():
+            self._trip(FaultCode.OVERLOAD, column + 1, "the drive reports an overload")
+
+    def _refuse_faults(self) -> None:
+        """Refuse while a fault is latched."""
+        if faults := self._latch.faults:
+            raise DriverError(DriverErrorKind.FAULT, "; ".join(str(fault) for fault in faults), faults)

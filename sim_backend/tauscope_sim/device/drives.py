@@ -1,0 +1,178 @@
+"""What the drives do with the joints in each activity: which torque, and where the position loop is to be."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.robot.robot import Robot
+from tauscope_drivers import DriveLimits, Setpoint
+from tauscope_sim.device.activity import Activity
+from tauscope_sim.device.faults import FaultCode
+from tauscope_sim.device.inertia import InertiaSchedule
+from tauscope_sim.device.servo import Servo
+from tauscope_sim.device.target import STOP_TIME_S, Target, catching_up_acceleration
+from tauscope_sim.scenario import Scenario
+
+Array = NDArray[np.float64]
+
+_MARGIN = 2e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """What the drives' own loop sees of the motors.
+
+    position : (n,) float64
+        in joint units, with the encoders' slip [rad or m]
+    velocity : (n,) float64
+        likewise [rad/s or m/s]
+    """
+
+    position: Array
+    velocity: Array
+
+
+class Drives:
+    """Servo and target of all joints.
+
+    Parameters
+    ----------
+    robot : Robot
+        the arm
+    scenario : Scenario
+        what is concealed: a commissioned arm's drives are tuned to the arm as it is
+    motion : Motion
+        where the arm stands
+    tick_s : float
+        time between two ticks [s]
+    """
+
+    def __init__(self, robot: Robot, scenario: Scenario, motion: Motion, tick_s: float) -> None:
+        self._servo = Servo(robot, InertiaSchedule(robot, scenario.effects), tick_s)
+        self._tick_s = tick_s
+        self._acceleration = catching_up_acceleration(robot)
+        self._zero = np.zeros(robot.joint_count)
+        self._target = self._target_at(motion)
+        self._fastest = np.full(robot.joint_count, np.inf)
+        self._commanded_torque: Array | None = None
+
+    def enable(self, before: Activity, motion: Motion, limits: DriveLimits) -> None:
+        """Take the arm over where it stands, or go on holding it where it is held.
+
+        Parameters
+        ----------
+        before : Activity
+            what the drives were doing
+        motion : Motion
+            of the motors
+        limits : DriveLimits
+            what is enforced from now on
+        """
+        self._servo.set_torque_limit(limits.torque)
+        if before is not Activity.HOLDING:
+            self._servo.begin()
+            self._target = self._target_at(motion)
+        self._target.resume()
+        self._target.limit(limits.position_low, limits.position_high, limits.velocity)
+        self._fastest = limits.velocity
+        self._commanded_torque = None
+
+    def command(self, activity: Activity, setpoint: Setpoint, arrival: float) -> None:
+        """Take a setpoint that is due.
+
+        Parameters
+        ----------
+        activity : Activity
+            what the drives are doing
+        setpoint : Setpoint
+            of the host
+        arrival : float
+            when it arrived [ticks]
+        """
+        if activity is Activity.TRACKING:
+            self._target.follow(setpoint.position, setpoint.torque, arrival)
+        else:
+            self._commanded_torque = setpoint.torque
+
+    def hold(self, before: Activity, motion: Motion) -> None:
+        """Bring the joints to rest and hold them.
+
+        Parameters
+        ----------
+        before : Activity
+            what the drives were doing
+        motion : Motion
+            of the motors
+        """
+        if before is Activity.TRACKING or self._waits_for_torque(before):
+            self._servo.absorb(self._target.feed_forward)
+            self._target.brake()
+            return
+        low, high = self._target.range
+        self._servo.begin()
+        self._target = self._target_at(motion)
+        self._target.limit(low, high, np.full_like(low, np.inf))
+
+    def torque(self, activity: Activity, motion: Motion, tick: int) -> Array:
+        """Torque of all joints, (n,) [Nm or N].
+
+        Parameters
+        ----------
+        activity : Activity
+            what the drives are doing
+        motion : Motion
+            of the motors
+        tick : int
+            number of the tick
+        """
+        if activity is Activity.FREE:
+            return self._zero
+        if activity is Activity.DAMPING:
+            return self._servo.damp(motion.position, motion.velocity)
+        if activity is Activity.TORQUE and self._commanded_torque is not None:
+            return self._servo.capped(self._commanded_torque)
+        target = self._target
+        target.advance(tick)
+        forward = target.feed_forward if activity is Activity.TRACKING else None
+        error, error_rate = target.position - motion.position, target.velocity - motion.velocity
+        return self._servo.track(error, error_rate, forward, motion.position)
+
+    def overrun(self, motion: Motion) -> tuple[FaultCode, int, str] | None:
+        """What takes the arm beyond its limits in torque control, where no target keeps it within them.
+
+        A joint that could not be stopped any more within its range counts as outside already.
+
+        Parameters
+        ----------
+        motion : Motion
+            of the motors
+
+        Returns
+        -------
+        tuple of FaultCode, int and str, or None
+            the fault, the joint's number counted from 1, and what happened
+        """
+        speed = np.abs(motion.velocity)
+        if (speed > self._fastest).any():
+            column = int(np.argmax(speed - self._fastest))
+            detail = f"speed {speed[column]:.3g}, above the limit {self._fastest[column]:.3g}"
+            return FaultCode.OVER_SPEED, column + 1, detail
+        low, high = self._target.range
+        halt = motion.position + (0.5 * STOP_TIME_S) * motion.velocity
+        outside = ((halt > high + _MARGIN) & (motion.velocity > 0.0)) | (
+            (halt < low - _MARGIN) & (motion.velocity < 0.0)
+        )
+        if not outside.any():
+            return None
+        column = int(np.argmax(outside))
+        detail = f"at {motion.position[column]:.4g}, leaving its range {low[column]:.4g} to {high[column]:.4g}"
+        return FaultCode.POSITION_LIMIT, column + 1, detail
+
+    def _target_at(self, motion: Motion) -> Target:
+        """A target that begins where the motors are, and comes to rest from there."""
+        return Target(motion.position, motion.velocity, self._acceleration, self._tick_s)
+
+    def _waits_for_torque(self, activity: Activity) -> bool:
+        """Whether the arm is in torque control but held, because no setpoint came yet."""
+        return activity is Activity.TORQUE and self._commanded_torque is None

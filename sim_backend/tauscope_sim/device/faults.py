@@ -1,0 +1,113 @@
+"""Faults of the simulated drives: their words, and those that a test makes happen."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from tauscope_drivers import Fault
+
+
+class FaultCode(StrEnum):
+    """What the simulated drives report."""
+
+    WATCHDOG = "watchdog"
+    OVER_TEMPERATURE = "over-temperature"
+    OVERLOAD = "overload"
+    OVER_SPEED = "over-speed"
+    POSITION_LIMIT = "position-limit"
+    UNSTABLE = "simulation-unstable"
+
+
+REMEDIES = {
+    FaultCode.WATCHDOG: "find out why the host fell silent, then acknowledge the fault and enable again",
+    FaultCode.OVER_TEMPERATURE: "let the motor cool down, then acknowledge the fault",
+    FaultCode.OVERLOAD: "take the load off or slow the motion down, then acknowledge the fault",
+    FaultCode.OVER_SPEED: "command less torque or raise the speed limit, then acknowledge the fault",
+    FaultCode.POSITION_LIMIT: "command torque that turns the joint back in time, then acknowledge the fault",
+    FaultCode.UNSTABLE: "make the scenario less extreme; the simulated arm was put to rest",
+}
+"""What the user does next, by fault."""
+
+
+class Disturbance(StrEnum):
+    """What a test can make happen to a joint."""
+
+    LOST_SAMPLE = "lost-sample"
+    """The joint does not answer: its readings are missing."""
+    OVER_TEMPERATURE = "over-temperature"
+    """The motor's temperature rises by the size [K]."""
+    OVERLOAD = "overload"
+    """The drive reports an overload."""
+    ENCODER_JUMP = "encoder-jump"
+    """The encoder slips by the size [rad or m], for the drive's own loop too, and stays so."""
+
+
+@dataclass(frozen=True)
+class Injection:
+    """One disturbance, for tests of what stands above the device.
+
+    kind : Disturbance
+        what happens
+    joint : int
+        joint number, counted from 1
+    start_ns : int
+        device time at which it begins; one that has passed means now [ns]
+    duration_ns : int or None
+        how long it lasts; None for ever [ns]
+    size : float
+        rise of the temperature or slip of the encoder [K; rad or m]
+    """
+
+    kind: Disturbance
+    joint: int
+    start_ns: int = 0
+    duration_ns: int | None = None
+    size: float = 0.0
+
+    def active_at(self, time_ns: int) -> bool:
+        """Whether it acts at an instant.
+
+        Parameters
+        ----------
+        time_ns : int
+            device time [ns]
+        """
+        return self.start_ns <= time_ns and (self.duration_ns is None or time_ns < self.start_ns + self.duration_ns)
+
+
+def device_fault(code: FaultCode, joint: int | None, detail: str) -> Fault:
+    """The fault as the protocol of `drivers` states it.
+
+    Parameters
+    ----------
+    code : FaultCode
+        which fault
+    joint : int or None
+        joint number, counted from 1; None for the whole arm
+    detail : str
+        what happened, in one line
+    """
+    return Fault(code.value, joint, detail, REMEDIES[code])
+
+
+class FaultLatch:
+    """Faults that stay until the operator acknowledges them; the first report of a kind and joint is kept."""
+
+    def __init__(self) -> None:
+        self._faults: dict[tuple[str, int | None], Fault] = {}
+        self.faults: tuple[Fault, ...] = ()
+
+    def latch(self, fault: Fault) -> None:
+        """Keep a fault.
+
+        Parameters
+        ----------
+        fault : Fault
+            what the device reports
+        """
+        self._faults.setdefault((fault.code, fault.joint), fault)
+        self.faults = tuple(self._faults.values())
+
+    def clear(self) -> None:
+        """Forget them all."""
+        self._faults.clear()
+        self.faults = ()

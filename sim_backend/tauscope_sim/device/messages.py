@@ -1,0 +1,310 @@
+"""What the bodies of frames hold: numbers of every cycle in binary, everything rare as JSON."""
+
+import json
+import math
+import struct
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope_drivers import ArmState, ControlMode, DriveLimits, DriverError, Fault, Setpoint, StopPolicy
+from tauscope_drivers.errors import DriverErrorKind
+from tauscope_sim.device.faults import Disturbance, Injection
+
+Array = NDArray[np.float64]
+
+_INSTANT = struct.Struct("<q")
+_STATE_HEAD = struct.Struct("<qH")
+_LIMIT_FIELDS = ("position_low", "position_high", "velocity", "torque")
+
+
+class BadMessageError(ValueError):
+    """A body that does not hold what its kind of frame says."""
+
+
+def encode_document(document: Mapping[str, Any]) -> bytes:
+    """Plain data as JSON.
+
+    Parameters
+    ----------
+    document : mapping
+        without not-a-number and infinity
+    """
+    return json.dumps(document, allow_nan=False).encode()
+
+
+def decode_document(body: bytes) -> dict[str, Any]:
+    """Plain data from JSON.
+
+    Parameters
+    ----------
+    body : bytes
+        of a frame
+
+    Raises
+    ------
+    BadMessageError
+        where it is not a JSON object
+    """
+    try:
+        document = json.loads(body)
+    except (ValueError, RecursionError) as error:
+        raise BadMessageError("the body is not JSON") from error
+    if not isinstance(document, dict):
+        raise BadMessageError("the body is not a JSON object")
+    return document
+
+
+def encode_setpoint(sent_ns: int, setpoint: Setpoint) -> bytes:
+    """Instant, then position and torque, 2 n numbers.
+
+    Parameters
+    ----------
+    sent_ns : int
+        present instant of the machine's monotonic clock [ns]
+    setpoint : Setpoint
+        targets of one cycle
+    """
+    return _INSTANT.pack(sent_ns) + np.concatenate([setpoint.position, setpoint.torque]).astype("<f8").tobytes()
+
+
+def decode_setpoint(body: bytes, joint_count: int) -> tuple[int, Setpoint]:
+    """Instant and setpoint of an exchange; whether its numbers are finite is the device's matter.
+
+    Parameters
+    ----------
+    body : bytes
+        of a frame
+    joint_count : int
+        number of joints n
+
+    Raises
+    ------
+    BadMessageError
+        where it holds another number of values
+    """
+    if len(body) != _INSTANT.size + 16 * joint_count:
+        raise BadMessageError(f"a setpoint of {len(body)} bytes for {joint_count} joints")
+    numbers = np.frombuffer(body, dtype="<f8", offset=_INSTANT.size).astype(np.float64)
+    return _INSTANT.unpack_from(body)[0], Setpoint(numbers[:joint_count], numbers[joint_count:])
+
+
+def encode_state(state: ArmState) -> bytes:
+    """Time, position, velocity, effort, temperature, enabled, and the faults as JSON where there are any.
+
+    Parameters
+    ----------
+    state : ArmState
+        one reading
+    """
+    numbers = np.concatenate([state.position, state.velocity, state.effort, state.temperature]).astype("<f8")
+    faults = json.dumps([_fault_document(fault) for fault in state.faults]).encode() if state.faults else b""
+    head = _STATE_HEAD.pack(state.time_ns, len(state.position))
+    return b"".join((head, numbers.tobytes(), state.enabled.tobytes(), faults))
+
+
+def decode_state(body: bytes) -> ArmState:
+    """The reading that `encode_state` wrote.
+
+    Parameters
+    ----------
+    body : bytes
+        of a frame
+
+    Raises
+    ------
+    BadMessageError
+        where it does not hold a reading
+    """
+    try:
+        time_ns, count = _STATE_HEAD.unpack_from(body)
+        numbers = np.frombuffer(body, "<f8", 4 * count, _STATE_HEAD.size).astype(np.float64).reshape(4, count)
+        end = _STATE_HEAD.size + 33 * count
+        enabled = np.frombuffer(body, np.uint8, count, end - count).astype(np.bool_)
+        faults = _faults(json.loads(body[end:])) if len(body) > end else ()
+    except (struct.error, ValueError, TypeError, KeyError) as error:
+        raise BadMessageError("the body is not a reading of the arm") from error
+    position, velocity, effort, temperature = numbers
+    return ArmState(time_ns, position, velocity, effort, temperature, enabled, faults)
+
+
+def encode_error(error: DriverError) -> bytes:
+    """A refusal.
+
+    Parameters
+    ----------
+    error : DriverError
+        what the device raised
+    """
+    faults = [_fault_document(fault) for fault in error.faults]
+    return encode_document({"kind": error.kind.value, "message": str(error), "faults": faults})
+
+
+def decode_error(body: bytes) -> DriverError:
+    """The error that `encode_error` wrote.
+
+    Parameters
+    ----------
+    body : bytes
+        of a frame
+
+    Raises
+    ------
+    BadMessageError
+        where it does not hold one
+    """
+    document = decode_document(body)
+    try:
+        kind = DriverErrorKind(document["kind"])
+        return DriverError(kind, str(document["message"]), _faults(document["faults"]))
+    except (ValueError, TypeError, KeyError) as error:
+        raise BadMessageError("the body is not an error") from error
+
+
+def encode_enable(mode: ControlMode, limits: DriveLimits, stop_policy: StopPolicy, watchdog_s: float) -> bytes:
+    """A request to enable; infinite limits go as text.
+
+    Parameters
+    ----------
+    mode : ControlMode
+        who closes the loop
+    limits : DriveLimits
+        what the drives enforce; not-a-number goes as text too: refusing it is the device's matter
+    stop_policy : StopPolicy
+        what the device does when its watchdog fires
+    watchdog_s : float
+        time of the watchdog [s]
+    """
+    document = {
+        "mode": mode.value,
+        "stop_policy": stop_policy.value,
+        "watchdog_s": _number_out(watchdog_s),
+        "limits": {name: [_number_out(x) for x in np.ravel(getattr(limits, name))] for name in _LIMIT_FIELDS},
+    }
+    return encode_document(document)
+
+
+def decode_enable(body: bytes) -> tuple[ControlMode, DriveLimits, StopPolicy, float]:
+    """The arguments of `encode_enable`.
+
+    Parameters
+    ----------
+    body : bytes
+        of a frame
+
+    Raises
+    ------
+    BadMessageError
+        where a field is missing or of the wrong kind
+    """
+    document = decode_document(body)
+    try:
+        limits = DriveLimits(
+            **{name: np.array([_number_in(x) for x in document["limits"][name]]) for name in _LIMIT_FIELDS}
+        )
+        mode, policy = ControlMode(document["mode"]), StopPolicy(document["stop_policy"])
+        return mode, limits, policy, _number_in(document["watchdog_s"])
+    except (ValueError, TypeError, KeyError, OverflowError) as error:
+        raise BadMessageError("the body is not a request to enable") from error
+
+
+def encode_stop(policy: StopPolicy) -> bytes:
+    """A request to stop.
+
+    Parameters
+    ----------
+    policy : StopPolicy
+        how
+    """
+    return encode_document({"policy": policy.value})
+
+
+def decode_stop(body: bytes) -> StopPolicy:
+    """The policy of `encode_stop`.
+
+    Parameters
+    ----------
+    body : bytes
+        of a frame
+
+    Raises
+    ------
+    BadMessageError
+        where it names no policy
+    """
+    try:
+        return StopPolicy(decode_document(body)["policy"])
+    except (ValueError, KeyError) as error:
+        raise BadMessageError("the body is not a request to stop") from error
+
+
+def encode_injection(injection: Injection) -> bytes:
+    """A disturbance for a test.
+
+    Parameters
+    ----------
+    injection : Injection
+        which
+    """
+    return encode_document({**vars(injection), "kind": injection.kind.value})
+
+
+def decode_injection(body: bytes) -> Injection:
+    """The disturbance that `encode_injection` wrote.
+
+    Parameters
+    ----------
+    body : bytes
+        of a frame
+
+    Raises
+    ------
+    BadMessageError
+        where a field is missing or of the wrong kind
+    """
+    document = decode_document(body)
+    try:
+        duration = document["duration_ns"]
+        return Injection(
+            kind=Disturbance(document["kind"]),
+            joint=int(document["joint"]),
+            start_ns=int(document["start_ns"]),
+            duration_ns=None if duration is None else int(duration),
+            size=float(document["size"]),
+        )
+    except (ValueError, TypeError, KeyError, OverflowError) as error:
+        raise BadMessageError("the body is not a disturbance") from error
+
+
+def _number_out(value: float) -> float | str:
+    """JSON knows no infinity and no not-a-number: they go as text."""
+    return float(value) if math.isfinite(value) else str(float(value))
+
+
+def _number_in(value: Any) -> float:
+    """Read a number, or the text of one that JSON cannot hold."""
+    if isinstance(value, str) and value in ("inf", "-inf", "nan"):
+        return float(value)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise TypeError(value)
+    return float(value)
+
+
+def _fault_document(fault: Fault) -> dict[str, Any]:
+    """A fault as plain data."""
+    return {"code": fault.code, "joint": fault.joint, "detail": fault.detail, "remedy": fault.remedy}
+
+
+def _faults(documents: Any) -> tuple[Fault, ...]:
+    """Faults from plain data."""
+    return tuple(
+        Fault(
+            str(one["code"]),
+            None if one["joint"] is None else int(one["joint"]),
+            str(one["detail"]),
+            str(one["remedy"]),
+        )
+        for one in documents
+    )

@@ -1,0 +1,266 @@
+"""The device process: keeps the simulated drives in step with the machine's clock, and serves one host at a time."""
+
+import os
+import select
+import socket
+import struct
+import time
+from dataclasses import dataclass
+
+from tauscope_drivers import DriverError
+from tauscope_drivers.errors import DriverErrorKind
+from tauscope_sim.device.activity import Activity
+from tauscope_sim.device.device import SimulatedDevice
+from tauscope_sim.device.frames import PROTOCOL, BrokenFrameError, Frame, FrameBuffer, FrameKind
+from tauscope_sim.device.messages import (
+    BadMessageError,
+    decode_document,
+    decode_enable,
+    decode_injection,
+    decode_setpoint,
+    decode_stop,
+    encode_document,
+    encode_error,
+    encode_state,
+)
+from tauscope_sim.device.trace import TraceWriter
+
+PASS_NS = 2_000_000
+"""The drives are carried forward at least this often [ns]."""
+
+PASS_AT_REST_NS = 20_000_000
+"""Likewise while the arm is braked [ns]."""
+
+LATE_NS = 6_000_000
+"""Being later than this counts as an overrun [ns]."""
+
+OLDEST_NS = 100_000_000
+"""A setpoint that claims to have been sent longer ago counts as sent this long ago [ns]."""
+
+_PEER = struct.Struct("3i")
+
+
+@dataclass
+class Punctuality:
+    """How well the device kept to the machine's clock.
+
+    overruns : int
+        passes that began later than `LATE_NS` after the one before was due
+    largest_lag_ns : int
+        the latest of them [ns]
+    """
+
+    overruns: int = 0
+    largest_lag_ns: int = 0
+
+
+class _Host:
+    """The connection of one host."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        connection.setblocking(False)
+        self.connection = connection
+        self.buffer = FrameBuffer()
+        self.process = peer_process(connection)
+
+    def send(self, frame: Frame) -> None:
+        """Send a reply whole, or give the connection up: a host that reads nothing must not block the device."""
+        data = frame.encode()
+        if self.connection.send(data) != len(data):
+            raise BrokenFrameError("the host does not read its replies")
+
+
+class DeviceServer:
+    """Runs a device against the monotonic clock.
+
+    Every pass carries the device forward to the present. After a stall of the machine the device's clock does not jump:
+    what the host asked meanwhile is answered first, then the time is made up for tick by tick, and the overrun counted.
+    A host whose connection ends while it has the arm under power counts as silent: the watchdog's stop is carried out
+    at once.
+
+    Parameters
+    ----------
+    device : SimulatedDevice
+        whose time began at a recent instant of the monotonic clock
+    listener : socket.socket
+        listening
+    trace : TraceWriter
+        the device's own record
+    linger_s : float
+        how long it goes on without a host [s]
+    """
+
+    def __init__(self, device: SimulatedDevice, listener: socket.socket, trace: TraceWriter, linger_s: float) -> None:
+        listener.setblocking(False)
+        self._device, self._listener, self._trace = device, listener, trace
+        self._linger_ns = round(linger_s * 1e9)
+        self._host: _Host | None = None
+        self._alone_since_ns = time.monotonic_ns()
+        self._finished = False
+        self.punctuality = Punctuality()
+
+    def finish(self) -> None:
+        """End after the present pass; may be called from a signal handler."""
+        self._finished = True
+
+    def run(self) -> None:
+        """Serve until asked to finish, or until nobody has been connected for the set time."""
+        self._trace.note()
+        while not self._finished:
+            self._sleep()
+            self._pass(time.monotonic_ns())
+            if self._host is None and time.monotonic_ns() - self._alone_since_ns > self._linger_ns:
+                break
+        self._drop_host("the device is shutting down")
+
+    def _sleep(self) -> None:
+        """Wait for a request, a new host or the next pass."""
+        interval = PASS_AT_REST_NS if self._device.activity is Activity.BRAKED else PASS_NS
+        remaining = self._device.time_ns + interval - time.monotonic_ns()
+        if remaining > 0:
+            waiting = [self._listener] if self._host is None else [self._listener, self._host.connection]
+            select.select(waiting, [], [], remaining * 1e-9)
+
+    def _pass(self, now_ns: int) -> None:
+        """Carry the device forward to the present and answer."""
+        lag_ns = now_ns - self._device.time_ns
+        if self._device.activity is not Activity.BRAKED and lag_ns > LATE_NS:
+            self.punctuality.overruns += 1
+            self.punctuality.largest_lag_ns = max(self.punctuality.largest_lag_ns, lag_ns)
+            self._serve()
+        while (behind_ns := now_ns - self._device.time_ns) > LATE_NS and not self._finished:
+            self._device.advance_to(now_ns - behind_ns + PASS_NS)
+            self._trace.note()
+            self._serve()
+        self._device.advance_to(now_ns)
+        self._serve()
+        self._trace.note()
+
+    def _serve(self) -> None:
+        """Answer the host that is there, then take a new one."""
+        if self._host is not None:
+            self._hear(self._host)
+        self._accept()
+
+    def _hear(self, host: _Host) -> None:
+        """Answer what a host asks for; notice that it has gone."""
+        try:
+            data = host.connection.recv(65536)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        if not data:
+            self._drop_host("the host's connection ended")
+            return
+        try:
+            for frame in host.buffer.feed(data):
+                host.send(self._answer(frame))
+                if frame.kind is FrameKind.GOODBYE:
+                    self._drop_host("the host's connection ended")
+                    return
+        except (BrokenFrameError, OSError) as error:
+            self._drop_host(f"the host's connection broke: {error}")
+
+    def _accept(self) -> None:
+        """Let a host in, or tell it who is in already."""
+        try:
+            connection, _ = self._listener.accept()
+        except (BlockingIOError, ConnectionAbortedError):
+            return
+        if self._host is not None:
+            self._hear(self._host)  # it may have gone since it was last heard, before the new one came
+        if self._host is None:
+            self._host = _Host(connection)
+            return
+        held = DriverError(
+            DriverErrorKind.CANNOT_CONNECT,
+            f"the simulated arm is held by process {self._host.process}; end that run first",
+        )
+        with connection:
+            connection.setblocking(False)
+            try:
+                connection.send(Frame(FrameKind.ERROR, 0, encode_error(held)).encode())
+            except OSError:
+                return
+
+    def _drop_host(self, reason: str) -> None:
+        """Close the connection; an arm under this host's command stops as if its watchdog had fired."""
+        if self._host is not None:
+            self._host.connection.close()
+        self._host = None
+        self._alone_since_ns = time.monotonic_ns()
+        self._device.lose_host(reason)
+        self._trace.note()
+
+    def _answer(self, frame: Frame) -> Frame:
+        """Carry out a request; whatever is wrong with it goes back as an error."""
+        try:
+            kind, body = self._carry_out(frame.kind, frame.body)
+        except DriverError as error:
+            kind, body = FrameKind.ERROR, encode_error(error)
+        except BadMessageError as error:
+            refusal = DriverError(DriverErrorKind.REFUSED, f"the device does not understand the request: {error}")
+            kind, body = FrameKind.ERROR, encode_error(refusal)
+        return Frame(kind, frame.sequence, body)
+
+    def _carry_out(self, kind: FrameKind, body: bytes) -> tuple[FrameKind, bytes]:
+        """Carry out a request; returns the kind and the body of the reply."""
+        device = self._device
+        if kind is FrameKind.HELLO:
+            return FrameKind.WELCOME, self._welcome(body)
+        if kind is FrameKind.STATUS:
+            return FrameKind.REPORT, self._report()
+        if kind is FrameKind.EXCHANGE:
+            sent_ns, setpoint = decode_setpoint(body, device.capabilities.joint_count)
+            now_ns = time.monotonic_ns()
+            device.command(setpoint, min(max(sent_ns, device.time_ns, now_ns - OLDEST_NS), now_ns))
+        elif kind is FrameKind.ENABLE:
+            device.enable(*decode_enable(body))
+        elif kind is FrameKind.STOP:
+            device.stop(decode_stop(body))
+        elif kind is FrameKind.ACKNOWLEDGE:
+            device.acknowledge_faults()
+        elif kind is FrameKind.INJECT:
+            device.inject(decode_injection(body))
+        elif kind is FrameKind.PUT_BACK:
+            device.put_back()
+        elif kind is FrameKind.GOODBYE:
+            device.stop()
+        elif kind is FrameKind.SHUT_DOWN:
+            device.stop()
+            self.finish()
+        elif kind is not FrameKind.READ:
+            raise BadMessageError(f"{kind.name} is no request")
+        return FrameKind.STATE, encode_state(device.read())
+
+    def _welcome(self, body: bytes) -> bytes:
+        """Agree on the version of the protocol."""
+        if (asked := decode_document(body).get("protocol")) != PROTOCOL:
+            raise DriverError(
+                DriverErrorKind.CANNOT_CONNECT,
+                f"the device speaks version {PROTOCOL} of its protocol, not {asked!r}; use one Tauscope for both",
+            )
+        return encode_document({"joint_count": self._device.capabilities.joint_count, "process": os.getpid()})
+
+    def _report(self) -> bytes:
+        """What the device does and how punctual it has been."""
+        return encode_document(
+            {
+                "activity": self._device.activity.value,
+                "time_ns": self._device.time_ns,
+                "overruns": self.punctuality.overruns,
+                "largest_lag_ns": self.punctuality.largest_lag_ns,
+            }
+        )
+
+
+def peer_process(connection: socket.socket) -> int:
+    """Id of the process at the other end of a Unix socket, as the kernel knows it.
+
+    Parameters
+    ----------
+    connection : socket.socket
+        connected
+    """
+    return _PEER.unpack(connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _PEER.size))[0]

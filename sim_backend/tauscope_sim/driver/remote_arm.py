@@ -1,0 +1,292 @@
+"""The simulated arm in real time: a host's connection to the device process."""
+
+import contextlib
+import os
+import socket
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tauscope_drivers import (
+    ArmState,
+    Capabilities,
+    Clock,
+    ControlMode,
+    DriveLimits,
+    DriverError,
+    MonotonicClock,
+    Setpoint,
+    StopPolicy,
+)
+from tauscope_drivers.errors import DriverErrorKind
+from tauscope_sim.device.device import WATCHDOG_RANGE_S
+from tauscope_sim.device.faults import Injection
+from tauscope_sim.device.frames import PROTOCOL, BrokenFrameError, Frame, FrameBuffer, FrameKind
+from tauscope_sim.device.limits import checked_setpoint
+from tauscope_sim.device.messages import (
+    BadMessageError,
+    decode_document,
+    decode_error,
+    decode_state,
+    encode_document,
+    encode_enable,
+    encode_injection,
+    encode_setpoint,
+    encode_stop,
+)
+
+LARGEST_RATE_HZ = 1000.0
+"""Cycles a second that a connection carries with some time to spare [Hz]."""
+
+_PATIENCE_S = 2.0
+
+
+class RemoteSimulatedArm:
+    """A backend that reaches the device process over its Unix socket; see `tauscope_sim.driver.start_device`.
+
+    The device keeps its own watchdog: it stops the arm when this process is killed, stopped or cut off. A reply that
+    does not come in time leaves not-a-number in the state of that cycle; `ArmState.enabled` is then as last known.
+
+    Parameters
+    ----------
+    path : Path
+        socket of the device process
+    joint_count : int
+        number of joints n
+    reply_timeout_s : float
+        how long one cycle waits for its reply [s]
+    """
+
+    def __init__(self, path: Path, joint_count: int, *, reply_timeout_s: float = 0.02) -> None:
+        self._path, self._count, self._reply_timeout_s = path, joint_count, reply_timeout_s
+        self._clock = MonotonicClock()
+        self._socket: socket.socket | None = None
+        self._buffer = FrameBuffer()
+        self._sequence = 0
+        self._enabled = np.zeros(joint_count, dtype=np.bool_)
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """What it can do."""
+        return Capabilities(
+            joint_count=self._count,
+            modes=frozenset(ControlMode),
+            stop_policies=frozenset(StopPolicy),
+            largest_rate_hz=LARGEST_RATE_HZ,
+            watchdog_range_s=WATCHDOG_RANGE_S,
+            takes_feed_forward=True,
+        )
+
+    @property
+    def clock(self) -> Clock:
+        """The machine's monotonic clock, which is the device's too."""
+        return self._clock
+
+    def connect(self) -> ArmState:
+        """Reach the device and read it.
+
+        Raises
+        ------
+        DriverError
+            ``cannot-connect`` where there is no device, another host has it, or it has another number of joints
+        """
+        if self._socket is not None:
+            raise _cannot_connect("the arm is connected already; disconnect it first")
+        connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        try:
+            connection.settimeout(_PATIENCE_S)
+            connection.connect(str(self._path))
+        except OSError as error:
+            connection.close()
+            raise _cannot_connect(
+                f"{self._path}: no simulated arm answers there ({error.strerror}); start it"
+            ) from error
+        self._socket, self._buffer = connection, FrameBuffer()
+        try:
+            hello = encode_document({"protocol": PROTOCOL, "process": os.getpid()})
+            welcome = decode_document(self._request(FrameKind.HELLO, hello).body)
+            if welcome.get("joint_count") != self._count:
+                raise _cannot_connect(
+                    f"{self._path}: the simulated arm has {welcome.get('joint_count')} joints, the robot file "
+                    f"{self._count}; start the device with this robot file"
+                )
+            return self._state_after(FrameKind.READ)
+        except (DriverError, BadMessageError) as error:
+            self._close()
+            raise _cannot_connect(str(error)) from error
+
+    def acknowledge_faults(self) -> ArmState:
+        """Clear the latched faults; see `drivers.Backend`."""
+        return self._state_after(FrameKind.ACKNOWLEDGE)
+
+    def enable(
+        self,
+        mode: ControlMode,
+        limits: DriveLimits,
+        stop_policy: StopPolicy,
+        watchdog_s: float,
+        cycle_s: float | None = None,
+    ) -> ArmState:
+        """Take the arm under power where it stands; see `drivers.Backend`.
+
+        Parameters
+        ----------
+        mode : ControlMode
+            who closes the loop
+        limits : DriveLimits
+            what the drives enforce
+        stop_policy : StopPolicy
+            what the device does by itself when its watchdog fires
+        watchdog_s : float
+            time without `exchange` after which it does [s]
+        cycle_s : float or None
+            not needed: the device finds its host's pace
+        """
+        del cycle_s
+        return self._state_after(FrameKind.ENABLE, encode_enable(mode, limits, stop_policy, watchdog_s))
+
+    def exchange(self, setpoint: Setpoint) -> ArmState:
+        """Write the setpoints, read the arm; see `drivers.Backend`.
+
+        Parameters
+        ----------
+        setpoint : Setpoint
+            finite targets for every joint
+        """
+        body = encode_setpoint(self._clock.now_ns(), checked_setpoint(setpoint, self._count))
+        try:
+            reply = self._request(FrameKind.EXCHANGE, body, self._reply_timeout_s)
+        except TimeoutError:
+            return self._missed()
+        return self._state_of(reply)
+
+    def stop(self, policy: StopPolicy) -> ArmState:
+        """Stop the arm; where there is no connection the device has done so by itself, and nothing is known of it.
+
+        Parameters
+        ----------
+        policy : StopPolicy
+            how
+
+        Raises
+        ------
+        DriverError
+            ``lost`` where the device does not confirm
+        """
+        return self._missed() if self._socket is None else self._state_after(FrameKind.STOP, encode_stop(policy))
+
+    def disconnect(self) -> None:
+        """Let go of the device, which stops an arm that is still enabled by its own policy."""
+        if self._socket is None:
+            return
+        with contextlib.suppress(DriverError):
+            self._state_after(FrameKind.GOODBYE)
+        self._close()
+
+    def status(self) -> dict[str, Any]:
+        """What the device says of itself: ``activity``, ``time_ns``, ``overruns``, ``largest_lag_ns``."""
+        return decode_document(self._patiently(FrameKind.STATUS).body)
+
+    def inject(self, injection: Injection) -> ArmState:
+        """Make a disturbance happen, for a test.
+
+        Parameters
+        ----------
+        injection : Injection
+            which, to which joint, and when
+        """
+        return self._state_after(FrameKind.INJECT, encode_injection(injection))
+
+    def put_back(self) -> ArmState:
+        """Have the arm carried back to where it began; see `tauscope_sim.device.SimulatedDevice.put_back`."""
+        return self._state_after(FrameKind.PUT_BACK)
+
+    def shut_down_device(self) -> None:
+        """Ask the device process to stop the arm and end."""
+        self._patiently(FrameKind.SHUT_DOWN)
+        self._close()
+
+    def _state_after(self, kind: FrameKind, body: bytes = b"") -> ArmState:
+        """State that answers a request outside the cycle."""
+        return self._state_of(self._patiently(kind, body))
+
+    def _patiently(self, kind: FrameKind, body: bytes = b"") -> Frame:
+        """Send a request outside the cycle; the device is lost if it takes longer than it ever should."""
+        try:
+            return self._request(kind, body)
+        except TimeoutError as error:
+            raise self._lost(f"no reply within {_PATIENCE_S:g} s") from error
+
+    def _request(self, kind: FrameKind, body: bytes, timeout_s: float = _PATIENCE_S) -> Frame:
+        """Send a request and wait for its reply; raises TimeoutError, and what the device refuses."""
+        connection = self._connected()
+        self._sequence = (self._sequence + 1) % 2**32
+        deadline = time.monotonic() + timeout_s
+        try:
+            connection.settimeout(timeout_s)
+            # A device that another host has says so and hangs up before it hears anything: its words can still be read.
+            with contextlib.suppress(BrokenPipeError):
+                connection.sendall(Frame(kind, self._sequence, body).encode())
+            reply = self._await_reply(connection, deadline)
+        except TimeoutError:
+            raise
+        except (OSError, BrokenFrameError) as error:
+            raise self._lost(str(error)) from error
+        if reply.kind is FrameKind.ERROR:
+            raise decode_error(reply.body)
+        return reply
+
+    def _connected(self) -> socket.socket:
+        """The connection; refuses where there is none."""
+        if self._socket is None:
+            raise DriverError(DriverErrorKind.NOT_CONNECTED, "the arm is not connected; connect it first")
+        return self._socket
+
+    def _await_reply(self, connection: socket.socket, deadline: float) -> Frame:
+        """The reply to the last request; replies to those before it came too late and are passed over."""
+        while (remaining := deadline - time.monotonic()) > 0.0:
+            connection.settimeout(remaining)
+            data = connection.recv(65536)
+            if not data:
+                raise ConnectionResetError("the device closed the connection")
+            for frame in self._buffer.feed(data):
+                refused_at_the_door = frame.sequence == 0 and frame.kind is FrameKind.ERROR
+                if frame.sequence == self._sequence or refused_at_the_door:
+                    return frame
+        raise TimeoutError
+
+    def _state_of(self, reply: Frame) -> ArmState:
+        """The reading in a reply."""
+        try:
+            state = decode_state(reply.body)
+        except BadMessageError as error:
+            raise self._lost(str(error)) from error
+        self._enabled = state.enabled
+        return state
+
+    def _missed(self) -> ArmState:
+        """State of a cycle without an answer."""
+        nothing = np.full(self._count, np.nan)
+        return ArmState(self._clock.now_ns(), nothing, nothing, nothing, nothing, self._enabled)
+
+    def _lost(self, reason: str) -> DriverError:
+        """Give the connection up."""
+        self._close()
+        return DriverError(
+            DriverErrorKind.LOST,
+            f"{self._path}: the simulated arm's process is lost ({reason}); its watchdog stops the arm: connect again",
+        )
+
+    def _close(self) -> None:
+        """Close the socket."""
+        if self._socket is not None:
+            self._socket.close()
+        self._socket = None
+        self._enabled = np.zeros(self._count, dtype=np.bool_)
+
+
+def _cannot_connect(message: str) -> DriverError:
+    """The error of a connection that does not come about."""
+    return DriverError(DriverErrorKind.CANNOT_CONNECT, message)

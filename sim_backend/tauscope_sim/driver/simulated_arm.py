@@ -1,0 +1,132 @@
+"""The simulated arm in virtual time: a whole run takes as long as it takes to compute."""
+
+from numpy.typing import ArrayLike
+
+from tauscope.robot.robot import Robot
+from tauscope_drivers import ArmState, Capabilities, Clock, ControlMode, DriveLimits, DriverError, Setpoint, StopPolicy
+from tauscope_drivers.errors import DriverErrorKind
+from tauscope_sim.device import SimulatedDevice
+from tauscope_sim.driver.virtual_clock import VirtualClock
+from tauscope_sim.scenario import Scenario
+
+
+class SimulatedArm:
+    """A backend whose clock carries the device forward; see `tauscope_sim.device.SimulatedDevice` for what that does.
+
+    The device lives as long as this object: it keeps its place, its stop and its faults while disconnected.
+
+    Parameters
+    ----------
+    robot : Robot
+        the arm; its model block has to hold the links
+    scenario : Scenario or None
+        what is concealed, the noise and the latency; None conceals nothing
+    start_position : (n,) float64 or None
+        where the arm stands; None is `tauscope_sim.device.posture.resting_posture` [rad or m]
+
+    Raises
+    ------
+    RobotFileError
+        where the robot file lacks what a simulation needs
+    ScenarioError
+        where the scenario does not fit the arm
+    """
+
+    def __init__(
+        self, robot: Robot, scenario: Scenario | None = None, *, start_position: ArrayLike | None = None
+    ) -> None:
+        kept = Scenario() if scenario is None else scenario
+        self.device = SimulatedDevice(robot, kept, start_position=start_position)
+        """the drives and the arm, for tests and demonstrations"""
+        self._clock = VirtualClock(self.device.time_ns, self.device.advance_to)
+        self._connected = False
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """What it can do."""
+        return self.device.capabilities
+
+    @property
+    def clock(self) -> Clock:
+        """Virtual time."""
+        return self._clock
+
+    def connect(self) -> ArmState:
+        """Reach the device and read it.
+
+        Raises
+        ------
+        DriverError
+            ``cannot-connect`` where it is connected already
+        """
+        if self._connected:
+            raise DriverError(DriverErrorKind.CANNOT_CONNECT, "the arm is connected already; disconnect it first")
+        self._connected = True
+        return self.device.read()
+
+    def acknowledge_faults(self) -> ArmState:
+        """Clear the latched faults; see `drivers.Backend`."""
+        self._require_connection()
+        self.device.acknowledge_faults()
+        return self.device.read()
+
+    def enable(
+        self,
+        mode: ControlMode,
+        limits: DriveLimits,
+        stop_policy: StopPolicy,
+        watchdog_s: float,
+        cycle_s: float | None = None,
+    ) -> ArmState:
+        """Take the arm under power where it stands; see `drivers.Backend`.
+
+        Parameters
+        ----------
+        mode : ControlMode
+            who closes the loop
+        limits : DriveLimits
+            what the drives enforce
+        stop_policy : StopPolicy
+            what the device does by itself when its watchdog fires
+        watchdog_s : float
+            time without `exchange` after which it does, in virtual time [s]
+        cycle_s : float or None
+            not needed: the device finds its host's pace
+        """
+        del cycle_s
+        self._require_connection()
+        self.device.enable(mode, limits, stop_policy, watchdog_s)
+        return self.device.read()
+
+    def exchange(self, setpoint: Setpoint) -> ArmState:
+        """Write the setpoints, read the arm; see `drivers.Backend`.
+
+        Parameters
+        ----------
+        setpoint : Setpoint
+            finite targets for every joint
+        """
+        self._require_connection()
+        self.device.command(setpoint, self._clock.now_ns())
+        return self.device.read()
+
+    def stop(self, policy: StopPolicy) -> ArmState:
+        """Stop the arm; legal at any time, also while disconnected.
+
+        Parameters
+        ----------
+        policy : StopPolicy
+            how
+        """
+        self.device.stop(policy)
+        return self.device.read()
+
+    def disconnect(self) -> None:
+        """Let go of the device; an arm that is still enabled is stopped by its own policy first."""
+        self.device.stop()
+        self._connected = False
+
+    def _require_connection(self) -> None:
+        """Refuse what needs a connection."""
+        if not self._connected:
+            raise DriverError(DriverErrorKind.NOT_CONNECTED, "the arm is not connected; connect it first")

@@ -1,0 +1,126 @@
+"""What the servos move: anything that torque moves, such as a pendulum a joint."""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tauscope_sim.dynamixel_bus.servo_loop import Demand
+
+Array = NDArray[np.float64]
+
+BANDWIDTH_HZ = 8.0
+"""Of the pendulums' position loops [Hz]."""
+
+
+class MovedArm(Protocol):
+    """An arm that torque moves, and the position loops that were tuned to it."""
+
+    @property
+    def joint_count(self) -> int:
+        """Number of joints n."""
+        ...
+
+    @property
+    def motion(self) -> tuple[Array, Array]:
+        """Position [rad or m] and velocity [rad/s or m/s] of the joints, each (n,)."""
+        ...
+
+    def torque(self, demands: Sequence[Demand]) -> Array:
+        """Torque with which the servos meet their demands now, (n,) [Nm or N].
+
+        Parameters
+        ----------
+        demands : sequence of Demand
+            one a joint
+        """
+        ...
+
+    def advance(self, torque: Array, duration_s: float) -> None:
+        """Move on under a constant torque.
+
+        Parameters
+        ----------
+        torque : (n,) float64
+            of the motors, at the joints [Nm or N]
+        duration_s : float
+            for how long [s]
+        """
+        ...
+
+
+class Pendulums:
+    """A pendulum a joint: J q̈ = τ − b q̇ − m g l sin q, without coupling; enough to test a bus.
+
+    Position loops are critically damped and without integral, so that they droop under a load as a servo's do:
+    τ = J ω² (q_g − q) + 2 J ω (q̇_g − q̇).
+    """
+
+    def __init__(
+        self,
+        position: ArrayLike,
+        *,
+        inertia: float = 0.05,
+        damping: float = 0.05,
+        weight: float = 0.5,
+    ) -> None:
+        """Place them at rest.
+
+        Parameters
+        ----------
+        position : (n,) float64
+            where they stand [rad]
+        inertia : float
+            J [kg m²]
+        damping : float
+            b [Nm s/rad]
+        weight : float
+            m g l [Nm]
+        """
+        self._position = np.array(position, dtype=np.float64)
+        self._velocity = np.zeros_like(self._position)
+        self._inertia, self._damping, self._weight = inertia, damping, weight
+
+    @property
+    def joint_count(self) -> int:
+        """Number of joints n."""
+        return self._position.size
+
+    @property
+    def motion(self) -> tuple[Array, Array]:
+        """Position and velocity."""
+        return self._position.copy(), self._velocity.copy()
+
+    def torque(self, demands: Sequence[Demand]) -> Array:
+        """Torque of the position loops where a target is tracked, else what is demanded.
+
+        Parameters
+        ----------
+        demands : sequence of Demand
+            one a joint
+        """
+        omega = 2.0 * np.pi * BANDWIDTH_HZ
+        torque = np.zeros(self.joint_count)
+        for joint, demand in enumerate(demands):
+            wanted = demand.torque
+            if demand.tracks:
+                error = demand.position - self._position[joint]
+                error_rate = demand.speed - self._velocity[joint]
+                wanted = self._inertia * omega * (omega * error + 2.0 * error_rate)
+            torque[joint] = max(-demand.cap, min(demand.cap, wanted))
+        return torque
+
+    def advance(self, torque: Array, duration_s: float) -> None:
+        """Move on under a constant torque, by the semi-implicit Euler method.
+
+        Parameters
+        ----------
+        torque : (n,) float64
+            [Nm]
+        duration_s : float
+            for how long [s]
+        """
+        load = self._damping * self._velocity + self._weight * np.sin(self._position)
+        self._velocity += duration_s * (torque - load) / self._inertia
+        self._position += duration_s * self._velocity

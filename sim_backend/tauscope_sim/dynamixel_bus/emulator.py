@@ -1,0 +1,180 @@
+"""Servos, the arm that they move, and a clock: everything of the emulator but its pseudo terminal."""
+
+import heapq
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope_sim.dynamixel_bus.arm import MovedArm
+from tauscope_sim.dynamixel_bus.bus import EmulatedBus
+from tauscope_sim.dynamixel_bus.servo import EmulatedServo
+from tauscope_sim.emulation.device_clock import ALL_STEPS, MOST_STEPS, STEP_S, DeviceClock
+from tauscope_sim.emulation.fault_kit import faults_from
+
+Array = NDArray[np.float64]
+
+
+class DynamixelEmulator:
+    """An arm of emulated servos on one bus; the instants are those of the caller's clock."""
+
+    def __init__(
+        self, bus: EmulatedBus, order: Sequence[int], arm: MovedArm, now_s: float, *, latency_s: float = 0.0
+    ) -> None:
+        """Everything at rest. The arm stands on a stand until all its servos have had torque once.
+
+        Parameters
+        ----------
+        bus : EmulatedBus
+            of the servos
+        order : sequence of int
+            ID of the servo of each joint
+        arm : MovedArm
+            what they move
+        now_s : float
+            present instant [s]
+        latency_s : float
+            how much later than over the wire an answer reaches the master: the latency of an adapter [s]
+        """
+        self.bus = bus
+        self.arm = arm
+        self.torque = np.zeros(arm.joint_count)
+        self.stands_on_stand = True
+        self._servos = [bus.servos[servo] for servo in order]
+        self._bauds = {servo.specification.baud for servo in self._servos}
+        self._latency_s = latency_s
+        self._clock = DeviceClock(now_s)
+        self._outgoing: list[tuple[float, int, bytes]] = []
+        self._count = 0
+        self._look()
+
+    @property
+    def servos(self) -> list[EmulatedServo]:
+        """In the order of the joints."""
+        return self._servos
+
+    @property
+    def now_s(self) -> float:
+        """Instant up to which the device has come [s]."""
+        return self._clock.now_s
+
+    def hears(self, baud: int) -> bool:
+        """Whether a master that has set this baud rate is understood.
+
+        Parameters
+        ----------
+        baud : int
+            of the master's port [bit/s]
+        """
+        return baud in self._bauds
+
+    def receive(self, data: bytes, now_s: float) -> None:
+        """Take bytes of the master, and answer with what is measured now, however long the machine stood still.
+
+        They are heard before the device catches up with the clock: they may have waited while this process slept, and
+        its sleep is no silence of the master.
+
+        Parameters
+        ----------
+        data : bytes
+            as they came
+        now_s : float
+            when [s]
+        """
+        instructions = self.bus.hear(data, now_s)
+        self._clock.catch_up(now_s, self._step, ALL_STEPS)
+        for servo in self._servos:
+            servo.sense(self.now_s, min(1.0, max(0.0, now_s - self.now_s) / STEP_S))
+        for due_s, frame in self.bus.answer(instructions, now_s):
+            self._count += 1
+            heapq.heappush(self._outgoing, (due_s + self._latency_s, self._count, frame))
+
+    def due(self, now_s: float) -> bytes:
+        """Bytes that have reached the master by now.
+
+        Parameters
+        ----------
+        now_s : float
+            present instant [s]
+        """
+        arrived = b""
+        while self._outgoing and self._outgoing[0][0] <= now_s:
+            arrived += heapq.heappop(self._outgoing)[2]
+        return arrived
+
+    @property
+    def next_due_s(self) -> float:
+        """When the next bytes reach the master; infinite where none are under way [s]."""
+        return self._outgoing[0][0] if self._outgoing else float("inf")
+
+    def advance_to(self, now_s: float, most_steps: int = MOST_STEPS) -> None:
+        """Let time pass: not all at once where the machine stood still, so that the master is heard in between.
+
+        Parameters
+        ----------
+        now_s : float
+            present instant [s]
+        most_steps : int
+            after which it waits to be asked again
+        """
+        self._clock.catch_up(now_s, self._step, most_steps)
+
+    def describe(self) -> dict[str, Any]:
+        """Where the arm is and what its servos do."""
+        position, velocity = self.arm.motion
+        return {
+            "time": self.now_s,
+            "position": position.tolist(),
+            "velocity": velocity.tolist(),
+            "torque": self.torque.tolist(),
+            "enabled": [servo.has_torque for servo in self._servos],
+            "latched": [servo.memory.is_latched for servo in self._servos],
+            "commanded": [servo.is_commanded for servo in self._servos],
+            "latched_at": [servo.latched_s for servo in self._servos],
+            "error": [servo.hardware_error for servo in self._servos],
+            "on_stand": self.stands_on_stand,
+            "lost": self._clock.lost_s,
+        }
+
+    def answer(self, request: dict[str, Any]) -> dict[str, int] | None:
+        """Do what a test asks.
+
+        Parameters
+        ----------
+        request : dict
+            ``{"inject": [fault, …]}``, ``{"get": [servo, item]}``, ``{"put": [servo, item, value]}``, ``{"stand":
+            bool}`` (put the stand under it, or take it away), or nothing of these
+        """
+        if "inject" in request:
+            self.bus.schedule.add(faults_from(request["inject"], self.now_s))
+            self.bus.run_faults(self.now_s)
+        elif "get" in request:
+            servo, item = request["get"]
+            return {"value": self.bus.servos[servo].memory.get(item)}
+        elif "put" in request:
+            servo, item, value = request["put"]
+            self.bus.servos[servo].memory.put(item, value)
+        elif "stand" in request:
+            self.stands_on_stand = request["stand"]
+        return None
+
+    def _step(self) -> None:
+        """One period of the servos' loops."""
+        self.bus.run_faults(self.now_s)
+        position, _ = self.arm.motion
+        demands = [
+            servo.demand(float(place), self.now_s, STEP_S) for servo, place in zip(self._servos, position, strict=True)
+        ]
+        self.torque = self.arm.torque(demands)
+        if self.stands_on_stand:
+            self.stands_on_stand = not all(servo.has_torque for servo in self._servos)
+        if not self.stands_on_stand:
+            self.arm.advance(self.torque, STEP_S)
+        self._look()
+
+    def _look(self) -> None:
+        """Let the servos see their joints."""
+        position, velocity = self.arm.motion
+        for servo, *seen in zip(self._servos, position, velocity, self.torque, strict=True):
+            servo.take_motion(*map(float, seen))

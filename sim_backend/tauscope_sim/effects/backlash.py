@@ -1,0 +1,88 @@
+"""Lost motion at load reversal: motor and link are two masses that meet on teeth.
+
+With the twist δ = θ - q and the gap b, the teeth overlap by x = δ - sgn(δ) b/2 where |δ| > b/2, else by nothing:
+
+    T = k x max(0, 1 + c sgn(x) δ̇)
+
+k in Nm/rad (N/m). The damping c in s/rad (s/m) grows with the overlap (Hunt and Crossley), so that T neither jumps
+when the teeth meet nor pulls when they part. All friction and the drive act on the motor; the encoder sits there too.
+"""
+
+import math
+from typing import ClassVar
+
+from tauscope.robot.document_fields import Positive
+from tauscope_sim.effects.effect import JointEffect
+from tauscope_sim.effects.fields import NotNegative
+from tauscope_sim.plant.term import Transmission
+
+
+class Backlash(JointEffect):
+    """T = k x max(0, 1 + c sgn(x) δ̇) beyond a dead zone.
+
+    joint : int
+        its number, counted from 1
+    gap : float
+        b, total lost motion [rad or m]
+    contact_stiffness : float
+        k, of teeth and transmission together [Nm/rad or N/m]
+    contact_damping : float
+        c [s/rad or s/m]
+    rotor_inertia : float
+        reflected inertia of the motor [kg m² or kg]
+    """
+
+    effect_id: ClassVar[str] = "backlash"
+    gap: Positive
+    contact_stiffness: Positive
+    contact_damping: NotNegative = 10.0
+    rotor_inertia: Positive
+
+    def transmission(self) -> Transmission:
+        """Itself."""
+        return self
+
+    def torque(self, twist: float, twist_rate: float) -> float:
+        """T [Nm or N].
+
+        Parameters
+        ----------
+        twist : float
+            δ [rad or m]
+        twist_rate : float
+            δ̇ [rad/s or m/s]
+        """
+        overlap = abs(twist) - 0.5 * self.gap
+        if overlap <= 0.0:
+            return 0.0
+        return math.copysign(self.contact_stiffness * overlap * self._damping(twist, twist_rate), twist)
+
+    def torque_slopes(self, twist: float, twist_rate: float) -> tuple[float, float]:
+        """Derivatives of T with respect to δ and δ̇.
+
+        Parameters
+        ----------
+        twist : float
+            δ [rad or m]
+        twist_rate : float
+            δ̇ [rad/s or m/s]
+        """
+        overlap = abs(twist) - 0.5 * self.gap
+        damping = self._damping(twist, twist_rate)
+        if overlap <= 0.0 or damping == 0.0:
+            return 0.0, 0.0
+        return self.contact_stiffness * damping, self.contact_stiffness * overlap * self.contact_damping
+
+    def twist_at_rest(self, torque: float) -> float:
+        """Twist at which resting teeth hold a torque [rad or m].
+
+        Parameters
+        ----------
+        torque : float
+            T [Nm or N]
+        """
+        return math.copysign(0.5 * self.gap, torque) + torque / self.contact_stiffness if torque else 0.0
+
+    def _damping(self, twist: float, twist_rate: float) -> float:
+        """Factor max(0, 1 + c sgn(δ) δ̇)."""
+        return max(0.0, 1.0 + self.contact_damping * math.copysign(twist_rate, twist * twist_rate))

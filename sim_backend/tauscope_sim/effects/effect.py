@@ -1,0 +1,155 @@
+"""What every concealed effect of the plant has in common; the hooks of which each overrides those that it needs."""
+
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.errors import ScenarioError
+from tauscope.robot.document_fields import Document, Positive
+from tauscope.robot.robot import Joint, Robot
+from tauscope_sim.effects.fields import JointNumber
+from tauscope_sim.plant.coordinates import Coordinates
+from tauscope_sim.plant.term import Term, Transmission
+
+Array = NDArray[np.float64]
+
+
+class ScenarioEntry(Document):
+    """One entry of a scenario's list of effects: its fields are the entry's keys."""
+
+    effect_id: ClassVar[str] = ""
+    """id of CONTRACT.md, the entry's key ``effect``"""
+
+    def check(self, robot: Robot) -> None:
+        """Refuse an entry that this robot cannot have.
+
+        Parameters
+        ----------
+        robot : Robot
+            the arm
+
+        Raises
+        ------
+        ScenarioError
+            naming effect and key
+        """
+        joint = getattr(self, "joint", None)
+        if joint is not None and joint > robot.joint_count:
+            raise self.refused("joint", f"is {joint}, but the arm has {robot.joint_count} joints")
+
+    def refused(self, key: str, text: str) -> ScenarioError:
+        """The error of one key.
+
+        Parameters
+        ----------
+        key : str
+            the key
+        text : str
+            what is wrong with it and what to do
+        """
+        return ScenarioError(f"{self.effect_id}.{key}: {text}")
+
+
+class Effect(ScenarioEntry):
+    """A concealed effect of arm, transmission or surroundings.
+
+    All torques are signed as what the drive has to overcome in addition: measured = rigid bodies + friction + effect.
+    """
+
+    def alter(self, robot: Robot) -> Robot:
+        """The arm as it really is, before its model is built.
+
+        Parameters
+        ----------
+        robot : Robot
+            as its robot file, and the effects before this one, describe it
+        """
+        return robot
+
+    def added_rotor_inertia(self, robot: Robot) -> Array:
+        """Reflected inertia of the motors of rigid joints, (n,) [kg m² or kg].
+
+        Parameters
+        ----------
+        robot : Robot
+            the arm
+        """
+        return np.zeros(robot.joint_count)
+
+    def transmission(self) -> Transmission | None:
+        """The compliant transmission that it makes of a joint, if it does."""
+        return None
+
+    def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
+        """What it adds to the equations of motion.
+
+        Parameters
+        ----------
+        robot : Robot
+            the arm, altered
+        coordinates : Coordinates
+            places of links and motors
+        """
+        return ()
+
+
+class JointEffect(Effect):
+    """An effect of one joint.
+
+    joint : int
+        its number, counted from 1
+    """
+
+    joint: JointNumber
+
+    @property
+    def index(self) -> int:
+        """The joint counted from 0."""
+        return self.joint - 1
+
+    def joint_of(self, robot: Robot) -> Joint:
+        """The joint that it concerns.
+
+        Parameters
+        ----------
+        robot : Robot
+            the arm
+        """
+        return robot.joints[self.index]
+
+
+class SmoothSignEffect(JointEffect):
+    """An effect of one joint in which A(v) = (2/π) arctan(K_v v) stands for the sign of velocity.
+
+    joint : int
+        its number, counted from 1
+    k_v : float or None
+        K_v; that of the joint's friction_shape where None [s/rad or s/m]
+    """
+
+    k_v: Positive | None = None
+
+    def check(self, robot: Robot) -> None:
+        """Refuse a joint that does not exist or has no K_v.
+
+        Parameters
+        ----------
+        robot : Robot
+            the arm
+        """
+        super().check(robot)
+        self.steepness(robot)
+
+    def steepness(self, robot: Robot) -> float:
+        """K_v [s/rad or s/m].
+
+        Parameters
+        ----------
+        robot : Robot
+            the arm
+        """
+        k_v = self.k_v if self.k_v is not None else self.joint_of(robot).friction_shape.k_v
+        if k_v is None:
+            raise self.refused("k_v", "is missing, and the robot file states none for this joint; state k_v [s/rad]")
+        return k_v

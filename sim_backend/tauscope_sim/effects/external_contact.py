@@ -1,0 +1,110 @@
+"""Contact with the surroundings in a bounded time window: the tool presses with F, or one joint with a torque.
+
+With w(t) = 1 in the window (profile ``rectangular``) or sin(π (t - t₀)/T) (``half_sine``), and J(q) the Jacobian of the
+contact point:
+
+    τ = J(q)ᵀ F w(t)       [Nm], F in N, base axes: the force that the tool exerts on the surroundings
+    τ_j = c w(t)           [Nm or N], where a joint and a torque are stated instead
+"""
+
+import math
+from typing import Annotated, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from tauscope.robot.document_fields import Number, Positive, Vector
+from tauscope.robot.robot import Robot
+from tauscope_sim.effects.effect import Effect
+from tauscope_sim.effects.fields import JointNumber, NotNegative, one_of, zero_vector
+from tauscope_sim.plant.coordinates import Coordinates
+from tauscope_sim.plant.rigid_bodies import RigidBodies
+from tauscope_sim.plant.term import Forces, Moment, Term
+
+Array = NDArray[np.float64]
+
+
+class ExternalContact(Effect):
+    """Force at the tool, or torque at one joint, while t₀ ≤ t < t₀ + T.
+
+    force : list of float or None
+        F [N]
+    offset : list of float
+        contact point in the last link's frame [m]
+    joint : int or None
+        joint, counted from 1
+    torque : float or None
+        c [Nm or N]
+    start : float
+        t₀ [s]
+    duration : float
+        T [s]
+    profile : str
+        ``half_sine`` or ``rectangular``
+    """
+
+    effect_id: ClassVar[str] = "external_contact"
+    force: Vector | None = None
+    offset: Vector = Field(default_factory=zero_vector)
+    joint: JointNumber | None = None
+    torque: Number | None = None
+    start: NotNegative
+    duration: Positive
+    profile: Annotated[str, one_of("half_sine", "rectangular")] = "half_sine"
+
+    def check(self, robot: Robot) -> None:
+        """Refuse anything but a force, or a joint and a torque.
+
+        Parameters
+        ----------
+        robot : Robot
+            the arm
+        """
+        super().check(robot)
+        if self.force is not None and (self.joint is not None or self.torque is not None):
+            raise self.refused(
+                "force", "stands beside joint or torque; state a force at the tool or a torque at a joint"
+            )
+        if self.force is None and (self.joint is None or self.torque is None):
+            raise self.refused("force", "is missing; state it, or joint and torque")
+
+    def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
+        """The contact.
+
+        Parameters
+        ----------
+        robot : Robot
+            the arm
+        coordinates : Coordinates
+            places of links and motors
+        """
+        return (_Contact(self),)
+
+
+class _Contact(Term):
+    """Torque on the links within the window."""
+
+    def __init__(self, contact: ExternalContact) -> None:
+        self._force = None if contact.force is None else np.array(contact.force)
+        self._offset = np.array(contact.offset)
+        self._joint, self._torque = (contact.joint or 1) - 1, contact.torque or 0.0
+        self._start, self._duration = contact.start, contact.duration
+        self._smooth = contact.profile == "half_sine"
+        self.event_times = (contact.start, contact.start + contact.duration)
+        self._touching = False
+
+    def begin(self, time: float, bodies: RigidBodies) -> None:
+        """Take note whether the window is open."""
+        self._touching = self.event_times[0] <= time < self.event_times[1]
+
+    def act(self, moment: Moment, forces: Forces) -> None:
+        """Add the torque on the links."""
+        if not self._touching:
+            return
+        share = math.sin(math.pi * (moment.time - self._start) / self._duration) if self._smooth else 1.0
+        if self._force is None:
+            forces.link[self._joint] += share * self._torque
+        else:
+            torque = share * (self._force @ moment.bodies.tool_jacobian(self._offset))
+            forces.link = [carried + pushed for carried, pushed in zip(forces.link, torque.tolist(), strict=True)]

@@ -1,0 +1,98 @@
+"""Friction on the sum or difference of two joints' motion, as a wrist with bevel gears has it.
+
+With w = v_j + s v_k, s = ±1, and f = c A(w) + d w, joint j feels τ_j = f and joint k feels τ_k = s f;
+c in Nm, d in Nm s/rad, A(w) = (2/π) arctan(K_v w) with the K_v of joint j.
+"""
+
+from typing import Annotated, ClassVar
+
+from tauscope.robot.document_fields import Number
+from tauscope.robot.robot import Robot
+from tauscope_sim.effects.effect import SmoothSignEffect
+from tauscope_sim.effects.fields import JointNumber, one_of
+from tauscope_sim.friction import smooth_sign, smooth_sign_slope
+from tauscope_sim.plant.coordinates import Coordinates
+from tauscope_sim.plant.term import Forces, Moment, Slopes, Term
+
+
+class FrictionCoupling(SmoothSignEffect):
+    """τ_j = f, τ_k = s f with f = c A(v_j + s v_k) + d (v_j + s v_k).
+
+    joint : int
+        j, counted from 1
+    k_v : float or None
+        K_v; that of the joint's friction_shape where None [s/rad or s/m]
+    other_joint : int
+        k, counted from 1
+    of : str
+        ``sum`` or ``difference`` of the motions
+    coulomb : float
+        c [Nm or N]
+    viscous : float
+        d [Nm s/rad or N s/m]
+    """
+
+    effect_id: ClassVar[str] = "friction_coupling"
+    other_joint: JointNumber
+    of: Annotated[str, one_of("sum", "difference")] = "sum"
+    coulomb: Number = 0.0
+    viscous: Number = 0.0
+
+    def check(self, robot: Robot) -> None:
+        """Refuse a joint that does not exist or is coupled with itself.
+
+        Parameters
+        ----------
+        robot : Robot
+            the arm
+        """
+        super().check(robot)
+        if self.other_joint > robot.joint_count:
+            raise self.refused("other_joint", f"is {self.other_joint}, but the arm has {robot.joint_count} joints")
+        if self.other_joint == self.joint:
+            raise self.refused("other_joint", f"is {self.joint} too; name the joint that it is coupled with")
+
+    def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
+        """The coupling.
+
+        Parameters
+        ----------
+        robot : Robot
+            the arm
+        coordinates : Coordinates
+            places of links and motors
+        """
+        joints = (self.index, self.other_joint - 1)
+        places = (coordinates.motor(joints[0]), coordinates.motor(joints[1]))
+        sign = 1.0 if self.of == "sum" else -1.0
+        return (_Coupling(joints, places, sign, self.coulomb, self.viscous, self.steepness(robot)),)
+
+
+class _Coupling(Term):
+    """Friction between two joints."""
+
+    def __init__(
+        self, joints: tuple[int, int], places: tuple[int, int], sign: float, coulomb: float, viscous: float, k_v: float
+    ) -> None:
+        self._joints, self._places, self._sign = joints, places, sign
+        self._coulomb, self._viscous, self._k_v = coulomb, viscous, k_v
+
+    def act(self, moment: Moment, forces: Forces) -> None:
+        """Add f to the one joint and s f to the other."""
+        w = self._motion(moment)
+        friction = self._coulomb * smooth_sign(w, self._k_v) + self._viscous * w
+        forces.friction[self._joints[0]] += friction
+        forces.friction[self._joints[1]] += self._sign * friction
+
+    def linearise(self, moment: Moment, slopes: Slopes) -> None:
+        """Add df/dw, times s for each time that the other joint is concerned."""
+        slope = self._coulomb * smooth_sign_slope(self._motion(moment), self._k_v) + self._viscous
+        first, second = self._places
+        slopes.by_velocity[first, first] += slope
+        slopes.by_velocity[second, second] += slope
+        slopes.by_velocity[first, second] += self._sign * slope
+        slopes.by_velocity[second, first] += self._sign * slope
+
+    def _motion(self, moment: Moment) -> float:
+        """Sum or difference of the velocities, w."""
+        return moment.velocity[self._places[0]] + self._sign * moment.velocity[self._places[1]]

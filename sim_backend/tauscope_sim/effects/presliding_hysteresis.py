@@ -1,0 +1,133 @@
+"""Bristle-like rise of friction after each reversal: the Coulomb part of the joint's friction becomes a state.
+
+The bristles' deflection z, as a part of their largest, follows the motor's velocity v over a distance x_s [rad or m]:
+
+    Dahl:   ż = (v - |v| z) / x_s,            τ = τ_s z - τ_s A(v)
+    LuGre:  ż = (v - |v| z / g(v)) / x_s,     τ = τ_s z + σ₁ x_s ż - τ_s A(v) - τ_sc A_δ(v),
+            g(v) = 1 + (τ_sc/τ_s) (2/π) arctan(δ |v|).
+
+What is subtracted is the static friction that the bristles replace (`tauscope_sim.friction`): steady sliding, where
+z = ±1 or ±g(v), takes as much torque as before. τ_s, τ_sc in Nm (N), σ₁ in Nm s/rad (N s/m), z without unit.
+"""
+
+import math
+from typing import Annotated, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.robot.document_fields import Positive
+from tauscope.robot.robot import Robot
+from tauscope_sim.effects.effect import JointEffect
+from tauscope_sim.effects.fields import NotNegative, one_of
+from tauscope_sim.friction import shape_constants, smooth_sign, smooth_sign_slope
+from tauscope_sim.plant.coordinates import Coordinates
+from tauscope_sim.plant.term import Forces, Moment, Slopes, Term
+
+Array = NDArray[np.float64]
+
+
+class PreslidingHysteresis(JointEffect):
+    """Dahl's or the LuGre model in place of the joint's Coulomb friction.
+
+    joint : int
+        its number, counted from 1
+    distance : float
+        x_s, over which friction builds up [rad or m]
+    bristles : str
+        ``dahl`` or ``lugre``
+    damping : float
+        σ₁ of the LuGre model [Nm s/rad or N s/m]
+    """
+
+    effect_id: ClassVar[str] = "presliding_hysteresis"
+    distance: Positive
+    bristles: Annotated[str, one_of("dahl", "lugre")] = "dahl"
+    damping: NotNegative = 0.0
+
+    def check(self, robot: Robot) -> None:
+        """Refuse a joint without Coulomb friction, and damping of Dahl's bristles.
+
+        Parameters
+        ----------
+        robot : Robot
+            the arm
+        """
+        super().check(robot)
+        friction = robot.model.friction
+        coefficients = friction[self.index] if friction is not None else None
+        if coefficients is None or min(coefficients.stiction, coefficients.stiction + coefficients.stribeck) <= 0.0:
+            raise self.refused("joint", "has no Coulomb friction in the robot file that bristles could replace")
+        if self.bristles == "dahl" and self.damping > 0.0:
+            raise self.refused("damping", "belongs to the LuGre model; state bristles: lugre or remove it")
+
+    def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
+        """The bristles.
+
+        Parameters
+        ----------
+        robot : Robot
+            the arm
+        coordinates : Coordinates
+            places of links and motors
+        """
+        friction = (robot.model.friction or ())[self.index]
+        shape = shape_constants([friction], [self.joint_of(robot).friction_shape])[0]
+        levels = (friction.stiction, friction.stribeck if self.bristles == "lugre" else 0.0)
+        place = coordinates.motor(self.index)
+        return (_Bristles(self.index, place, levels, shape, self.distance, self.damping),)
+
+
+class _Bristles(Term):
+    """LuGre's bristles; Dahl's are those without Stribeck part and damping."""
+
+    state_count = 1
+
+    def __init__(
+        self,
+        joint: int,
+        place: int,
+        levels: tuple[float, float],
+        shape: tuple[float, float],
+        distance: float,
+        damping: float,
+    ) -> None:
+        self._joint, self._place = joint, place
+        self._stiction, self._stribeck = levels
+        self._k_v, self._delta = shape
+        self._distance, self._damping = distance, damping * distance
+
+    def initial_states(self) -> tuple[float, ...]:
+        """Bristles that stand upright."""
+        return (0.0,)
+
+    def act(self, moment: Moment, forces: Forces) -> None:
+        """Add the bristles' torque less the static friction that they replace."""
+        v, z = moment.velocity[self._place], moment.states[self.first_state]
+        replaced = self._stiction * smooth_sign(v, self._k_v) + self._stribeck * smooth_sign(v, self._delta)
+        forces.friction[self._joint] += self._stiction * z + self._damping * self._rate(v, z) - replaced
+
+    def rates(self, moment: Moment, rates: list[float]) -> None:
+        """Write ż."""
+        rates[self.first_state] = self._rate(moment.velocity[self._place], moment.states[self.first_state])
+
+    def linearise(self, moment: Moment, slopes: Slopes) -> None:
+        """Add the derivatives of torque and ż."""
+        place, state = self._place, self.first_state
+        v, z = moment.velocity[place], moment.states[state]
+        level = self._level(v)
+        by_velocity = (1.0 - math.copysign(z / level, v)) / self._distance
+        by_state = -abs(v) / level / self._distance
+        slopes.rate_by_velocity[state, place] += by_velocity
+        slopes.rate_by_state[state, state] += by_state
+        replaced = self._stiction * smooth_sign_slope(v, self._k_v) + self._stribeck * smooth_sign_slope(v, self._delta)
+        slopes.by_velocity[place, place] += self._damping * by_velocity - replaced
+        slopes.by_state[place, state] += self._stiction + self._damping * by_state
+
+    def _level(self, v: float) -> float:
+        """Steady deflection at a speed, g(v)."""
+        return 1.0 + self._stribeck / self._stiction * smooth_sign(abs(v), self._delta)
+
+    def _rate(self, v: float, z: float) -> float:
+        """Rate of deflection, ż."""
+        return (v - abs(v) * z / self._level(v)) / self._distance

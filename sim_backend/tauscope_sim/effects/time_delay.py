@@ -1,0 +1,84 @@
+"""Torque and position channels shifted in time: the recorded torque at t is that of t - d, d in s.
+
+Any fraction of a sample is possible: between samples the torque is taken as linear. Where d is negative the position is
+late by -d instead: no sensor looks into the future. Before anything as old is known, the oldest sample stands.
+"""
+
+from collections import deque
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.robot.document_fields import Nonzero
+from tauscope.robot.robot import Robot
+from tauscope_sim.effects.fields import JointNumber
+from tauscope_sim.effects.sensor_effect import Channel, SensorEffect
+
+Array = NDArray[np.float64]
+
+LONGEST_DELAY = 1.0
+"""What is late by more is no delay of a channel [s]."""
+
+
+class TimeDelay(SensorEffect):
+    """τ_recorded(t) = τ(t - d).
+
+    delay : float
+        d, by which torque is late relative to position; negative: position is late [s]
+    joint : int or None
+        its number, counted from 1; all joints where None
+    """
+
+    effect_id: ClassVar[str] = "time_delay"
+    delay: Nonzero
+    joint: JointNumber | None = None
+
+    def check(self, robot: Robot) -> None:
+        """Refuse a delay that no channel has.
+
+        Parameters
+        ----------
+        robot : Robot
+            the arm
+        """
+        super().check(robot)
+        if abs(self.delay) > LONGEST_DELAY:
+            raise self.refused("delay", f"is {self.delay:g} s; state at most {LONGEST_DELAY:g} s")
+
+    def channel(self, joint_count: int) -> Channel:
+        """The delay line.
+
+        Parameters
+        ----------
+        joint_count : int
+            number of joints n
+        """
+        columns = slice(None) if self.joint is None else slice(self.joint - 1, self.joint)
+        return _DelayLine(self.delay, columns)
+
+
+class _DelayLine:
+    """Remembers samples for as long as the delay."""
+
+    def __init__(self, delay: float, columns: slice) -> None:
+        self._delay, self._columns = delay, columns
+        self._samples: deque[tuple[float, Array]] = deque()
+
+    def pass_on(self, time: float, position: Array, torque: Array) -> tuple[Array, Array]:
+        """Replace torque, or position, by what it was."""
+        late = torque if self._delay > 0.0 else position
+        recorded = late.copy()
+        recorded[self._columns] = self._past(time, late[self._columns], abs(self._delay))
+        return (position, recorded) if self._delay > 0.0 else (recorded, torque)
+
+    def _past(self, time: float, value: Array, age: float) -> Array:
+        """The channel as it was, and one more sample to remember."""
+        samples, instant = self._samples, time - age
+        samples.append((time, value.copy()))
+        while len(samples) > 1 and samples[1][0] <= instant:
+            samples.popleft()
+        (before, old), (after, new) = samples[0], samples[min(1, len(samples) - 1)]
+        if instant <= before or after == before:
+            return old
+        return old + (instant - before) / (after - before) * (new - old)

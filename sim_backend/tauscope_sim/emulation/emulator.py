@@ -1,0 +1,148 @@
+"""What the server runs: anything that takes bytes of a master, lets time pass, and answers."""
+
+from typing import Any, ClassVar, Protocol
+
+from tauscope_sim.emulation.device_clock import MOST_STEPS
+
+
+class Emulator(Protocol):
+    """Devices on one bus with the arm that they move; the instants are those of the server's clock."""
+
+    @property
+    def now_s(self) -> float:
+        """Instant up to which the devices have come [s]."""
+        ...
+
+    @property
+    def next_due_s(self) -> float:
+        """When the next bytes reach the master; infinite where none are under way [s]."""
+        ...
+
+    def hears(self, baud: int) -> bool:
+        """Whether a master that has set this baud rate is understood.
+
+        Parameters
+        ----------
+        baud : int
+            of the master's port [bit/s]
+        """
+        ...
+
+    def receive(self, data: bytes, now_s: float) -> None:
+        """Take bytes of the master.
+
+        Parameters
+        ----------
+        data : bytes
+            as they came
+        now_s : float
+            when [s]
+        """
+        ...
+
+    def advance_to(self, now_s: float, most_steps: int = MOST_STEPS) -> None:
+        """Let time pass: not all at once where the machine stood still, so that the master is heard in between.
+
+        Parameters
+        ----------
+        now_s : float
+            present instant [s]
+        most_steps : int
+            after which it waits to be asked again
+        """
+        ...
+
+    def due(self, now_s: float) -> bytes:
+        """Bytes that have reached the master by now.
+
+        Parameters
+        ----------
+        now_s : float
+            present instant [s]
+        """
+        ...
+
+    def describe(self) -> dict[str, Any]:
+        """What the devices are doing, as plain data."""
+        ...
+
+    def answer(self, request: dict[str, Any]) -> dict[str, int] | None:
+        """Do what a test asks; returns ``{"value": …}`` where it asks for one.
+
+        Parameters
+        ----------
+        request : dict
+            as `EmulatorProcess` writes it; ``advance_to`` and ``reset`` are the server's own, and done already
+        """
+        ...
+
+
+class Port(Protocol):
+    """The devices' end of what a master opens."""
+
+    @property
+    def baud(self) -> int:
+        """What the master has set, or a rate that is understood where there is none to set [bit/s]."""
+        ...
+
+    def fileno(self) -> int:
+        """Descriptor to wait on."""
+        ...
+
+    def read(self) -> bytes | None:
+        """What a master sent; None where no master has it open."""
+        ...
+
+    def write(self, data: bytes) -> None:
+        """Send to the master; lost where there is none, or where it reads nothing.
+
+        Parameters
+        ----------
+        data : bytes
+            whole frames
+        """
+        ...
+
+    def close(self) -> None:
+        """Hang up."""
+        ...
+
+
+class EmulatorOrder(Protocol):
+    """What the server needs of the order that started it."""
+
+    module: ClassVar[str]
+    """What runs as the process: the package of the bus."""
+
+    @property
+    def control(self) -> str:
+        """Unix socket for the test."""
+        ...
+
+    @property
+    def trace(self) -> str | None:
+        """File that what the devices do is appended to."""
+        ...
+
+    @property
+    def stepped(self) -> bool:
+        """Whether time passes only when a test says so; else it is the machine's."""
+        ...
+
+    def to_json(self) -> str:
+        """The order as text, which the process is started with."""
+        ...
+
+    def open_port(self) -> Port:
+        """What the master opens."""
+        ...
+
+    def build(self, now_s: float) -> Emulator:
+        """The emulator.
+
+        Parameters
+        ----------
+        now_s : float
+            present instant [s]
+        """
+        ...

@@ -1,0 +1,184 @@
+"""An emulator as a process: a port for the master, a socket for the test, a trace of what was done."""
+
+import contextlib
+import json
+import os
+import select
+import socket
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from tauscope_sim.emulation.arrivals import Arrivals
+from tauscope_sim.emulation.device_clock import MOST_STEPS
+from tauscope_sim.emulation.emulator import EmulatorOrder
+from tauscope_sim.own_process import take_precedence
+
+_PERIOD_S = 0.001
+_TRACE_PERIOD_S = 0.002
+_LONGEST_MESSAGE = 65_536
+_ROUNDING_S = 1e-9
+"""What is due is not put off because a sum of steps falls short of it by its rounding."""
+
+_AT_ONCE_S = 0.02
+"""Where time is stepped, a master that waits lets none pass: what is due so soon arrives at once."""
+
+
+class EmulatorServer:
+    """Runs an emulator until its standard input ends, against the machine's clock or one that a test moves on."""
+
+    def __init__(self, order: EmulatorOrder) -> None:
+        """Open everything.
+
+        Parameters
+        ----------
+        order : EmulatorOrder
+            what to emulate
+        """
+        self._order = order
+        self._port = order.open_port()
+        self._tests = _listen(order.control)
+        self._test: socket.socket | None = None
+        self._pending = b""
+        self._trace = (
+            None if order.trace is None else os.open(order.trace, os.O_CREAT | os.O_APPEND | os.O_WRONLY, 0o644)
+        )
+        self._begin()
+        self._arrivals = None if order.stepped else Arrivals(self._port)
+        self._running = True
+        self._master_is_there = True
+
+    def run(self) -> None:
+        """Serve."""
+        take_precedence()
+        try:
+            with self._arrivals or contextlib.nullcontext():
+                print("ready", flush=True)  # noqa: T201 (whoever started this waits for the line)
+                while self._running:
+                    ready = self._wait()
+                    self._serve_master()
+                    self._serve_test(ready)
+                    self._write_trace()
+        finally:
+            self._port.close()
+            Path(self._order.control).unlink(missing_ok=True)
+
+    def _begin(self) -> None:
+        """Devices as delivered, the arm where it stands at first, the clock at zero, and a trace of only that."""
+        self._emulator = self._order.build(0.0)
+        self._start_ns = time.monotonic_ns()
+        self._stepped_s = 0.0
+        self._next_trace_s = 0.0
+        if self._trace is not None:
+            os.ftruncate(self._trace, 0)
+        self._write_trace()
+
+    @property
+    def _now_s(self) -> float:
+        return self._stepped_s if self._order.stepped else self._instant(time.monotonic_ns())
+
+    def _wait(self) -> list[Any]:
+        """Until something comes, an answer is due, or the physics want their step; what can be read then."""
+        due_s = self._emulator.next_due_s
+        if not self._order.stepped:
+            due_s = min(due_s, self._emulator.now_s + _PERIOD_S)
+        wait_s = min(_PERIOD_S, max(0.0, due_s - self._now_s))
+        sources: list[Any] = [self._tests, sys.stdin]
+        if self._arrivals is not None:
+            sources.append(self._arrivals)
+        elif self._master_is_there:
+            sources.append(self._port)
+        if self._test is not None:
+            sources.append(self._test)
+        ready = select.select(sources, [], [], wait_s)[0]
+        if sys.stdin in ready and not os.read(sys.stdin.fileno(), 1):
+            self._running = False
+        return ready
+
+    def _serve_master(self) -> None:
+        """Take what the master sent, let time pass, send what has arrived at the master.
+
+        By the machine's clock no answer waits for more than the step that is under way: a master takes what comes much
+        later than usual for no sample.
+        """
+        pieces, now_s = self._received()
+        for piece, arrival_s in pieces:
+            if self._emulator.hears(self._port.baud):
+                self._emulator.receive(piece, arrival_s)
+        if pieces:
+            self._send()
+        self._emulator.advance_to(now_s, MOST_STEPS if self._order.stepped else 1)
+        self._send()
+
+    def _send(self) -> None:
+        """What has arrived at the master by now."""
+        if arrived := self._emulator.due(self._now_s + (_AT_ONCE_S if self._order.stepped else 0.0)):
+            self._port.write(arrived)
+
+    def _received(self) -> tuple[list[tuple[bytes, float]], float]:
+        """What the master sent since the last call, each piece with its instant, and until when that is all [s]."""
+        if self._arrivals is not None:
+            pieces, until_ns = self._arrivals.take()
+            return [(piece, self._instant(at_ns)) for piece, at_ns in pieces], self._instant(until_ns)
+        piece = self._port.read()
+        self._master_is_there = piece is not None
+        return [(piece, self._stepped_s)] if piece else [], self._stepped_s
+
+    def _instant(self, monotonic_ns: int) -> float:
+        """By the devices' clock [s]."""
+        return max(0.0, (monotonic_ns - self._start_ns) * 1e-9)
+
+    def _serve_test(self, ready: list[Any]) -> None:
+        """Answer the test, a line of JSON each way."""
+        if self._tests in ready:
+            self._test = self._tests.accept()[0]
+            self._test.setblocking(False)
+            return
+        if self._test is None or self._test not in ready:
+            return
+        received = self._test.recv(_LONGEST_MESSAGE)
+        if not received:
+            self._test, self._pending = None, b""
+            return
+        *lines, self._pending = (self._pending + received).split(b"\n")
+        for line in lines:
+            request = json.loads(line)
+            if "advance_to" in request:
+                # what the master sent before that came before, and what is due comes before the answer
+                self._serve_master()
+                self._step_to(request["advance_to"])
+                self._send()
+            if "reset" in request:
+                self._begin()
+            answer = self._emulator.answer(request) or self._describe()
+            self._test.setblocking(True)
+            self._test.sendall(json.dumps(answer).encode() + b"\n")
+            self._test.setblocking(False)
+
+    def _step_to(self, instant_s: float) -> None:
+        """Let time pass where only that makes it pass."""
+        while self._stepped_s < instant_s:
+            self._stepped_s = min(instant_s, self._stepped_s + _PERIOD_S)
+            self._emulator.advance_to(self._stepped_s + _ROUNDING_S)
+            self._write_trace()
+
+    def _describe(self) -> dict[str, Any]:
+        """What the devices are doing, and when, by the machine's clock."""
+        return {**self._emulator.describe(), "monotonic_ns": time.monotonic_ns()}
+
+    def _write_trace(self) -> None:
+        """Append where the arm is, one JSON line at a time; a line is whole or not there."""
+        if self._trace is None or self._emulator.now_s + _ROUNDING_S < self._next_trace_s:
+            return
+        self._next_trace_s = self._emulator.now_s + _TRACE_PERIOD_S
+        os.write(self._trace, json.dumps(self._describe()).encode() + b"\n")
+
+
+def _listen(path: str) -> socket.socket:
+    Path(path).unlink(missing_ok=True)
+    listener = socket.socket(socket.AF_UNIX)
+    listener.bind(path)
+    listener.listen(1)
+    listener.setblocking(False)
+    return listener

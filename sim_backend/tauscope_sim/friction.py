@@ -1,0 +1,115 @@
+"""Static joint friction with stiction, Stribeck effect and viscous part, as physics to simulate."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.errors import RobotFileError
+from tauscope.robot.robot import FrictionCoefficients, FrictionShape
+
+Array = NDArray[np.float64]
+
+
+def static_friction_torque(
+    velocity: Array, friction: Sequence[FrictionCoefficients], friction_shape: Sequence[FrictionShape]
+) -> Array:
+    """Friction torque τ_f = τ_s S₀(v) + τ_sc (2/π) arctan(v δ) + τ_v v, with S₀(v) = (2/π) arctan(v K_v).
+
+    Parameters
+    ----------
+    velocity : (N, n) float64
+        v = q̇ [rad/s or m/s]
+    friction : sequence of FrictionCoefficients
+        τ_s, τ_sc, τ_v, one entry a joint [Nm, Nm, Nm s/rad; N, N, N s/m]
+    friction_shape : sequence of FrictionShape
+        K_v and δ, one entry a joint [s/rad or s/m]; may be None where the coefficient that it shapes is zero
+
+    Returns
+    -------
+    (N, n) float64
+        τ_f, positive where the drive has to overcome it in the positive direction [Nm or N]
+
+    Raises
+    ------
+    RobotFileError
+        where a shape constant that is needed is None, or where the number of entries is not the number of joints
+
+    Notes
+    -----
+    The paper's equations (7) and (8); its (7) prints the viscous part without v, its (9) has it.
+    """
+    joint_count = velocity.shape[1]
+    if len(friction) != joint_count or len(friction_shape) != joint_count:
+        raise RobotFileError(
+            f"friction has {len(friction)} and friction_shape {len(friction_shape)} entries; "
+            f"the arm has {joint_count} joints: give one entry a joint"
+        )
+    constants = shape_constants(friction, friction_shape)
+    torque = np.empty_like(velocity)
+    for column, (coefficients, (k_v, delta)) in enumerate(zip(friction, constants, strict=True)):
+        speed = velocity[:, column]
+        stiction = coefficients.stiction * np.arctan(k_v * speed) / (0.5 * math.pi)
+        stribeck = coefficients.stribeck * np.arctan(delta * speed) / (0.5 * math.pi)
+        torque[:, column] = stiction + stribeck + coefficients.viscous * speed
+    return torque
+
+
+def shape_constants(
+    friction: Sequence[FrictionCoefficients], friction_shape: Sequence[FrictionShape]
+) -> list[tuple[float, float]]:
+    """K_v and δ of each joint; zero where the coefficient that they shape is zero and the robot file states none.
+
+    Parameters
+    ----------
+    friction : sequence of FrictionCoefficients
+        τ_s, τ_sc, τ_v, one entry a joint [Nm, Nm, Nm s/rad; N, N, N s/m]
+    friction_shape : sequence of FrictionShape
+        K_v and δ, one entry a joint [s/rad or s/m]
+
+    Raises
+    ------
+    RobotFileError
+        where a shape constant that is needed is None
+    """
+    constants: list[tuple[float, float]] = []
+    for number, (coefficients, shape) in enumerate(zip(friction, friction_shape, strict=True), 1):
+        place = f"joint {number}: friction_shape"
+        k_v = _needed(shape.k_v, coefficients.stiction, f"{place}.k_v")
+        constants.append((k_v, _needed(shape.delta, coefficients.stribeck, f"{place}.delta")))
+    return constants
+
+
+def _needed(slope: float | None, level: float, place: str) -> float:
+    """Return the slope, which may be missing only where the level that it shapes is zero."""
+    if slope is None and level != 0.0:
+        raise RobotFileError(f"{place} is missing; a simulation with friction needs it [s/rad or s/m]")
+    return 0.0 if slope is None else slope
+
+
+def smooth_sign(velocity: float, k_v: float) -> float:
+    """A(v) = (2/π) arctan(K_v v), the continuous stand-in for sgn v, equation (8).
+
+    Parameters
+    ----------
+    velocity : float
+        v [rad/s or m/s]
+    k_v : float
+        K_v [s/rad or s/m]
+    """
+    return math.atan(k_v * velocity) / (0.5 * math.pi)
+
+
+def smooth_sign_slope(velocity: float, k_v: float) -> float:
+    """dA/dv = (2/π) K_v / (1 + (K_v v)²) [s/rad or s/m].
+
+    Parameters
+    ----------
+    velocity : float
+        v [rad/s or m/s]
+    k_v : float
+        K_v [s/rad or s/m]
+    """
+    scaled = k_v * velocity
+    return k_v / (1.0 + scaled * scaled) / (0.5 * math.pi)

@@ -1,0 +1,223 @@
+"""The robot file's arm as a MuJoCo model: joints and rigid links, nothing else."""
+
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's extension modules come without type stubs)
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from tauscope.errors import RobotFileError, TauscopeError, UnphysicalModelError
+from tauscope.robot.robot import Joint, JointType, LinkInertia, Robot, Segment
+
+Array = NDArray[np.float64]
+
+LEAST_INERTIA = 1e-12
+"""Added to each principal moment of inertia [kg m²]: a slender rod has a zero one, MuJoCo refuses less than 1e-15."""
+
+LEAST_MASS = 1e-12
+"""Mass given to a massless link [kg], for the same reason."""
+
+INERTIA_TOLERANCE = 1e-9
+"""Negative moments up to this part of the inertia about the link frame's origin are rounding of the robot file."""
+
+_JOINT_TYPES = {
+    JointType.REVOLUTE: mujoco.mjtJoint.mjJNT_HINGE,
+    JointType.PRISMATIC: mujoco.mjtJoint.mjJNT_SLIDE,
+}
+
+
+def build_spec(robot: Robot) -> mujoco.MjSpec:
+    """Editable MuJoCo model of an arm: ``robot.segments`` as joints, ``robot.model.links`` as rigid bodies.
+
+    The generalised coordinates are the joint variables of the robot file, in chain order. There are no geometries, no
+    joint limits, no damping and no actuators: what is not in the robot file is not in the model. Friction is not part
+    of it either; see `tauscope_sim.friction`.
+
+    Parameters
+    ----------
+    robot : Robot
+        the arm; its model block has to hold the links
+
+    Returns
+    -------
+    mujoco.MjSpec
+        body ``link<j>`` is link frame j, joint names are the robot file's
+
+    Raises
+    ------
+    RobotFileError
+        where the robot file states no links, or where MuJoCo refuses the model
+    UnphysicalModelError
+        where a link is no rigid body: negative mass, or moments of inertia that no mass distribution has
+    """
+    links = robot.model.links
+    if links is None or len(links) != robot.joint_count:
+        stated = 0 if links is None else len(links)
+        raise RobotFileError(
+            f"{_origin(robot)}: model.links states {stated} of {robot.joint_count} links; "
+            "a simulation needs mass, first_moment and inertia of each"
+        )
+    spec = mujoco.MjSpec()
+    spec.modelname = robot.name
+    spec.compiler.degree = False
+    spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
+    spec.option.gravity = robot.gravity
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
+    spec.option.timestep = 1e-3
+    body = spec.worldbody
+    with _mujoco_refusals(robot):
+        for number, (joint, segment, link) in enumerate(zip(robot.joints, robot.segments, links, strict=True), 1):
+            body = body.add_body(name=f"link{number}")
+            _place(body, joint, segment)
+            _weigh(body, link, f"{_origin(robot)}: model.links, link {number}")
+    return spec
+
+
+def build_model(robot: Robot) -> mujoco.MjModel:
+    """Compiled MuJoCo model of an arm; see `build_spec`.
+
+    Parameters
+    ----------
+    robot : Robot
+        the arm; its model block has to hold the links
+
+    Returns
+    -------
+    mujoco.MjModel
+        ready for ``mj_inverse`` and ``mj_step``
+
+    Raises
+    ------
+    RobotFileError
+        where the robot file states no links, or where MuJoCo refuses the model
+    UnphysicalModelError
+        where a link is no rigid body
+    """
+    spec = build_spec(robot)
+    with _mujoco_refusals(robot):
+        return spec.compile()
+
+
+@contextmanager
+def _mujoco_refusals(robot: Robot) -> Iterator[None]:
+    """Name the robot where MuJoCo refuses a model, in one line."""
+    try:
+        yield
+    except TauscopeError:
+        raise
+    except ValueError as error:
+        reason = " ".join(str(error).split()).removeprefix("Error: ")
+        raise RobotFileError(f"{_origin(robot)}: MuJoCo refuses the arm ({reason}); correct the robot file") from error
+
+
+def _origin(robot: Robot) -> str:
+    """Return what a message calls the robot."""
+    return str(robot.source) if robot.source is not None else robot.name
+
+
+def _place(body: mujoco.MjsBody, joint: Joint, segment: Segment) -> None:
+    """Put the body at ``before · after`` and its joint axis where the z axis between the two placements lies."""
+    before, after = segment.before, segment.after
+    body.pos = before.translation + before.rotation @ after.translation
+    body.quat = _quaternion(before.rotation @ after.rotation)
+    # MuJoCo states the axis in the body's own frame: x = afterᵀ (z axis, origin)
+    body.add_joint(
+        name=joint.name,
+        type=_JOINT_TYPES[segment.type],
+        axis=after.rotation.T @ np.array([0.0, 0.0, 1.0]),
+        pos=-after.rotation.T @ after.translation,
+        limited=mujoco.mjtLimited.mjLIMITED_FALSE,
+    )
+
+
+def _weigh(body: mujoco.MjsBody, link: LinkInertia, place: str) -> None:
+    """Give the body its inertia."""
+    inertia = body_inertia(link, place)
+    body.explicitinertial = True
+    body.mass = inertia.mass
+    body.ipos = inertia.centre
+    body.iquat = inertia.quaternion
+    body.inertia = inertia.moments
+
+
+@dataclass(frozen=True, eq=False)
+class BodyInertia:
+    """Inertia of a body in MuJoCo's terms.
+
+    mass : float
+        m, above zero [kg]
+    centre : (3,) float64
+        centre of mass in the link frame [m]
+    quaternion : (4,) float64
+        (w, x, y, z) of the principal axes in the link frame
+    moments : (3,) float64
+        principal moments about the centre of mass, ascending, above zero [kg m²]
+    """
+
+    mass: float
+    centre: Array
+    quaternion: Array
+    moments: Array
+
+
+def body_inertia(link: LinkInertia, place: str) -> BodyInertia:
+    """Centre of mass, principal axes and principal moments of a link.
+
+    Parameters
+    ----------
+    link : LinkInertia
+        about the link frame's origin
+    place : str
+        what a message calls the link
+
+    Raises
+    ------
+    UnphysicalModelError
+        where the link is no rigid body: negative mass, or moments of inertia that no mass distribution has
+    """
+    if link.mass < 0.0:
+        raise UnphysicalModelError(f"{place}: mass {link.mass:g} kg is negative; give a mass of zero or more")
+    if link.mass == 0.0 and np.any(link.first_moment):
+        raise UnphysicalModelError(f"{place}: first_moment is not zero but mass is; give the mass or drop the moment")
+    centre = link.first_moment / link.mass if link.mass > 0.0 else np.zeros(3)
+    about_centre = link.inertia - link.mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+    moments, axes = np.linalg.eigh(about_centre)
+    if np.linalg.det(axes) < 0.0:
+        axes[:, 0] = -axes[:, 0]
+    return BodyInertia(
+        mass=max(link.mass, LEAST_MASS),
+        centre=centre,
+        quaternion=_quaternion(axes),
+        moments=_regularised(moments, float(np.trace(link.inertia)), place),
+    )
+
+
+def _regularised(moments: Array, scale: float, place: str) -> Array:
+    """Ascending principal moments with rounding removed and just enough added for MuJoCo to accept them."""
+    tolerance = INERTIA_TOLERANCE * scale
+    first, second, third = (float(moment) for moment in moments)
+    if first < -tolerance:
+        raise UnphysicalModelError(
+            f"{place}: the inertia about the centre of mass has a negative principal moment {first:.3g} kg m²; "
+            "check inertia (about the frame's origin), mass and first_moment"
+        )
+    if third - second - first > tolerance:
+        raise UnphysicalModelError(
+            f"{place}: principal moments {first:.3g}, {second:.3g}, {third:.3g} kg m² about the centre of mass break "
+            "the triangle inequality; check inertia (about the frame's origin), mass and first_moment"
+        )
+    first, second = max(first, 0.0), max(second, 0.0)
+    # a flat body has third = first + second: rounding may put it a hair above, which MuJoCo refuses
+    first += max(0.0, third - second - first)
+    return np.array([first, second, third]) + max(LEAST_INERTIA, 1e-13 * scale)
+
+
+def _quaternion(rotation: Array) -> Array:
+    """Compute the unit quaternion (w, x, y, z) of a rotation matrix."""
+    return Rotation.from_matrix(rotation).as_quat(scalar_first=True)

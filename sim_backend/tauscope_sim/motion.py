@@ -1,0 +1,172 @@
+"""Random Fourier motions: band-limited, periodic, within the joints' limits. Random, not optimised for excitation."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.errors import RecordingError, RobotFileError
+from tauscope.robot.robot import Joint
+
+Array = NDArray[np.float64]
+
+
+LEAST_HARMONICS = 2
+"""One harmonic alone cannot be at rest, with zero acceleration, at the ends of its period."""
+
+
+@dataclass(frozen=True, eq=False)
+class MotionSamples:
+    """A motion at given instants.
+
+    position, velocity, acceleration : (N, n) float64
+        q, q̇, q̈ [rad or m, and per s, per s²]
+    """
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+
+@dataclass(frozen=True, eq=False)
+class FourierMotion:
+    """A finite Fourier series a joint, the form of the paper's section 5.2 about a centre position.
+
+    period_s : float
+        duration of one period, 2π/ω_f [s]
+    centre : (n,) float64
+        mean position [rad or m]
+    cosine : (n, M) float64
+        a_l, velocity amplitude of the cosine of harmonic l [rad/s or m/s]
+    sine : (n, M) float64
+        b_l, velocity amplitude of the sine of harmonic l [rad/s or m/s]
+    """
+
+    period_s: float
+    centre: Array
+    cosine: Array
+    sine: Array
+
+    def evaluate(self, time: Array) -> MotionSamples:
+        """Exact position, velocity and acceleration.
+
+        Parameters
+        ----------
+        time : (N,) float64
+            instants since the start of a period [s]
+
+        Returns
+        -------
+        MotionSamples
+            q, q̇, q̈ at these instants
+        """
+        omega = 2.0 * np.pi / self.period_s * np.arange(1, self.cosine.shape[1] + 1)
+        phase = np.multiply.outer(time, omega)
+        cosine, sine = np.cos(phase), np.sin(phase)
+        return MotionSamples(
+            position=self.centre + sine @ (self.cosine / omega).T - cosine @ (self.sine / omega).T,
+            velocity=cosine @ self.cosine.T + sine @ self.sine.T,
+            acceleration=cosine @ (self.sine * omega).T - sine @ (self.cosine * omega).T,
+        )
+
+
+def random_fourier_motion(
+    joints: Sequence[Joint],
+    rng: np.random.Generator,
+    *,
+    period_s: float = 10.0,
+    harmonics: int = 5,
+    limit_fraction: float = 0.95,
+) -> FourierMotion:
+    """Random finite Fourier series, each joint scaled until the first of its limits is reached.
+
+    Velocity and acceleration are zero at the start and the end of the period: Σ a_l = 0 and Σ l b_l = 0. The limits
+    hold at every instant, not only at samples. A limit that is not stated does not bind.
+
+    Parameters
+    ----------
+    joints : sequence of Joint
+        their limits; each needs at least one of position, velocity and acceleration
+    rng : numpy.random.Generator
+        source of the coefficients and of the centre positions
+    period_s : float
+        duration of one period [s]
+    harmonics : int
+        number of harmonics M, at least `LEAST_HARMONICS`
+    limit_fraction : float
+        part of each limit that is used, in (0, 1]
+
+    Returns
+    -------
+    FourierMotion
+        the series of all joints
+
+    Raises
+    ------
+    RobotFileError
+        where a joint states no limit
+    RecordingError
+        where `period_s`, `harmonics` or `limit_fraction` is out of its range
+    """
+    if not (np.isfinite(period_s) and period_s > 0.0):
+        raise RecordingError(f"period_s is {period_s}; give a positive duration")
+    if harmonics < LEAST_HARMONICS:
+        raise RecordingError(
+            f"harmonics is {harmonics}; a motion that rests at its ends needs at least {LEAST_HARMONICS}"
+        )
+    if not 0.0 < limit_fraction <= 1.0:
+        raise RecordingError(f"limit_fraction is {limit_fraction}; give a number above 0 and up to 1")
+    order = np.arange(1, harmonics + 1)
+    cosine = rng.standard_normal((len(joints), harmonics))
+    cosine -= cosine.mean(axis=1, keepdims=True)
+    sine = rng.standard_normal((len(joints), harmonics))
+    sine -= np.multiply.outer(sine @ order, order) / (order @ order)
+    shape = FourierMotion(period_s, np.zeros(len(joints)), cosine, sine)
+    return _fit_into_limits(shape, joints, limit_fraction, rng)
+
+
+def _fit_into_limits(
+    shape: FourierMotion, joints: Sequence[Joint], limit_fraction: float, rng: np.random.Generator
+) -> FourierMotion:
+    """Scale and shift each joint's series so that it stays within its limits."""
+    harmonics = shape.cosine.shape[1]
+    count = 64 * harmonics
+    samples = shape.evaluate(np.arange(count) * (shape.period_s / count))
+    # Between samples a trigonometric polynomial of degree M exceeds the largest of K equispaced samples by at most
+    # 1/cos(π M / K) (Ehlich and Zeller): the limits hold everywhere.
+    between = 1.0 / np.cos(np.pi * harmonics / count)
+    middle = 0.5 * (samples.position.max(axis=0) + samples.position.min(axis=0))
+    reach = between * np.abs(samples.position - middle).max(axis=0)
+    speed = between * np.abs(samples.velocity).max(axis=0)
+    acceleration = between * np.abs(samples.acceleration).max(axis=0)
+    scale, centre = np.empty(len(joints)), np.zeros(len(joints))
+    for column, joint in enumerate(joints):
+        scale[column] = limit_fraction * _largest_scale(joint, reach[column], speed[column], acceleration[column])
+        if joint.limits.position is not None:
+            low, high = joint.limits.position
+            half_room = 0.5 * limit_fraction * (high - low) - scale[column] * reach[column]
+            centre[column] = 0.5 * (low + high) + half_room * rng.uniform(-1.0, 1.0)
+    return FourierMotion(
+        period_s=shape.period_s,
+        centre=centre - scale * middle,
+        cosine=shape.cosine * scale[:, None],
+        sine=shape.sine * scale[:, None],
+    )
+
+
+def _largest_scale(joint: Joint, reach: float, speed: float, acceleration: float) -> float:
+    """Factor at which the first of the joint's limits is reached."""
+    factors: list[float] = []
+    if joint.limits.position is not None:
+        low, high = joint.limits.position
+        factors.append(0.5 * (high - low) / reach)
+    if joint.limits.velocity is not None:
+        factors.append(joint.limits.velocity / speed)
+    if joint.limits.acceleration is not None:
+        factors.append(joint.limits.acceleration / acceleration)
+    if not factors:
+        raise RobotFileError(
+            f"joint {joint.name}: limits states neither position, velocity nor acceleration; state one to make a motion"
+        )
+    return min(factors)

@@ -1,0 +1,211 @@
+"""Equations of motion of the plant: rigid bodies, friction, concealed effects, compliant transmissions."""
+
+from collections.abc import Sequence
+from functools import reduce
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.robot.robot import Robot
+from tauscope_sim.plant.compliance import Compliance, compliant_transmissions
+from tauscope_sim.plant.coordinates import Coordinates
+from tauscope_sim.plant.loads import loaded_accelerations
+from tauscope_sim.plant.rigid_bodies import RigidBodies
+from tauscope_sim.plant.static_friction import StaticFriction
+from tauscope_sim.plant.term import Forces, Moment, PhysicalEffect, Slopes, Term
+
+Array = NDArray[np.float64]
+
+
+class EquationsOfMotion:
+    """Accelerations and rates of the plant, and their linearisation.
+
+    A rigid joint has one coordinate and obeys the equation of `tauscope_sim.plant.term`. A compliant one has two, link
+    and motor, with the transmission's torque T between them:
+
+        H(q) q̈ + h + c + link = T,      J θ̈ + friction + motor + T (1 + g) + |T| f = u.
+
+    Parameters
+    ----------
+    robot : Robot
+        the arm as its robot file describes it
+    effects : sequence of PhysicalEffect
+        what is concealed, applied in this order
+
+    Raises
+    ------
+    RobotFileError
+        where the robot file lacks what the simulation needs
+    ScenarioError
+        where effects contradict one another
+    """
+
+    def __init__(self, robot: Robot, effects: Sequence[PhysicalEffect]) -> None:
+        real = reduce(lambda arm, effect: effect.alter(arm), effects, robot)
+        count = real.joint_count
+        self._rotors = sum((effect.added_rotor_inertia(real) for effect in effects), np.zeros(count))
+        transmissions = compliant_transmissions(effects, self._rotors)
+        self.coordinates = Coordinates(count, tuple(sorted(transmissions)))
+        self._count, self._size = count, self.coordinates.size
+        self.compliance = Compliance(transmissions, self.coordinates)
+        self.bodies = RigidBodies(real, self._rotors)
+        self._terms = _terms(real, effects, self.coordinates)
+        self.state_count = _allot_states(self._terms)
+        self._acting = _overriding(self._terms, "act")
+        self._linearising = _overriding(self._terms, "linearise")
+        self._evolving = _overriding(self._terms, "rates")
+        self._heating = _overriding(self._terms, "report_temperature")
+        self._loaded = any(term.depends_on_load for term in self._terms)
+        self._plain = not (self._loaded or self._evolving or self.coordinates.compliant)
+        self.event_times = sorted({time for term in self._terms for time in term.event_times})
+        self._moment = Moment(self.coordinates, self.bodies)
+        self._forces = Forces(count)
+        self._slopes = Slopes(self.coordinates.size, self.state_count)
+        self._matrix = np.diag(np.concatenate([np.ones(count), self.compliance.rotor_inertia]))
+        self._last_load = np.ones(count)
+
+    def initial_states(self) -> list[float]:
+        """Internal states of an arm that rests, m numbers."""
+        return [state for term in self._terms for state in term.initial_states()]
+
+    def begin(self, time: float) -> None:
+        """Let the terms take note that an interval without events begins.
+
+        Parameters
+        ----------
+        time : float
+            its first instant [s]
+        """
+        for term in self._terms:
+            term.begin(time, self.bodies)
+
+    def temperature(self, states: list[float], ambient: float) -> Array:
+        """Temperature of the joints, (n,) [°C].
+
+        Parameters
+        ----------
+        states : list of float
+            internal states, m numbers
+        ambient : float
+            temperature of joints that no term heats [°C]
+        """
+        temperature = np.full(self.coordinates.joint_count, ambient)
+        for term in self._heating:
+            term.report_temperature(states, temperature)
+        return temperature
+
+    def evaluate(self, time: float, vector: list[float], drive: list[float]) -> list[float]:
+        """Rate of change of y = [p, v, z], 2N + m numbers.
+
+        Parameters
+        ----------
+        time : float
+            t [s]
+        vector : list of float
+            y: N positions, N velocities, m internal states
+        drive : list of float
+            u, torque of the drives on the joint's side, one a joint [Nm or N]
+        """
+        size = self._size
+        link_side = self._sum_forces(time, vector)
+        forces, moment = self._forces, self._moment
+        motor_side = [u - f - m for u, f, m in zip(drive, forces.friction, forces.motor, strict=True)]
+        velocity = vector[size : 2 * size]
+        if self._plain:
+            torque = [u - b for u, b in zip(motor_side, link_side, strict=True)]
+            return velocity + self.bodies.accelerations(torque).tolist()
+        acceleration, load = self._accelerations(np.array(motor_side), np.array(link_side))
+        moment.load = load.tolist()
+        moment.friction = [
+            friction + abs(carried) * share
+            for friction, carried, share in zip(forces.friction, moment.load, forces.load_friction, strict=True)
+        ]
+        rates = [0.0] * self.state_count
+        for term in self._evolving:
+            term.rates(moment, rates)
+        return velocity + acceleration.tolist() + rates
+
+    def linearise(self) -> tuple[Array, Slopes]:
+        """Mass matrix (N, N) and slopes at the state that was evaluated last; overwritten by the next call."""
+        slopes, moment = self._slopes, self._moment
+        slopes.all[:] = 0.0
+        for term in self._linearising:
+            term.linearise(moment, slopes)
+        if self.coordinates.compliant:
+            self.compliance.linearise(moment, self._forces, slopes)
+        if not self._loaded:
+            count = self._count
+            self._matrix[:count, :count] = self.bodies.mass_matrix()
+        return self._matrix, slopes
+
+    def load_at(self, time: float, vector: list[float]) -> list[float]:
+        """Torque h + c + link that links need from their transmissions when they do not accelerate [Nm or N].
+
+        Parameters
+        ----------
+        time : float
+            t [s]
+        vector : list of float
+            y
+        """
+        return self._sum_forces(time, vector)
+
+    def _sum_forces(self, time: float, vector: list[float]) -> list[float]:
+        """Move the links and sum the terms' torque into `Forces`; returns h + c + link, one a joint."""
+        count, size = self._count, self._size
+        moment, forces = self._moment, self._forces
+        self.bodies.update(vector[:count], vector[size : size + count])
+        moment.time = time
+        moment.position, moment.velocity, moment.states = vector[:size], vector[size : 2 * size], vector[2 * size :]
+        forces.clear()
+        for term in self._acting:
+            term.act(moment, forces)
+        return [bias + link for bias, link in zip(self.bodies.bias.tolist(), forces.link, strict=True)]
+
+    def _accelerations(self, motor_side: Array, link_side: Array) -> tuple[Array, Array]:
+        """Solve for v̇ (N,) and the load (n,), given u - friction - motor and h + c + link."""
+        drive = motor_side.copy()
+        own_gain, own_friction = np.array(self._forces.load_gain), np.array(self._forces.load_friction)
+        gain, friction = own_gain.copy(), own_friction.copy()
+        compliant = list(self.coordinates.compliant)
+        if compliant:
+            torque = self.compliance.torque(self._moment)
+            # links of compliant joints are driven by their transmission, which hands on all that it holds
+            drive[compliant], gain[compliant], friction[compliant] = torque, 0.0, 0.0
+        if self._loaded:
+            matrix = self.bodies.mass_matrix()
+            pair = np.array([matrix, matrix - np.diag(self._rotors)])
+            links, load, loaded = loaded_accelerations(pair, drive, link_side, gain, friction, self._last_load)
+            self._matrix[: len(links), : len(links)] = loaded
+            self._last_load = load
+        else:
+            links = self.bodies.accelerations(drive - link_side)
+            load = drive - self._rotors * links
+        if not compliant:
+            return links, load
+        lost = load * (1.0 + own_gain) + np.abs(load) * own_friction
+        motors = (motor_side - lost)[compliant] / self.compliance.rotor_inertia
+        return np.concatenate([links, motors]), load
+
+
+def _terms(robot: Robot, effects: Sequence[PhysicalEffect], coordinates: Coordinates) -> tuple[Term, ...]:
+    """The robot file's own friction, and what the effects add."""
+    own: tuple[Term, ...] = ()
+    if robot.model.friction is not None:
+        shape = [joint.friction_shape for joint in robot.joints]
+        own = (StaticFriction(robot.model.friction, shape, coordinates),)
+    return own + tuple(term for effect in effects for term in effect.terms(robot, coordinates))
+
+
+def _allot_states(terms: Sequence[Term]) -> int:
+    """Give each term the place of its internal states; returns their number m."""
+    count = 0
+    for term in terms:
+        term.first_state = count
+        count += term.state_count
+    return count
+
+
+def _overriding(terms: Sequence[Term], hook: str) -> tuple[Term, ...]:
+    """Terms that fill in a hook: the others need not be called."""
+    return tuple(term for term in terms if getattr(type(term), hook) is not getattr(Term, hook))

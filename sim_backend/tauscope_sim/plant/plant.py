@@ -1,0 +1,203 @@
+"""The simulated arm as a thing that torque moves: place it, push it, look where it is."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil, isfinite
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tauscope.errors import ScenarioError
+from tauscope.robot.robot import Robot
+from tauscope_sim.plant.equations import EquationsOfMotion
+from tauscope_sim.plant.rosenbrock import RosenbrockStep
+from tauscope_sim.plant.settling import settled
+from tauscope_sim.plant.term import AMBIENT, PhysicalEffect
+
+Array = NDArray[np.float64]
+
+STEP = 5e-4
+"""Longest step of the integration where none is asked for [s]."""
+
+TOLERANCE = 2e-5
+"""Error of one step of length `STEP` that is let pass: velocity [rad/s or m/s], internal states [1]."""
+
+SHORTEST_PART = 2.0**-12
+"""Shortest sub-step, as a part of the step."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlantState:
+    """Where the plant is, in joint units; every array a copy.
+
+    time : float
+        since the arm was placed [s]
+    motor_position : (n,) float64
+        of the motors, divided by the gear ratio [rad or m]
+    motor_velocity : (n,) float64
+        likewise [rad/s or m/s]
+    link_position : (n,) float64
+        q; the motor's own where the transmission is rigid [rad or m]
+    link_velocity : (n,) float64
+        q̇ [rad/s or m/s]
+    temperature : (n,) float64
+        of the joints [°C]
+    """
+
+    time: float
+    motor_position: Array
+    motor_velocity: Array
+    link_position: Array
+    link_velocity: Array
+    temperature: Array
+
+
+class Plant:
+    """Forward physics of an arm: rigid bodies, the robot file's static friction, and concealed effects.
+
+    Steps are at most `step_s` long. Where friction reverses, teeth meet or a bristle turns, a step is divided until its
+    estimated error is below `TOLERANCE` × (step_s / `STEP`)²: halving `step_s` halves every sub-step, and the result
+    converges with the square of `step_s`. No step crosses an instant at which an effect begins or ends.
+
+    Parameters
+    ----------
+    robot : Robot
+        the arm; its model block has to hold the links
+    effects : sequence of PhysicalEffect
+        what is concealed; see `tauscope_sim.effects`
+    step_s : float
+        longest step of the integration [s]
+
+    Raises
+    ------
+    RobotFileError
+        where the robot file lacks what the simulation needs
+    ScenarioError
+        where effects contradict one another or the robot
+    """
+
+    def __init__(self, robot: Robot, effects: Sequence[PhysicalEffect] = (), *, step_s: float = STEP) -> None:
+        if not (isfinite(step_s) and step_s > 0.0):
+            raise ScenarioError(f"step_s is {step_s}; give a positive duration")
+        self._equations = EquationsOfMotion(robot, effects)
+        self._coordinates = self._equations.coordinates
+        self._motors = self._coordinates.motors
+        self._step = RosenbrockStep(self._equations)
+        self._longest = step_s
+        self._tolerance = TOLERANCE * (step_s / STEP) ** 2
+        self._shortest = SHORTEST_PART * step_s
+        self._part = step_s
+        self.place(np.zeros(robot.joint_count))
+
+    @property
+    def joint_count(self) -> int:
+        """Number of joints n."""
+        return self._coordinates.joint_count
+
+    @property
+    def motor_motion(self) -> tuple[Array, Array]:
+        """Position and velocity of the motors, in joint units, each (n,) [rad or m, rad/s or m/s]."""
+        return self._of_motors(0), self._of_motors(self._coordinates.size)
+
+    @property
+    def state(self) -> PlantState:
+        """Where the plant is."""
+        count, size = self.joint_count, self._coordinates.size
+        return PlantState(
+            time=self._time,
+            motor_position=self._of_motors(0),
+            motor_velocity=self._of_motors(size),
+            link_position=np.array(self._vector[:count]),
+            link_velocity=np.array(self._vector[size : size + count]),
+            temperature=self._equations.temperature(self._vector[2 * size :], AMBIENT),
+        )
+
+    def place(self, position: ArrayLike) -> None:
+        """Start afresh at time zero: motors at rest in a place, compliant links hanging still, effects as when new.
+
+        Parameters
+        ----------
+        position : (n,) float64
+            of the motors, in joint units [rad or m]
+
+        Raises
+        ------
+        ScenarioError
+            where that is no place, or a transmission is too soft to carry its link
+        """
+        motors = np.asarray(position, dtype=np.float64)
+        if motors.shape != (self.joint_count,) or not np.all(np.isfinite(motors)):
+            raise ScenarioError(f"position {motors} is not one finite number for each of {self.joint_count} joints")
+        self._time = 0.0
+        self._events = [time for time in self._equations.event_times if time > 0.0]
+        self._equations.bodies.drop_everything()
+        self._equations.begin(0.0)
+        self._vector = settled(self._equations, motors).tolist()
+        self._part = self._longest
+
+    def advance(self, motor_torque: ArrayLike, duration_s: float) -> None:
+        """Let time pass under constant torque.
+
+        Parameters
+        ----------
+        motor_torque : (n,) float64
+            of the drives, on the joint's side of the gear [Nm or N]
+        duration_s : float
+            how long [s]
+
+        Raises
+        ------
+        ScenarioError
+            where the duration is negative, or the motion grows beyond all bounds
+        """
+        if not duration_s >= 0.0:
+            raise ScenarioError(f"duration_s is {duration_s}; time passes forwards only")
+        drive = np.asarray(motor_torque, dtype=np.float64).tolist()
+        end = self._time + duration_s
+        while self._events and self._events[0] <= end:
+            event = self._events.pop(0)
+            self._advance_to(event, drive)
+            self._equations.begin(event)
+        self._advance_to(end, drive)
+
+    def _advance_to(self, end: float, drive: list[float]) -> None:
+        """Integrate over an interval without events, in equal steps unless the error asks for shorter ones."""
+        duration = end - self._time
+        if duration <= 0.0:
+            return
+        steps = max(1, ceil(duration / self._longest - 1e-9))
+        nominal = duration / steps
+        begin = self._time
+        for number in range(1, steps + 1):
+            self._step_to(begin + nominal * number if number < steps else end, drive)
+
+    def _step_to(self, end: float, drive: list[float]) -> None:
+        """Integrate over one step, or over as many parts of it as its error asks for."""
+        while self._time < end:
+            remaining = end - self._time
+            # the last part takes what is left: none is cut to a sliver
+            part = remaining if remaining < 1.5 * self._part else self._part
+            self._step.begin(self._time, self._vector, drive)
+            attempt = self._step.attempt(part, self._tolerance)
+            while not attempt.error <= 1.0 and part > self._shortest:
+                part = max(part * _change(attempt.error), self._shortest)
+                attempt = self._step.attempt(part, self._tolerance)
+            if not isfinite(attempt.error):
+                raise ScenarioError(
+                    f"the simulated arm's motion grows beyond all bounds at {self._time:g} s; drive it with less torque"
+                )
+            # what is too quick even for the shortest part is not worth following, only its end
+            self._vector = attempt.second_order if attempt.error <= 1.0 else attempt.first_order
+            self._time = end if part == remaining else self._time + part
+            self._part = min(max(part * _change(attempt.error), self._shortest), self._longest)
+
+    def _of_motors(self, first: int) -> Array:
+        """Numbers of the motors among the coordinates that begin at a place of the vector, (n,)."""
+        return np.array([self._vector[first + place] for place in self._motors])
+
+
+def _change(error: float) -> float:
+    """Factor on the step's length by its error: the difference between the orders grows with the square of the step."""
+    if not isfinite(error):
+        return 0.1
+    return min(max(0.9 * error**-0.5, 0.1), 4.0) if error > 0.0 else 4.0

@@ -1,0 +1,124 @@
+"""The multibody dynamics of the plant, all of it MuJoCo's: mass matrix, bias, Jacobians."""
+
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's extension modules come without type stubs)
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.robot.robot import LinkInertia, Robot
+from tauscope_sim.model import body_inertia, build_model
+
+Array = NDArray[np.float64]
+
+
+class RigidBodies:
+    """An arm of rigid links at one position and velocity: H(q), h(q, q̇) + c(q), and what a tool carries.
+
+    Parameters
+    ----------
+    robot : Robot
+        the arm; its model block has to hold the links
+    rotor_inertia : (n,) float64
+        reflected inertia of the motors of rigid joints, added to the diagonal of H [kg m² or kg]
+    """
+
+    def __init__(self, robot: Robot, rotor_inertia: Array) -> None:
+        self._model = build_model(robot)
+        self._model.dof_armature[:] = rotor_inertia
+        self._data = mujoco.MjData(self._model)
+        self._scratch = mujoco.MjData(self._model)
+        self._place = f"{robot.name}: link {robot.joint_count} with its payload"
+        count = robot.joint_count
+        self._last_link = list(robot.model.links or ())[-1].to_vector()
+        self._carried: dict[int, Array] = {}
+        self._position, self._velocity = self._data.qpos, self._data.qvel
+        self._bias = self._data.qfrc_bias
+        self._matrix = np.zeros((count, count))
+        self._solution = np.empty((1, count))
+        self._accelerations = self._solution[0]
+        self._right_side = np.empty((1, count))
+
+    def update(self, position: Array | list[float], velocity: Array | list[float]) -> None:
+        """Move the links.
+
+        Parameters
+        ----------
+        position : (n,) float64
+            q [rad or m]
+        velocity : (n,) float64
+            q̇ [rad/s or m/s]
+        """
+        self._position[:] = position
+        self._velocity[:] = velocity
+        mujoco.mj_fwdPosition(self._model, self._data)
+        mujoco.mj_fwdVelocity(self._model, self._data)
+
+    @property
+    def bias(self) -> Array:
+        """h(q, q̇) + c(q), shape (n,): a view that the next `update` overwrites [Nm or N]."""
+        return self._bias
+
+    def mass_matrix(self) -> Array:
+        """H(q) with the rotors on its diagonal, shape (n, n): overwritten by the next call [kg m² or kg]."""
+        mujoco.mj_fullM(self._model, self._data, self._matrix)
+        return self._matrix
+
+    def accelerations(self, torque: Array | list[float]) -> Array:
+        """Solve H(q) q̈ = τ, shape (n,): a view that the next call overwrites [rad/s² or m/s²].
+
+        Parameters
+        ----------
+        torque : (n,) float64
+            τ [Nm or N]
+        """
+        self._right_side[0] = torque
+        mujoco.mj_solveM(self._model, self._data, self._solution, self._right_side)
+        return self._accelerations
+
+    def tool_jacobian(self, offset: Array) -> Array:
+        """Jacobian of a point that moves with the last link, in base axes, shape (3, n) [m/rad or 1].
+
+        Parameters
+        ----------
+        offset : (3,) float64
+            the point in the last link's frame [m]
+        """
+        tool = len(self._position)
+        point = self._data.xpos[tool] + self._data.xmat[tool].reshape(3, 3) @ offset
+        jacobian = np.zeros((3, tool))
+        mujoco.mj_jac(self._model, self._data, jacobian, None, point, tool)
+        return jacobian
+
+    def carry(self, carrier: object, payload: Array | None) -> None:
+        """Change what the last link carries; it takes the payload over at its own speed, without an impact.
+
+        Parameters
+        ----------
+        carrier : object
+            whose payload it is; one at a time
+        payload : (10,) float64 or None
+            standard parameters in the last link's frame, in the order of `tauscope.robot.robot.STANDARD_PARAMETERS`;
+            None drops it
+        """
+        self._carried.pop(id(carrier), None)
+        if payload is not None:
+            self._carried[id(carrier)] = payload
+        self._weigh_last_link()
+
+    def drop_everything(self) -> None:
+        """Leave the last link as the robot file describes it."""
+        if self._carried:
+            self._carried.clear()
+            self._weigh_last_link()
+
+    def _weigh_last_link(self) -> None:
+        """Write the last link's inertia into the compiled model, and let MuJoCo renew what depends on it."""
+        inertia = body_inertia(LinkInertia.from_vector(sum(self._carried.values(), self._last_link)), self._place)
+        body = len(self._position)
+        self._model.body_mass[body] = inertia.mass
+        self._model.body_ipos[body] = inertia.centre
+        self._model.body_iquat[body] = inertia.quaternion
+        self._model.body_inertia[body] = inertia.moments
+        mujoco.mj_setConst(self._model, self._scratch)

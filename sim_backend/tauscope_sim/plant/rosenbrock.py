@@ -1,0 +1,141 @@
+"""Rosenbrock-W integration of the plant, second order and stable for stiff friction, contacts and bristles.
+
+ROS2 of Verwer, Spee, Blom and Hundsdorfer (SIAM J. Sci. Comput. 20, 1999): with W = 1 - γ h J,
+
+    W k₁ = f(y),      W k₂ = f(y + h k₁) - 2 k₁,      y⁺ = y + 3/2 h k₁ + 1/2 h k₂,
+
+of order two whatever matrix J is (so J holds only what is stiff: friction, stiffness, bristles), and L-stable for
+γ = 1 - 1/√2 where J is exact. y + h k₁ is of order one: the difference tells the error of a step.
+"""
+
+from math import isfinite, nan
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg.lapack import dgesv
+
+from tauscope_sim.plant.equations import EquationsOfMotion
+
+Array = NDArray[np.float64]
+
+GAMMA = 1.0 - float(np.sqrt(0.5))
+"""γ: L-stable, with the smaller of the two error constants."""
+
+UNIT = 0.1
+"""Velocity or internal state at which twice the tolerance passes [rad/s, m/s, 1]: reversals of friction lie below."""
+
+
+class Attempt(NamedTuple):
+    """A step that may be taken; states as lists, 2N + m numbers each.
+
+    second_order : list of float
+        y⁺
+    first_order : list of float
+        y + h k₁, the linearly implicit Euler step: it has no fixed points but the true ones, however long the step
+    error : float
+        largest difference of the two in a velocity or internal state, by what may pass; NaN where one is not finite
+    """
+
+    second_order: list[float]
+    first_order: list[float]
+    error: float
+
+
+class RosenbrockStep:
+    """One step of ROS2 on y = [p, v, z]: positions (N,), velocities (N,) and internal states (m,).
+
+    k_p = r_p + s k_v with s = γ h leaves N + m equations for κ = [k_v, k_z], the first N of them multiplied by the mass
+    matrix M. With the slopes P, V, Z of torque and P', V', Z' of the states' rates by position, velocity and state:
+
+        [M + s V + s² P,        s Z]  κ  =  [-s P,  M,  0]  r.
+        [-s V' - s² P',   1 - s Z' ]        [ s P', 0,  1]
+
+    It is solved once an attempt, for the matrix K with κ = K r. States are lists: a call into NumPy takes longer than
+    the few numbers of an arm.
+
+    Parameters
+    ----------
+    equations : EquationsOfMotion
+        f and the stiff part of its Jacobian
+    """
+
+    def __init__(self, equations: EquationsOfMotion) -> None:
+        self._equations = equations
+        size, states = equations.coordinates.size, equations.state_count
+        self._size, self._stateful = size, states > 0
+        self._sign = np.concatenate([np.ones(size), -np.ones(states)])[:, None]
+        self._left = np.eye(size + states)
+        self._right = np.eye(size + states, 2 * size + states, size)
+        self._by_position: Array | None = None
+
+    def begin(self, time: float, vector: list[float], drive: list[float]) -> None:
+        """Evaluate and linearise where steps shall start; a step may then be tried with several lengths.
+
+        Parameters
+        ----------
+        time : float
+            t [s]
+        vector : list of float
+            y
+        drive : list of float
+            torque of the drives, one a joint, constant during the step [Nm or N]
+        """
+        size = self._size
+        self._time, self._vector, self._drive = time, vector, drive
+        self._rate = self._equations.evaluate(time, vector, drive)
+        mass, slopes = self._equations.linearise()
+        self._left[:size, :size] = mass
+        self._right[:size, size : 2 * size] = mass
+        self._slopes = self._sign * (slopes.all[1] + slopes.all[2]) if self._stateful else slopes.by_velocity
+        if np.count_nonzero(slopes.all[0]):
+            self._by_position = self._sign * slopes.all[0]
+        elif self._by_position is not None:
+            self._by_position = None
+            self._right[:, :size] = 0.0
+        self._passing = [1.0 + abs(value) / UNIT for value in vector[size:]]
+
+    def attempt(self, step: float, tolerance: float) -> Attempt:
+        """Take the step and estimate its error.
+
+        Parameters
+        ----------
+        step : float
+            h [s]
+        tolerance : float
+            error of a velocity or internal state of size zero that may pass; it grows with its size
+        """
+        scale = GAMMA * step
+        solution = self._solution(scale)
+        first = self._solve(solution, scale, self._rate)
+        predicted = [y + step * k for y, k in zip(self._vector, first, strict=True)]
+        rate = self._equations.evaluate(self._time + step, predicted, self._drive)
+        second = self._solve(solution, scale, [r - 2.0 * k for r, k in zip(rate, first, strict=True)])
+        half = 0.5 * step
+        difference = [half * (k + other) for k, other in zip(first, second, strict=True)]
+        error = _largest(difference[self._size :], self._passing) / tolerance
+        return Attempt([y + d for y, d in zip(predicted, difference, strict=True)], predicted, error)
+
+    def _solution(self, scale: float) -> Array:
+        """K, (N + m, 2N + m)."""
+        left = self._left + scale * self._slopes
+        if self._by_position is not None:
+            left += (scale * scale) * self._by_position
+            self._right[:, : self._size] = -scale * self._by_position[:, : self._size]
+        return dgesv(left, self._right)[2]
+
+    def _solve(self, solution: Array, scale: float, right_side: list[float]) -> list[float]:
+        """Solve W k = r."""
+        rates = solution.dot(right_side).tolist()
+        return [r + scale * k for r, k in zip(right_side[: self._size], rates, strict=False)] + rates
+
+
+def _largest(differences: list[float], passing: list[float]) -> float:
+    """Largest difference by what may pass; NaN where one is not finite."""
+    largest = 0.0
+    for difference, passes in zip(differences, passing, strict=True):
+        error = abs(difference) / passes
+        if not isfinite(error):
+            return nan
+        largest = max(largest, error)
+    return largest

@@ -1,0 +1,265 @@
+"""What an effect adds to the equations of motion, and what the plant needs of an effect.
+
+The equations of a rigid joint j are, in joint units,
+
+    u_j = J_j q̈_j + friction_j + motor_j + L_j (1 + g_j) + |L_j| f_j,     L = H(q) q̈ + h(q, q̇) + c(q) + link
+
+where u is the drive's torque and L the load: the torque that the transmission hands to the link. `friction`, `motor`,
+`link`, and the load's gains g and f are what terms fill in. All are signed as what the drive has to overcome.
+"""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.robot.robot import Robot
+from tauscope_sim.plant.coordinates import Coordinates
+from tauscope_sim.plant.rigid_bodies import RigidBodies
+
+Array = NDArray[np.float64]
+
+AMBIENT = 25.0
+"""Temperature of joints that no effect heats [°C]."""
+
+
+class Moment:
+    """The state at which terms are evaluated; plain lists, because terms read single numbers.
+
+    Parameters
+    ----------
+    coordinates : Coordinates
+        places of links and motors
+    bodies : RigidBodies
+        the multibody system, at the same positions and velocities
+    """
+
+    def __init__(self, coordinates: Coordinates, bodies: RigidBodies) -> None:
+        self.bodies = bodies
+        self.time = 0.0
+        """instant since the arm was placed [s]"""
+        self.position = [0.0] * coordinates.size
+        """p, by coordinate [rad or m]"""
+        self.velocity = [0.0] * coordinates.size
+        """v, by coordinate [rad/s or m/s]"""
+        self.states: list[float] = []
+        """internal states of the terms"""
+        self.load = [0.0] * coordinates.joint_count
+        """L, by joint: known to `Term.linearise` and `Term.rates`, not yet to `Term.act` [Nm or N]"""
+        self.friction = [0.0] * coordinates.joint_count
+        """all friction of each joint, that of its load included; known like `load` [Nm or N]"""
+
+
+class Forces:
+    """Torque that the drives have to overcome, summed over the terms; lists by joint, as in `Moment`.
+
+    Parameters
+    ----------
+    joint_count : int
+        number of joints n
+    """
+
+    def __init__(self, joint_count: int) -> None:
+        self._none = [0.0] * joint_count
+        self.clear()
+
+    def clear(self) -> None:
+        """Begin a sum."""
+        self.friction = self._none.copy()
+        """friction on the motor's side [Nm or N]"""
+        self.motor = self._none.copy()
+        """anything else on the motor's side [Nm or N]"""
+        self.link = self._none.copy()
+        """on the link's side: part of the load [Nm or N]"""
+        self.load_gain = self._none.copy()
+        """g, torque a unit of load"""
+        self.load_friction = self._none.copy()
+        """f, torque a unit of the load's magnitude; counts as friction"""
+
+
+class Slopes:
+    """Derivatives for the implicit part of the integration; an omitted or approximate one costs stability, not order.
+
+    Parameters
+    ----------
+    size : int
+        number of coordinates N
+    state_count : int
+        number of internal states m
+    """
+
+    def __init__(self, size: int, state_count: int) -> None:
+        total = size + state_count
+        self.all = np.zeros((3, total, total))
+        self.by_position: Array = self.all[0, :size, :size]
+        """derivative of each coordinate's torque with respect to p, (N, N)"""
+        self.by_velocity: Array = self.all[1, :size, :size]
+        """with respect to v, (N, N)"""
+        self.by_state: Array = self.all[2, :size, size:]
+        """with respect to the internal states, (N, m)"""
+        self.rate_by_position: Array = self.all[0, size:, :size]
+        """derivative of the internal states' rates with respect to p, (m, N)"""
+        self.rate_by_velocity: Array = self.all[1, size:, :size]
+        """with respect to v, (m, N)"""
+        self.rate_by_state: Array = self.all[2, size:, size:]
+        """with respect to the internal states, (m, m)"""
+
+
+class Term:
+    """One contribution to the equations of motion; a subclass overrides the hooks that it needs."""
+
+    state_count: int = 0
+    """number of internal states"""
+    first_state: int = 0
+    """place of the first of them in `Moment.states`, set by the equations of motion"""
+    depends_on_load: bool = False
+    """whether `act` fills in `Forces.load_gain` or `Forces.load_friction`"""
+    event_times: tuple[float, ...] = ()
+    """instants at which the term changes abruptly; the integration never steps across one [s]"""
+
+    def initial_states(self) -> tuple[float, ...]:
+        """Internal states of an arm that rests."""
+        return ()
+
+    def begin(self, time: float, bodies: RigidBodies) -> None:
+        """Take note that an interval without events begins.
+
+        Parameters
+        ----------
+        time : float
+            its first instant: the placing of the arm, or one of `event_times` [s]
+        bodies : RigidBodies
+            the multibody system, whose load may be changed here
+        """
+
+    def act(self, moment: Moment, forces: Forces) -> None:
+        """Add the torque that the drives have to overcome.
+
+        Parameters
+        ----------
+        moment : Moment
+            where; without load and friction
+        forces : Forces
+            what is added to
+        """
+
+    def linearise(self, moment: Moment, slopes: Slopes) -> None:
+        """Add the derivatives of torque and rates.
+
+        Parameters
+        ----------
+        moment : Moment
+            where
+        slopes : Slopes
+            what is added to
+        """
+
+    def rates(self, moment: Moment, rates: list[float]) -> None:
+        """Write the rates of the term's own internal states.
+
+        Parameters
+        ----------
+        moment : Moment
+            where
+        rates : list of float
+            of all terms' states; the term's own begin at `first_state` [1/s times the state's unit]
+        """
+
+    def report_temperature(self, states: list[float], temperature: Array) -> None:
+        """Write the temperature of the joints that the term heats.
+
+        Parameters
+        ----------
+        states : list of float
+            internal states of all terms
+        temperature : (n,) float64
+            of all joints [°C]
+        """
+
+
+class Transmission(Protocol):
+    """A transmission that gives way: torque by the motor's lead over the link."""
+
+    @property
+    def joint(self) -> int:
+        """Number of its joint, counted from 1."""
+        ...
+
+    @property
+    def rotor_inertia(self) -> float:
+        """Reflected inertia of the motor [kg m² or kg]."""
+        ...
+
+    def torque(self, twist: float, twist_rate: float) -> float:
+        """Torque that the link receives [Nm or N].
+
+        Parameters
+        ----------
+        twist : float
+            motor position less link position [rad or m]
+        twist_rate : float
+            its rate [rad/s or m/s]
+        """
+        ...
+
+    def torque_slopes(self, twist: float, twist_rate: float) -> tuple[float, float]:
+        """Derivatives of the torque with respect to twist [Nm/rad] and its rate [Nm s/rad].
+
+        Parameters
+        ----------
+        twist : float
+            motor position less link position [rad or m]
+        twist_rate : float
+            its rate [rad/s or m/s]
+        """
+        ...
+
+    def twist_at_rest(self, torque: float) -> float:
+        """Twist at which a resting joint transmits a torque [rad or m].
+
+        Parameters
+        ----------
+        torque : float
+            that the link needs [Nm or N]
+        """
+        ...
+
+
+class PhysicalEffect(Protocol):
+    """What the plant asks of a concealed effect."""
+
+    def alter(self, robot: Robot) -> Robot:
+        """The arm as it really is, before its model is built.
+
+        Parameters
+        ----------
+        robot : Robot
+            as its robot file, and the effects before this one, describe it
+        """
+        ...
+
+    def added_rotor_inertia(self, robot: Robot) -> Array:
+        """Reflected inertia of the motors of rigid joints, (n,) [kg m² or kg].
+
+        Parameters
+        ----------
+        robot : Robot
+            the arm
+        """
+        ...
+
+    def transmission(self) -> Transmission | None:
+        """The compliant transmission that it makes of a joint, if it does."""
+        ...
+
+    def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
+        """What it adds to the equations of motion.
+
+        Parameters
+        ----------
+        robot : Robot
+            the arm, altered
+        coordinates : Coordinates
+            places of links and motors
+        """
+        ...

@@ -1,0 +1,168 @@
+"""A recording that a simulated arm would leave: exact motion, exact torque, and what noisy sensors make of them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tauscope.errors import RecordingError
+from tauscope.robot.robot import FrictionCoefficients, FrictionShape, Robot
+from tauscope_sim.friction import static_friction_torque
+from tauscope_sim.inverse_dynamics import rigid_body_torque
+from tauscope_sim.model import build_model
+from tauscope_sim.motion import FourierMotion, MotionSamples
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedRecording:
+    """A simulated measurement together with the truth behind it.
+
+    time : (N,) float64
+        instants, uniform, from zero [s]
+    position : (N, n) float64
+        q as the encoder reports it [rad or m]
+    torque : (N, n) float64
+        τ as measured: exact torque plus noise [Nm or N]
+    exact : MotionSamples
+        q, q̇, q̈ without noise, (N, n) each
+    torque_exact : (N, n) float64
+        τ without noise, friction included [Nm or N]
+    period : (N,) int64
+        index of the repeated period, from zero
+    """
+
+    time: Array
+    position: Array
+    torque: Array
+    exact: MotionSamples
+    torque_exact: Array
+    period: NDArray[np.int64]
+
+
+def simulate_recording(
+    robot: Robot,
+    motion: FourierMotion,
+    *,
+    rate_hz: float,
+    periods: int,
+    noise_std: ArrayLike,
+    rng: np.random.Generator,
+    position_noise_std: ArrayLike = 0.0,
+    encoder_step: ArrayLike = 0.0,
+    friction: Sequence[FrictionCoefficients] | None = None,
+    friction_shape: Sequence[FrictionShape] | None = None,
+) -> SimulatedRecording:
+    """Record an arm that follows a motion exactly: τ = H(q) q̈ + h(q, q̇) + c(q) + τ_f(q̇) + noise, equations (1), (6).
+
+    The noise is Gaussian, white, of zero mean, and independent between joints, as in the paper's section 3.
+
+    Parameters
+    ----------
+    robot : Robot
+        the arm; its model block has to hold the links
+    motion : FourierMotion
+        what the arm does, period after period
+    rate_hz : float
+        samples per second; each period has to hold a whole number of samples [Hz]
+    periods : int
+        number of periods, at least 1
+    noise_std : (n,) float64 or float
+        standard deviation of the torque noise [Nm or N]
+    rng : numpy.random.Generator
+        source of the noise
+    position_noise_std : (n,) float64 or float
+        standard deviation of the position noise [rad or m]
+    encoder_step : (n,) float64 or float
+        resolution to which positions are rounded, zero for none [rad or m]
+    friction : sequence of FrictionCoefficients, optional
+        friction of each joint; the robot's model block where None, no friction where that has none either
+    friction_shape : sequence of FrictionShape, optional
+        K_v and δ of each joint [s/rad or s/m]; the robot file's where None
+
+    Returns
+    -------
+    SimulatedRecording
+        one row a sample, samples per period times periods
+
+    Raises
+    ------
+    RobotFileError
+        where the robot file lacks what the simulation needs
+    RecordingError
+        where the settings make no recording
+    """
+    samples_per_period = _samples_per_period(motion.period_s, rate_hz)
+    if periods < 1:
+        raise RecordingError(f"periods is {periods}; record at least 1")
+    if motion.centre.shape != (robot.joint_count,):
+        raise RecordingError(f"the motion moves {motion.centre.size} joints; the arm has {robot.joint_count}")
+    torque_std = _per_joint(noise_std, robot, "noise_std")
+    position_std = _per_joint(position_noise_std, robot, "position_noise_std")
+    step = _per_joint(encoder_step, robot, "encoder_step")
+
+    one_period = motion.evaluate(np.arange(samples_per_period) / rate_hz)
+    torque = _torque(robot, one_period, friction, friction_shape)
+    exact = MotionSamples(
+        position=np.tile(one_period.position, (periods, 1)),
+        velocity=np.tile(one_period.velocity, (periods, 1)),
+        acceleration=np.tile(one_period.acceleration, (periods, 1)),
+    )
+    torque_exact = np.tile(torque, (periods, 1))
+    shape = torque_exact.shape
+    torque_noise, position_noise = rng.standard_normal(shape), rng.standard_normal(shape)
+    return SimulatedRecording(
+        time=np.arange(shape[0]) / rate_hz,
+        position=_quantised(exact.position + position_std * position_noise, step),
+        torque=torque_exact + torque_std * torque_noise,
+        exact=exact,
+        torque_exact=torque_exact,
+        period=np.repeat(np.arange(periods, dtype=np.int64), samples_per_period),
+    )
+
+
+def _samples_per_period(period_s: float, rate_hz: float) -> int:
+    """Whole number of samples in a period; anything else would blur the average over periods."""
+    if not (np.isfinite(rate_hz) and rate_hz > 0.0):
+        raise RecordingError(f"rate_hz is {rate_hz}; give a positive rate")
+    count = period_s * rate_hz
+    if round(count) < 1 or abs(count - round(count)) > 1e-9 * count:
+        raise RecordingError(
+            f"rate_hz {rate_hz:g} puts {count:g} samples into the period of {period_s:g} s; choose a whole number"
+        )
+    return round(count)
+
+
+def _per_joint(value: ArrayLike, robot: Robot, name: str) -> Array:
+    """One non-negative number a joint, shape (n,)."""
+    array = np.asarray(value, dtype=np.float64)
+    if array.shape not in ((), (1,), (robot.joint_count,)):
+        raise RecordingError(f"{name} has {array.size} values; give one, or one for each of {robot.joint_count} joints")
+    if not np.all(np.isfinite(array) & (array >= 0.0)):
+        raise RecordingError(f"{name} holds a negative or non-finite value; give zero or more")
+    return np.broadcast_to(array, (robot.joint_count,))
+
+
+def _torque(
+    robot: Robot,
+    samples: MotionSamples,
+    friction: Sequence[FrictionCoefficients] | None,
+    friction_shape: Sequence[FrictionShape] | None,
+) -> Array:
+    """Rigid-body torque plus friction, (N, n)."""
+    torque = rigid_body_torque(build_model(robot), samples.position, samples.velocity, samples.acceleration)
+    friction = friction if friction is not None else robot.model.friction
+    if friction is None:
+        return torque
+    shape = friction_shape if friction_shape is not None else [joint.friction_shape for joint in robot.joints]
+    return torque + static_friction_torque(samples.velocity, friction, shape)
+
+
+def _quantised(position: Array, step: Array) -> Array:
+    """Positions rounded to the encoder's step; joints with step zero as they are."""
+    rounded = position.copy()
+    coarse = step > 0.0
+    rounded[:, coarse] = np.rint(position[:, coarse] / step[coarse]) * step[coarse]
+    return rounded

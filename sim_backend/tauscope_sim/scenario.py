@@ -1,0 +1,165 @@
+"""What a simulated arm conceals: effects, noise and delays, as a scenario file states them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.robot.robot import Robot
+from tauscope_sim.effects import Effect, SensorEffect
+from tauscope_sim.plant import Plant
+from tauscope_sim.plant.plant import STEP
+
+Array = NDArray[np.float64]
+
+
+def _zero() -> Array:
+    """Zero for every joint."""
+    return np.zeros(())
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """What differs from the robot file, and how well the sensors see it; ``Scenario()`` conceals nothing.
+
+    effects : tuple of Effect
+        of arm, transmission and surroundings
+    sensor_effects : tuple of SensorEffect
+        between arm and recording, in this order
+    torque_noise_std : (n,) or () float64
+        standard deviation of the recorded torque's white noise [Nm or N]
+    position_noise_std : (n,) or () float64
+        of the recorded position's [rad or m]
+    encoder_step : (n,) or () float64
+        resolution to which positions are recorded, zero for none [rad or m]
+    command_latency_s : float
+        time from a setpoint's arrival to its effect [s]
+    seed : int
+        of the noise
+    """
+
+    effects: tuple[Effect, ...] = ()
+    sensor_effects: tuple[SensorEffect, ...] = ()
+    torque_noise_std: Array = field(default_factory=_zero)
+    position_noise_std: Array = field(default_factory=_zero)
+    encoder_step: Array = field(default_factory=_zero)
+    command_latency_s: float = 0.0
+    seed: int = 0
+
+    def plant(self, robot: Robot, *, step_s: float = STEP) -> Plant:
+        """Forward physics of the arm with its concealed effects.
+
+        Parameters
+        ----------
+        robot : Robot
+            the arm; its model block has to hold the links
+        step_s : float
+            longest step of the integration [s]
+
+        Raises
+        ------
+        RobotFileError
+            where the robot file lacks what the simulation needs
+        ScenarioError
+            where effects contradict one another or the robot
+        """
+        for effect in self.effects:
+            effect.check(robot)
+        return Plant(robot, self.effects, step_s=step_s)
+
+    def sensors(self, robot: Robot, rng: np.random.Generator | None = None) -> "Sensors":
+        """The sensors, at the beginning of a recording.
+
+        Parameters
+        ----------
+        robot : Robot
+            the arm
+        rng : numpy.random.Generator or None
+            source of the noise; one of the scenario's seed where None
+
+        Raises
+        ------
+        ScenarioError
+            where an effect contradicts the robot
+        """
+        for effect in self.sensor_effects:
+            effect.check(robot)
+        return Sensors(self, robot.joint_count, np.random.default_rng(self.seed) if rng is None else rng)
+
+
+class Sensors:
+    """What a recording shows of the arm, sample by sample; causal, so that a control loop can use it.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        the sensors' effects, noise and resolution
+    joint_count : int
+        number of joints n
+    rng : numpy.random.Generator
+        source of the noise
+    """
+
+    def __init__(self, scenario: Scenario, joint_count: int, rng: np.random.Generator) -> None:
+        self._channels = [effect.channel(joint_count) for effect in scenario.sensor_effects]
+        shape = (joint_count,)
+        self._torque_std = np.broadcast_to(scenario.torque_noise_std, shape)
+        self._position_std = np.broadcast_to(scenario.position_noise_std, shape)
+        step = np.broadcast_to(scenario.encoder_step, shape)
+        self._coarse = step > 0.0
+        self._step = np.where(self._coarse, step, 1.0)
+        self._rng = rng
+
+    def measure(self, time: float, position: Array, torque: Array) -> tuple[Array, Array]:
+        """What is recorded of one instant; instants have to come in order, at the rate of the recording or faster.
+
+        Parameters
+        ----------
+        time : float
+            of the sample [s]
+        position : (n,) float64
+            true position of the encoder's side [rad or m]
+        torque : (n,) float64
+            true torque of the drive, on the joint's side of the gear [Nm or N]
+
+        Returns
+        -------
+        position : (n,) float64
+            as recorded [rad or m]
+        torque : (n,) float64
+            as recorded [Nm or N]
+        """
+        for channel in self._channels:
+            position, torque = channel.pass_on(time, position, torque)
+        noise = self._rng.standard_normal((2, len(position)))
+        noisy = position + self._position_std * noise[0]
+        recorded = np.where(self._coarse, np.rint(noisy / self._step) * self._step, noisy)
+        return recorded, torque + self._torque_std * noise[1]
+
+
+def measure_all(sensors: Sensors, time: Array, position: Array, torque: Array) -> tuple[Array, Array]:
+    """What is recorded of a whole motion.
+
+    Parameters
+    ----------
+    sensors : Sensors
+        at the beginning of a recording
+    time : (N,) float64
+        of the samples, ascending [s]
+    position : (N, n) float64
+        true position [rad or m]
+    torque : (N, n) float64
+        true torque [Nm or N]
+
+    Returns
+    -------
+    position : (N, n) float64
+        as recorded [rad or m]
+    torque : (N, n) float64
+        as recorded [Nm or N]
+    """
+    rows: Sequence[tuple[Array, Array]] = [
+        sensors.measure(float(t), q, u) for t, q, u in zip(time, position, torque, strict=True)
+    ]
+    return np.array([row[0] for row in rows]), np.array([row[1] for row in rows])

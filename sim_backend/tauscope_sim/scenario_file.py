@@ -1,0 +1,201 @@
+"""The scenario file, read: YAML to a Scenario that fits a robot.
+
+    torque_noise_std: [0.5, 0.3, 0.7]   # a number, or one a joint [Nm or N]
+    position_noise_std: 2.0e-5          # likewise [rad or m]
+    encoder_step: 1.0e-5                # likewise [rad or m]
+    command_latency: 0.002              # [s]
+    seed: 1
+    effects:
+      - {effect: cogging, joint: 2, amplitude: 0.4, order: 44, phase: 0.3}
+      - {effect: time_delay, delay: 0.001}
+
+Every key may be left out. What the keys of an effect mean stands in its file below `sim_backend/effects`; a joint is
+its number, counted from 1, or its name.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, ValidationError
+
+from tauscope.errors import RobotFileError, ScenarioError
+from tauscope.robot.bounded_file import decode_utf8, read_bounded
+from tauscope.robot.document_fields import Document
+from tauscope.robot.document_origin import WORDING
+from tauscope.robot.messages import nearest, one_line, shown
+from tauscope.robot.robot import Robot
+from tauscope.robot.yaml_text import Place, read_yaml
+from tauscope_sim.effects import EFFECTS, Effect, ScenarioEntry, SensorEffect
+from tauscope_sim.effects.fields import NotNegative, NotNegativeNumbers, Seed, single_zero
+from tauscope_sim.scenario import Scenario
+
+Array = NDArray[np.float64]
+
+LARGEST_SCENARIO_FILE = 256 * 1024
+MOST_EFFECTS = 200
+
+
+class ScenarioDocument(Document):
+    """The scenario file's keys.
+
+    torque_noise_std, position_noise_std, encoder_step : list of float
+        one number, or one a joint
+    command_latency : float
+        [s]
+    seed : int
+        of the noise
+    effects : list of mappings
+        entries, each with the key ``effect``
+    """
+
+    torque_noise_std: NotNegativeNumbers = Field(default_factory=single_zero)
+    position_noise_std: NotNegativeNumbers = Field(default_factory=single_zero)
+    encoder_step: NotNegativeNumbers = Field(default_factory=single_zero)
+    command_latency: NotNegative = 0.0
+    seed: Seed = 0
+    effects: list[Any] = Field(default_factory=list, max_length=MOST_EFFECTS)
+
+
+def read_scenario(path: Path | str, robot: Robot) -> Scenario:
+    """The scenario of a file.
+
+    Parameters
+    ----------
+    path : Path or str
+        the scenario file
+    robot : Robot
+        the arm that it is for
+
+    Returns
+    -------
+    Scenario
+        checked against the robot
+
+    Raises
+    ------
+    ScenarioError
+        if the file cannot be read, is not valid or does not fit the robot; one line naming file, entry and key
+    """
+    try:
+        data = read_bounded(Path(path), LARGEST_SCENARIO_FILE)
+    except RobotFileError as error:
+        raise ScenarioError(str(error)) from error
+    return scenario_from_yaml(data, str(path), robot)
+
+
+def scenario_from_yaml(data: bytes, label: str, robot: Robot) -> Scenario:
+    """The scenario of a YAML document.
+
+    Parameters
+    ----------
+    data : bytes
+        content of the file
+    label : str
+        name of the file, for messages
+    robot : Robot
+        the arm that it is for
+
+    Raises
+    ------
+    ScenarioError
+        if the document is not valid or does not fit the robot
+    """
+    try:
+        content = read_yaml(decode_utf8(data, label), label)
+    except RobotFileError as error:
+        raise ScenarioError(str(error).replace("this is no robot file", "this is no scenario file")) from error
+    return _Reader(label, content.lines, robot).scenario(content.data)
+
+
+class _Reader:
+    """Words the refusals of one file."""
+
+    def __init__(self, label: str, lines: Mapping[Place, int], robot: Robot) -> None:
+        self._label, self._lines, self._robot = label, lines, robot
+
+    def scenario(self, data: Any) -> Scenario:
+        """The scenario of plain data."""
+        document = self._validated(ScenarioDocument, data, (), "")
+        entries = [self._entry(value, number) for number, value in enumerate(document.effects)]
+        scenario = Scenario(
+            effects=tuple(entry for entry in entries if isinstance(entry, Effect)),
+            sensor_effects=tuple(entry for entry in entries if isinstance(entry, SensorEffect)),
+            torque_noise_std=self._per_joint(document, "torque_noise_std"),
+            position_noise_std=self._per_joint(document, "position_noise_std"),
+            encoder_step=self._per_joint(document, "encoder_step"),
+            command_latency_s=document.command_latency,
+            seed=document.seed,
+        )
+        self._try_out(scenario)
+        return scenario
+
+    def _entry(self, value: Any, number: int) -> ScenarioEntry:
+        """One effect."""
+        place: Place = ("effects", number)
+        if not isinstance(value, Mapping):
+            raise self._error(place, "", f"must be a mapping with the key effect, but is {shown(value)}")
+        if "effect" not in value:
+            raise self._error(place, "", f"the key 'effect' is missing; add it ({nearest('', EFFECTS)})")
+        name = value["effect"]
+        if not isinstance(name, str) or name not in EFFECTS:
+            hint = nearest(name, EFFECTS) if isinstance(name, str) else "write an effect id"
+            raise self._error((*place, "effect"), "", f"unknown effect {shown(name)}; {hint}")
+        keys = {key: self._joint_number(key, part) for key, part in value.items() if key != "effect"}
+        entry = self._validated(EFFECTS[name], keys, place, name)
+        try:
+            entry.check(self._robot)
+        except ScenarioError as error:
+            raise self._error(place, "", str(error)) from error
+        return entry
+
+    def _joint_number(self, key: str, value: Any) -> Any:
+        """A joint's number where its name is written; anything else as it is."""
+        if key not in ("joint", "other_joint", "link") or not isinstance(value, str):
+            return value
+        names = [joint.name for joint in self._robot.joints]
+        return names.index(value) + 1 if value in names else value
+
+    def _per_joint(self, document: ScenarioDocument, key: str) -> Array:
+        """One number a joint, (n,)."""
+        values, count = getattr(document, key), self._robot.joint_count
+        if len(values) not in (1, count):
+            raise self._error((key,), "", f"holds {len(values)} numbers; give one, or one for each of {count} joints")
+        return np.broadcast_to(np.array(values), (count,)).copy()
+
+    def _try_out(self, scenario: Scenario) -> None:
+        """Build the plant once: effects may contradict one another."""
+        try:
+            scenario.plant(self._robot)
+        except ScenarioError as error:
+            raise self._error(("effects",), "", str(error)) from error
+
+    def _validated(self, kind: type, data: Any, place: Place, name: str) -> Any:
+        """The data as a validated document."""
+        if not isinstance(data, Mapping):
+            raise self._error(place, name, f"must be a mapping, but is {shown(data)}")
+        try:
+            return kind.model_validate(data)
+        except ValidationError as error:
+            details = error.errors(include_url=False)
+        detail = details[0]
+        inner: Place = tuple(detail["loc"])
+        key = detail.get("ctx", {}).get("key")
+        if key is not None:
+            inner = (*inner, key)
+        word = WORDING.get(detail["type"])
+        text = word(detail) if word else detail["msg"]
+        more = f" (the first of {len(details)} errors)" if len(details) > 1 else ""
+        raise self._error((*place, *inner), name, text + more)
+
+    def _error(self, place: Place, name: str, text: str) -> ScenarioError:
+        """The error of an entry: ``scenario.yaml:7: effects[1] (cogging).order: …``."""
+        line = next((self._lines[place[:n]] for n in range(len(place), -1, -1) if place[:n] in self._lines), None)
+        steps = [f"[{step}]" if isinstance(step, int) else f".{step}" for step in place]
+        if name:
+            steps[1] += f" ({name})"
+        where = self._label if line is None else f"{self._label}:{line}"
+        path = "".join(steps).lstrip(".")
+        return ScenarioError(one_line(f"{where}: {path}: {text}" if path else f"{where}: {text}"))

@@ -1,0 +1,126 @@
+"""The interface: committed, complete, with examples, and its pages."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+
+import tauscope.errors
+from server.http import write_openapi
+from server.http.problem_check import assert_problem
+from server.http.write_openapi import COMMITTED, document_text
+from tauscope.errors import TauscopeError
+from tauscope.server.problems import KINDS
+from tauscope.server.queue.queue import CANCELLED, INTERNAL, INTERRUPTED, WORKER_LOST
+
+
+@pytest.fixture(scope="module")
+def document() -> dict[str, Any]:
+    return json.loads(document_text())
+
+
+def operations(document: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
+    return [
+        (f"{method.upper()} {path}", operation)
+        for path, methods in document["paths"].items()
+        for method, operation in methods.items()
+    ]
+
+
+def test_the_committed_document_is_the_present_one() -> None:
+    hint = (
+        "the interface changed: raise API_VERSION in service/api/app.py, run `python tests/api/write_openapi.py`,"
+        " and note it in CHANGELOG.md"
+    )
+    assert COMMITTED.read_text(encoding="utf-8") == document_text(), hint
+
+
+def test_a_changed_document_has_a_version_of_its_own(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    text = COMMITTED.read_text(encoding="utf-8")
+    version = json.loads(text)["info"]["version"]
+    assert write_openapi.known_versions()[version] == write_openapi.document_hash(text)
+    monkeypatch.setattr(write_openapi, "COMMITTED", tmp_path / "openapi.json")
+    monkeypatch.setattr(write_openapi, "VERSIONS", tmp_path / "versions.json")
+    (tmp_path / "versions.json").write_text(json.dumps({version: write_openapi.document_hash(text)}))
+    assert write_openapi.write(amend=False) is None
+    monkeypatch.setattr(write_openapi, "document_text", lambda: text.replace("Tauscope", "Otherscope"))
+    assert "raise API_VERSION" in str(write_openapi.write(amend=False))
+    assert (tmp_path / "openapi.json").read_text(encoding="utf-8") == text
+    assert write_openapi.write(amend=True) is None
+
+
+def test_the_document_is_served(client: TestClient, document: dict[str, Any]) -> None:
+    assert client.get("/openapi.json").json() == document
+
+
+def test_every_reference_leads_somewhere(document: dict[str, Any]) -> None:
+    references = set(re.findall(r'"\$ref": "#/components/schemas/([^"]+)"', json.dumps(document)))
+    assert references <= set(document["components"]["schemas"])
+    assert not {"HTTPValidationError", "ValidationError"} & references
+
+
+def test_every_operation_says_what_it_does_and_which_problems_it_has(document: dict[str, Any]) -> None:
+    for name, operation in operations(document):
+        assert operation["summary"], name
+        assert operation["description"], name
+        for status, answer in operation["responses"].items():
+            assert answer["description"], (name, status)
+            if int(status) >= 400:
+                (media_type,) = answer["content"]
+                assert media_type == "application/problem+json", (name, status)
+                assert answer["content"][media_type]["examples"], (name, status)
+
+
+def test_every_body_is_strict_and_has_an_example(document: dict[str, Any]) -> None:
+    for name, operation in operations(document):
+        body = operation.get("requestBody")
+        if name.startswith("POST"):
+            assert body is not None, name
+        for media_type, content in (body or {"content": {}})["content"].items():
+            if media_type == "application/json":
+                assert content["examples"], name
+    for name, schema in document["components"]["schemas"].items():
+        if schema.get("type") == "object":
+            assert schema["additionalProperties"] is False, name
+
+
+def test_the_examples_are_accepted(client: TestClient, document: dict[str, Any], tmp_path: Path) -> None:
+    body = document["paths"]["/api/v1/identifications"]["post"]["requestBody"]["content"]["application/json"]
+    for day in ("monday.csv", "tuesday.csv", "wednesday.mcap"):
+        client.post("/api/v1/recordings", files={"file": (day, day.encode())})
+    for example in body["examples"].values():
+        assert client.post("/api/v1/identifications", json=example["value"]).status_code == 202
+    check = document["paths"]["/api/v1/robots/check"]["post"]["requestBody"]["content"]["application/json"]
+    for example in check["examples"].values():
+        assert client.post("/api/v1/robots/check", json=example["value"]).json()["passed"] is True
+
+
+def test_every_code_has_a_kind_and_a_page(client: TestClient) -> None:
+    errors = [
+        error
+        for error in vars(tauscope.errors).values()
+        if isinstance(error, type) and issubclass(error, TauscopeError)
+    ]
+    codes = {error.code for error in errors if error is not TauscopeError}
+    assert codes <= set(KINDS)
+    assert {problem.code for problem in (CANCELLED, INTERNAL, INTERRUPTED, WORKER_LOST)} <= set(KINDS)
+    for code in KINDS:
+        page = client.get(f"/docs/errors/{code}")
+        assert page.status_code == 200
+        assert code in page.text
+    assert_problem(client.get("/docs/errors/nothing"), "not-found", 404)
+
+
+def test_the_page_shows_every_operation_and_needs_nothing_from_elsewhere(
+    client: TestClient, document: dict[str, Any]
+) -> None:
+    page = client.get("/docs")
+    assert page.headers["content-type"].startswith("text/html")
+    for name, operation in operations(document):
+        assert name in page.text
+        assert operation["summary"] in page.text
+    assert "<script" not in page.text
+    assert not re.search(r"(?:src|href)=\"?(?:https?:)?//", page.text)

@@ -1,0 +1,96 @@
+"""Robot files checked over HTTP."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+
+from server.http.problem_check import assert_problem
+
+CHECK = "/api/v1/robots/check"
+URDF = (
+    b'<robot name="arm"><link name="base"/><link name="tool"/><joint name="j" type="revolute"><parent link="base"/>'
+    b'<child link="tool"/><axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
+)
+URDF_ROBOT = b"name: arm\nkinematics: {urdf: {file: arm.urdf, base: base, tip: tool}}\n"
+
+
+def test_a_robot_file_at_a_glance(client: TestClient, paper_robot: bytes) -> None:
+    report = client.post(CHECK, files={"robot": ("arm.yaml", paper_robot)}).json()
+    assert (report["name"], report["passed"]) == ("paper-arm", True)
+    assert [joint["number"] for joint in report["joints"]] == [1, 2, 3]
+    assert report["joints"][1]["limits"] == {
+        "position": [-2.9, 2.9],
+        "velocity": 2.0,
+        "acceleration": 5.0,
+        "torque": 40.0,
+    }
+    assert report["total_mass"] == pytest.approx(2 * 2**0.5)
+
+
+def test_the_same_robot_as_json(client: TestClient, paper_robot: bytes) -> None:
+    from ruamel.yaml import YAML
+
+    robot: Any = YAML(typ="safe").load(paper_robot)
+    inline = client.post(CHECK, json={"robot": robot}).json()
+    assert inline == client.post(CHECK, files={"robot": ("robot", paper_robot)}).json()
+
+
+def test_a_urdf_comes_as_a_part_of_its_own(client: TestClient) -> None:
+    files = {"robot": ("arm.yaml", URDF_ROBOT), "urdf": ("arm.urdf", URDF)}
+    assert client.post(CHECK, files=files).json()["joints"][0]["limits"]["position"] == [-1.0, 1.0]
+    problem = assert_problem(client.post(CHECK, files={"robot": ("arm.yaml", URDF_ROBOT)}), "robot-file", 422)
+    assert "'arm.urdf' was not sent" in problem["detail"]
+
+
+def test_an_impossible_body_is_a_finding(client: TestClient, tmp_path: Path) -> None:
+    link = {"mass": -1.0, "first_moment": [0, 0, 0], "inertia": dict.fromkeys(("xx", "yy", "zz", "xy", "xz", "yz"), 0)}
+    robot = {"name": "r", "kinematics": {"dh": [{"theta": 0, "d": 0, "a": 1, "alpha": 0}]}, "model": {"links": [link]}}
+    report = client.post(CHECK, json={"robot": robot})
+    assert report.json()["passed"] is False
+    assert report.json()["findings"][0]["severity"] == "error"
+    assert report.json()["findings"][0]["where"].startswith("robot: ")
+    named = client.post(CHECK, files={"robot": ("arm.yaml", json.dumps(robot).encode())}).json()
+    assert named["findings"][0]["where"].startswith("arm.yaml")
+    assert "/" not in named["findings"][0]["where"]
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", "arm.yaml"),
+        (b"name: [", "arm.yaml:1"),
+        (b"name: r\nname: s\n", "arm.yaml:2"),
+        (b"\xff\xfe\x00", "arm.yaml:1: byte 0xff"),
+        (b"[" * 5000, "arm.yaml"),
+        (b"<robot/>", "arm.yaml: is XML"),
+        (b"- 1\n", "arm.yaml"),
+        (b"a: &a [x, x]\nb: &b [*a, *a]\nc: &c [*b, *b]\nd: [*c, *c]\nname: r\n", "arm.yaml"),
+    ],
+)
+def test_files_that_are_no_robot(content: bytes, words: str, client: TestClient) -> None:
+    answer = client.post(CHECK, files={"robot": ("arm.yaml", content)})
+    assert assert_problem(answer, "robot-file", 422)["detail"].startswith(words)
+
+
+def test_a_urdf_with_an_entity_bomb(client: TestClient) -> None:
+    bomb = b'<!DOCTYPE r [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;">]><robot name="&b;"/>'
+    outside = b'<!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/hostname">]><robot name="&x;"/>'
+    for urdf in (bomb, outside):
+        answer = client.post(CHECK, files={"robot": ("arm.yaml", URDF_ROBOT), "urdf": ("arm.urdf", urdf)})
+        assert assert_problem(answer, "robot-file", 422)["detail"].startswith("arm.")
+
+
+def test_no_robot_at_all(client: TestClient) -> None:
+    assert_problem(client.post(CHECK, files={"urdf": ("arm.urdf", URDF)}), "invalid-request", 422)
+    assert_problem(client.post(CHECK, json={}), "invalid-request", 422)
+    assert_problem(client.post(CHECK, json={"robot": [False]}), "invalid-request", 422)
+    assert_problem(client.post(CHECK, content=b""), "media-type", 415)
+
+
+def test_a_large_document(client: TestClient) -> None:
+    robot = {"name": "r", "kinematics": {"dh": []}, "x": "y" * 4 * 2**20}
+    answer = client.post(CHECK, json={"robot": robot})
+    assert_problem(answer, "limit-exceeded", 413)
