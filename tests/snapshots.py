@@ -3,7 +3,7 @@
 import tarfile
 from pathlib import Path
 
-SNAPSHOTS = sorted((Path(__file__).parent / "store" / "snapshots").glob("*.tar.xz"))
+SNAPSHOTS = sorted((Path(__file__).parent / "server" / "store" / "snapshots").glob("*.tar.xz"))
 
 
 def unpacked(snapshot: Path, folder: Path) -> Path:

@@ -62,27 +62,12 @@ class DriveLimits:
 class Capabilities:
     """What a backend can do, known without motion.
 
-    joint_count : int
-        number of joints n
-    modes : frozenset of ControlMode
-        ways of control
-    stop_policies : frozenset of StopPolicy
-        ways to stop that the device carries out itself, also when the host is gone, in one mode at least
     largest_rate_hz : float
         cycles a second that the bus allows [Hz]
     watchdog_range_s : tuple of two float
         shortest and longest time of the device's watchdog [s]
-    takes_feed_forward : bool
-        whether `Setpoint.torque` counts in `ControlMode.POSITION`
-    effort_unit : str
-        unit of `ArmState.effort`: ``Nm`` is joint torque (N on prismatic joints), anything else a drive unit (``mA``,
-        ``permille``) that the robot file's torque constant turns into torque
     policies_by_mode : mapping of ControlMode to frozenset of StopPolicy, or None
         ways to stop that the device carries out itself in each mode, where they differ; None where every mode has all
-    rate_limited_by : str
-        what limits the rate, and what to do about it; empty where nothing is known
-    holds_before_torque : bool
-        whether an arm that was enabled in torque mode is held until the first torque; else it is given none
     """
 
     joint_count: int
@@ -97,13 +82,7 @@ class Capabilities:
     holds_before_torque: bool = True
 
     def policies_in(self, mode: ControlMode) -> frozenset[StopPolicy]:
-        """Ways to stop that the device carries out itself when its host is gone.
-
-        Parameters
-        ----------
-        mode : ControlMode
-            who closes the loop
-        """
+        """Ways to stop that the device carries out itself when its host is gone."""
         return self.stop_policies if self.policies_by_mode is None else self.policies_by_mode.get(mode, frozenset())
 
 
@@ -152,12 +131,6 @@ class Backend(Protocol):
 
         Parameters
         ----------
-        mode : ControlMode
-            who closes the loop
-        limits : DriveLimits
-            what the drives enforce
-        stop_policy : StopPolicy
-            what the device does by itself when its watchdog fires
         watchdog_s : float
             time without `exchange` after which it does [s]
         cycle_s : float or None
@@ -177,11 +150,6 @@ class Backend(Protocol):
 
         A drive that does not answer leaves NaN in the state; a fault that it reports stands in `ArmState.faults`.
 
-        Parameters
-        ----------
-        setpoint : Setpoint
-            finite targets for every joint
-
         Raises
         ------
         DriverError
@@ -190,13 +158,7 @@ class Backend(Protocol):
         ...
 
     def stop(self, policy: StopPolicy) -> ArmState:
-        """Stop the arm; afterwards it needs no cycles and stays so until `enable`.
-
-        Parameters
-        ----------
-        policy : StopPolicy
-            how
-        """
+        """Stop the arm; afterwards it needs no cycles and stays so until `enable`."""
         ...
 
     def disconnect(self) -> None:

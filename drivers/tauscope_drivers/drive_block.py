@@ -30,10 +30,6 @@ def require_known_keys(joints: Sequence[JointWithDrive], bus_keys: Sequence[str]
     ----------
     joints : sequence of JointWithDrive
         base first; what they say of the bus stands on the first
-    bus_keys : sequence of str
-        of the bus
-    own_keys : sequence of str
-        of each joint, beside those that any bus has
 
     Raises
     ------
@@ -54,13 +50,6 @@ def require_known_keys(joints: Sequence[JointWithDrive], bus_keys: Sequence[str]
 def require_distinct(joints: Sequence[JointWithDrive], key: str) -> None:
     """Refuse an address that is there twice.
 
-    Parameters
-    ----------
-    joints : sequence of JointWithDrive
-        with that key
-    key : str
-        whose value is the address
-
     Raises
     ------
     DriverError
@@ -77,14 +66,8 @@ def read_whole(joint: JointWithDrive, key: str, default: int | None, *, least: i
 
     Parameters
     ----------
-    joint : JointWithDrive
-        whose
-    key : str
-        of its block
     default : int or None
         where the key is missing; None where it has to be there
-    least, most : int
-        its range
 
     Raises
     ------
@@ -100,11 +83,6 @@ def read_whole(joint: JointWithDrive, key: str, default: int | None, *, least: i
 def read_direction(joint: JointWithDrive) -> int:
     """Which way a drive turns: -1 where it is against the joint, else 1.
 
-    Parameters
-    ----------
-    joint : JointWithDrive
-        whose
-
     Raises
     ------
     DriverError
@@ -118,13 +96,6 @@ def read_direction(joint: JointWithDrive) -> int:
 
 def read_positive(joint: JointWithDrive, key: str) -> float | None:
     """A positive number; None where the key is missing.
-
-    Parameters
-    ----------
-    joint : JointWithDrive
-        whose
-    key : str
-        of its block
 
     Raises
     ------
@@ -142,15 +113,6 @@ def read_positive(joint: JointWithDrive, key: str) -> float | None:
 def read_text(joint: JointWithDrive, key: str, what: str) -> str:
     """A text that has to be there.
 
-    Parameters
-    ----------
-    joint : JointWithDrive
-        whose
-    key : str
-        of its block
-    what : str
-        to give, where it is missing
-
     Raises
     ------
     DriverError
@@ -163,15 +125,5 @@ def read_text(joint: JointWithDrive, key: str, what: str) -> str:
 
 
 def refusal(joint: JointWithDrive, key: str, reason: str) -> DriverError:
-    """Why a block is not usable.
-
-    Parameters
-    ----------
-    joint : JointWithDrive
-        whose
-    key : str
-        of its block
-    reason : str
-        one line, with what to do
-    """
+    """Why a block is not usable."""
     return DriverError(DriverErrorKind.REFUSED, f"joint {joint.name}: drive.{key} {reason}")

@@ -8,14 +8,8 @@ from enum import StrEnum
 class Fault:
     """A fault that a drive or the bus reports, decoded.
 
-    code : str
-        stable name in kebab-case: ``watchdog``, ``overload``, ``over-temperature``, ``lost-bus`` …
     joint : int or None
         joint number, counted from 1; None where it concerns the whole arm
-    detail : str
-        what the device said, in one line
-    remedy : str
-        what the user does next, in one line
     """
 
     code: str
@@ -41,17 +35,7 @@ class DriverErrorKind(StrEnum):
 
 
 class DriverError(RuntimeError):
-    """A backend cannot do what it was asked for; nothing moves because of the request.
-
-    Parameters
-    ----------
-    kind : DriverErrorKind
-        what went wrong
-    message : str
-        one line that names the device or joint and the next step
-    faults : tuple of Fault
-        what the drives report, where they do
-    """
+    """A backend cannot do what it was asked for; nothing moves because of the request."""
 
     def __init__(self, kind: DriverErrorKind, message: str, faults: tuple[Fault, ...] = ()) -> None:
         super().__init__(message)

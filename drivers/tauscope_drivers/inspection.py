@@ -14,17 +14,7 @@ class Severity(StrEnum):
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at.
-
-    severity : Severity
-        how much it matters: a failure keeps the arm from running
-    subject : str
-        the port, or the joint with its drive
-    detail : str
-        what was found, in one line
-    remedy : str
-        what the user does next, in one line; empty where nothing is to be done
-    """
+    """One thing that was looked at."""
 
     severity: Severity
     subject: str
@@ -36,14 +26,8 @@ class Finding:
 class FoundDevice:
     """A device that answered on a bus.
 
-    address : int
-        servo ID or node ID
     bit_rate : int
         at which it answered [bit/s]
-    model : str
-        as printed on its case, or what it says of itself
-    firmware : str
-        version, as it says; empty where it says none
     """
 
     address: int
@@ -56,10 +40,6 @@ class FoundDevice:
 class PlannedFrame:
     """A frame that would be sent.
 
-    phase : str
-        ``connect``, ``enable``, ``cycle`` or ``stop``
-    meaning : str
-        in one line
     wire : str
         as the bus's own tools write it: bytes in hexadecimal on a serial bus, ``201#0F00`` on CAN
     """
@@ -74,29 +54,13 @@ PHASES = ("connect", "enable", "cycle", "stop")
 
 
 def failure(place: str, message: str, device: str = "") -> Finding:
-    """A failure by a driver's message, without the place at its beginning: that stands before it.
-
-    Parameters
-    ----------
-    place : str
-        the port, or the joint with its drive
-    message : str
-        of a `drivers.DriverError`
-    device : str
-        what else the place is called in messages; empty for nothing
-    """
+    """A failure by a driver's message, without the place at its beginning: that stands before it."""
     for name in filter(None, (place, device)):
         message = message.removeprefix(f"{name}: ").removeprefix(f"{name} ")
     return Finding(Severity.FAILURE, place, *split_remedy(message))
 
 
 def split_remedy(message: str) -> tuple[str, str]:
-    """Detail and remedy of a driver's message: what follows the last semicolon is what to do.
-
-    Parameters
-    ----------
-    message : str
-        of a `drivers.DriverError`
-    """
+    """Detail and remedy of a driver's message: what follows the last semicolon is what to do."""
     detail, _, remedy = message.rpartition("; ")
     return (detail, remedy) if detail else (message, "see the message")

@@ -31,12 +31,8 @@ def require_sensible(limits: DriveLimits, position: Array, labels: Sequence[str]
 
     Parameters
     ----------
-    limits : DriveLimits
-        of the joints
     position : (n,) float64
         where the arm stands [rad or m]
-    labels : sequence of str
-        what the joints are called, with the drives behind them
 
     Raises
     ------
@@ -66,13 +62,6 @@ def require_sensible(limits: DriveLimits, position: Array, labels: Sequence[str]
 def require_finite(setpoint: Setpoint, joint_count: int) -> None:
     """Refuse targets that are missing or no numbers.
 
-    Parameters
-    ----------
-    setpoint : Setpoint
-        targets
-    joint_count : int
-        number of joints n
-
     Raises
     ------
     DriverError
@@ -89,13 +78,7 @@ class RunawayWatch:
     """Looks at every reading of an arm that is given torque."""
 
     def __init__(self, limits: DriveLimits) -> None:
-        """Begin with a sound arm.
-
-        Parameters
-        ----------
-        limits : DriveLimits
-            of the joints
-        """
+        """Begin with a sound arm."""
         self._limits = limits
         self._fast = np.zeros(len(limits.velocity), dtype=np.int64)
 

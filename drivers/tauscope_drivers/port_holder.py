@@ -10,11 +10,6 @@ def find_holder(path: str) -> str | None:
     """The process that has a port open, as ``process 123 (name)``; None where none is seen.
 
     Processes of other users show their open files only to the superuser.
-
-    Parameters
-    ----------
-    path : str
-        of the port
     """
     try:
         wanted = os.stat(path).st_rdev

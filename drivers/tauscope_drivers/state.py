@@ -28,8 +28,6 @@ class ArmState:
         of the motor, NaN where it is not reported [°C]
     enabled : (n,) bool
         whether the joint's drive holds or drives the joint
-    faults : tuple of Fault
-        what the drives report now; empty on a sound arm
     late_ns : int
         how much later than the bus takes the answers came: the instant of the reading is not known any better [ns]
     """

@@ -10,13 +10,6 @@ def write_atomically(path: Path, content: bytes) -> None:
     """Write or replace a file; a reader sees the old content or the new, never a part.
 
     The bytes reach the disk before the name does, and the name before this function returns.
-
-    Parameters
-    ----------
-    path : Path
-        the file; its folder has to exist
-    content : bytes
-        the whole content
     """
     descriptor, temporary = tempfile.mkstemp(dir=path.parent, prefix=".part-")
     try:
@@ -32,13 +25,7 @@ def write_atomically(path: Path, content: bytes) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Bring the names in a folder to the disk.
-
-    Parameters
-    ----------
-    folder : Path
-        in which a file was made, renamed or removed
-    """
+    """Bring the names in a folder to the disk."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         os.fsync(descriptor)
@@ -47,11 +34,5 @@ def sync_folder(folder: Path) -> None:
 
 
 def is_disk_full(error: OSError) -> bool:
-    """Whether something failed for want of room: no fault of ours, and over as soon as there is room again.
-
-    Parameters
-    ----------
-    error : OSError
-        of a call that writes
-    """
+    """Whether something failed for want of room: no fault of ours, and over as soon as there is room again."""
     return error.errno in (errno.ENOSPC, errno.EDQUOT)

@@ -17,11 +17,6 @@ from tauscope_sim.recording_csv import write_recording_csv
 def main(arguments: Sequence[str] | None = None) -> int:
     """Simulate a recording and write it.
 
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        command line without the program's name; that of the process where None
-
     Returns
     -------
     int

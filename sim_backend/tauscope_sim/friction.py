@@ -21,8 +21,6 @@ def static_friction_torque(
     ----------
     velocity : (N, n) float64
         v = q̇ [rad/s or m/s]
-    friction : sequence of FrictionCoefficients
-        τ_s, τ_sc, τ_v, one entry a joint [Nm, Nm, Nm s/rad; N, N, N s/m]
     friction_shape : sequence of FrictionShape
         K_v and δ, one entry a joint [s/rad or s/m]; may be None where the coefficient that it shapes is zero
 
@@ -63,8 +61,6 @@ def shape_constants(
 
     Parameters
     ----------
-    friction : sequence of FrictionCoefficients
-        τ_s, τ_sc, τ_v, one entry a joint [Nm, Nm, Nm s/rad; N, N, N s/m]
     friction_shape : sequence of FrictionShape
         K_v and δ, one entry a joint [s/rad or s/m]
 

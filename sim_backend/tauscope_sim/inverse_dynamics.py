@@ -15,8 +15,6 @@ def rigid_body_torque(model: mujoco.MjModel, position: Array, velocity: Array, a
 
     Parameters
     ----------
-    model : mujoco.MjModel
-        the arm, from `tauscope_sim.model.build_model`
     position : (N, n) float64
         q [rad or m]
     velocity : (N, n) float64

@@ -39,16 +39,6 @@ def build_spec(robot: Robot) -> mujoco.MjSpec:
     joint limits, no damping and no actuators: what is not in the robot file is not in the model. Friction is not part
     of it either; see `tauscope_sim.friction`.
 
-    Parameters
-    ----------
-    robot : Robot
-        the arm; its model block has to hold the links
-
-    Returns
-    -------
-    mujoco.MjSpec
-        body ``link<j>`` is link frame j, joint names are the robot file's
-
     Raises
     ------
     RobotFileError
@@ -81,16 +71,6 @@ def build_spec(robot: Robot) -> mujoco.MjSpec:
 
 def build_model(robot: Robot) -> mujoco.MjModel:
     """Compiled MuJoCo model of an arm; see `build_spec`.
-
-    Parameters
-    ----------
-    robot : Robot
-        the arm; its model block has to hold the links
-
-    Returns
-    -------
-    mujoco.MjModel
-        ready for ``mj_inverse`` and ``mj_step``
 
     Raises
     ------
@@ -168,13 +148,6 @@ class BodyInertia:
 
 def body_inertia(link: LinkInertia, place: str) -> BodyInertia:
     """Centre of mass, principal axes and principal moments of a link.
-
-    Parameters
-    ----------
-    link : LinkInertia
-        about the link frame's origin
-    place : str
-        what a message calls the link
 
     Raises
     ------

@@ -55,11 +55,6 @@ class FourierMotion:
         ----------
         time : (N,) float64
             instants since the start of a period [s]
-
-        Returns
-        -------
-        MotionSamples
-            q, q̇, q̈ at these instants
         """
         omega = 2.0 * np.pi / self.period_s * np.arange(1, self.cosine.shape[1] + 1)
         phase = np.multiply.outer(time, omega)
@@ -86,21 +81,8 @@ def random_fourier_motion(
 
     Parameters
     ----------
-    joints : sequence of Joint
-        their limits; each needs at least one of position, velocity and acceleration
-    rng : numpy.random.Generator
-        source of the coefficients and of the centre positions
     period_s : float
         duration of one period [s]
-    harmonics : int
-        number of harmonics M, at least `LEAST_HARMONICS`
-    limit_fraction : float
-        part of each limit that is used, in (0, 1]
-
-    Returns
-    -------
-    FourierMotion
-        the series of all joints
 
     Raises
     ------

@@ -61,31 +61,16 @@ def simulate_recording(
 
     Parameters
     ----------
-    robot : Robot
-        the arm; its model block has to hold the links
-    motion : FourierMotion
-        what the arm does, period after period
     rate_hz : float
         samples per second; each period has to hold a whole number of samples [Hz]
-    periods : int
-        number of periods, at least 1
     noise_std : (n,) float64 or float
         standard deviation of the torque noise [Nm or N]
-    rng : numpy.random.Generator
-        source of the noise
     position_noise_std : (n,) float64 or float
         standard deviation of the position noise [rad or m]
     encoder_step : (n,) float64 or float
         resolution to which positions are rounded, zero for none [rad or m]
-    friction : sequence of FrictionCoefficients, optional
-        friction of each joint; the robot's model block where None, no friction where that has none either
     friction_shape : sequence of FrictionShape, optional
         K_v and δ of each joint [s/rad or s/m]; the robot file's where None
-
-    Returns
-    -------
-    SimulatedRecording
-        one row a sample, samples per period times periods
 
     Raises
     ------

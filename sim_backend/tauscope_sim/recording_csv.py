@@ -19,17 +19,6 @@ def write_recording_csv(
     A joint with ``sign: -1`` is recorded the other way round; with `as_current` the columns are i1…in and hold torque
     divided by the joint's torque constant. Numbers are written so that reading them gives the same float64.
 
-    Parameters
-    ----------
-    path : Path
-        file to write; must not exist: a recording is never overwritten
-    recording : SimulatedRecording
-        what is written
-    joints : sequence of Joint
-        the arm's joints, for their sign and torque constant
-    as_current : bool
-        whether drive units are written in place of torque
-
     Raises
     ------
     RecordingError

@@ -23,10 +23,6 @@ def _zero() -> Array:
 class Scenario:
     """What differs from the robot file, and how well the sensors see it; ``Scenario()`` conceals nothing.
 
-    effects : tuple of Effect
-        of arm, transmission and surroundings
-    sensor_effects : tuple of SensorEffect
-        between arm and recording, in this order
     torque_noise_std : (n,) or () float64
         standard deviation of the recorded torque's white noise [Nm or N]
     position_noise_std : (n,) or () float64
@@ -35,8 +31,6 @@ class Scenario:
         resolution to which positions are recorded, zero for none [rad or m]
     command_latency_s : float
         time from a setpoint's arrival to its effect [s]
-    seed : int
-        of the noise
     """
 
     effects: tuple[Effect, ...] = ()
@@ -52,8 +46,6 @@ class Scenario:
 
         Parameters
         ----------
-        robot : Robot
-            the arm; its model block has to hold the links
         step_s : float
             longest step of the integration [s]
 
@@ -71,13 +63,6 @@ class Scenario:
     def sensors(self, robot: Robot, rng: np.random.Generator | None = None) -> "Sensors":
         """The sensors, at the beginning of a recording.
 
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        rng : numpy.random.Generator or None
-            source of the noise; one of the scenario's seed where None
-
         Raises
         ------
         ScenarioError
@@ -89,17 +74,7 @@ class Scenario:
 
 
 class Sensors:
-    """What a recording shows of the arm, sample by sample; causal, so that a control loop can use it.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        the sensors' effects, noise and resolution
-    joint_count : int
-        number of joints n
-    rng : numpy.random.Generator
-        source of the noise
-    """
+    """What a recording shows of the arm, sample by sample; causal, so that a control loop can use it."""
 
     def __init__(self, scenario: Scenario, joint_count: int, rng: np.random.Generator) -> None:
         self._channels = [effect.channel(joint_count) for effect in scenario.sensor_effects]
@@ -143,8 +118,6 @@ def measure_all(sensors: Sensors, time: Array, position: Array, torque: Array) -
 
     Parameters
     ----------
-    sensors : Sensors
-        at the beginning of a recording
     time : (N,) float64
         of the samples, ascending [s]
     position : (N, n) float64

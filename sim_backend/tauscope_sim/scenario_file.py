@@ -41,14 +41,8 @@ MOST_EFFECTS = 200
 class ScenarioDocument(Document):
     """The scenario file's keys.
 
-    torque_noise_std, position_noise_std, encoder_step : list of float
-        one number, or one a joint
     command_latency : float
         [s]
-    seed : int
-        of the noise
-    effects : list of mappings
-        entries, each with the key ``effect``
     """
 
     torque_noise_std: NotNegativeNumbers = Field(default_factory=single_zero)
@@ -61,18 +55,6 @@ class ScenarioDocument(Document):
 
 def read_scenario(path: Path | str, robot: Robot) -> Scenario:
     """The scenario of a file.
-
-    Parameters
-    ----------
-    path : Path or str
-        the scenario file
-    robot : Robot
-        the arm that it is for
-
-    Returns
-    -------
-    Scenario
-        checked against the robot
 
     Raises
     ------
@@ -88,15 +70,6 @@ def read_scenario(path: Path | str, robot: Robot) -> Scenario:
 
 def scenario_from_yaml(data: bytes, label: str, robot: Robot) -> Scenario:
     """The scenario of a YAML document.
-
-    Parameters
-    ----------
-    data : bytes
-        content of the file
-    label : str
-        name of the file, for messages
-    robot : Robot
-        the arm that it is for
 
     Raises
     ------

@@ -4,7 +4,7 @@ import pytest
 from playwright.sync_api import expect
 
 from browser.conftest import Visit
-from server.http.conftest import RECORDINGS
+from server.conftest import RECORDINGS
 from server.http.serving import Served
 
 pytestmark = [pytest.mark.system, pytest.mark.slow]

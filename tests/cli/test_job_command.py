@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from cli.conftest import Ended
-from server.http.conftest import connected
+from server.conftest import connected
 from server.queue.executors import InlineExecutor
 from snapshots import SNAPSHOTS, unpacked
 from tauscope.server.http import Settings, create_app

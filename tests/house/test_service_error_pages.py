@@ -17,7 +17,7 @@ from httpx2 import Response
 from starlette.testclient import TestClient
 
 from server.auth.keyed import client_with
-from server.http.conftest import HOST, RECORDINGS
+from server.conftest import HOST, RECORDINGS
 from server.http.motions import ROBOT, move_document
 from server.http.problem_check import assert_problem
 from server.queue.controls import HandControls
@@ -292,7 +292,7 @@ def a_fault_in_a_request(bench: Bench) -> Response:
     def fail(*_: object) -> None:
         raise KeyError("x")
 
-    bench.patch.setattr("tauscope.server.store.ItemStore.identifiers", fail)
+    bench.patch.setattr("tauscope.server.store.items.ItemStore.identifiers", fail)
     return bench.client().get(RUNS)
 
 

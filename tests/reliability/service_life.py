@@ -20,7 +20,7 @@ from reliability.faulty_disk import FaultyDisk, die, full
 from reliability.judgement import Judge
 from reliability.ledger import Ledger
 from reliability.requests import Note, Requests
-from server.http.conftest import connected
+from server.conftest import connected
 from tauscope.server.http import Settings, assembly, create_app
 from tauscope.server.http.services import Services
 from tauscope.server.queue.worker_pool import WorkerPool

@@ -24,7 +24,7 @@ joints:
   - {name: joint1, limits: {position: [-2.0, 2.0], velocity: 2.0, acceleration: 10.0, torque: 50}}
   - {name: joint2, limits: {position: [-2.0, 2.0], velocity: 2.0, acceleration: 10.0, torque: 50}}
 """
-DOUBLE = (sys.executable, str(REPOSITORY / "tests" / "acquisition" / "control_double.py"))
+DOUBLE = (sys.executable, str(REPOSITORY / "tests" / "runtime" / "control_double.py"))
 LONG_S = 30.0
 
 

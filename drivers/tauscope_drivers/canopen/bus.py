@@ -46,15 +46,6 @@ class CanBus:
     ) -> None:
         """Open the bus.
 
-        Parameters
-        ----------
-        configuration : BusConfiguration
-            which bus
-        bus : can.BusABC or None
-            a bus that is open already, in place of the configured one
-        clock : Clock or None
-            by which heartbeats are due; the machine's where None
-
         Raises
         ------
         DriverError
@@ -84,25 +75,11 @@ class CanBus:
         self._network.bus = self._bus
 
     def subscribe(self, identifier: int, handler: FrameHandler) -> None:
-        """Hand all frames of an identifier to a handler.
-
-        Parameters
-        ----------
-        identifier : int
-            11 bits
-        handler : callable
-            takes the identifier and the payload
-        """
+        """Hand all frames of an identifier to a handler."""
         self._handlers[identifier] = handler
 
     def add_node(self, node_id: int) -> NodeDictionary:
-        """The object dictionary of a node.
-
-        Parameters
-        ----------
-        node_id : int
-            1 to 127
-        """
+        """The object dictionary of a node."""
         client = PumpedSdoClient(self, node_id)
         client.network = self._network
         self.subscribe(client.tx_cobid, lambda identifier, data: client.on_response(identifier, data, 0.0))
@@ -110,13 +87,6 @@ class CanBus:
 
     def send(self, identifier: int, data: bytes) -> None:
         """Send a frame.
-
-        Parameters
-        ----------
-        identifier : int
-            11 bits
-        data : bytes
-            up to 8
 
         Raises
         ------
@@ -213,15 +183,7 @@ class CanBus:
             self.send(HEARTBEAT_ID + MASTER_NODE, bytes([NMT_OPERATIONAL_STATE]))
 
     def command_nodes(self, command: int, node_id: int = 0) -> None:
-        """Send a network-management command.
-
-        Parameters
-        ----------
-        command : int
-            `NMT_START`, `NMT_PRE_OPERATIONAL`
-        node_id : int
-            0 for all
-        """
+        """Send a network-management command."""
         self.send(NMT_ID, bytes([command, node_id]))
 
     def close(self) -> None:

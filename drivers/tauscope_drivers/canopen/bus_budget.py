@@ -40,15 +40,7 @@ def frame_bits(payload_bytes: int) -> int:
 
 
 def cycle_bits(nodes: int, frames: CycleFrames) -> int:
-    """Bits of one cycle: SYNC and every node's PDOs.
-
-    Parameters
-    ----------
-    nodes : int
-        number of nodes
-    frames : CycleFrames
-        of one node
-    """
+    """Bits of one cycle: SYNC and every node's PDOs."""
     node = sum(frame_bits(size) for size in (*frames.received_bytes, *frames.sent_bytes))
     return frame_bits(_SYNC_BYTES) + nodes * node
 
@@ -58,10 +50,6 @@ def largest_rate_hz(nodes: int, frames: CycleFrames, bit_rate: float, serial_bau
 
     Parameters
     ----------
-    nodes : int
-        number of nodes
-    frames : CycleFrames
-        of one node
     bit_rate : float
         of the bus [bit/s]
     serial_baud : float or None
@@ -81,10 +69,6 @@ def rate_limit(nodes: int, frames: CycleFrames, bit_rate: float, serial_baud: fl
 
     Parameters
     ----------
-    nodes : int
-        number of nodes
-    frames : CycleFrames
-        of one node
     bit_rate : float
         of the bus [bit/s]
     serial_baud : float or None

@@ -22,11 +22,6 @@ class BusClaim:
     def __init__(self, interface: str) -> None:
         """Claim.
 
-        Parameters
-        ----------
-        interface : str
-            as the system calls it, such as ``can0``
-
         Raises
         ------
         ClaimedError

@@ -46,11 +46,6 @@ def write_settings(node: DriveNode) -> bool:
 
     They may change what its positions and torques mean, so that nothing that was read before holds any more.
 
-    Parameters
-    ----------
-    node : DriveNode
-        with or without such a file
-
     Raises
     ------
     DriverError
@@ -116,14 +111,6 @@ def commission_drive(
 
     Parameters
     ----------
-    node : DriveNode
-        whose units are known
-    mode : ControlMode
-        who closes the loop
-    limits : DriveLimits
-        of all joints; the drive enforces those of position and torque
-    stop_policy : StopPolicy
-        ``hold`` or ``torque_off``
     watchdog_s : float
         time without the master's heartbeat after which the drive stops [s]
     cycle_s : float or None

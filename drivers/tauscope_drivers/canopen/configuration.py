@@ -35,15 +35,7 @@ _NODE_KEYS = ("node_id", "counts_per_turn", "zero_count", "direction", "rated_to
 
 @dataclass(frozen=True)
 class DriveJoint:
-    """A joint as the driver sees it.
-
-    name : str
-        of the joint
-    gear_ratio : float
-        motor turns per joint turn; per metre of travel over 2π on a prismatic joint
-    drive : mapping
-        its ``drive`` block
-    """
+    """A joint as the driver sees it."""
 
     name: str
     gear_ratio: float
@@ -54,20 +46,8 @@ class DriveJoint:
 class NodeConfiguration:
     """One drive.
 
-    node_id : int
-        1 to 127
-    counts_per_turn : float
-        position counts a motor turn
-    gear_ratio : float
-        motor turns per joint turn
-    zero_count : int
-        count at which the joint stands at zero
-    direction : int
-        -1 where the drive counts against the joint, else 1
     rated_torque_nm : float or None
         at the motor shaft, in place of what the drive states (0x6076): makers scale it differently [Nm]
-    device_file : DeviceFile or None
-        the drive's EDS or DCF file, which describes what the driver needs
     """
 
     node_id: int
@@ -83,18 +63,10 @@ class NodeConfiguration:
 class BusConfiguration:
     """The bus and the drives on it, in the order of the joints.
 
-    nodes : tuple of NodeConfiguration
-        one a joint
-    interface : str
-        python-can's name: ``socketcan``, ``slcan``, ``pcan``, ``socketcand``, ``virtual`` …
-    channel : str
-        ``can0``, ``/dev/ttyACM0`` …
     bit_rate : int
         [bit/s]
     serial_baud : float or None
         of an adapter on a true serial line [bit/s]
-    options : mapping of str to str, number or bool
-        what python-can's interface takes besides
     """
 
     nodes: tuple[NodeConfiguration, ...]
@@ -135,13 +107,6 @@ def read_configuration(joints: Sequence[DriveJoint]) -> BusConfiguration:
 
 def require_targets(configuration: BusConfiguration, mode: ControlMode) -> None:
     """Refuse a mode whose targets a drive does not take, by its EDS or DCF file.
-
-    Parameters
-    ----------
-    configuration : BusConfiguration
-        bus and drives
-    mode : ControlMode
-        who closes the loop
 
     Raises
     ------

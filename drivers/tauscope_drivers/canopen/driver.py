@@ -59,12 +59,8 @@ class CanopenArm:
         ----------
         joints : sequence of DriveJoint
             base first
-        bus : can.BusABC or None
-            a bus that is open already, in place of the configured one
         patience_s : float
             how much longer than the bus takes an answer is waited for [s]
-        clock : Clock or None
-            that the arm runs by; the machine's where None
 
         Raises
         ------
@@ -136,12 +132,6 @@ class CanopenArm:
 
         Parameters
         ----------
-        mode : ControlMode
-            cyclic synchronous position or torque
-        limits : DriveLimits
-            of torque and position, which the drives enforce
-        stop_policy : StopPolicy
-            ``hold`` or ``torque_off``
         watchdog_s : float
             time without the master's heartbeat after which the drives stop [s]
         cycle_s : float or None
@@ -176,13 +166,7 @@ class CanopenArm:
         return state
 
     def exchange(self, setpoint: Setpoint) -> ArmState:
-        """Targets out, SYNC, answers in; a node that does not answer in time leaves NaN.
-
-        Parameters
-        ----------
-        setpoint : Setpoint
-            finite targets
-        """
+        """Targets out, SYNC, answers in; a node that does not answer in time leaves NaN."""
         session = self._reached()
         mode, limiter = self._mode, self._limiter
         if mode is None or limiter is None:
@@ -201,13 +185,7 @@ class CanopenArm:
         return state
 
     def stop(self, policy: StopPolicy) -> ArmState:
-        """Quick stop and hold, or ramp and let go; drives that are in such a state already stay as they are.
-
-        Parameters
-        ----------
-        policy : StopPolicy
-            ``hold`` or ``torque_off``
-        """
+        """Quick stop and hold, or ramp and let go; drives that are in such a state already stay as they are."""
         session, mode = self._session, self._mode
         if session is None:
             return blind_state(self.clock.now_ns(), len(self._configuration.nodes))

@@ -94,21 +94,12 @@ def plan_frames(
     ----------
     joints : sequence of DriveJoint
         base first; each ``drive`` block has to state ``rated_torque_nm``
-    mode : ControlMode
-        who closes the loop; in torque mode the torque is the host's loop's to say, and 0 is shown
-    limits : DriveLimits
-        of the joints
     watchdog_s : float
         time of silence after which the drives stop [s]
     targets : (K, n) float64
         positions of the first K cycles; the arm is supposed to stand at the first of them [rad or m]
     cycle_s : float or None
         time between them, which drives are told; None where it is not known [s]
-
-    Yields
-    ------
-    PlannedFrame
-        in the order of sending
 
     Raises
     ------

@@ -49,13 +49,7 @@ _MEANINGS: tuple[tuple[int, int, str, str, str], ...] = (
 
 
 def decode_emergency(payload: bytes) -> int | None:
-    """Error code of an emergency message; None where its length is not eight bytes.
-
-    Parameters
-    ----------
-    payload : bytes
-        of the frame: code (2), error register (1), the maker's own (5)
-    """
+    """Error code of an emergency message; None where its length is not eight bytes."""
     return int.from_bytes(payload[:2], "little") if len(payload) == _LENGTH else None
 
 
@@ -64,8 +58,6 @@ def describe_error(code: int, joint: int) -> Fault | None:
 
     Parameters
     ----------
-    code : int
-        16 bits
     joint : int
         number of the joint, from 1
     """

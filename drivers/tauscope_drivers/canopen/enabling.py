@@ -19,13 +19,6 @@ STILL_CYCLES = 4
 def power_up(session: Session, mode: ControlMode) -> tuple[ArmState, Array]:
     """Take all drives to *operation enabled*; targets are where the joints are when their drives get there.
 
-    Parameters
-    ----------
-    session : Session
-        with commissioned drives that are told to take process data
-    mode : ControlMode
-        that they were commissioned for
-
     Returns
     -------
     ArmState

@@ -25,12 +25,8 @@ def open_interface(interface: str, channel: str, bit_rate: int, options: Mapping
 
     Parameters
     ----------
-    interface, channel : str
-        as python-can names them
     bit_rate : int
         [bit/s]
-    options : mapping of str to str, number or bool
-        that this interface takes besides; what python-can's own configuration file has is added to them
 
     Raises
     ------

@@ -45,30 +45,10 @@ class Measurement:
 class DriveNode:
     """A drive on the bus.
 
-    configuration : NodeConfiguration
-        as the robot file states it
     joint : int
         number of its joint, from 1
-    dictionary : NodeDictionary
-        its object dictionary
-    units : DriveUnits
-        its counts and per mille, known once it is connected
-    values : dict of DriveObject to int
-        what it sent in this cycle; empty where it sent nothing
-    error_code : int
-        of its last emergency
-    acknowledged_code : int
-        error code that the operator has seen: a drive may go on showing it until it is enabled again
-    measurement : Measurement
-        of this cycle, as far as it is believed
-    last_state : DriveState or None
-        power state as it told when it last answered: what it is told next when an answer is lost
     last_position : float
         of the joint when it last answered: the place to stay at, never a measurement [rad or m]
-    is_deaf : bool
-        whether it said, after its last process data, that it takes none any more: it missed the master, or restarted
-    leaps : LeapFilter
-        knows where the joint can be
     """
 
     configuration: NodeConfiguration
@@ -90,10 +70,6 @@ class DriveNode:
 
         Parameters
         ----------
-        bus : CanBus
-            where it is
-        configuration : NodeConfiguration
-            which drive
         joint : int
             number of its joint, from 1
         """
@@ -165,10 +141,6 @@ class DriveNode:
 
         Parameters
         ----------
-        mode : ControlMode
-            which of the two targets it takes
-        controlword : int
-            0x6040
         position : float
             of the joint, finite [rad or m]
         torque : float
@@ -187,13 +159,7 @@ class DriveNode:
             raise DriverError(DriverErrorKind.REFUSED, f"{self.place}: {error}; check counts_per_turn") from error
 
     def controlword(self, goal: Goal) -> int:
-        """Next controlword towards a goal; a lost answer changes nothing, or it would drop an arm under power.
-
-        Parameters
-        ----------
-        goal : Goal
-            where to take it
-        """
+        """Next controlword towards a goal; a lost answer changes nothing, or it would drop an arm under power."""
         return next_controlword(self.last_state, goal)
 
     def faults(self) -> tuple[Fault, ...]:

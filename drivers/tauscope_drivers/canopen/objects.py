@@ -5,19 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class DriveObject:
-    """One entry of the object dictionary.
-
-    name : str
-        as CiA calls it
-    index : int
-        0x1000 … 0xFFFF
-    subindex : int
-        0 for a variable
-    bits : int
-        its size; 0 for a text
-    signed : bool
-        whether it is an INTEGER (else UNSIGNED)
-    """
+    """One entry of the object dictionary."""
 
     name: str
     index: int

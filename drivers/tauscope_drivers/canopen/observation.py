@@ -20,12 +20,8 @@ def arm_state(nodes: Sequence[DriveNode], time_ns: int, caught: Fault | None) ->
 
     Parameters
     ----------
-    nodes : sequence of DriveNode
-        in the order of the joints
     time_ns : int
         instant of the reading [ns]
-    caught : Fault or None
-        what the driver itself has found
     """
     measured = [node.measurement for node in nodes]
     return ArmState(
@@ -41,15 +37,7 @@ def arm_state(nodes: Sequence[DriveNode], time_ns: int, caught: Fault | None) ->
 
 
 def arm_faults(nodes: Sequence[DriveNode], caught: Fault | None) -> tuple[Fault, ...]:
-    """What drives report and what the driver itself has caught; a host that fell silent is one fault of the arm.
-
-    Parameters
-    ----------
-    nodes : sequence of DriveNode
-        in the order of the joints
-    caught : Fault or None
-        what the driver itself has found
-    """
+    """What drives report and what the driver itself has caught; a host that fell silent is one fault of the arm."""
     reported = [fault for node in nodes for fault in node.faults()]
     silence = [replace(fault, joint=None) for fault in reported if fault.code == WATCHDOG_CODE]
     own = [] if caught is None else [caught]
@@ -63,19 +51,11 @@ def blind_state(time_ns: int, joint_count: int) -> ArmState:
     ----------
     time_ns : int
         present instant [ns]
-    joint_count : int
-        number of joints n
     """
     unknown = np.full(joint_count, math.nan)
     return ArmState(time_ns, unknown, unknown, unknown, unknown, np.zeros(joint_count, dtype=np.bool_))
 
 
 def listed(faults: Sequence[Fault]) -> str:
-    """Faults in one line, for messages.
-
-    Parameters
-    ----------
-    faults : sequence of Fault
-        at least one
-    """
+    """Faults in one line, for messages."""
     return "; ".join(str(fault) for fault in faults)

@@ -9,11 +9,7 @@ from tauscope_drivers.canopen.objects import DriveObject
 
 @dataclass(frozen=True)
 class PdoLayout:
-    """Which objects a process data object holds, in their order.
-
-    objects : tuple of DriveObject
-        together at most 64 bits
-    """
+    """Which objects a process data object holds, in their order."""
 
     objects: tuple[DriveObject, ...]
 
@@ -35,13 +31,6 @@ def encode_pdo(layout: PdoLayout, values: Mapping[DriveObject, int]) -> bytes:
     A value that its object cannot hold is an error and never cut to size: a target that wraps round or saturates is
     full torque.
 
-    Parameters
-    ----------
-    layout : PdoLayout
-        what the frame holds
-    values : mapping of DriveObject to int
-        a value for each object
-
     Raises
     ------
     OverflowError
@@ -57,15 +46,7 @@ def encode_pdo(layout: PdoLayout, values: Mapping[DriveObject, int]) -> bytes:
 
 
 def decode_pdo(layout: PdoLayout, payload: bytes) -> dict[DriveObject, int] | None:
-    """Values of a frame; None where its length is not the layout's, which a wrongly mapped drive sends.
-
-    Parameters
-    ----------
-    layout : PdoLayout
-        what the frame holds
-    payload : bytes
-        of the frame
-    """
+    """Values of a frame; None where its length is not the layout's, which a wrongly mapped drive sends."""
     if len(payload) != layout.size:
         return None
     values, start = {}, 0
@@ -77,11 +58,5 @@ def decode_pdo(layout: PdoLayout, payload: bytes) -> dict[DriveObject, int] | No
 
 
 def mapping_entries(objects: Sequence[DriveObject]) -> list[int]:
-    """What the mapping parameter's subindices 1, 2, … hold.
-
-    Parameters
-    ----------
-    objects : sequence of DriveObject
-        in their order
-    """
+    """What the mapping parameter's subindices 1, 2, … hold."""
     return [entry.mapping for entry in objects]

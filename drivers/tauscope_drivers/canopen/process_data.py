@@ -20,17 +20,7 @@ TARGET_PDOS = {
 
 @dataclass(frozen=True)
 class PdoParameters:
-    """Where a drive keeps what one of its PDOs is.
-
-    identifier : DriveObject
-        of its frame, and whether it is on
-    kind : DriveObject
-        transmission type
-    count : DriveObject
-        of the objects in it
-    entries : tuple of DriveObject
-        which objects these are, in their order
-    """
+    """Where a drive keeps what one of its PDOs is."""
 
     identifier: DriveObject
     kind: DriveObject
@@ -39,13 +29,7 @@ class PdoParameters:
 
 
 def received_parameters(layout: PdoLayout) -> PdoParameters:
-    """Parameters of the PDO with the targets.
-
-    Parameters
-    ----------
-    layout : PdoLayout
-        what it holds
-    """
+    """Parameters of the PDO with the targets."""
     return _parameters(0x1400, 0x1600, layout)
 
 
@@ -56,8 +40,6 @@ def sent_parameters(number: int, layout: PdoLayout) -> PdoParameters:
     ----------
     number : int
         from 0, as in `SENT_IDS`
-    layout : PdoLayout
-        what it holds
     """
     return _parameters(0x1800 + number, 0x1A00 + number, layout)
 

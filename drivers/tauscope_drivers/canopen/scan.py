@@ -30,8 +30,6 @@ def scan_bus(interface: str, channel: str, bit_rates: Sequence[int] | None = Non
 
     Parameters
     ----------
-    interface, channel : str
-        as python-can names them
     bit_rates : sequence of int or None
         to try [bit/s]; the usual ones where None, one where the interface has a fixed one
 

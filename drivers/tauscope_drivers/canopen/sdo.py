@@ -48,25 +48,12 @@ class NodeDictionary:
     """The object dictionary of one node, read and written by service data."""
 
     def __init__(self, client: SdoClient, node_id: int) -> None:
-        """Reach a node; nothing is sent yet.
-
-        Parameters
-        ----------
-        client : SdoClient
-            of the node
-        node_id : int
-            1 to 127
-        """
+        """Reach a node; nothing is sent yet."""
         self._client = client
         self.node_id = node_id
 
     def read(self, entry: DriveObject) -> int:
         """Value of an entry.
-
-        Parameters
-        ----------
-        entry : DriveObject
-            what to read
 
         Raises
         ------
@@ -77,11 +64,6 @@ class NodeDictionary:
 
     def read_surely(self, entry: DriveObject) -> int:
         """Value of an entry that every measurement hangs on: as two readings in a row have it.
-
-        Parameters
-        ----------
-        entry : DriveObject
-            what to read
 
         Raises
         ------
@@ -101,11 +83,6 @@ class NodeDictionary:
     def read_data(self, entry: DriveObject) -> bytes:
         """Value of an entry as transferred, cut to its size; of a text without the zeros that end it.
 
-        Parameters
-        ----------
-        entry : DriveObject
-            what to read
-
         Raises
         ------
         DriverError
@@ -118,13 +95,7 @@ class NodeDictionary:
         return data[: entry.bits // 8] if entry.bits else data.rstrip(b"\0")
 
     def read_optional(self, entry: DriveObject) -> int | None:
-        """Value of an entry that not every drive has; None where the drive has none.
-
-        Parameters
-        ----------
-        entry : DriveObject
-            what to read
-        """
+        """Value of an entry that not every drive has; None where the drive has none."""
         try:
             return self.read(entry)
         except DriverError as error:
@@ -133,13 +104,7 @@ class NodeDictionary:
             return None
 
     def read_text(self, entry: DriveObject) -> str:
-        """A text; empty where the node has none.
-
-        Parameters
-        ----------
-        entry : DriveObject
-            what to read
-        """
+        """A text; empty where the node has none."""
         try:
             return self._client.upload(entry.index, entry.subindex).decode("ascii", "replace").strip("\0 ")
         except (SdoError, can.CanError, OSError):
@@ -147,13 +112,6 @@ class NodeDictionary:
 
     def write(self, entry: DriveObject, value: int) -> None:
         """Write an entry and read it back.
-
-        Parameters
-        ----------
-        entry : DriveObject
-            what to write
-        value : int
-            that fits the entry
 
         Raises
         ------
@@ -174,13 +132,6 @@ class NodeDictionary:
     def send(self, entry: DriveObject, value: int) -> None:
         """Write an entry that cannot be read back yet.
 
-        Parameters
-        ----------
-        entry : DriveObject
-            what to write
-        value : int
-            that fits the entry
-
         Raises
         ------
         DriverError
@@ -190,15 +141,6 @@ class NodeDictionary:
 
     def send_data(self, entry: DriveObject, data: bytes, text: str) -> None:
         """Write an entry as transferred.
-
-        Parameters
-        ----------
-        entry : DriveObject
-            what to write
-        data : bytes
-            little end first
-        text : str
-            the value, for messages
 
         Raises
         ------
@@ -237,43 +179,19 @@ class PumpedSdoClient(SdoClient):
     MAX_RETRIES = ATTEMPTS
 
     def __init__(self, pump: Pump, node_id: int) -> None:
-        """Reach a node; nothing is sent yet.
-
-        Parameters
-        ----------
-        pump : Pump
-            takes frames off the bus
-        node_id : int
-            1 to 127
-        """
+        """Reach a node; nothing is sent yet."""
         super().__init__(0x600 + node_id, 0x580 + node_id, ObjectDictionary())
         self._pump = pump
         self._asked: bytes | None = None
 
     def send_request(self, request: bytes) -> None:
-        """Send a frame, and remember what it asks for.
-
-        Parameters
-        ----------
-        request : bytes
-            eight of them
-        """
+        """Send a frame, and remember what it asks for."""
         if request[0] >> 5 in _INITIATE:
             self._asked = bytes(request[:4])
         super().send_request(request)
 
     def on_response(self, can_id: int, data: bytes, timestamp: float) -> None:
-        """Take a frame of the node.
-
-        Parameters
-        ----------
-        can_id : int
-            identifier
-        data : bytes
-            payload
-        timestamp : float
-            of no matter
-        """
+        """Take a frame of the node."""
         command = data[0] >> 5 if len(data) == 8 else None
         if command is None or self._asked is None:
             return

@@ -37,8 +37,6 @@ class SerialAdapterBus(slcanBus):
 
         Parameters
         ----------
-        path : str
-            serial device
         bit_rate : int
             of the bus [bit/s]
 

@@ -27,24 +27,12 @@ SETTLING_CYCLE_S = 0.01
 
 
 def possible_rate_hz(configuration: BusConfiguration) -> float:
-    """Most cycles a second that bus and adapter carry [Hz].
-
-    Parameters
-    ----------
-    configuration : BusConfiguration
-        bus and drives
-    """
+    """Most cycles a second that bus and adapter carry [Hz]."""
     return largest_rate_hz(len(configuration.nodes), CYCLE_FRAMES, configuration.bit_rate, configuration.serial_baud)
 
 
 def rate_limited_by(configuration: BusConfiguration) -> str:
-    """What keeps the rate from being higher, and what to do about it.
-
-    Parameters
-    ----------
-    configuration : BusConfiguration
-        bus and drives
-    """
+    """What keeps the rate from being higher, and what to do about it."""
     return rate_limit(len(configuration.nodes), CYCLE_FRAMES, configuration.bit_rate, configuration.serial_baud)
 
 
@@ -52,20 +40,10 @@ def rate_limited_by(configuration: BusConfiguration) -> str:
 class Session:
     """An arm's drives, reached.
 
-    bus : CanBus
-        that they are on
-    nodes : tuple of DriveNode
-        in the order of the joints
-    clock : Clock
-        that the arm runs by
     answer_ns : int
         time that drives get to answer SYNC in the control loop [ns]
-    caught : Fault or None
-        what the driver itself has found and nobody has acknowledged
     settling_ns : int
         cycle while drives change state: that of the control loop, once it is known [ns]
-    answer_time : AnswerTime
-        what is usual on this bus
     """
 
     bus: CanBus
@@ -105,12 +83,6 @@ class Session:
 
         Parameters
         ----------
-        mode : ControlMode
-            which targets the drives take
-        goal : Goal
-            where each is taken
-        setpoint : Setpoint
-            finite targets
         answer_ns : int
             longest wait for the answers [ns]
         """
@@ -159,10 +131,6 @@ class Session:
 
         Parameters
         ----------
-        is_reached : callable
-            looks whether it is
-        step : callable
-            takes a step
         within_s : float
             time for it [s]
         """
@@ -174,13 +142,7 @@ class Session:
         return state
 
     def wait_for_next(self, state: ArmState) -> None:
-        """Let a cycle pass while drives change state.
-
-        Parameters
-        ----------
-        state : ArmState
-            of the cycle before
-        """
+        """Let a cycle pass while drives change state."""
         self.clock.wait_until_ns(state.time_ns + self.settling_ns)
 
 

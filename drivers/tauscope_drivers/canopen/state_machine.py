@@ -61,13 +61,7 @@ _TO_OPERATION = {
 
 
 def decode_state(statusword: int) -> DriveState | None:
-    """State that a statusword (0x6041) tells; None for a pattern that the standard does not know.
-
-    Parameters
-    ----------
-    statusword : int
-        16 bits
-    """
+    """State that a statusword (0x6041) tells; None for a pattern that the standard does not know."""
     return next((state for mask, value, state in _PATTERNS if statusword & mask == value), None)
 
 
@@ -76,13 +70,6 @@ def next_controlword(state: DriveState | None, goal: Goal) -> int:
 
     A drive in fault, one whose state is not known and one that is not ready gets no voltage: only an explicit
     `FAULT_RESET` takes it further.
-
-    Parameters
-    ----------
-    state : DriveState or None
-        as `decode_state` tells
-    goal : Goal
-        where the drive shall be taken
     """
     if goal is Goal.OPERATION_ENABLED:
         return _TO_OPERATION.get(state, DISABLE_VOLTAGE) if state is not None else DISABLE_VOLTAGE

@@ -30,15 +30,6 @@ def stop_in_cycle(session: Session, mode: ControlMode, goal: Goal) -> bool:
     """Stop by process data, all drives together; False where not all got there.
 
     Nobody waits for a drive that takes no process data any more: it has stopped by itself.
-
-    Parameters
-    ----------
-    session : Session
-        of drives that take process data
-    mode : ControlMode
-        that they are enabled in
-    goal : Goal
-        where the stop takes them
     """
     still = session.standstill()
 
@@ -57,15 +48,6 @@ def stop_promptly(session: Session, mode: ControlMode, goal: Goal) -> ArmState:
 
     Those that missed the master have stopped by themselves and answer no SYNC: they are asked by service data, for
     what they told last is from before.
-
-    Parameters
-    ----------
-    session : Session
-        of drives that take process data
-    mode : ControlMode
-        that they are enabled in
-    goal : Goal
-        where the stop takes them
     """
     still = session.standstill()
     for _ in range(PROMPT_CYCLES):
@@ -82,15 +64,6 @@ def stop_one_by_one(nodes: Sequence[DriveNode], goal: Goal, *, is_stopped: bool)
 
     One that holds already stays as it is. A fault for each drive that does not answer: the others are stopped all the
     same.
-
-    Parameters
-    ----------
-    nodes : sequence of DriveNode
-        in the order of the joints
-    goal : Goal
-        where the stop takes them
-    is_stopped : bool
-        whether they are there already
 
     Raises
     ------
@@ -114,28 +87,14 @@ def stop_one_by_one(nodes: Sequence[DriveNode], goal: Goal, *, is_stopped: bool)
 
 
 def has_stopped(node: DriveNode, goal: Goal) -> bool:
-    """Whether a drive is where a stop takes it; one in fault has stopped by itself.
-
-    Parameters
-    ----------
-    node : DriveNode
-        which has answered, or not
-    goal : Goal
-        where the stop takes it
-    """
+    """Whether a drive is where a stop takes it; one in fault has stopped by itself."""
     if goal is Goal.QUICK_STOP:
         return node.state in (DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT)
     return node.state not in (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE, None)
 
 
 def dropped_faults(nodes: Sequence[DriveNode]) -> list[Fault]:
-    """Drives that should hold and have no power, and do not say why: they were restarted.
-
-    Parameters
-    ----------
-    nodes : sequence of DriveNode
-        just read, after a stop that holds
-    """
+    """Drives that should hold and have no power, and do not say why: they were restarted."""
     return [
         Fault("not-held", node.joint, f"is without power ({node.state}) after a stop that holds", _RESTART_REMEDY)
         for node in nodes
@@ -144,13 +103,7 @@ def dropped_faults(nodes: Sequence[DriveNode]) -> list[Fault]:
 
 
 def reset_faults(session: Session) -> ArmState:
-    """Reset drives in fault, once, and forget emergencies; what persists is in the state that is returned.
-
-    Parameters
-    ----------
-    session : Session
-        of drives outside the cycle
-    """
+    """Reset drives in fault, once, and forget emergencies; what persists is in the state that is returned."""
     session.caught = None
     for node in session.nodes:
         node.read_now()

@@ -64,8 +64,6 @@ class TargetLimiter:
 
         Parameters
         ----------
-        limits : DriveLimits
-            of the joints
         position : (n,) float64
             where the arm stands [rad or m]
         cycle_s : float
@@ -83,8 +81,6 @@ class TargetLimiter:
 
         Parameters
         ----------
-        setpoint : Setpoint
-            finite targets
         now_ns : int
             present instant [ns]
         """

@@ -13,8 +13,6 @@ class DriveUnits:
     radians_per_count : float
         2π ÷ (counts a motor turn × gear ratio), signed where the drive turns the other way round than the joint; metres
         a count on prismatic joints [rad or m]
-    zero_count : int
-        count at which the joint stands at zero
     torque_per_permille : float
         joint torque for one part in thousand of the motor's rated torque (0x6076), signed likewise [Nm or N]
     """
@@ -24,13 +22,7 @@ class DriveUnits:
     torque_per_permille: float
 
     def position(self, counts: int) -> float:
-        """Joint position [rad or m].
-
-        Parameters
-        ----------
-        counts : int
-            0x6064
-        """
+        """Joint position [rad or m]."""
         return (counts - self.zero_count) * self.radians_per_count
 
     def counts(self, position: float) -> int:
@@ -44,23 +36,11 @@ class DriveUnits:
         return round(position / self.radians_per_count) + self.zero_count
 
     def velocity(self, counts_per_second: int) -> float:
-        """Joint velocity [rad/s or m/s].
-
-        Parameters
-        ----------
-        counts_per_second : int
-            0x606C
-        """
+        """Joint velocity [rad/s or m/s]."""
         return counts_per_second * self.radians_per_count
 
     def torque(self, permille: int) -> float:
-        """Joint torque [Nm or N].
-
-        Parameters
-        ----------
-        permille : int
-            0x6077
-        """
+        """Joint torque [Nm or N]."""
         return permille * self.torque_per_permille
 
     def permille(self, torque: float) -> int:
@@ -90,8 +70,6 @@ def drive_units(configuration: NodeConfiguration, rated_torque_nm: float) -> Dri
 
     Parameters
     ----------
-    configuration : NodeConfiguration
-        of the drive
     rated_torque_nm : float
         at the motor shaft [Nm]
     """

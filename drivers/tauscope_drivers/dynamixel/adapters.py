@@ -21,13 +21,7 @@ def serial_adapters() -> list[Finding]:
 
 
 def latency_finding(path: str) -> Finding:
-    """The adapter's latency timer, which caps every rate where it is long.
-
-    Parameters
-    ----------
-    path : str
-        of the serial device
-    """
+    """The adapter's latency timer, which caps every rate where it is long."""
     latency_ms = read_latency_timer_ms(path)
     if latency_ms is None:
         return Finding(Severity.GOOD, path, "the adapter has no latency timer")

@@ -29,19 +29,7 @@ class Bounds:
 def goals_of(
     servos: Sequence[JointServo], mode: ControlMode, bounds: Bounds, setpoint: Setpoint
 ) -> tuple[str, list[int]]:
-    """Item and values of a setpoint. Positions and torques beyond the bounds are brought back to them.
-
-    Parameters
-    ----------
-    servos : sequence of JointServo
-        in the order of the joints
-    mode : ControlMode
-        who closes the loop
-    bounds : Bounds
-        of the goals
-    setpoint : Setpoint
-        finite targets
-    """
+    """Item and values of a setpoint. Positions and torques beyond the bounds are brought back to them."""
     values = (setpoint.position if mode is ControlMode.POSITION else setpoint.torque).tolist()
     if mode is ControlMode.POSITION:
         return "Goal Position", [

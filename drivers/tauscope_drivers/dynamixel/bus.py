@@ -41,8 +41,6 @@ class Answers:
         instant at which the question had left [ns, by the bus' clock]
     late_ns : int
         how much later than bus and adapter take the last answer came [ns]
-    statuses : dict of int to Status
-        whole answers by ID; a servo that did not answer is not in it
     """
 
     asked_ns: int
@@ -54,15 +52,7 @@ class ServoBus:
     """Speaks to the servos of one port; one thread's own."""
 
     def __init__(self, port: SerialPort, clock: Clock | None = None) -> None:
-        """Use a port, open or not yet.
-
-        Parameters
-        ----------
-        port : SerialPort
-            that this process owns
-        clock : Clock or None
-            by which readings are stamped; the machine's where None
-        """
+        """Use a port, open or not yet."""
         self.port = port
         self._clock = MonotonicClock() if clock is None else clock
         self.return_delay_s = FACTORY_RETURN_DELAY_S
@@ -71,13 +61,7 @@ class ServoBus:
         self._answered_ns = 0
 
     def ping(self, servo: int) -> tuple[int, int] | None:
-        """Model number and firmware of a servo; None where it does not answer.
-
-        Parameters
-        ----------
-        servo : int
-            ID
-        """
+        """Model number and firmware of a servo; None where it does not answer."""
         for _ in range(ATTEMPTS):
             answer = self._ask(servo, packets.encode_ping(servo), 3, PATIENCE_S)
             if answer is not None and len(answer.data) == 3:
@@ -103,12 +87,6 @@ class ServoBus:
 
         Parameters
         ----------
-        servo : int
-            ID
-        address : int
-            of the first byte
-        length : int
-            number of bytes
         patience_s : float
             how much longer to wait than in the control loop [s]
         """
@@ -116,13 +94,6 @@ class ServoBus:
 
     def read_block(self, servo: int, block: Block) -> dict[str, int]:
         """Values of a block by their names.
-
-        Parameters
-        ----------
-        servo : int
-            ID
-        block : Block
-            what to read
 
         Raises
         ------
@@ -139,13 +110,6 @@ class ServoBus:
     def read(self, servo: int, item: Item) -> int:
         """Value of an item.
 
-        Parameters
-        ----------
-        servo : int
-            ID
-        item : Item
-            what to read
-
         Raises
         ------
         DriverError
@@ -155,15 +119,6 @@ class ServoBus:
 
     def write(self, servo: int, item: Item, value: int) -> None:
         """Write an item and read it back.
-
-        Parameters
-        ----------
-        servo : int
-            ID
-        item : Item
-            what to write
-        value : int
-            that fits it
 
         Raises
         ------
@@ -184,27 +139,13 @@ class ServoBus:
         )
 
     def clear_error(self, servo: int) -> None:
-        """Let a servo of the Y series forget its error; whether it did is what its Error Code says.
-
-        Parameters
-        ----------
-        servo : int
-            ID
-        """
+        """Let a servo of the Y series forget its error; whether it did is what its Error Code says."""
         for _ in range(ATTEMPTS):
             if self._ask(servo, packets.encode_clear_error(servo), 0, PATIENCE_S) is not None:
                 return
 
     def sync_write(self, items: Sequence[Item], values: Mapping[int, Sequence[int]]) -> None:
-        """Write items of many servos at once; no servo answers.
-
-        Parameters
-        ----------
-        items : sequence of Item
-            what to write, each where the one before ends
-        values : mapping of int to sequence of int
-            values for each ID
-        """
+        """Write items of many servos at once; no servo answers."""
         encoded = {servo: encode_items(items, own) for servo, own in values.items()}
         self.port.send(packets.encode_sync_write(encoded, items[0].address))
 
@@ -218,16 +159,8 @@ class ServoBus:
 
         Parameters
         ----------
-        servos : sequence of int
-            IDs
-        block : Block
-            what to read
-        fast : bool
-            ask for one packet for all
         patience_s : float
             how much longer to wait than in the control loop [s]
-        spare : int
-            bytes before the block that can be read as well
         """
         if any(self._owed(servos, block.length + surplus) for surplus in range(spare + 1)):
             self.port.drain()

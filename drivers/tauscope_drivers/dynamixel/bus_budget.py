@@ -24,18 +24,12 @@ _READ_BYTES = 14
 class CycleTraffic:
     """What goes over the bus in one cycle.
 
-    servos : int
-        number of servos n
     state_bytes : int
         that each servo is asked for [bytes]
     goal_bytes : int
         that each servo is sent [bytes]
     health_bytes : int
         that one servo is asked for besides; 0 for no such read [bytes]
-    fast : bool
-        whether one packet answers for all
-    families : int
-        group instructions of a kind, one for each family of servos
     """
 
     servos: int
@@ -87,15 +81,7 @@ class BusTiming:
 
 
 def cycle_parts(traffic: CycleTraffic, timing: BusTiming) -> dict[str, float]:
-    """Time of one cycle by what takes it [s].
-
-    Parameters
-    ----------
-    traffic : CycleTraffic
-        what goes over the bus
-    timing : BusTiming
-        how fast it is
-    """
+    """Time of one cycle by what takes it [s]."""
     return {
         f"the wire at {timing.baud:g} baud": traffic.bytes * BITS_PER_BYTE / timing.baud,
         f"a Return Delay Time of {timing.return_delay_s * 1e6:.0f} µs": traffic.answers * timing.return_delay_s,
@@ -104,17 +90,7 @@ def cycle_parts(traffic: CycleTraffic, timing: BusTiming) -> dict[str, float]:
 
 
 def largest_rate_hz(traffic: CycleTraffic, timing: BusTiming, load: float = LARGEST_LOAD) -> float:
-    """Most cycles a second [Hz].
-
-    Parameters
-    ----------
-    traffic : CycleTraffic
-        what goes over the bus
-    timing : BusTiming
-        how fast it is
-    load : float
-        share of each cycle that the bus may take
-    """
+    """Most cycles a second [Hz]."""
     return load / sum(cycle_parts(traffic, timing).values())
 
 
@@ -125,10 +101,6 @@ def require_rate(rate_hz: float, traffic: CycleTraffic, timing: BusTiming) -> No
     ----------
     rate_hz : float
         wanted cycles a second [Hz]
-    traffic : CycleTraffic
-        what goes over the bus
-    timing : BusTiming
-        how fast it is
 
     Raises
     ------
@@ -146,15 +118,7 @@ def require_rate(rate_hz: float, traffic: CycleTraffic, timing: BusTiming) -> No
 
 
 def largest_part(traffic: CycleTraffic, timing: BusTiming) -> tuple[str, str]:
-    """What takes most of a cycle, and what to do about it.
-
-    Parameters
-    ----------
-    traffic : CycleTraffic
-        what goes over the bus
-    timing : BusTiming
-        how fast it is
-    """
+    """What takes most of a cycle, and what to do about it."""
     parts = cycle_parts(traffic, timing)
     longest = max(parts, key=parts.__getitem__)
     return f"{longest} takes {parts[longest] * 1e3:.2f} ms of each cycle", _REMEDIES[list(parts).index(longest)]

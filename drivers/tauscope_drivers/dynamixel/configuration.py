@@ -33,10 +33,6 @@ _LOWEST_BAUD, _HIGHEST_BAUD = 9_600, 10_500_000
 class DynamixelJoint:
     """A joint as the driver sees it.
 
-    name : str
-        of the joint
-    drive : mapping
-        its ``drive`` block
     torque_per_milliampere : float or None
         joint torque for one milliampere, signed as the robot file's ``sign`` and ``torque_constant`` are; None where
         it does not say: then positions can be tracked, but torque neither limited in newton metres nor commanded
@@ -52,14 +48,6 @@ class DynamixelJoint:
 class ServoConfiguration:
     """One servo.
 
-    joint : str
-        name of its joint
-    servo : int
-        ID, key ``id``
-    model : str or None
-        as printed on its case; where it is given, another model is refused
-    direction : int
-        -1 where it turns against the joint, else 1
     reduction : float
         turns of the horn per turn of the joint; radians of the horn per metre on prismatic joints
     zero_count : int or None
@@ -68,8 +56,6 @@ class ServoConfiguration:
         one unit of Present Current, in place of the model's [mA]
     current_limit_ma : float or None
         most current that it is given, besides its own Current Limit [mA]
-    torque_per_milliampere : float or None
-        see `DynamixelJoint`
     """
 
     joint: str
@@ -87,10 +73,6 @@ class ServoConfiguration:
 class BusConfiguration:
     """The bus and the servos on it, in the order of the joints.
 
-    servos : tuple of ServoConfiguration
-        one a joint
-    port : str
-        path of the serial device
     baud : int
         [bit/s]
     """

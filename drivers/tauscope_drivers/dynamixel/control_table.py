@@ -27,14 +27,8 @@ BYTES_BEFORE_STATE = 3
 class Item:
     """An entry of a control table.
 
-    name : str
-        as ROBOTIS calls it
-    address : int
-        of its first byte
     size : int
         [bytes]
-    signed : bool
-        whether it is a two's complement
     """
 
     name: str
@@ -43,39 +37,17 @@ class Item:
     signed: bool
 
     def encode(self, value: int) -> bytes:
-        """Its bytes.
-
-        Parameters
-        ----------
-        value : int
-            that fits it
-        """
+        """Its bytes."""
         return value.to_bytes(self.size, "little", signed=self.signed)
 
     def decode(self, block: bytes, start: int) -> int:
-        """Its value in a block of bytes.
-
-        Parameters
-        ----------
-        block : bytes
-            a stretch of the control table
-        start : int
-            address of the block's first byte
-        """
+        """Its value in a block of bytes."""
         offset = self.address - start
         return int.from_bytes(block[offset : offset + self.size], "little", signed=self.signed)
 
 
 def encode_items(items: Iterable[Item], values: Iterable[int]) -> bytes:
-    """Bytes of neighbours in a control table.
-
-    Parameters
-    ----------
-    items : iterable of Item
-        each where the one before ends
-    values : iterable of int
-        one of each
-    """
+    """Bytes of neighbours in a control table."""
     return b"".join(item.encode(value) for item, value in zip(items, values, strict=True))
 
 
@@ -83,12 +55,8 @@ def encode_items(items: Iterable[Item], values: Iterable[int]) -> bytes:
 class Block:
     """A stretch of a control table that is read at once.
 
-    address : int
-        of its first byte
     length : int
         [bytes]
-    items : tuple of Item
-        what is in it
     """
 
     address: int
@@ -96,13 +64,7 @@ class Block:
     items: tuple[Item, ...]
 
     def decode(self, data: bytes) -> dict[str, int]:
-        """Values of its items by name; empty where the data are not as long as the block.
-
-        Parameters
-        ----------
-        data : bytes
-            as read
-        """
+        """Values of its items by name; empty where the data are not as long as the block."""
         if len(data) != self.length:
             return {}
         return {item.name: item.decode(data, self.address) for item in self.items}
@@ -112,18 +74,8 @@ class Block:
 class ServoModel:
     """A model of servo.
 
-    number : int
-        model number, as the servo states it
-    name : str
-        as the library's file is called: ``xm430_w350``
-    family : FamilyFacts
-        what its family has in common
-    items : mapping of str to Item
-        control table
     counts_per_radian : float
         of the horn [1/rad]
-    zero_count : int
-        count at which the horn is at zero
     velocity_unit : float
         one unit of Present Velocity [rad/s]
     current_unit : CurrentUnit or None
@@ -196,15 +148,7 @@ class ServoModel:
         return tuple(blocks)
 
     def blocks(self, names: Iterable[str], longest: int = 48) -> tuple[Block, ...]:
-        """Items in as few stretches as are worth one read; those that the model lacks are left out.
-
-        Parameters
-        ----------
-        names : iterable of str
-            as ROBOTIS calls them
-        longest : int
-            most bytes of a stretch with more than one item
-        """
+        """Items in as few stretches as are worth one read; those that the model lacks are left out."""
         wanted = sorted((self.items[name] for name in names if name in self.items), key=lambda item: item.address)
         stretches: list[list[Item]] = []
         for item in wanted:
@@ -235,13 +179,6 @@ def model_names() -> Mapping[int, str]:
 @cache
 def find_model(number: int, firmware: int = 0) -> ServoModel:
     """The model of a number, with the table of its firmware.
-
-    Parameters
-    ----------
-    number : int
-        as the servo states it
-    firmware : int
-        version, as the servo states it
 
     Raises
     ------
@@ -278,11 +215,6 @@ def find_model(number: int, firmware: int = 0) -> ServoModel:
 
 def find_model_by_name(name: str) -> ServoModel:
     """The model of a name, with the table of its oldest firmware.
-
-    Parameters
-    ----------
-    name : str
-        ``XM430-W350``, with or without what follows it on the case
 
     Raises
     ------

@@ -16,10 +16,6 @@ def has_room_for_speeds(traffic: CycleTraffic, timing: BusTiming, cycle_s: float
 
     Parameters
     ----------
-    traffic : CycleTraffic
-        of a cycle without
-    timing : BusTiming
-        of the bus
     cycle_s : float
         of the control loop [s]
     """
@@ -27,13 +23,7 @@ def has_room_for_speeds(traffic: CycleTraffic, timing: BusTiming, cycle_s: float
 
 
 def planned_budget(configuration: BusConfiguration) -> tuple[CycleTraffic, BusTiming]:
-    """Before the servos are reached: with what they will be set to.
-
-    Parameters
-    ----------
-    configuration : BusConfiguration
-        of the arm
-    """
+    """Before the servos are reached: with what they will be set to."""
     latency_ms = read_latency_timer_ms(configuration.port)
     exists = os.path.exists(configuration.port)
     latency_s = LEAST_LATENCY_S if latency_ms is None and exists else (latency_ms or 1) * 1e-3
@@ -42,13 +32,7 @@ def planned_budget(configuration: BusConfiguration) -> tuple[CycleTraffic, BusTi
 
 
 def found_budget(session: Session) -> tuple[CycleTraffic, BusTiming]:
-    """Of servos that were reached.
-
-    Parameters
-    ----------
-    session : Session
-        of the arm
-    """
+    """Of servos that were reached."""
     port = session.bus.port
     longest = max(block.length for servo in session.servos for block in servo.model.watched_blocks)
     traffic = CycleTraffic(

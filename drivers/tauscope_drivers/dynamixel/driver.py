@@ -57,8 +57,6 @@ class DynamixelArm:
             base first
         slack_s : float
             how much longer than the bus takes an answer is waited for [s]
-        clock : Clock or None
-            that the servos' time is told by; the machine's where None
 
         Raises
         ------
@@ -178,12 +176,6 @@ class DynamixelArm:
 
         Parameters
         ----------
-        mode : ControlMode
-            who closes the loop
-        limits : DriveLimits
-            position and current are kept to by the driver and, as cap of current and largest speed, by the servos
-        stop_policy : StopPolicy
-            what the servos do when their watchdog fires: `HOLD` in position mode, `TORQUE_OFF` in torque mode
         watchdog_s : float
             time without `exchange` after which they do; rounded down to 20 ms [s]
         cycle_s : float or None
@@ -215,11 +207,6 @@ class DynamixelArm:
     def exchange(self, setpoint: Setpoint) -> ArmState:
         """One cycle: Sync Write of the goals, Sync Read of all servos, health of one servo.
 
-        Parameters
-        ----------
-        setpoint : Setpoint
-            finite targets for every joint
-
         Raises
         ------
         DriverError
@@ -248,13 +235,7 @@ class DynamixelArm:
         return arm_state(session, reading, temperature)
 
     def stop(self, policy: StopPolicy) -> ArmState:
-        """Stop the arm; legal at any time. `DAMP` is carried out as `HOLD`: these servos cannot damp.
-
-        Parameters
-        ----------
-        policy : StopPolicy
-            how
-        """
+        """Stop the arm; legal at any time. `DAMP` is carried out as `HOLD`: these servos cannot damp."""
         self._mode = None
         session = self._session
         if session is None:

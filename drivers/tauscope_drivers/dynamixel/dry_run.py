@@ -55,21 +55,12 @@ def plan_frames(
     ----------
     joints : sequence of DynamixelJoint
         base first; each ``drive`` block has to name its model
-    mode : ControlMode
-        who closes the loop; in torque mode the current is the host's loop's to say, and 0 is shown
-    limits : DriveLimits
-        of the joints
     watchdog_s : float
         time of silence after which the servos stop [s]
     targets : (K, n) float64
         positions of the first K cycles; the arm is supposed to stand at the first of them [rad or m]
     cycle_s : float or None
         time between them, over which servos go from one to the next; None where it is not known [s]
-
-    Yields
-    ------
-    PlannedFrame
-        in the order of sending
 
     Raises
     ------

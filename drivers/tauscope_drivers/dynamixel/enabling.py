@@ -33,12 +33,6 @@ def enable_servos(
 
     Parameters
     ----------
-    session : Session
-        with sound servos
-    mode : ControlMode
-        who closes the loop
-    limits : DriveLimits
-        of the joints
     watchdog_s : float
         time of silence after which the servos stop [s]
 

@@ -41,10 +41,6 @@ def hardware_faults(model: ServoModel, register: int, joint: int) -> tuple[Fault
 
     Parameters
     ----------
-    model : ServoModel
-        of the servo: bits on most families, one code on Y
-    register : int
-        Hardware Error Status or Error Code
     joint : int
         number of the joint, from 1
     """
@@ -105,22 +101,10 @@ def torque_lost_fault(joint: int) -> Fault:
 
 
 def silent_servo_fault(detail: str) -> Fault:
-    """A servo could not be stopped, for it did not answer: its own watchdog has stopped it.
-
-    Parameters
-    ----------
-    detail : str
-        which, and what was asked of it
-    """
+    """A servo could not be stopped, for it did not answer: its own watchdog has stopped it."""
     return Fault("silent", None, detail, "look at the arm; check the servo's power and cable, then stop again")
 
 
 def lost_bus_fault(detail: str) -> Fault:
-    """The bus is gone: what the arm does now is what the servos' watchdogs make it do.
-
-    Parameters
-    ----------
-    detail : str
-        what the port said
-    """
+    """The bus is gone: what the arm does now is what the servos' watchdogs make it do."""
     return Fault("lost-bus", None, detail, "check the adapter, its cable and its power, then connect again")

@@ -51,15 +51,7 @@ class ServoGroup:
     """All servos of an arm; servos of different families are asked one family after the other."""
 
     def __init__(self, bus: ServoBus, servos: Sequence[JointServo]) -> None:
-        """Nothing is asked yet.
-
-        Parameters
-        ----------
-        bus : ServoBus
-            that they are on
-        servos : sequence of JointServo
-            in the order of the joints
-        """
+        """Nothing is asked yet."""
         self.servos = tuple(servos)
         self.fast = False
         self._bus = bus
@@ -77,15 +69,7 @@ class ServoGroup:
         return self.fast
 
     def write(self, name: str, values: Sequence[int | None]) -> None:
-        """Write an item of all servos, without an answer.
-
-        Parameters
-        ----------
-        name : str
-            as ROBOTIS calls it
-        values : sequence of int or None
-            one a joint; None leaves a servo out
-        """
+        """Write an item of all servos, without an answer."""
         for _, members in self._families:
             item = self.servos[members[0]].model.items[name]
             chosen = {self.servos[index].servo: [value] for index in members if (value := values[index]) is not None}
@@ -201,13 +185,7 @@ class ServoGroup:
 
 
 def servo_families(servos: Sequence[JointServo]) -> list[tuple[Block, list[int]]]:
-    """Servos whose control tables agree where they are read and written: the block of their state, their indices.
-
-    Parameters
-    ----------
-    servos : sequence of JointServo
-        in the order of the joints
-    """
+    """Servos whose control tables agree where they are read and written: the block of their state, their indices."""
     families: dict[tuple[int, int, int], tuple[Block, list[int]]] = {}
     for index, servo in enumerate(servos):
         block = servo.model.state_block
@@ -223,8 +201,6 @@ def paced_goals(
 
     Parameters
     ----------
-    servos : sequence of JointServo
-        in the order of the joints
     goals : sequence of int
         one a joint [counts]
     speeds : sequence of int
@@ -240,12 +216,6 @@ def paced_goals(
 
 
 def health_turns(servos: Sequence[JointServo]) -> list[tuple[int, Block]]:
-    """Whose health is read in which cycle, and which piece of it: the watchdogs of all, then errors, then heat.
-
-    Parameters
-    ----------
-    servos : sequence of JointServo
-        in the order of the joints
-    """
+    """Whose health is read in which cycle, and which piece of it: the watchdogs of all, then errors, then heat."""
     watched = [servo.model.watched_blocks for servo in servos]
     return [(index, blocks[piece]) for piece in range(3) for index, blocks in enumerate(watched)]

@@ -17,13 +17,7 @@ class Health:
     """Faults and torque of all servos, as last read."""
 
     def __init__(self, servos: Sequence[JointServo]) -> None:
-        """Nothing is known yet.
-
-        Parameters
-        ----------
-        servos : sequence of JointServo
-            in the order of the joints
-        """
+        """Nothing is known yet."""
         count = len(servos)
         self.has_torque = np.zeros(count, dtype=np.bool_)
         self.is_latched = np.zeros(count, dtype=np.bool_)
@@ -42,8 +36,6 @@ class Health:
         ----------
         joint : int
             index of the joint, from 0
-        values : mapping of str to int
-            items by name, some of them
         """
         model = self._servos[joint].model
         if "Torque Enable" in values:
@@ -66,8 +58,6 @@ class Health:
         ----------
         joint : int
             index of the joint, from 0
-        alert : bool
-            whether it was set
         """
         self._alerts[joint] = alert
 
@@ -82,13 +72,7 @@ class Health:
         return bool(self._registers[joint])
 
     def expect_torque(self, expected: bool) -> None:
-        """Say whether the servos shall have torque from now on; one that loses it meanwhile is at fault.
-
-        Parameters
-        ----------
-        expected : bool
-            whether
-        """
+        """Say whether the servos shall have torque from now on; one that loses it meanwhile is at fault."""
         self._expected[:] = expected
 
     def forget(self) -> None:

@@ -26,8 +26,6 @@ class CurrentUnit:
 
     milliampere : float
         [mA]
-    source : str
-        where the figure comes from
     """
 
     milliampere: float
@@ -38,17 +36,8 @@ class CurrentUnit:
 class FamilyFacts:
     """What servos of one family have in common.
 
-    name : str
-        of the family
-    position_mode : int
-        Operating Mode that tracks positions under a cap of current: 5 where it exists; on P and Y the position mode 3
-        takes Goal Current as its cap
     voltage_unit_v : float
         of Present Input Voltage [V]
-    error_is_code : bool
-        whether the error register holds one number (Y) and not bits
-    torque_on_by_goal : bool
-        whether bit 3 of Drive Mode switches torque on when a goal is written
     """
 
     name: str
@@ -108,13 +97,7 @@ MISSING_ITEMS: Mapping[str, Mapping[str, tuple[int, int]]] = {
 
 
 def family_of(model: str) -> FamilyFacts | None:
-    """Facts of the family that a model belongs to; None for a family that this driver does not know.
-
-    Parameters
-    ----------
-    model : str
-        as the library's file is called: ``xm430_w350``
-    """
+    """Facts of the family that a model belongs to; None for a family that this driver does not know."""
     return next((facts for prefix, facts in _FAMILIES if model.startswith(prefix)), None)
 
 
@@ -124,21 +107,10 @@ def gear_ratio_of(model: str) -> int:
     A servo of the Y series divides its motor's counts and speeds by its Electronic Gear Ratio, as delivered that of its
     gear: only then are 524 288 counts a turn of the horn, as the tables have them. Source: e-Manual, YM070-210-R099,
     Resolution and Electronic GearRatio Numerator; the model's name ends in the ratio.
-
-    Parameters
-    ----------
-    model : str
-        as the library's file is called: ``ym070_210_r099``
     """
     return int(model[-3:]) if model.startswith("ym") else 1
 
 
 def current_unit_of(model: str) -> CurrentUnit | None:
-    """Unit of current of a model; None where no source states one.
-
-    Parameters
-    ----------
-    model : str
-        as the library's file is called
-    """
+    """Unit of current of a model; None where no source states one."""
     return next((unit for prefix, unit in _CURRENT_UNITS if model.startswith(prefix)), None)

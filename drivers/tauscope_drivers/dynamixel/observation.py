@@ -19,12 +19,8 @@ def observe(session: Session, temperature: Array | None = None, *failures: Fault
 
     Parameters
     ----------
-    session : Session
-        whose servos are asked
     temperature : (n,) float64 or None
         where it was just read [°C]
-    *failures : Fault
-        what failed before, to be told with the state
     """
     reading = session.group.read_patiently()
     for joint, alert in enumerate(reading.alerts):
@@ -44,10 +40,6 @@ def arm_state(session: Session, reading: GroupReading, temperature: Array) -> Ar
 
     Parameters
     ----------
-    session : Session
-        of the servos
-    reading : GroupReading
-        of the cycle
     temperature : (n,) float64
         where it was read in this cycle, else NaN [°C]
     """
@@ -73,10 +65,6 @@ def blind_state(time_ns: int, joint_count: int, faults: tuple[Fault, ...]) -> Ar
     ----------
     time_ns : int
         present instant [ns]
-    joint_count : int
-        number of joints n
-    faults : tuple of Fault
-        why
     """
     unknown = np.full(joint_count, np.nan)
     return ArmState(time_ns, unknown, unknown, unknown, unknown, np.zeros(joint_count, dtype=np.bool_), faults)

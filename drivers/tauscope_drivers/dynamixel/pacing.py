@@ -41,8 +41,6 @@ class GoalPace:
 
         Parameters
         ----------
-        servos : sequence of JointServo
-            in the order of the joints
         goals : sequence of int
             Goal Position of each [counts]
         caps : sequence of int

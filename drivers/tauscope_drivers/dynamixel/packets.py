@@ -29,15 +29,7 @@ _STUFFED, _PLAIN = b"\xff\xff\xfd\xfd", b"\xff\xff\xfd"
 
 @dataclass(frozen=True)
 class Status:
-    """A status packet.
-
-    servo : int
-        ID of the servo that sent it
-    error : int
-        error byte: `ALERT` and, below it, the number of an error of the instruction
-    data : bytes
-        its parameters
-    """
+    """A status packet."""
 
     servo: int
     error: int
@@ -69,117 +61,47 @@ _CRC = _crc_table()
 
 
 def checksum(data: bytes | bytearray | memoryview, crc: int = 0) -> int:
-    """CRC-16 (polynomial 0x8005, initial value 0) of a frame without its last two bytes.
-
-    Parameters
-    ----------
-    data : bytes
-        header to last parameter, stuffing included
-    crc : int
-        of what came before
-    """
+    """CRC-16 (polynomial 0x8005, initial value 0) of a frame without its last two bytes."""
     for byte in data:
         crc = (crc << 8 & 0xFFFF) ^ _CRC[crc >> 8 ^ byte]
     return crc
 
 
 def encode_instruction(servo: int, instruction: int, parameters: bytes = b"") -> bytes:
-    """A frame: header, ID, length, instruction and parameters with stuffing, CRC.
-
-    Parameters
-    ----------
-    servo : int
-        ID that it is for
-    instruction : int
-        what to do
-    parameters : bytes
-        with what
-    """
+    """A frame: header, ID, length, instruction and parameters with stuffing, CRC."""
     body = (bytes([instruction]) + parameters).replace(_PLAIN, _STUFFED)
     frame = HEADER + struct.pack("<BH", servo, len(body) + 2) + body
     return frame + struct.pack("<H", checksum(frame))
 
 
 def encode_ping(servo: int = BROADCAST_ID) -> bytes:
-    """Ask who is there.
-
-    Parameters
-    ----------
-    servo : int
-        ID, or `BROADCAST_ID` for all
-    """
+    """Ask who is there."""
     return encode_instruction(servo, _PING)
 
 
 def encode_clear_error(servo: int) -> bytes:
-    """Let a servo of the Y series forget its error, without a restart; one whose cause persists refuses.
-
-    Parameters
-    ----------
-    servo : int
-        ID
-    """
+    """Let a servo of the Y series forget its error, without a restart; one whose cause persists refuses."""
     return encode_instruction(servo, _CLEAR, _ERROR_TO_CLEAR)
 
 
 def encode_read(servo: int, address: int, length: int) -> bytes:
-    """Read a stretch of a control table.
-
-    Parameters
-    ----------
-    servo : int
-        ID
-    address : int
-        of the first byte
-    length : int
-        number of bytes
-    """
+    """Read a stretch of a control table."""
     return encode_instruction(servo, _READ, struct.pack("<HH", address, length))
 
 
 def encode_write(servo: int, address: int, data: bytes) -> bytes:
-    """Write a stretch of a control table.
-
-    Parameters
-    ----------
-    servo : int
-        ID
-    address : int
-        of the first byte
-    data : bytes
-        what to write
-    """
+    """Write a stretch of a control table."""
     return encode_instruction(servo, _WRITE, struct.pack("<H", address) + data)
 
 
 def encode_sync_read(servos: Sequence[int], address: int, length: int, *, fast: bool = False) -> bytes:
-    """Read the same stretch of many servos.
-
-    Parameters
-    ----------
-    servos : sequence of int
-        IDs in the order in which they shall answer
-    address : int
-        of the first byte
-    length : int
-        bytes of each
-    fast : bool
-        one status packet for all, in place of one each
-    """
+    """Read the same stretch of many servos."""
     parameters = struct.pack("<HH", address, length) + bytes(servos)
     return encode_instruction(BROADCAST_ID, _FAST_SYNC_READ if fast else _SYNC_READ, parameters)
 
 
 def encode_sync_write(values: Mapping[int, bytes], address: int) -> bytes:
-    """Write the same stretch of many servos at once; none of them answers.
-
-    Parameters
-    ----------
-    values : mapping of int to bytes
-        what to write to each ID, all of one length
-    address : int
-        of the first byte
-    """
+    """Write the same stretch of many servos at once; none of them answers."""
     length = len(next(iter(values.values())))
     if any(len(data) != length for data in values.values()):
         raise ValueError("a Sync Write carries the same number of bytes to every servo")
@@ -208,13 +130,7 @@ class FrameParser:
         self._buffer = bytearray()
 
     def feed(self, received: bytes) -> Iterator[bytes]:
-        """Frames that are complete now and whose checksum is right, header included.
-
-        Parameters
-        ----------
-        received : bytes
-            what has come since
-        """
+        """Frames that are complete now and whose checksum is right, header included."""
         self._buffer += received
         while (frame := self._next_frame()) is not None:
             yield frame
@@ -253,13 +169,7 @@ class FrameParser:
 
 
 def decode_status(frame: bytes) -> Status | None:
-    """A frame as a status packet of one servo; None where it is something else, such as the echo of an instruction.
-
-    Parameters
-    ----------
-    frame : bytes
-        as `FrameParser` finds it
-    """
+    """A frame as a status packet of one servo; None where it is something else, such as the echo of an instruction."""
     if len(frame) <= _SHORTEST_FRAME or frame[_FIXED_BYTES] != _STATUS or frame[4] > HIGHEST_ID:
         return None
     body = frame[_FIXED_BYTES:-2].replace(_STUFFED, _PLAIN)
@@ -271,15 +181,6 @@ def decode_fast(frame: bytes, servos: Sequence[int], length: int) -> list[Status
 
     Each servo appends error, ID, data and the checksum of everything before it; there is no stuffing. A servo that
     stays silent cuts the packet short, and those before it are still good.
-
-    Parameters
-    ----------
-    frame : bytes
-        from the header on
-    servos : sequence of int
-        IDs in the order in which they were asked
-    length : int
-        bytes of data of each
     """
     found: list[Status] = []
     if not frame.startswith(HEADER + bytes([BROADCAST_ID])) or frame[_FIXED_BYTES : _FIXED_BYTES + 1] != b"\x55":
@@ -299,13 +200,7 @@ def decode_fast(frame: bytes, servos: Sequence[int], length: int) -> list[Status
 
 
 def describe_refusal(number: int) -> str:
-    """What an error number of a status packet means.
-
-    Parameters
-    ----------
-    number : int
-        error byte without `ALERT`
-    """
+    """What an error number of a status packet means."""
     return _REFUSALS.get(number, f"error {number}")
 
 

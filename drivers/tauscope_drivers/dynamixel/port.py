@@ -39,8 +39,6 @@ class SerialPort(PortHandler):
 
         Parameters
         ----------
-        path : str
-            of the device
         baud : int
             [bit/s]
         slack_s : float
@@ -80,13 +78,7 @@ class SerialPort(PortHandler):
         self.ser = None
 
     def send(self, frame: bytes) -> None:
-        """Send a frame; what had come and was not read is forgotten, so that a late answer is not taken for the next.
-
-        Parameters
-        ----------
-        frame : bytes
-            whole
-        """
+        """Discard unread input, so that no late answer is taken for the next one, and send a frame."""
         serial_port = self._opened()
         try:
             serial_port.reset_input_buffer()
@@ -125,8 +117,6 @@ class SerialPort(PortHandler):
 
         Parameters
         ----------
-        byte_count : int
-            of the instruction and of all answers
         delay_s : float
             sum of the servos' return delays [s]
         """
@@ -167,25 +157,13 @@ class SerialPort(PortHandler):
         return True
 
     def readPort(self, length: int) -> bytes:  # noqa: N802
-        """Up to so many bytes; waits on the descriptor and not in a loop.
-
-        Parameters
-        ----------
-        length : int
-            most bytes
-        """
+        """Up to so many bytes; waits on the descriptor and not in a loop."""
         remaining_s = max(0.0, self.packet_timeout - self.getTimeSinceStart()) * 1e-3
         select.select([self._opened().fileno()], [], [], remaining_s)
         return self._opened().read(length)
 
     def setPacketTimeout(self, packet_length: int) -> None:  # noqa: N802
-        """Time-out of an answer from the true latency, not from 16 ms.
-
-        Parameters
-        ----------
-        packet_length : int
-            bytes of the answer
-        """
+        """Time-out of an answer from the true latency, not from 16 ms."""
         self.packet_start_time = self.getCurrentTime()
         self.packet_timeout = self.tx_time_per_byte * packet_length + 1e3 * (2.0 * self.latency_s + self._slack_s)
 
@@ -227,13 +205,7 @@ class SerialPort(PortHandler):
 
 
 def read_latency_timer_ms(path: str) -> int | None:
-    """Latency timer of a USB adapter [ms]; None where the device has none.
-
-    Parameters
-    ----------
-    path : str
-        of the port
-    """
+    """Latency timer of a USB adapter [ms]; None where the device has none."""
     name = os.path.basename(os.path.realpath(path))
     try:
         return int((_TTY_DEVICES / name / "device" / "latency_timer").read_text())

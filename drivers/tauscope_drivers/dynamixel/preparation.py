@@ -29,15 +29,7 @@ _ROUNDING = 1e-6
 
 @dataclass(frozen=True)
 class RegisterWrite:
-    """A value for an item of a servo.
-
-    item : Item
-        what is written
-    value : int
-        what it becomes
-    reason : str
-        why, in a few words
-    """
+    """A value for an item of a servo."""
 
     item: Item
     value: int
@@ -48,16 +40,12 @@ class RegisterWrite:
 class ServoTask:
     """What a servo shall do once it has torque.
 
-    mode : ControlMode
-        who closes the loop
     current_cap : int
         most current [units]
     velocity_cap : int
         largest speed of its target while it tracks positions, 0 for none [units]
     present : int
         Present Position [counts]
-    watchdog_steps : int
-        Bus Watchdog
     """
 
     mode: ControlMode
@@ -68,44 +56,18 @@ class ServoTask:
 
 
 def operating_mode(servo: JointServo, mode: ControlMode) -> int:
-    """Operating Mode of a servo for a way of control.
-
-    Parameters
-    ----------
-    servo : JointServo
-        of which
-    mode : ControlMode
-        who closes the loop
-    """
+    """Operating Mode of a servo for a way of control."""
     return CURRENT_MODE if mode is ControlMode.TORQUE else servo.model.family.position_mode
 
 
 def drive_mode(servo: JointServo, present: int) -> int:
-    """Drive Mode without time-based profiles, and without torque that a goal switches on.
-
-    Parameters
-    ----------
-    servo : JointServo
-        of which
-    present : int
-        Drive Mode now
-    """
+    """Drive Mode without time-based profiles, and without torque that a goal switches on."""
     unwanted = _TIME_BASED_PROFILE | (_TORQUE_ON_BY_GOAL if servo.model.family.torque_on_by_goal else 0)
     return present & ~unwanted
 
 
 def commissioning_writes(servo: JointServo, settings: Mapping[str, int], *, holds: bool) -> list[RegisterWrite]:
-    """What is written when a servo is reached; nothing that moves it, and EEPROM only where it differs.
-
-    Parameters
-    ----------
-    servo : JointServo
-        of which
-    settings : mapping of str to int
-        values of `SETTINGS`
-    holds : bool
-        whether it has torque: then its EEPROM is locked
-    """
+    """What is written when a servo is reached; nothing that moves it, and EEPROM only where it differs."""
     wanted = [("Status Return Level", 2, "every instruction is answered")]
     if not holds:
         wanted.append(("Return Delay Time", 0, "no wait before an answer"))
@@ -119,19 +81,7 @@ def commissioning_writes(servo: JointServo, settings: Mapping[str, int], *, hold
 def preparing_writes(
     servo: JointServo, settings: Mapping[str, int], task: ServoTask, *, holds: bool
 ) -> list[RegisterWrite]:
-    """What is written to a servo long before it is taken under power: all that does not depend on where it is then.
-
-    Parameters
-    ----------
-    servo : JointServo
-        of which
-    settings : mapping of str to int
-        values of `SETTINGS`
-    task : ServoTask
-        what it shall do
-    holds : bool
-        whether it has torque already, in the right mode: then it stays where it is from the first write on
-    """
+    """What is written to a servo long before it is taken under power: all that does not depend on where it is then."""
     items = servo.model.items
     tracks = task.mode is ControlMode.POSITION
     wanted: list[tuple[str, int, str]] = []
@@ -149,17 +99,7 @@ def preparing_writes(
 
 
 def taking_writes(servo: JointServo, task: ServoTask, *, holds: bool) -> list[RegisterWrite]:
-    """What is written to take a prepared servo under power, at once after it has told where it is.
-
-    Parameters
-    ----------
-    servo : JointServo
-        of which
-    task : ServoTask
-        what it shall do, with the Present Position of this moment: a joint that falls is caught here, not carried back
-    holds : bool
-        whether it has torque already
-    """
+    """What is written to take a prepared servo under power, at once after it has told where it is."""
     items = servo.model.items
     seconds = task.watchdog_steps * WATCHDOG_STEP_S
     wanted = [("Bus Watchdog", task.watchdog_steps, f"stop after {seconds:g} s of silence")]
@@ -198,10 +138,6 @@ def current_cap(servo: JointServo, settings: Mapping[str, int], torque: float) -
 
     Parameters
     ----------
-    servo : JointServo
-        of which
-    settings : mapping of str to int
-        values of `SETTINGS`
     torque : float
         limit of the joint, infinite where there is none [Nm or N]
 
@@ -234,14 +170,8 @@ def position_counts(
 
     Parameters
     ----------
-    servo : JointServo
-        of which
-    settings : mapping of str to int
-        values of `SETTINGS`
     low, high : float
         limits of the joint, infinite where there are none [rad or m]
-    mode : ControlMode
-        who closes the loop
     """
     lowest, highest = servo.units.counts_within(low, high)
     if mode is ControlMode.POSITION and servo.model.family.position_mode not in _MULTI_TURN_MODES:

@@ -16,8 +16,6 @@ def scan_bus(path: str, bauds: Sequence[int] = USUAL_BAUDS, *, slack_s: float = 
 
     Parameters
     ----------
-    path : str
-        of the serial device
     bauds : sequence of int
         rates to try [bit/s]
     slack_s : float

@@ -14,16 +14,6 @@ class JointServo:
 
     number : int
         of the joint, from 1
-    joint : str
-        name of the joint
-    servo : int
-        ID
-    model : ServoModel
-        control table
-    firmware : int
-        version
-    units : ServoUnits
-        at the joint
     current_limit_ma : float or None
         most current that the robot file allows [mA]
     """
@@ -49,10 +39,6 @@ def make_servo(number: int, configuration: ServoConfiguration, identity: tuple[i
     ----------
     number : int
         of the joint, from 1
-    configuration : ServoConfiguration
-        from the robot file
-    identity : tuple of two int, or None
-        model number and firmware as the servo states them; None before it was reached
 
     Raises
     ------

@@ -25,19 +25,7 @@ _RETURN_DELAY_UNIT_S = 2e-6
 
 @dataclass
 class Session:
-    """An arm's servos, reached.
-
-    bus : ServoBus
-        that they are on
-    servos : tuple of JointServo
-        in the order of the joints
-    settings : list of dict
-        values of `SETTINGS` of each
-    group : ServoGroup
-        the cyclic exchange
-    health : Health
-        faults and torque
-    """
+    """An arm's servos, reached."""
 
     bus: ServoBus
     servos: tuple[JointServo, ...]
@@ -52,8 +40,6 @@ class Session:
         ----------
         joint : int
             index of the joint, from 0
-        names : iterable of str
-            as ROBOTIS calls them
         """
         return read_items(self.bus, self.servos[joint], names)
 
@@ -64,10 +50,6 @@ class Session:
         ----------
         joint : int
             index of the joint, from 0
-        name : str
-            as ROBOTIS calls it
-        value : int
-            that fits it
         """
         servo = self.servos[joint]
         try:
@@ -84,8 +66,6 @@ class Session:
         ----------
         joint : int
             index of the joint, from 0
-        writes : iterable of RegisterWrite
-            the plan
         """
         for write in writes:
             self.write(joint, write.item.name, write.value)
@@ -105,13 +85,6 @@ class Session:
 
 def open_session(bus: ServoBus, configurations: Sequence[ServoConfiguration]) -> Session:
     """Reach every servo, set what moves nothing, and read its health.
-
-    Parameters
-    ----------
-    bus : ServoBus
-        with an open port
-    configurations : sequence of ServoConfiguration
-        in the order of the joints
 
     Raises
     ------
@@ -150,17 +123,7 @@ def _require_delivered_gear(bus: ServoBus, servo: JointServo) -> None:
 
 
 def read_items(bus: ServoBus, servo: JointServo, names: Iterable[str]) -> dict[str, int]:
-    """Items of a servo by name.
-
-    Parameters
-    ----------
-    bus : ServoBus
-        that it is on
-    servo : JointServo
-        of which
-    names : iterable of str
-        as ROBOTIS calls them
-    """
+    """Items of a servo by name."""
     wanted = tuple(names)
     try:
         return {

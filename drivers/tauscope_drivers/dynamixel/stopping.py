@@ -25,15 +25,8 @@ def stop_servos(
 
     Parameters
     ----------
-    session : Session
-        in whatever state
-    policy : StopPolicy
-        how
     caps : sequence of int
         most current with which each servo may hold [units]
-    last_goals : sequence of int or None
-        Goal Position of each servo where positions were tracked until now: one that is near it keeps it. With a goal
-        where it is, a moving one would spring back, and one that gives way to a load would sink once more
 
     Raises
     ------
@@ -63,11 +56,6 @@ def clear_watchdogs(session: Session) -> None:
     to be where the servo stands, but for a following error; it is approached at the slowest speed, and replaced by the
     present position at once. A servo in current mode exerts nothing while it is latched, and is let go first.
 
-    Parameters
-    ----------
-    session : Session
-        whose health was just read
-
     Raises
     ------
     DriverError
@@ -81,11 +69,6 @@ def clear_errors(session: Session) -> None:
     """Clear errors of servos that forget them without a restart (Y), just as `clear_watchdogs` does.
 
     What cannot be cleared, or comes back at once, stays in the servo's Error Code.
-
-    Parameters
-    ----------
-    session : Session
-        whose health was just read
 
     Raises
     ------

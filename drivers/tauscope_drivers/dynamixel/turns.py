@@ -14,15 +14,7 @@ class Turns:
     """
 
     def __init__(self, servos: Sequence[int], owed: Collection[int] = ()) -> None:
-        """Nothing has come yet.
-
-        Parameters
-        ----------
-        servos : sequence of int
-            IDs in the order in which they were asked
-        owed : collection of int
-            IDs of those who have lately not answered in time
-        """
+        """Nothing has come yet."""
         self._place = {servo: place for place, servo in enumerate(servos)}
         self._owed = frozenset(owed)
         self._found: dict[int, Status] = {}
@@ -46,13 +38,7 @@ class Turns:
         return self._place.keys() - self._heard
 
     def take(self, status: Status) -> None:
-        """Take an answer.
-
-        Parameters
-        ----------
-        status : Status
-            as it came
-        """
+        """Take an answer."""
         servo = status.servo
         place = self._place.get(servo)
         if place is not None:

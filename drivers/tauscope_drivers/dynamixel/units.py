@@ -15,14 +15,10 @@ class ServoUnits:
 
     radians_per_count : float
         joint position for one count, negative where the servo is mounted the other way round [rad or m]
-    zero_count : int
-        count at which the joint stands at zero
     velocity_unit : float
         joint velocity for one unit of Present Velocity, signed likewise [rad/s or m/s]
     milliampere : float
         current for one unit of Present Current, signed likewise [mA]
-    source : str
-        where the unit of current comes from
     torque_per_milliampere : float or None
         joint torque for one milliampere; None where the robot file does not say, for no maker's figure exists
         [Nm/mA or N/mA]
@@ -36,13 +32,7 @@ class ServoUnits:
     torque_per_milliampere: float | None = None
 
     def position(self, counts: int) -> float:
-        """Joint position [rad or m].
-
-        Parameters
-        ----------
-        counts : int
-            Present Position
-        """
+        """Joint position [rad or m]."""
         return (counts - self.zero_count) * self.radians_per_count
 
     def counts(self, position: float) -> int:
@@ -69,13 +59,7 @@ class ServoUnits:
         return lowest, highest
 
     def velocity(self, units: int) -> float:
-        """Joint velocity [rad/s or m/s].
-
-        Parameters
-        ----------
-        units : int
-            Present Velocity
-        """
+        """Joint velocity [rad/s or m/s]."""
         return units * self.velocity_unit
 
     def velocity_cap(self, velocity: float) -> int:
@@ -90,13 +74,7 @@ class ServoUnits:
         return 0 if most > _LARGEST_PROFILE else max(1, math.floor(most))
 
     def current(self, units: int) -> float:
-        """Motor current, positive where it pushes the joint forward [mA].
-
-        Parameters
-        ----------
-        units : int
-            Present Current
-        """
+        """Motor current, positive where it pushes the joint forward [mA]."""
         return units * self.milliampere
 
     def current_units(self, torque: float) -> int:
@@ -144,10 +122,6 @@ def servo_units(
 
     Parameters
     ----------
-    model : ServoModel
-        from which the horn's figures come
-    direction : int
-        -1 where the servo turns against the joint, else 1
     reduction : float
         turns of the horn per turn of the joint; radians of the horn per metre on prismatic joints
     zero_count : int or None

@@ -12,15 +12,6 @@ from tauscope.server.http.settings import default_data_folder
 def verify_audit(data: Path | None, head: str | None, file: Path | None) -> None:
     """Check the log, and print the hash of its last entry.
 
-    Parameters
-    ----------
-    data : Path or None
-        data folder of the service; the user's own where None
-    head : str or None
-        hash of an entry that has to be there
-    file : Path or None
-        a copy of the log, in place of a data folder
-
     Raises
     ------
     TauscopeError

@@ -28,15 +28,6 @@ def verify(
     """Check that no entry of the audit log was changed, moved or removed, and print the hash of the last one.
 
     Note that hash now and then where the machine's owner cannot reach it: --head finds out whether the end was cut off.
-
-    Parameters
-    ----------
-    data : Path or None
-        data folder of the service
-    head : str or None
-        hash that was noted earlier
-    file : Path or None
-        a copy of the log
     """
     from tauscope.cli.audit import verify_audit
 

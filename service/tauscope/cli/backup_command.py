@@ -13,17 +13,7 @@ def backup(
     data: DataFolder = None,
     database: DatabaseUrl = None,
 ) -> None:
-    """Write everything that is kept into one file; a service may work with it meanwhile.
-
-    Parameters
-    ----------
-    file : Path
-        file to make
-    data : Path or None
-        data folder
-    database : str or None
-        URL of a PostgreSQL database
-    """
+    """Write everything that is kept into one file; a service may work with it meanwhile."""
     from tauscope.cli.backup_run import make_backup
 
     make_backup(file, data, database)
@@ -34,17 +24,7 @@ def restore(
     data: Annotated[Path, typer.Option(metavar="DIR", file_okay=False, help="Data folder to make.")],
     database: DatabaseUrl = None,
 ) -> None:
-    """Make a data folder from a backup; also where the database was one of the other kind.
-
-    Parameters
-    ----------
-    file : Path
-        of `tauscope backup`
-    data : Path
-        data folder to make
-    database : str or None
-        URL of an empty PostgreSQL database
-    """
+    """Make a data folder from a backup; also where the database was one of the other kind."""
     from tauscope.cli.backup_run import use_backup
 
     use_backup(file, data, database)

@@ -15,15 +15,6 @@ from tauscope.version import tauscope_version
 def make_backup(file: Path, data: Path | None, database: str | None) -> None:
     """Write everything that is kept into one file.
 
-    Parameters
-    ----------
-    file : Path
-        file to make
-    data : Path or None
-        data folder; the user's own where None
-    database : str or None
-        URL of a PostgreSQL database; SQLite in the data folder where None
-
     Raises
     ------
     ExportError
@@ -44,15 +35,6 @@ def make_backup(file: Path, data: Path | None, database: str | None) -> None:
 
 def use_backup(file: Path, data: Path, database: str | None) -> None:
     """Make a data folder from a backup.
-
-    Parameters
-    ----------
-    file : Path
-        of `make_backup`
-    data : Path
-        data folder to make
-    database : str or None
-        URL of an empty PostgreSQL database; SQLite in the data folder where None
 
     Raises
     ------

@@ -32,10 +32,6 @@ def scan(
 
     Parameters
     ----------
-    backend : str
-        ``dynamixel`` or ``canopen``
-    port : str
-        where the bus hangs
     bit_rate : list of int or None
         to try [bit/s]
     """

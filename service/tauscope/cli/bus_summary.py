@@ -28,10 +28,6 @@ def show_devices(backend: str, port: str, bit_rates: Sequence[int] | None) -> No
 
     Parameters
     ----------
-    backend : str
-        name of the field bus
-    port : str
-        where it hangs
     bit_rates : sequence of int or None
         to try [bit/s]; the usual ones where None
 
@@ -54,17 +50,6 @@ def show_devices(backend: str, port: str, bit_rates: Sequence[int] | None) -> No
 
 def show_frames(robot_file: Path, backend: str, trajectory: Path | None, options: RunOptions) -> None:
     """Show the frames that a run would send: connecting, enabling, its first cycles, stopping.
-
-    Parameters
-    ----------
-    robot_file : Path
-        robot file
-    backend : str
-        name of the field bus; for ``sim``, which has none, the bus that the drive blocks speak of
-    trajectory : Path or None
-        motion whose first cycles are shown; the arm standing at zero, or where its limits allow, where None
-    options : RunOptions
-        of the run
 
     Raises
     ------

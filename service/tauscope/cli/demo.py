@@ -61,13 +61,7 @@ and how its joints rub is left out. Of the friction curve only the shape constan
 
 @dataclass(frozen=True)
 class Comparison:
-    """A parameter's truth beside its estimate.
-
-    name : str
-        of the parameter
-    truth, value, std : float
-        truth, estimate and the estimate's standard error
-    """
+    """A parameter's truth beside its estimate."""
 
     name: str
     truth: float
@@ -82,13 +76,6 @@ class Comparison:
 
 def run_demo(folder: Path, page: PageShown) -> None:
     """Design, run, identify, compare, and say where everything is.
-
-    Parameters
-    ----------
-    folder : Path
-        where the files go
-    page : PageShown
-        who shows the page afterwards
 
     Raises
     ------
@@ -129,19 +116,7 @@ def run_demo(folder: Path, page: PageShown) -> None:
 
 
 def design_motion(robot: Path, out: Path, options: ExcitationOptions, told: Told) -> None:
-    """Design a motion and write it as a trajectory file.
-
-    Parameters
-    ----------
-    robot : Path
-        robot file
-    out : Path
-        file to make
-    options : ExcitationOptions
-        what is wished
-    told : callable
-        told the step and the percentage
-    """
+    """Design a motion and write it as a trajectory file."""
 
     def tell(progress: OptimiserProgress) -> None:
         told(f"design {out.stem} motion", 100.0 * progress.fraction)
@@ -151,19 +126,6 @@ def design_motion(robot: Path, out: Path, options: ExcitationOptions, told: Told
 
 def run_motion(folder: Path, trajectory: Path, out: Path, seed: int, told: Told) -> None:
     """Play a motion on the simulated arm, and keep what it recorded.
-
-    Parameters
-    ----------
-    folder : Path
-        takes what the run leaves
-    trajectory : Path
-        the motion
-    out : Path
-        recording to make
-    seed : int
-        of the noise
-    told : callable
-        told the step and the percentage
 
     Raises
     ------
@@ -187,13 +149,7 @@ def run_motion(folder: Path, trajectory: Path, out: Path, seed: int, told: Told)
 
 
 def robot_text_without_model(path: Path) -> str:
-    """Text of a robot file without what it believes about links and friction; a heading says so.
-
-    Parameters
-    ----------
-    path : Path
-        robot file
-    """
+    """Text of a robot file without what it believes about links and friction; a heading says so."""
     yaml = YAML()
     yaml.width = 4096
     content = yaml.load(path.read_text(encoding="utf-8"))
@@ -205,20 +161,7 @@ def robot_text_without_model(path: Path) -> str:
 
 
 def compare(arm: Robot, identification: Identification) -> list[Comparison]:
-    """The estimate beside the truth: base parameters, then every joint's friction.
-
-    Parameters
-    ----------
-    arm : Robot
-        with its true model
-    identification : Identification
-        of the same arm
-
-    Returns
-    -------
-    list of Comparison
-        one a parameter, in the order of the model's columns
-    """
+    """The estimate beside the truth: base parameters, then every joint's friction."""
     structure, std = identification.structure, np.sqrt(np.diag(identification.covariance))
     standard = np.concatenate([link.to_vector() for link in arm.model.links or ()])
     truth = dict(zip(structure.base.expressions, structure.base.project(standard), strict=True))

@@ -31,22 +31,6 @@ MOTION = ExcitationDesignOptions(starts=1, periods=2, slow_postures=1, closing_p
 def run_campaign(data: Path, robot_file: Path, scenario: Mapping[str, Any], told: Told) -> DiagnosisDocument:
     """Run a campaign on a simulated arm, and diagnose it.
 
-    Parameters
-    ----------
-    data : Path
-        the service's data folder; what was made stays there
-    robot_file : Path
-        of the arm, its true model included: the simulation needs it, nobody else reads it
-    scenario : mapping
-        what the simulated arm conceals
-    told : callable
-        told the step and the percentage
-
-    Returns
-    -------
-    DiagnosisDocument
-        what was found
-
     Raises
     ------
     TauscopeError

@@ -26,13 +26,6 @@ def demo(
     Designs a motion for the seed paper's arm and a second one that the model is judged by, runs both, identifies the
     arm from the noisy recordings, and compares the estimate with the truth. Then a campaign through the service on the
     same arm with a concealed spring, which the page shows. Takes a minute or two.
-
-    Parameters
-    ----------
-    out : Path
-        folder for the results
-    page : bool or None
-        whether to show the page afterwards, until interrupted
     """
     from tauscope.cli.demo import run_demo
     from tauscope.cli.demo_page import PageShown

@@ -13,13 +13,6 @@ _FIRST_LINE = "Written by `tauscope demo`, which replaces the files named here w
 def prepare_folder(folder: Path, files: Sequence[str]) -> None:
     """Make the folder, mark it, and take away the files that an earlier demo wrote into it; folders stay.
 
-    Parameters
-    ----------
-    folder : Path
-        where the demo writes
-    files : sequence of str
-        names of all files and folders that it writes
-
     Raises
     ------
     ExportError

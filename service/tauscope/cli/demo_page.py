@@ -48,25 +48,13 @@ class PageShown(Enum):
 
 
 def show_page(folder: Path) -> None:
-    """Serve the page until interrupted.
-
-    Parameters
-    ----------
-    folder : Path
-        the demo's
-    """
+    """Serve the page until interrupted."""
     run_server(folder / DATA, port=_free_port())
 
 
 @dataclass(frozen=True)
 class LeftPage:
-    """A page that another process serves.
-
-    address : str
-        where it answers
-    process : Popen
-        which ends by itself
-    """
+    """A page that another process serves."""
 
     address: str
     process: subprocess.Popen[str]
@@ -77,15 +65,8 @@ def leave_page(folder: Path, seconds: float = LEFT_FOR_S) -> LeftPage:
 
     Parameters
     ----------
-    folder : Path
-        the demo's
     seconds : float
         after which it ends [s]
-
-    Returns
-    -------
-    LeftPage
-        which answers already
 
     Raises
     ------

@@ -60,30 +60,8 @@ def diagnose(
 
     Parameters
     ----------
-    robot : Path
-        robot file
-    recordings : list of Path
-        what is explained
-    held_out : list of Path or None
-        what findings are confirmed by
-    against : list of str or None
-        ``identified``, ``model`` or files
     cutoff : str
         ``auto``, ``none`` or a frequency [Hz], for the identification
-    json : Path or None
-        where the result goes
-    report : Path or None
-        where the page goes
-    next_trajectory : Path or None
-        where the motion to record next goes
-    model : Path or None
-        where the model with all findings goes
-    export : list of Path or None
-        where its compensation code goes
-    scenario : Path or None
-        where the findings go, as a scenario of the simulated arm
-    improved_robot : Path or None
-        where the robot file with what was identified goes
     """
     cutoff_hz = parse_cutoff(cutoff)
     from tauscope.cli.diagnose_outputs import OutputRequest

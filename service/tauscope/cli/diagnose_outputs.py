@@ -26,19 +26,7 @@ TRAJECTORIES = (".json", ".csv")
 
 @dataclass(frozen=True)
 class OutputRequest:
-    """Which files are to be written.
-
-    model : Path or None
-        the extended model, to keep
-    code : tuple of Path
-        its compensation as C or Python
-    scenario, improved_robot : Path or None
-        the same for the simulated arm
-    next_trajectory : Path or None
-        the motion to record next
-    report : Path or None
-        a page
-    """
+    """Which files are to be written."""
 
     model: Path | None = None
     code: tuple[Path, ...] = ()
@@ -75,17 +63,7 @@ class OutputRequest:
 
 @dataclass(frozen=True)
 class Source:
-    """What was diagnosed.
-
-    command : tuple of str
-        words of the command line that does it again
-    robot_file : Path
-        of the arm
-    recordings, held_out, compared : tuple of Path
-        what was explained, what findings were confirmed by, and the simulator's recordings or saved model
-    current : bool
-        whether any recording holds currents
-    """
+    """What was diagnosed."""
 
     command: tuple[str, ...]
     robot_file: Path
@@ -95,13 +73,7 @@ class Source:
     current: bool
 
     def provenance(self, diagnosis: Diagnosis) -> Provenance:
-        """Hashes of all files, versions and the time.
-
-        Parameters
-        ----------
-        diagnosis : Diagnosis
-            the result
-        """
+        """Hashes of all files, versions and the time."""
         return record_provenance(
             command=self.command,
             robot=diagnosis.robot,
@@ -121,21 +93,6 @@ def contents(
     progress: Callable[[str], None],
 ) -> dict[Path, bytes]:
     """What the files hold.
-
-    Parameters
-    ----------
-    request : OutputRequest
-        which files
-    diagnosis : Diagnosis
-        the result
-    document : DiagnosisDocument
-        the same as plain data
-    planned : PlannedExperiment or None
-        the next motion
-    source : Source
-        what was diagnosed
-    progress : callable
-        told the name of each step as it begins
 
     Raises
     ------

@@ -31,21 +31,7 @@ IDENTIFIED, MODEL, SAVED = "identified", "model", ".json"
 
 @dataclass(frozen=True)
 class DiagnoseRequest:
-    """What was asked for on the command line.
-
-    robot : Path
-        robot file
-    recordings, held_out : tuple of Path
-        what is explained, and what findings are confirmed by
-    against : tuple of str
-        ``identified``, ``model`` or recordings of a simulator
-    options : Options
-        of the identification
-    json : Path or None
-        where the result goes
-    outputs : OutputRequest
-        what else is written
-    """
+    """What was asked for on the command line."""
 
     robot: Path
     recordings: tuple[Path, ...]
@@ -83,11 +69,6 @@ class DiagnoseRequest:
 
 def run_diagnose(request: DiagnoseRequest) -> None:
     """Do what the command line asks for.
-
-    Parameters
-    ----------
-    request : DiagnoseRequest
-        files and options
 
     Raises
     ------
@@ -141,19 +122,7 @@ def run_diagnose(request: DiagnoseRequest) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What came of it.
-
-    diagnosis : Diagnosis
-        the result
-    document : DiagnosisDocument
-        the same as plain data
-    planned : PlannedExperiment or None
-        the motion to record next, where anything is open or it was asked for
-    refusal : ExcitationError or None
-        why there is none although it was asked for
-    recordings : tuple of Recording
-        as they were read
-    """
+    """What came of it."""
 
     diagnosis: Diagnosis
     document: DiagnosisDocument
@@ -163,20 +132,7 @@ class Outcome:
 
 
 def diagnose_files(request: DiagnoseRequest, progress: Callable[[str], None]) -> Outcome:
-    """Read the files and diagnose the arm.
-
-    Parameters
-    ----------
-    request : DiagnoseRequest
-        files and options
-    progress : callable
-        told the name of each step as it begins
-
-    Returns
-    -------
-    Outcome
-        the result
-    """
+    """Read the files and diagnose the arm."""
     progress(f"read {request.robot}")
     robot = read_robot(request.robot)
     saved = None if request.saved is None else read_model(request.saved, robot)

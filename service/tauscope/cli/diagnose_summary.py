@@ -11,15 +11,7 @@ from tauscope.report.table import Table
 
 
 def show_diagnosis(console: Console, document: DiagnosisDocument) -> None:
-    """Show the verdict, the findings, and what they change.
-
-    Parameters
-    ----------
-    console : Console
-        where to
-    document : DiagnosisDocument
-        the result
-    """
+    """Show the verdict, the findings, and what they change."""
     console.print(plain(f"Robot {document.robot}: {document.verdict}: {VERDICTS[document.verdict]}"), soft_wrap=True)
     console.print()
     for finding in document.findings:

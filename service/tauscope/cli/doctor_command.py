@@ -28,13 +28,6 @@ def doctor(
     """Look at adapters and drives, and say what keeps an arm from running well, each with its remedy.
 
     Moves nothing and writes nothing. Exit status 1 where something keeps the arm from running.
-
-    Parameters
-    ----------
-    robot : Path or None
-        robot file
-    backend : str or None
-        ``dynamixel`` or ``canopen``
     """
     from tauscope.cli.doctor_summary import show_findings
 

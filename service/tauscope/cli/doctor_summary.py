@@ -18,13 +18,6 @@ _MARKS = {Severity.GOOD: "ok", Severity.WARNING: "warning", Severity.FAILURE: "f
 def show_findings(robot: Path | None, backend: str | None) -> None:
     """Look, and show what was found.
 
-    Parameters
-    ----------
-    robot : Path or None
-        robot file whose drives are looked at; the adapters of this machine where None
-    backend : str or None
-        name of the field bus; as the robot file says where None
-
     Raises
     ------
     AcquisitionError

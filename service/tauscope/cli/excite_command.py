@@ -82,38 +82,12 @@ def excite(
 
     Parameters
     ----------
-    robot : Path
-        robot file
     duration : float
         length of one period [s]
-    harmonics : int
-        of the Fourier series
-    periods : int
-        how often the period is repeated
-    seed : int
-        of the optimiser's starts
-    criterion : str
-        what is minimised
     floor : float or None
         lowest height [m]
-    box : list of str or None
-        forbidden boxes
     tool : str
         tool point [m]
-    torque_margin : float
-        part of the torque limits that is kept free
-    limit_fraction : float
-        part of the other limits that is used
-    noise_std : str or None
-        expected torque noise
-    slow_reversals : bool
-        whether slow reversals are added
-    closing_period : bool
-        whether the first period is repeated at the end
-    json : Path or None
-        where the design goes
-    csv : Path or None
-        where the samples go
     rate : float
         samples a second of the CSV [Hz]
     """
@@ -144,15 +118,6 @@ def excite(
 
 def parse_numbers(text: str, option: str, count: int | None) -> list[float]:
     """Numbers separated by commas.
-
-    Parameters
-    ----------
-    text : str
-        what the user wrote
-    option : str
-        name of the option, for the message
-    count : int or None
-        how many are expected; any number where None
 
     Raises
     ------

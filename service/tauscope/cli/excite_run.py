@@ -25,12 +25,6 @@ from tauscope.trajectory.csv_format import trajectory_csv
 class Request:
     """What was asked for on the command line.
 
-    robot : Path
-        robot file
-    options : ExcitationOptions
-        what is wished of the motion
-    json, csv : Path or None
-        where the design, and the trajectory's samples, go
     rate_hz : float
         samples a second of the CSV [Hz]
     """
@@ -49,11 +43,6 @@ class Request:
 
 def run_excite(request: Request) -> None:
     """Do what the command line asks for.
-
-    Parameters
-    ----------
-    request : Request
-        file and options
 
     Raises
     ------

@@ -28,11 +28,6 @@ SUFFIXES = {
 def export_format(path: Path) -> ExportFormat:
     """The format that a file name asks for.
 
-    Parameters
-    ----------
-    path : Path
-        file to make
-
     Raises
     ------
     typer.BadParameter
@@ -51,22 +46,6 @@ def make_exports(
     paths: Sequence[Path], identification: Identification, recordings: Sequence[Recording], provenance: Provenance
 ) -> dict[Path, bytes]:
     """The content of every file that ``--export`` asks for.
-
-    Parameters
-    ----------
-    paths : sequence of Path
-        files to make
-    identification : Identification
-        the result
-    recordings : sequence of Recording
-        what it was made from
-    provenance : Provenance
-        their hashes, and the moment of the result
-
-    Returns
-    -------
-    dict of Path to bytes
-        content by file
 
     Raises
     ------

@@ -36,34 +36,14 @@ Workers = Annotated[
 
 
 def identify(manifest: Manifest, out: Out, workers: Workers = CORES) -> None:
-    """Identify every robot of a manifest. A failure is a row of the table; exit status 1 where there is any.
-
-    Parameters
-    ----------
-    manifest : Path
-        which robots
-    out : Path
-        folder of the results
-    workers : int
-        processes
-    """
+    """Identify every robot of a manifest. A failure is a row of the table; exit status 1 where there is any."""
     from tauscope.cli.fleet_run import run_fleet
 
     run_fleet("identify", manifest, out, workers)
 
 
 def diagnose(manifest: Manifest, out: Out, workers: Workers = CORES) -> None:
-    """Diagnose every robot of a manifest. A failure is a row of the table; exit status 1 where there is any.
-
-    Parameters
-    ----------
-    manifest : Path
-        which robots
-    out : Path
-        folder of the results
-    workers : int
-        processes
-    """
+    """Diagnose every robot of a manifest. A failure is a row of the table; exit status 1 where there is any."""
     from tauscope.cli.fleet_run import run_fleet
 
     run_fleet("diagnose", manifest, out, workers)

@@ -22,17 +22,6 @@ CLUSTER_PATIENCE_S = 60.0
 def run_fleet(verb: Literal["identify", "diagnose"], manifest: Path, out: Path, workers: int) -> None:
     """Analyse every robot of a manifest.
 
-    Parameters
-    ----------
-    verb : str
-        ``identify`` or ``diagnose``
-    manifest : Path
-        which robots
-    out : Path
-        folder of the results; made where it is missing, and has no table yet
-    workers : int
-        processes
-
     Raises
     ------
     RecordingError

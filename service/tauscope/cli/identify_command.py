@@ -66,24 +66,8 @@ def identify(
 
     Parameters
     ----------
-    robot : Path
-        robot file
-    recordings : list of Path
-        what the model is made from
-    held_out : list of Path or None
-        what it is judged by
-    estimator : str
-        ``ls`` or ``wls``
     cutoff : str
         ``auto``, ``none`` or a frequency [Hz]
-    rotor_inertia : bool
-        whether rotors are added where the data ask for them
-    json : Path or None
-        where the result goes
-    report : Path or None
-        where the page goes
-    export : list of Path or None
-        where the model goes
     """
     cutoff_hz = parse_cutoff(cutoff)
     from tauscope.cli.identify_run import Request, run_identify

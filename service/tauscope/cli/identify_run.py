@@ -20,19 +20,7 @@ from tauscope.robot.messages import one_line
 
 @dataclass(frozen=True)
 class Request:
-    """What was asked for on the command line.
-
-    robot : Path
-        robot file
-    recordings, held_out : tuple of Path
-        what the model is made from, and judged by
-    options : Options
-        estimator, band, optional terms
-    json, report : Path or None
-        where result and page go
-    exports : tuple of Path
-        where the model goes
-    """
+    """What was asked for on the command line."""
 
     robot: Path
     recordings: tuple[Path, ...]
@@ -60,17 +48,7 @@ class Request:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What came of it.
-
-    robot : Robot
-        the arm
-    recordings, held_out : tuple of Recording
-        as they were read
-    identification : Identification
-        the model
-    document : IdentificationDocument
-        the same as plain data
-    """
+    """What came of it."""
 
     robot: Robot
     recordings: tuple[Recording, ...]
@@ -81,11 +59,6 @@ class Outcome:
 
 def run_identify(request: Request) -> None:
     """Do what the command line asks for.
-
-    Parameters
-    ----------
-    request : Request
-        files and options
 
     Raises
     ------
@@ -113,11 +86,6 @@ def check_request(request: Request) -> None:
 
     A file that is given twice, an output that would destroy an input or cannot be written, a suffix without a format.
 
-    Parameters
-    ----------
-    request : Request
-        files and options
-
     Raises
     ------
     typer.BadParameter
@@ -130,20 +98,7 @@ def check_request(request: Request) -> None:
 
 
 def identify_files(request: Request, progress: Callable[[str], None]) -> Outcome:
-    """Read the files and identify the arm.
-
-    Parameters
-    ----------
-    request : Request
-        files and options
-    progress : callable
-        told the name of each step as it begins
-
-    Returns
-    -------
-    Outcome
-        the model and what it was made from
-    """
+    """Read the files and identify the arm."""
     progress(f"read {request.robot}")
     robot = read_robot(request.robot)
     if robot.urdf is not None:
@@ -156,15 +111,6 @@ def identify_files(request: Request, progress: Callable[[str], None]) -> Outcome
 
 def write_outcome(request: Request, outcome: Outcome, progress: Callable[[str], None]) -> None:
     """Write the files that were asked for: all of them, or none where one cannot be made.
-
-    Parameters
-    ----------
-    request : Request
-        files and options
-    outcome : Outcome
-        what came of it
-    progress : callable
-        told the name of each step as it begins
 
     Raises
     ------

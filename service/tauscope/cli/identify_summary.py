@@ -12,17 +12,7 @@ from tauscope.robot import Robot
 
 
 def show_identification(console: Console, document: IdentificationDocument, robot: Robot) -> None:
-    """Show parameters, friction, noise and fit.
-
-    Parameters
-    ----------
-    console : Console
-        where to
-    document : IdentificationDocument
-        the result
-    robot : Robot
-        the arm, for the joints' units
-    """
+    """Show parameters, friction, noise and fit."""
     console.print(
         plain(f"Robot {document.robot}: {counted(len(document.joints), 'joint')}, {document.estimator.upper()}")
     )

@@ -29,12 +29,6 @@ def run(
 
     Parameters
     ----------
-    name : str
-        of the schedule
-    data : Path or None
-        data folder
-    database : str or None
-        URL of a PostgreSQL database
     timeout_s : float
         how long its end is waited for [s]
     """
@@ -44,15 +38,7 @@ def run(
 
 
 def list_(data: DataFolder = None, database: DatabaseUrl = None) -> None:
-    """Show all schedules, and what came of each the last time.
-
-    Parameters
-    ----------
-    data : Path or None
-        data folder
-    database : str or None
-        URL of a PostgreSQL database
-    """
+    """Show all schedules, and what came of each the last time."""
     from tauscope.cli.job_run import list_jobs
 
     list_jobs(data, database)

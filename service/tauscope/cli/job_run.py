@@ -35,12 +35,6 @@ def run_job(name: str, data: Path | None, database: str | None, timeout_s: float
 
     Parameters
     ----------
-    name : str
-        of the schedule
-    data : Path or None
-        data folder
-    database : str or None
-        URL of a PostgreSQL database
     timeout_s : float
         how long its end is waited for [s]
 
@@ -67,13 +61,6 @@ def run_job(name: str, data: Path | None, database: str | None, timeout_s: float
 
 def list_jobs(data: Path | None, database: str | None) -> None:
     """Show all schedules, and what came of each the last time.
-
-    Parameters
-    ----------
-    data : Path or None
-        data folder
-    database : str or None
-        URL of a PostgreSQL database
 
     Raises
     ------

@@ -28,14 +28,8 @@ def add(
 
     Parameters
     ----------
-    name : str
-        who gets it
-    scope : str
-        what it may do
     days : int
         how long it holds [days]
-    data : Path or None
-        data folder of the service
     """
     from tauscope.cli.keys import add_key
 
@@ -43,13 +37,7 @@ def add(
 
 
 def list_(data: DataFolder = None) -> None:
-    """List all keys: who has them, what they may do, whether they still hold.
-
-    Parameters
-    ----------
-    data : Path or None
-        data folder of the service
-    """
+    """List all keys: who has them, what they may do, whether they still hold."""
     from tauscope.cli.keys import list_keys
 
     list_keys(data)
@@ -58,15 +46,7 @@ def list_(data: DataFolder = None) -> None:
 def revoke(
     name: Annotated[str, typer.Argument(help="Name or identifier of the key.")], data: DataFolder = None
 ) -> None:
-    """Take a key back; a service that runs refuses it within seconds.
-
-    Parameters
-    ----------
-    name : str
-        name or identifier of the key
-    data : Path or None
-        data folder of the service
-    """
+    """Take a key back; a service that runs refuses it within seconds."""
     from tauscope.cli.keys import revoke_key
 
     revoke_key(name, data)

@@ -17,14 +17,8 @@ def add_key(name: str, scope: str, days: int, data: Path | None) -> None:
 
     Parameters
     ----------
-    name : str
-        who gets it
-    scope : str
-        what it may do
     days : int
         how long it holds, for good where 0 [days]
-    data : Path or None
-        data folder of the service; the user's own where None
 
     Raises
     ------
@@ -44,11 +38,6 @@ def add_key(name: str, scope: str, days: int, data: Path | None) -> None:
 def list_keys(data: Path | None) -> None:
     """Print all keys, one a line.
 
-    Parameters
-    ----------
-    data : Path or None
-        data folder of the service; the user's own where None
-
     Raises
     ------
     TauscopeError
@@ -62,13 +51,6 @@ def list_keys(data: Path | None) -> None:
 
 def revoke_key(name: str, data: Path | None) -> None:
     """Take a key back.
-
-    Parameters
-    ----------
-    name : str
-        name or identifier of the key
-    data : Path or None
-        data folder of the service; the user's own where None
 
     Raises
     ------

@@ -21,93 +21,35 @@ Count = Annotated[int, typer.Option("--limit", min=1, max=1000, metavar="N", hel
 
 
 def list_(robot: RobotName, data: DataFolder = None, database: DatabaseUrl = None, limit: Count = 20) -> None:
-    """Show the models of a robot, the newest first, and why those that were refused were.
-
-    Parameters
-    ----------
-    robot : str
-        name of the robot
-    data : Path or None
-        data folder
-    database : str or None
-        URL of a PostgreSQL database
-    limit : int
-        most models
-    """
+    """Show the models of a robot, the newest first, and why those that were refused were."""
     from tauscope.cli.model_run import list_models
 
     list_models(robot, data, database, limit)
 
 
 def trend(robot: RobotName, data: DataFolder = None, database: DatabaseUrl = None) -> None:
-    """Show how every parameter of a robot has changed, from the first active model to the present one.
-
-    Parameters
-    ----------
-    robot : str
-        name of the robot
-    data : Path or None
-        data folder
-    database : str or None
-        URL of a PostgreSQL database
-    """
+    """Show how every parameter of a robot has changed, from the first active model to the present one."""
     from tauscope.cli.model_run import show_trend
 
     show_trend(robot, data, database)
 
 
 def events(robot: RobotName, data: DataFolder = None, database: DatabaseUrl = None, limit: Count = 20) -> None:
-    """Show the drifts of a robot that nobody has taken note of. Exit status 1 where there are any.
-
-    Parameters
-    ----------
-    robot : str
-        name of the robot
-    data : Path or None
-        data folder
-    database : str or None
-        URL of a PostgreSQL database
-    limit : int
-        most events
-    """
+    """Show the drifts of a robot that nobody has taken note of. Exit status 1 where there are any."""
     from tauscope.cli.model_run import show_events
 
     show_events(robot, data, database, limit)
 
 
 def activate(identifier: Identifier, reason: Reason, data: DataFolder = None, database: DatabaseUrl = None) -> None:
-    """Make a model the active one, also one that was refused; the one before is kept.
-
-    Parameters
-    ----------
-    identifier : str
-        of the model
-    reason : str
-        why
-    data : Path or None
-        data folder
-    database : str or None
-        URL of a PostgreSQL database
-    """
+    """Make a model the active one, also one that was refused; the one before is kept."""
     from tauscope.cli.model_run import choose_model
 
     choose_model(identifier, "active", reason, data, database)
 
 
 def reference(identifier: Identifier, reason: Reason, data: DataFolder = None, database: DatabaseUrl = None) -> None:
-    """Count drift from this model on, say after maintenance; drifts that are open are closed.
-
-    Parameters
-    ----------
-    identifier : str
-        of the model
-    reason : str
-        why
-    data : Path or None
-        data folder
-    database : str or None
-        URL of a PostgreSQL database
-    """
+    """Count drift from this model on, say after maintenance; drifts that are open are closed."""
     from tauscope.cli.model_run import choose_model
 
     choose_model(identifier, "reference", reason, data, database)

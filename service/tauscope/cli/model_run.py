@@ -16,17 +16,6 @@ from tauscope.server.history.parameter_trends import parameter_trends
 def list_models(robot: str, data: Path | None, database: str | None, limit: int) -> None:
     """Show the models of a robot.
 
-    Parameters
-    ----------
-    robot : str
-        name of the robot
-    data : Path or None
-        data folder
-    database : str or None
-        URL of a PostgreSQL database
-    limit : int
-        most models
-
     Raises
     ------
     NotFoundError
@@ -44,15 +33,6 @@ def list_models(robot: str, data: Path | None, database: str | None, limit: int)
 
 def show_trend(robot: str, data: Path | None, database: str | None) -> None:
     """Show how every parameter of a robot has changed.
-
-    Parameters
-    ----------
-    robot : str
-        name of the robot
-    data : Path or None
-        data folder
-    database : str or None
-        URL of a PostgreSQL database
 
     Raises
     ------
@@ -77,17 +57,6 @@ def show_trend(robot: str, data: Path | None, database: str | None) -> None:
 def show_events(robot: str, data: Path | None, database: str | None, limit: int) -> None:
     """Show the drifts of a robot that nobody has taken note of.
 
-    Parameters
-    ----------
-    robot : str
-        name of the robot
-    data : Path or None
-        data folder
-    database : str or None
-        URL of a PostgreSQL database
-    limit : int
-        most events
-
     Raises
     ------
     NotFoundError
@@ -110,19 +79,6 @@ def show_events(robot: str, data: Path | None, database: str | None, limit: int)
 
 def choose_model(identifier: str, role: str, reason: str, data: Path | None, database: str | None) -> None:
     """Make a model the active one, or the one that drift is counted from.
-
-    Parameters
-    ----------
-    identifier : str
-        of the model
-    role : str
-        ``active`` or ``reference``
-    reason : str
-        why
-    data : Path or None
-        data folder
-    database : str or None
-        URL of a PostgreSQL database
 
     Raises
     ------

@@ -16,11 +16,6 @@ STANDARD_OUTPUT = Path("-")
 def require_distinct(inputs: Sequence[Path]) -> None:
     """Refuse a file that is given twice: it would count twice, or be judged by what it taught.
 
-    Parameters
-    ----------
-    inputs : sequence of Path
-        all recordings, held-out ones included
-
     Raises
     ------
     typer.BadParameter
@@ -36,13 +31,6 @@ def require_distinct(inputs: Sequence[Path]) -> None:
 
 def require_free(outputs: Sequence[Path], inputs: Iterable[Path]) -> None:
     """Refuse, before any work is done, to write where it cannot be done or would destroy an input.
-
-    Parameters
-    ----------
-    outputs : sequence of Path
-        files to write; `STANDARD_OUTPUT` is always free
-    inputs : iterable of Path
-        files and folders that are read
 
     Raises
     ------
@@ -69,11 +57,6 @@ def require_free(outputs: Sequence[Path], inputs: Iterable[Path]) -> None:
 def require_new(path: Path) -> None:
     """Refuse, before any work is done, to make a file that is there already or whose folder is not.
 
-    Parameters
-    ----------
-    path : Path
-        file to make
-
     Raises
     ------
     typer.BadParameter
@@ -89,13 +72,6 @@ def require_new(path: Path) -> None:
 
 def keep_file(source: Path, target: Path) -> None:
     """Give a finished file its place; a file that is there already stays as it is.
-
-    Parameters
-    ----------
-    source : Path
-        on the same disk
-    target : Path
-        its place
 
     Raises
     ------
@@ -114,13 +90,6 @@ def keep_file(source: Path, target: Path) -> None:
 
 def write_file(path: Path, content: bytes) -> None:
     """Write a file that appears under its name only when it is complete.
-
-    Parameters
-    ----------
-    path : Path
-        the file; replaced where it exists; `STANDARD_OUTPUT` is standard output
-    content : bytes
-        what to write
 
     Raises
     ------

@@ -85,18 +85,7 @@ add_verb(app, prove)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the program.
-
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        command line without the program's name; that of the process where None
-
-    Returns
-    -------
-    int
-        exit status, see `ExitStatus`
-    """
+    """Run the program."""
     if arguments is None:
         _prepare_process()
     words = list(sys.argv[1:] if arguments is None else arguments)

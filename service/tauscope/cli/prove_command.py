@@ -34,19 +34,6 @@ def prove(
 
     Works in a clone of the repository. Outcomes are kept one by one, so that an interrupted set goes on. Uses all
     cores, or the Dask cluster whose scheduler DASK_SCHEDULER_ADDRESS names.
-
-    Parameters
-    ----------
-    full : bool
-        whether the full set is tried
-    first_seed : int
-        of every series
-    jobs : int or None
-        trials at the same time
-    out : Path
-        folder for outcomes, and for the page and its pictures
-    page : Path or None
-        where the page goes instead
     """
     words = ["--out", str(out), "--first-seed", str(first_seed)]
     words += ["--full"] if full else []
@@ -57,13 +44,6 @@ def prove(
 
 def become_trials(repository: Path, words: list[str]) -> NoReturn:
     """Run the trials of a clone in the place of this program: what ends it ends them, and their exit status is its own.
-
-    Parameters
-    ----------
-    repository : Path
-        the clone
-    words : list of str
-        arguments of `concealed.proof`
 
     Raises
     ------

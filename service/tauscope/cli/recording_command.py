@@ -17,15 +17,7 @@ def check(
         int | None, typer.Option(min=1, metavar="N", help="Number of joints that it has to have.")
     ] = None,
 ) -> None:
-    """Show what a recording holds, and what to look at before trusting it.
-
-    Parameters
-    ----------
-    file : Path
-        recording
-    joints : int or None
-        number of joints that it has to have
-    """
+    """Show what a recording holds, and what to look at before trusting it."""
     from tauscope.cli.recording_summary import show_recording
 
     show_recording(file, joints)
@@ -39,19 +31,7 @@ def convert(
     recover: Annotated[bool, typer.Option(help="Keep what comes before the damage of a truncated MCAP file.")] = False,
     overwrite: Annotated[bool, typer.Option(help="Replace TARGET where it exists.")] = False,
 ) -> None:
-    """Write a recording in another format; the source stays as it is.
-
-    Parameters
-    ----------
-    source : Path
-        recording
-    target : Path
-        file to make
-    recover : bool
-        keep what comes before the damage
-    overwrite : bool
-        replace the target where it exists
-    """
+    """Write a recording in another format; the source stays as it is."""
     from tauscope.cli.recording_summary import convert_file
 
     convert_file(source, target, recover=recover, overwrite=overwrite)

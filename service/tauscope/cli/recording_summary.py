@@ -14,13 +14,6 @@ from tauscope.report.table import Table
 def show_recording(path: Path, joint_count: int | None) -> None:
     """Show what a recording holds, and what to look at before trusting it.
 
-    Parameters
-    ----------
-    path : Path
-        recording
-    joint_count : int or None
-        number of joints that it has to have
-
     Raises
     ------
     RecordingError
@@ -43,17 +36,6 @@ def show_recording(path: Path, joint_count: int | None) -> None:
 
 def convert_file(source: Path, target: Path, *, recover: bool, overwrite: bool) -> None:
     """Write a recording in another format and say what was left out.
-
-    Parameters
-    ----------
-    source : Path
-        recording
-    target : Path
-        file to make
-    recover : bool
-        keep what comes before the damage of a truncated MCAP file
-    overwrite : bool
-        replace the target where it exists
 
     Raises
     ------

@@ -14,13 +14,7 @@ def _robot() -> None:
 
 
 def check(file: RobotFile) -> None:
-    """Show what a robot file says, and everything doubtful in it.
-
-    Parameters
-    ----------
-    file : Path
-        robot file
-    """
+    """Show what a robot file says, and everything doubtful in it."""
     from tauscope.cli.robot_summary import show_robot
 
     show_robot(file)

@@ -12,11 +12,6 @@ from tauscope.robot import JointSummary, RobotReport, Severity, check_robot
 def show_robot(path: Path) -> None:
     """Show what a robot file says, and everything doubtful in it.
 
-    Parameters
-    ----------
-    path : Path
-        robot file
-
     Raises
     ------
     RobotFileError

@@ -70,32 +70,10 @@ def run(
 
     Parameters
     ----------
-    robot : Path
-        robot file
-    backend : str
-        ``sim``, ``dynamixel`` or ``canopen``
-    trajectory : Path or None
-        motion to play
-    out : Path or None
-        recording to make
-    scenario : Path or None
-        what the simulated arm conceals
-    time : str
-        ``virtual`` or ``real``
     start : str or None
         where the simulated arm stands at first [rad or m]
-    mode : str
-        ``position`` or ``torque``
     rate : float or None
         cycles a second [Hz]
-    stop_policy : str or None
-        ``hold``, ``damp`` or ``torque_off``
-    seed : int
-        of the default excitation
-    acknowledge_faults : bool
-        whether latched faults are cleared first
-    dry_run : bool
-        whether the frames are shown and nothing is sent
     """
     posture = parse_posture(start)
     from tauscope.cli.run_session import Request, run_arm
@@ -126,11 +104,6 @@ def run(
 
 def parse_posture(text: str | None) -> tuple[float, ...] | None:
     """Read the value of ``--start``.
-
-    Parameters
-    ----------
-    text : str or None
-        numbers with commas between them
 
     Raises
     ------

@@ -30,24 +30,8 @@ SUFFIXES = (".csv", ".parquet", ".mcap")
 class Request:
     """What was asked for on the command line.
 
-    robot : Path
-        robot file
-    backend : str
-        ``sim``, ``dynamixel`` or ``canopen``
-    trajectory : Path or None
-        motion to play; the default excitation is designed where None
-    out : Path or None
-        recording to make; named after the present moment where None
-    scenario : Path or None
-        what the simulated arm conceals
-    time : str
-        ``virtual`` or ``real``
     start : tuple of float or None
         where the simulated arm stands at first [rad or m]
-    options : RunOptions
-        how it is run
-    seed : int
-        of the default excitation
     """
 
     robot: Path
@@ -85,11 +69,6 @@ class Request:
 def run_arm(request: Request) -> None:
     """Do what the command line asks for.
 
-    Parameters
-    ----------
-    request : Request
-        files and options
-
     Raises
     ------
     typer.BadParameter
@@ -123,24 +102,7 @@ def run_arm(request: Request) -> None:
 
 
 def run_to_end(folder: Path, order: RunOrder, robot: Robot, told: Told) -> RunRecord:
-    """Run in a process of its own; Ctrl-C stops the arm and is waited for.
-
-    Parameters
-    ----------
-    folder : Path
-        takes everything that the run leaves
-    order : RunOrder
-        what is to be done
-    robot : Robot
-        the order's
-    told : callable
-        told the step and the percentage
-
-    Returns
-    -------
-    RunRecord
-        in an end state
-    """
+    """Run in a process of its own; Ctrl-C stops the arm and is waited for."""
     process = RunProcess(folder, order, robot, report=lambda event: _report(event, told))
     while True:
         try:
@@ -152,15 +114,6 @@ def run_to_end(folder: Path, order: RunOrder, robot: Robot, told: Told) -> RunRe
 
 def keep_recording(folder: Path, record: RunRecord, out: Path) -> bool:
     """Give the recording of a run its place; no file is ever replaced.
-
-    Parameters
-    ----------
-    folder : Path
-        of the run
-    record : RunRecord
-        how it ended
-    out : Path
-        file to make
 
     Returns
     -------
@@ -182,15 +135,7 @@ def keep_recording(folder: Path, record: RunRecord, out: Path) -> bool:
 
 
 def why_unfinished(record: RunRecord, recording: Path | None) -> str:
-    """One line on a run that did not finish.
-
-    Parameters
-    ----------
-    record : RunRecord
-        in an end state
-    recording : Path or None
-        what was recorded until then, where anything was
-    """
+    """One line on a run that did not finish."""
     reason = record.stop if record.problem is None else record.problem.detail
     kept = "nothing was recorded" if recording is None else f"what was recorded until then is in {recording}"
     return one_line(f"the run {record.state}: {reason or 'no reason is known'}; {kept}")

@@ -10,17 +10,7 @@ from tauscope.runtime import RunRecord
 
 
 def show_run(console: Console, record: RunRecord, robot: Robot) -> None:
-    """Show how a run went, and how it kept its time.
-
-    Parameters
-    ----------
-    console : Console
-        where to
-    record : RunRecord
-        in an end state
-    robot : Robot
-        the arm, for the joints' units
-    """
+    """Show how a run went, and how it kept its time."""
     console.print(plain(f"Robot {record.robot} on {record.backend}: {record.state}"), soft_wrap=True)
     console.print(table("Run", _whole(record)))
     if record.worst_following:

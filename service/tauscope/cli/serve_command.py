@@ -78,38 +78,10 @@ def serve(
 
     Parameters
     ----------
-    host : str
-        address to listen at
-    port : int
-        port to listen at
-    data : Path or None
-        folder of everything that is kept
-    database : str or None
-        URL of a PostgreSQL database
-    backend : str
-        ``sim``, ``dynamixel`` or ``canopen``
-    sim_time : str
-        ``virtual`` or ``real``
-    sim_socket : Path or None
-        where a simulated arm that runs by the clock listens
-    name : list of str or None
-        further host names
-    tls_certificate, tls_key : Path or None
-        files of the certificate
-    trusted_proxy : list of str or None
-        addresses of reverse proxies
-    log_format : str
-        ``text`` or ``json``
-    require_lease : bool
-        whether an arm moves by a lease only
     requests_per_second : float or None
         how often a caller may call [1/s]
     prune_older_than : float or None
         age of what is removed, hour after hour [days]; nothing is where None
-    prune_kind : list of Kind or None
-        kinds of items; every kind where None
-    prune_recordings : bool
-        recordings too
     """
     from pydantic import SecretStr
 

@@ -13,13 +13,6 @@ from tauscope.server.http.settings import Settings, default_data_folder
 def run_server(data: Path | None, **choices: Any) -> None:
     """Serve until interrupted.
 
-    Parameters
-    ----------
-    data : Path or None
-        folder of everything that is kept; the user's own data folder where None
-    **choices : object
-        fields of `Settings`
-
     Raises
     ------
     typer.BadParameter

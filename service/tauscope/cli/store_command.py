@@ -44,15 +44,6 @@ def check(
     """Compare every file of every finished item with what it was when the item ended.
 
     Exit status 1 where a file is missing or is another one. No service may work with the folder meanwhile.
-
-    Parameters
-    ----------
-    data : Path or None
-        data folder
-    database : str or None
-        URL of a PostgreSQL database
-    quick : bool
-        compare sizes only
     """
     from tauscope.cli.store_run import check_store
 
@@ -81,16 +72,6 @@ def prune(
     ----------
     older_than : float
         age [days]
-    data : Path or None
-        data folder
-    database : str or None
-        URL of a PostgreSQL database
-    kind : list of Kind or None
-        kinds of items; every kind where None
-    recordings : bool
-        recordings too
-    dry_run : bool
-        remove nothing
     """
     from tauscope.cli.store_run import prune_store
 

@@ -27,15 +27,7 @@ _OWN_FILES = "its state, its order or its result"
 
 @dataclass(frozen=True, eq=False)
 class OpenStore:
-    """A data folder that is this process's own for a while.
-
-    folder : Path
-        the data folder
-    database : Database
-        its database
-    keeper : Indexer
-        its index, up to date
-    """
+    """A data folder that is this process's own for a while."""
 
     folder: Path
     database: Database
@@ -45,18 +37,6 @@ class OpenStore:
 @contextmanager
 def open_store(data: Path | None, database: str | None) -> Iterator[OpenStore]:
     """Take a data folder.
-
-    Parameters
-    ----------
-    data : Path or None
-        data folder; the user's own where None
-    database : str or None
-        URL of a PostgreSQL database; SQLite in the data folder where None
-
-    Yields
-    ------
-    OpenStore
-        closed afterwards
 
     Raises
     ------
@@ -85,18 +65,6 @@ def open_store(data: Path | None, database: str | None) -> Iterator[OpenStore]:
 def open_database(data: Path | None, database: str | None) -> Iterator[Database]:
     """Open the database alone, beside a service that may work with it.
 
-    Parameters
-    ----------
-    data : Path or None
-        data folder; the user's own where None
-    database : str or None
-        URL of a PostgreSQL database; SQLite in the data folder where None
-
-    Yields
-    ------
-    Database
-        closed afterwards
-
     Raises
     ------
     StoreError
@@ -114,15 +82,6 @@ def open_database(data: Path | None, database: str | None) -> Iterator[Database]
 
 def check_store(data: Path | None, database: str | None, *, quick: bool) -> None:
     """Compare every file of every finished item with what it was when the item ended.
-
-    Parameters
-    ----------
-    data : Path or None
-        data folder
-    database : str or None
-        URL of a PostgreSQL database
-    quick : bool
-        compare sizes only
 
     Raises
     ------
@@ -158,18 +117,8 @@ def prune_store(
 
     Parameters
     ----------
-    data : Path or None
-        data folder
-    database : str or None
-        URL of a PostgreSQL database
     days : float
         age [days]
-    kinds : sequence of str
-        kinds of items; every kind where there are none
-    recordings : bool
-        recordings too
-    dry_run : bool
-        remove nothing
 
     Raises
     ------

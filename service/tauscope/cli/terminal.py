@@ -25,26 +25,12 @@ def output() -> Console:
 
 
 def plain(text: str) -> Text:
-    """Text of a user's file: one line, and none of it taken for markup or for a terminal's command.
-
-    Parameters
-    ----------
-    text : str
-        any text
-    """
+    """Text of a user's file: one line, and none of it taken for markup or for a terminal's command."""
     return Text(one_line(text))
 
 
 def table(title: str, view: Table) -> RichTable:
-    """A table of plain text, numbers to the right.
-
-    Parameters
-    ----------
-    title : str
-        stands above it
-    view : Table
-        cells
-    """
+    """A table of plain text, numbers to the right."""
     made = RichTable(title=plain(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
     for place, column in enumerate(view.columns):
         is_word = place < view.words
@@ -60,13 +46,7 @@ Told = Callable[[str, float | None], None]
 
 @contextmanager
 def shown_percent() -> Iterator[Told]:
-    """A bar on standard error, where that is a terminal.
-
-    Yields
-    ------
-    callable
-        to be told the step and the percentage whenever they change
-    """
+    """A bar on standard error, where that is a terminal."""
     if not sys.stderr.isatty():
         yield lambda step, percent: None
         return
@@ -89,13 +69,7 @@ def shown_percent() -> Iterator[Told]:
 
 @contextmanager
 def shown_progress() -> Iterator[Callable[[str], None]]:
-    """Steps of long work on standard error, where that is a terminal.
-
-    Yields
-    ------
-    callable
-        to be told the name of each step as it begins
-    """
+    """Steps of long work on standard error, where that is a terminal."""
     if not sys.stderr.isatty():
         yield lambda step: None
         return

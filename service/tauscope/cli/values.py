@@ -13,18 +13,6 @@ def spread_values(words: Sequence[str], options: Collection[str]) -> list[str]:
     """Write an option again before each of its values: ``--held-out a b`` becomes ``--held-out a --held-out b``.
 
     An option's values end at the next option or at ``--``; ``--held-out=a`` takes this one value.
-
-    Parameters
-    ----------
-    words : sequence of str
-        the command line
-    options : collection of str
-        names of the options that take several values, dashes included
-
-    Returns
-    -------
-    list of str
-        the same command line for a parser that knows one value an option
     """
     spread: list[str] = []
     option: str | None = None
@@ -45,14 +33,6 @@ class SeveralValuesCommand(TyperCommand):
     """A command of which some options take several values: those whose metavar ends in ``...``."""
 
     def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:
-        """Parse the command line after its options were repeated before each value.
-
-        Parameters
-        ----------
-        ctx : typer.Context
-            the running command
-        args : list of str
-            what follows the command's name
-        """
+        """Parse the command line after its options were repeated before each value."""
         several = [p for p in self.params if isinstance(p, TyperOption) and (p.metavar or "").endswith(SEVERAL)]
         return super().parse_args(ctx, spread_values(args, {name for option in several for name in option.opts}))

@@ -10,17 +10,5 @@ from typer.core import TyperCommand
 def add_verb(
     app: typer.Typer, function: Callable[..., None], cls: type[TyperCommand] = TyperCommand, name: str | None = None
 ) -> None:
-    """Make a function a command of the same name; its help ends where its docstring turns to programmers.
-
-    Parameters
-    ----------
-    app : typer.Typer
-        program or group of commands
-    function : callable
-        what the command does
-    cls : type of TyperCommand
-        how its command line is parsed
-    name : str or None
-        of the command, where the function's own will not do
-    """
+    """Make a function a command of the same name; its help ends where its docstring turns to programmers."""
     app.command(name, cls=cls, help=(inspect.getdoc(function) or "").partition("\n\nParameters\n")[0])(function)

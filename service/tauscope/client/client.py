@@ -49,14 +49,8 @@ class Client:
 
         Parameters
         ----------
-        url : str
-            its address
-        key : str or None
-            API key, if it asks for one
         timeout_s : float
             how long each step of a request may take [s]
-        ca_file : Path or None
-            certificate that vouches for it; the system's where None
         """
         self._transport = Transport(url, key, timeout_s, ca_file)
 
@@ -69,101 +63,37 @@ class Client:
         return True
 
     def check_robot(self, robot: Path, urdf: Path | None = None) -> RobotReportAnswer:
-        """Have a robot file checked.
-
-        Parameters
-        ----------
-        robot : Path
-            robot file
-        urdf : Path or None
-            the URDF that it names
-        """
+        """Have a robot file checked."""
         files = [("robot", robot), *([("urdf", urdf)] if urdf else [])]
         return self._post("robots/check", RobotReportAnswer, form_content(None, files))
 
     def keep_recording(self, recording: Path) -> RecordingAnswer:
-        """Send a recording, to be named by later requests.
-
-        Parameters
-        ----------
-        recording : Path
-            CSV, Parquet, MCAP or rosbag2 database
-        """
+        """Send a recording, to be named by later requests."""
         return self._create("recordings", RecordingAnswer, form_content(None, [("file", recording)]))
 
     def identify(self, robot: Path, recordings: Sequence[Path], **request: Any) -> IdentificationAnswer:
-        """Hand in an identification.
-
-        Parameters
-        ----------
-        robot : Path
-            robot file
-        recordings : sequence of Path
-            recordings that are sent along; none where `request` names ones on the server
-        **request : object
-            further fields of the request
-        """
+        """Hand in an identification."""
         files = [("robot", robot), *(("recordings", path) for path in recordings)]
         return self._create("identifications", IdentificationAnswer, form_content(request, files))
 
     def diagnose(self, robot: Path, recordings: Sequence[Path], **request: Any) -> DiagnosisAnswer:
-        """Hand in a diagnosis.
-
-        Parameters
-        ----------
-        robot : Path
-            robot file
-        recordings : sequence of Path
-            recordings that are sent along
-        **request : object
-            further fields of the request
-        """
+        """Hand in a diagnosis."""
         files = [("robot", robot), *(("recordings", path) for path in recordings)]
         return self._create("diagnoses", DiagnosisAnswer, form_content(request, files))
 
     def excite(self, robot: Path, **request: Any) -> ExcitationAnswer:
-        """Have a motion designed.
-
-        Parameters
-        ----------
-        robot : Path
-            robot file
-        **request : object
-            further fields of the request
-        """
+        """Have a motion designed."""
         return self._create("excitations", ExcitationAnswer, form_content(request, [("robot", robot)]))
 
     def run(
         self, robot: Path, lease: HeldLease | None = None, trajectory: Path | None = None, **request: Any
     ) -> RunAnswer:
-        """Begin a run: the arm moves.
-
-        Parameters
-        ----------
-        robot : Path
-            robot file
-        lease : HeldLease or None
-            of the arm; needed where the service asks for keys
-        trajectory : Path or None
-            the motion; designed first where there is none
-        **request : object
-            further fields of the request
-        """
+        """Begin a run: the arm moves."""
         files = [("robot", robot), *([("trajectory", trajectory)] if trajectory else [])]
         return self._create("runs", RunAnswer, form_content(request, files), _lease_header(lease))
 
     def campaign(self, robot: Path, lease: HeldLease | None = None, **request: Any) -> CampaignAnswer:
-        """Begin a campaign: the arm moves.
-
-        Parameters
-        ----------
-        robot : Path
-            robot file
-        lease : HeldLease or None
-            of the arm; needed where the service asks for keys
-        **request : object
-            further fields of the request
-        """
+        """Begin a campaign: the arm moves."""
         content = form_content(request, [("robot", robot)])
         return self._create("campaigns", CampaignAnswer, content, _lease_header(lease))
 
@@ -172,17 +102,8 @@ class Client:
 
         Parameters
         ----------
-        item : answer
-            as it was handed in
         timeout_s : float or None
             how long; for good where None [s]
-        lease : HeldLease or None
-            ends the waiting where it is lost
-
-        Returns
-        -------
-        answer
-            its last state
 
         Raises
         ------
@@ -201,15 +122,7 @@ class Client:
             time.sleep(POLL_S)
 
     def fetch(self, link: str, to: Path) -> Path:
-        """Fetch a file, as links in answers name it; waits a moment where the service still puts it in its place.
-
-        Parameters
-        ----------
-        link : str
-            path of the resource
-        to : Path
-            where it is written
-        """
+        """Fetch a file, as links in answers name it; waits a moment where the service still puts it in its place."""
         last = time.monotonic() + SETTLING_S
         while True:
             try:
@@ -225,14 +138,8 @@ class Client:
 
         Parameters
         ----------
-        robot : str
-            what the robot file calls the robot
-        backend : str or None
-            what moves it; the service's own where None
         ttl_s : float
             time after which the arm stops when this program is gone [s]
-        take : bool
-            take it from somebody else
         """
         wanted = {"robot": robot, "backend": backend, "ttl_s": ttl_s, "take": take}
         taken = self._create("leases", LeaseAnswer, json_content(wanted))
@@ -244,23 +151,11 @@ class Client:
         )
 
     def arm(self, lease: HeldLease) -> None:
-        """Let the arm move.
-
-        Parameters
-        ----------
-        lease : HeldLease
-            of the arm
-        """
+        """Let the arm move."""
         self._transport.send("POST", lease.lease.links.arm, headers=_lease_header(lease))
 
     def stop(self, run: RunAnswer) -> StopAnswer:
-        """Stop a run.
-
-        Parameters
-        ----------
-        run : RunAnswer
-            the run
-        """
+        """Stop a run."""
         return _parsed(self._transport.send("POST", run.links.stop), StopAnswer)
 
     def stop_everything(self) -> StopAllAnswer:

@@ -15,17 +15,7 @@ class HeldLease:
     """A lease kept by heartbeats; use it as a context. When the program hangs or dies, the arm stops by itself."""
 
     def __init__(self, lease: LeaseAnswer, beat: Callable[[], object], release: Callable[[], object]) -> None:
-        """Begin to keep a lease.
-
-        Parameters
-        ----------
-        lease : LeaseAnswer
-            as it was taken
-        beat : callable
-            renews it
-        release : callable
-            gives it back
-        """
+        """Begin to keep a lease."""
         self.lease = lease
         self.lost: str | None = None
         self._beat, self._release = beat, release

@@ -17,17 +17,7 @@ _PIECE = 2**18
 
 
 class ApiError(TauscopeError):
-    """A request that the service refused, or that did not reach it.
-
-    Parameters
-    ----------
-    code : str
-        stable code of the problem; ``unreachable`` where there was no answer
-    status : int
-        of HTTP; 0 where there was no answer
-    detail : str
-        one line: what is wrong, and what to do
-    """
+    """A request that the service refused, or that did not reach it."""
 
     def __init__(self, code: str, status: int, detail: str) -> None:
         super().__init__(detail)
@@ -36,15 +26,7 @@ class ApiError(TauscopeError):
 
 @dataclass(frozen=True)
 class Answer:
-    """What came back.
-
-    status : int
-        of HTTP
-    headers : dict
-        by name, in lower case
-    body : bytes
-        as it came
-    """
+    """What came back."""
 
     status: int
     headers: dict[str, str]
@@ -59,14 +41,8 @@ class Transport:
 
         Parameters
         ----------
-        url : str
-            address of the service, for example ``http://127.0.0.1:8000``
-        key : str or None
-            API key, if the service asks for one
         timeout_s : float
             how long each step of a request may take [s]
-        ca_file : Path or None
-            certificate that vouches for the service; the system's where None
 
         Raises
         ------
@@ -86,22 +62,6 @@ class Transport:
         self, method: str, path: str, *, headers: Mapping[str, str] | None = None, content: "Content | None" = None
     ) -> Answer:
         """Make a request, and wait for its answer.
-
-        Parameters
-        ----------
-        method : str
-            of HTTP
-        path : str
-            of the resource, with its query
-        headers : mapping or None
-            further headers
-        content : Content or None
-            the body
-
-        Returns
-        -------
-        Answer
-            one that is no problem
 
         Raises
         ------
@@ -137,15 +97,7 @@ class Transport:
 
 @dataclass(frozen=True)
 class Content:
-    """A body that can be sent more than once.
-
-    media_type : str
-        what it is
-    parts : tuple of bytes or Path
-        what it is made of; files are read while they are sent
-    length : int
-        number of bytes
-    """
+    """A body that can be sent more than once."""
 
     media_type: str
     parts: tuple[bytes | Path, ...]
@@ -163,13 +115,7 @@ class Content:
 
 
 def json_content(document: Any) -> Content:
-    """A JSON body.
-
-    Parameters
-    ----------
-    document : dict or list
-        plain data
-    """
+    """A JSON body."""
     text = json.dumps(document, allow_nan=False).encode()
     return Content("application/json", (text,), len(text))
 

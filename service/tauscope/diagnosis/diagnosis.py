@@ -40,24 +40,6 @@ def diagnose(
 ) -> Diagnosis:
     """Say what the best rigid-body and friction model of an arm leaves out.
 
-    Parameters
-    ----------
-    robot : Robot
-        the arm
-    recordings : sequence of Recording
-        what is explained; each one continuous motion
-    held_out : sequence of Recording
-        what findings are confirmed by
-    options : Options
-        of the identification of the nominal model
-    progress : callable
-        told the name of each step as it begins
-
-    Returns
-    -------
-    Diagnosis
-        findings with their evidence, and what could not have been seen
-
     Raises
     ------
     TauscopeError

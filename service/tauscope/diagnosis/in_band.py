@@ -54,19 +54,7 @@ def selector_on(
     *,
     looked_at_before: int = 0,
 ) -> Selector:
-    """A selector on training rows whose noise and weights a model tells, and held-out rows of the same noise.
-
-    Parameters
-    ----------
-    rows, held_out : Observations
-        training and held-out recordings in one band; the second may be None
-    model : ExtendedModel
-        the nominal model, fitted
-    effects : sequence of Effect
-        what is looked for
-    looked_at_before : int
-        forms that were looked for before, elsewhere
-    """
+    """A selector on training rows whose noise and weights a model tells, and held-out rows of the same noise."""
     known, pure_error = _observed(rows, model, effects)
     confirming = None if held_out is None else _weighted(held_out.with_noise(known.noise), model)
     return Selector(
@@ -85,10 +73,6 @@ def confirming_rows(
 
     Parameters
     ----------
-    held_out : sequence of Conditioner
-        the surveyed recordings
-    identification : Identification
-        of the nominal model
     cutoff_hz : float
         of the band [Hz]
     steepness : (n,) float64
@@ -112,21 +96,7 @@ def _apart(observations: Observations) -> Observations:
 def selected(
     selector: Selector, model: ExtendedModel, identification: Identification, setting: Setting, progress: Progress
 ) -> tuple[Selection, Selector]:
-    """All that is missing, and the selector whose rows count as much as they should beside it.
-
-    Parameters
-    ----------
-    selector : Selector
-        on the recordings
-    model : ExtendedModel
-        the nominal model, fitted
-    identification : Identification
-        that it comes from
-    setting : Setting
-        the arm and the ranges of its motion
-    progress : callable
-        told the name of each step as it begins, and what was found
-    """
+    """All that is missing, and the selector whose rows count as much as they should beside it."""
     rotors = [
         Term(RotorInertia(j), np.zeros(0), np.array([value])) for j, value in identified_rotors(identification).items()
     ]
@@ -192,14 +162,6 @@ def concluded(
 
     Parameters
     ----------
-    identification : Identification
-        of the nominal model
-    setting : Setting
-        the arm and the ranges of its motion
-    selector : Selector
-        that has selected last
-    selection : Selection
-        what it has selected
     cutoff_hz : float
         of the band [Hz]
     """

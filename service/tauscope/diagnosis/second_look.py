@@ -38,17 +38,7 @@ OTHER_SIZE = 1e-3
 def looked_again(
     first: Diagnosis, recordings: Sequence[Conditioner], held_out: Sequence[Conditioner], progress: Progress
 ) -> Diagnosis:
-    """What a wider band shows where nothing was found and nothing seemed to be left; else the first diagnosis.
-
-    Parameters
-    ----------
-    first : Diagnosis
-        in the band of the first look
-    recordings, held_out : sequence of Conditioner
-        training and held-out recordings, surveyed
-    progress : callable
-        told the name of each step as it begins, and what was found
-    """
+    """What a wider band shows where nothing was found and nothing seemed to be left; else the first diagnosis."""
     identification, model = first.identification, first.selection.nominal.model
     cutoff = wider_cutoff(recordings, identification, model.steepness, first.cutoff_hz)
     if cutoff is None or first.verdict is not Verdict.CONSISTENT:
@@ -104,13 +94,6 @@ def agrees(first: Diagnosis, selection: Selection) -> bool:
     """Whether the first band's rows allow every term the size that was found, each beside all others.
 
     (ĉ - c)ᵀ G (ĉ - c) with G ĉ = g, the information and the scores of its columns there at the same shape.
-
-    Parameters
-    ----------
-    first : Diagnosis
-        in the first band
-    selection : Selection
-        what was selected in another
     """
     terms = selection.fit.model.terms
     for place, term in enumerate(terms):

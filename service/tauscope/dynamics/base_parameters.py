@@ -61,14 +61,6 @@ class BaseParameters:
         standard parameters that no motion of the arm shows
     combination : (m, k) float64
         B, equation (12)
-    names : tuple of str
-        standard names of the leading parameters, for example ``Ixx2``
-    expressions : tuple of str
-        the base parameters in full, for example ``Ixx2 - Iyy2 - 0.5*msx2``
-    terms : tuple of mappings
-        the same as numbers: standard name to coefficient, the leading parameter first
-    unidentifiable : tuple of str
-        standard names of the unidentifiable parameters
     """
 
     independent_columns: Columns
@@ -117,20 +109,7 @@ class BaseParameters:
 
 
 def base_parameters(robot: Robot, *, seed: int = 0) -> BaseParameters:
-    """Base parameters of an arm from its geometry alone, equations (10) to (14).
-
-    Parameters
-    ----------
-    robot : Robot
-        the chain and gravity; limits and recordings play no part
-    seed : int
-        of the random states at which the regressor is looked at; the result does not depend on it
-
-    Returns
-    -------
-    BaseParameters
-        leading columns, combinations and their names
-    """
+    """Base parameters of an arm from its geometry alone, equations (10) to (14)."""
     triangle = _column_triangle(_as_meant(robot), np.random.default_rng(seed))
     sizes = np.linalg.norm(triangle, axis=0)
     scales = np.maximum(_largest_of_unit(sizes), _ROUNDING / _LEADING[-1] * sizes.max())

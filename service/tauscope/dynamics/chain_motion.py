@@ -64,15 +64,7 @@ class LinkMotion(NamedTuple):
 
 
 class ChainMotion:
-    """The recursion of one robot, with its constants and work buffers.
-
-    Parameters
-    ----------
-    robot : Robot
-        the chain and gravity
-    capacity : int
-        largest number of samples that `links` will be asked for at once
-    """
+    """The recursion of one robot, with its constants and work buffers."""
 
     def __init__(self, robot: Robot, capacity: int) -> None:
         rows = _FIRST_SCREW + 2 * robot.joint_count
@@ -94,11 +86,6 @@ class ChainMotion:
             joint velocity
         qdd : (n, N) float64
             joint acceleration
-
-        Yields
-        ------
-        LinkMotion
-            views into the work buffers: use them before the next link is asked for
         """
         moving = _Frame(self._blocks, self._scratch, self._field, self._products, samples=q.shape[1])
         moving.rest(self._gravity)
@@ -249,13 +236,7 @@ def _cosine_and_sine(angle: Array) -> tuple[Array, Array]:
 
 
 def aligned_empty(*shape: int) -> Array:
-    """An uninitialised array whose rows, along the last axis, all start where the widest vector registers like it.
-
-    Parameters
-    ----------
-    *shape : int
-        the array's shape; rows are padded behind the view that is returned
-    """
+    """An uninitialised array, (*shape,), whose rows along the last axis start where wide vector registers like it."""
     item = np.dtype(np.float64).itemsize
     width = -(-shape[-1] * item // _ALIGNMENT) * _ALIGNMENT // item
     size = int(np.prod(shape[:-1])) * width

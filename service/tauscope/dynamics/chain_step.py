@@ -23,15 +23,8 @@ ABOUT_Z: Plane = (0, 1)
 class Step:
     """Constants of one segment: turns and offsets before the joint's motion and after it.
 
-    Parameters
-    ----------
-    segment : Segment
-        the joint and its two placements
-
     Attributes
     ----------
-    revolute : bool
-        whether the joint turns
     angle : float
         turn about the joint's axis that is added to its position, where it is revolute [rad]
     turns_before, turns_after : list of (Plane, float, float)

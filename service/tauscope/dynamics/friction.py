@@ -23,11 +23,6 @@ def smooth_sign(velocity: Array, k_v: float | Array) -> Array:
         v [rad/s or m/s]
     k_v : float or (...) float64
         steepness K_v at rest [s/rad or s/m]
-
-    Returns
-    -------
-    (...) float64
-        S₀, between -1 and 1
     """
     return _TWO_OVER_PI * np.arctan(k_v * velocity)
 
@@ -59,8 +54,6 @@ def friction_columns(velocity: Array, shape: FrictionShape, *, offset: bool = Tr
         v [rad/s or m/s]
     shape : FrictionShape
         K_v and δ, both given [s/rad or s/m]
-    offset : bool
-        whether the constant column is wanted, which the paper does not have
 
     Returns
     -------
@@ -89,8 +82,6 @@ def friction_torque(coefficients: FrictionCoefficients, shape: FrictionShape, ve
 
     Parameters
     ----------
-    coefficients : FrictionCoefficients
-        τ_s, τ_sc, τ_v
     shape : FrictionShape
         K_v and δ, both given [s/rad or s/m]
     velocity : (N,) float64

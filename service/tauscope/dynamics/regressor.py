@@ -44,8 +44,6 @@ def torque_regressor(robot: Robot, q: Array, qd: Array, qdd: Array, *, columns: 
 
     Parameters
     ----------
-    robot : Robot
-        the chain and gravity
     q : (N, n) float64
         joint position [rad or m]
     qd : (N, n) float64
@@ -76,12 +74,8 @@ class TorqueRegressor:
 
     Parameters
     ----------
-    robot : Robot
-        the chain and gravity
     columns : (C,) int or None
         the standard parameters wanted, ascending, counted over all links from 0; all 10 n where None
-    chunk : int
-        samples worked on at once
     """
 
     def __init__(self, robot: Robot, *, columns: Columns | None = None, chunk: int = CHUNK) -> None:

@@ -41,12 +41,8 @@ class RegressorGradient:
 
     Parameters
     ----------
-    robot : Robot
-        the chain and gravity
     columns : (C,) int or None
         the standard parameters that the regressor has columns for, ascending; all 10 n where None
-    capacity : int
-        largest number of samples that `contract` will be asked for at once
     """
 
     def __init__(self, robot: Robot, *, columns: Columns | None = None, capacity: int) -> None:

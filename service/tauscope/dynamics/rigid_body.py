@@ -18,8 +18,6 @@ def inverse_dynamics(robot: Robot, parameters: Array, q: Array, qd: Array, qdd: 
 
     Parameters
     ----------
-    robot : Robot
-        the chain and gravity
     parameters : (10 n,) float64
         Θ, ten standard parameters a link in the order of `STANDARD_PARAMETERS`
     q : (N, n) float64
@@ -51,8 +49,6 @@ def gravity_torque(robot: Robot, parameters: Array, q: Array) -> Array:
 
     Parameters
     ----------
-    robot : Robot
-        the chain and gravity
     parameters : (10 n,) float64
         Θ, ten standard parameters a link
     q : (N, n) float64
@@ -74,8 +70,6 @@ def mass_matrix(robot: Robot, parameters: Array, q: Array) -> Array:
 
     Parameters
     ----------
-    robot : Robot
-        the chain
     parameters : (10 n,) float64
         Θ, ten standard parameters a link
     q : (N, n) float64
@@ -105,8 +99,6 @@ def kinetic_energy(robot: Robot, parameters: Array, q: Array, qd: Array) -> Arra
 
     Parameters
     ----------
-    robot : Robot
-        the chain
     parameters : (10 n,) float64
         Θ, ten standard parameters a link
     q : (N, n) float64
@@ -127,8 +119,6 @@ def potential_energy(robot: Robot, parameters: Array, q: Array) -> Array:
 
     Parameters
     ----------
-    robot : Robot
-        the chain and gravity
     parameters : (10 n,) float64
         Θ, ten standard parameters a link
     q : (N, n) float64

@@ -27,13 +27,7 @@ class AsymmetricCoulomb(Effect):
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """One a joint that moves both ways.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """One a joint that moves both ways."""
         return [cls(joint) for joint in setting.joints if setting.reverses(joint)]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
@@ -41,8 +35,6 @@ class AsymmetricCoulomb(Effect):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shapes : (1, 0) float64
             none
         """
@@ -63,13 +55,7 @@ class AsymmetricViscous(Effect):
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """One a joint that moves both ways.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """One a joint that moves both ways."""
         return [cls(joint) for joint in setting.joints if setting.reverses(joint)]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
@@ -77,8 +63,6 @@ class AsymmetricViscous(Effect):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shapes : (1, 0) float64
             none
         """

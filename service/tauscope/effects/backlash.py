@@ -173,13 +173,7 @@ class Backlash(Deflection):
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """One a joint that moves under load.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """One a joint that moves under load."""
         made = []
         for joint in cls.deflected_joints(setting):
             gaps, bands = GAPS * (setting.highest[joint] - setting.lowest[joint]), BANDS * setting.cutoff_hz
@@ -189,13 +183,7 @@ class Backlash(Deflection):
 
     @classmethod
     def farther_forms(cls, setting: Setting) -> Sequence[Effect]:
-        """The same with teeth that give way, one a joint whose link has an inertia.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """The same with teeth that give way, one a joint whose link has an inertia."""
         return SpringyTeeth.forms(setting)
 
     def quantities(
@@ -208,8 +196,6 @@ class Backlash(Deflection):
 
         Parameters
         ----------
-        setting : Setting
-            the arm
         coefficients : (1,) float64
             b [rad or m]
         shape : (k,) float64
@@ -230,8 +216,6 @@ class Backlash(Deflection):
             b [rad or m]
         shape : (2,) float64
             gap that is flown over [rad or m], band of the load [Hz]
-        alone : bool
-            whether nothing else is known to be missing
         """
         return bool(shape[0] <= FARTHEST_FLOWN * coefficients[0])
 
@@ -262,13 +246,7 @@ class SpringyTeeth(Backlash):
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """One a joint that moves under load, and whose link has an inertia.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """One a joint that moves under load, and whose link has an inertia."""
         made = []
         for joint in cls.deflected_joints(setting):
             if setting.inertia[joint] <= 0.0:
@@ -283,13 +261,7 @@ class SpringyTeeth(Backlash):
 
     @classmethod
     def farther_forms(cls, setting: Setting) -> Sequence[Effect]:
-        """None: these are.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """None: these are."""
         return ()
 
     def reluctance(self, shapes: Array) -> Array:
@@ -313,8 +285,6 @@ class SpringyTeeth(Backlash):
         shape : (4,) float64
             gap that is crossed [rad or m], band of the load [Hz], compliance of the teeth [rad/Nm or m/N], their loss
             [s/rad or s/m]
-        alone : bool
-            whether nothing else is known to be missing
         """
         least = LEAST_MET if alone else 1.0 / SAME
         return bool(least < coefficients[0] / shape[0] < SAME)

@@ -43,13 +43,7 @@ class BaseTilt(Effect):
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """One for the arm, where there is gravity.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """One for the arm, where there is gravity."""
         return [cls(None)] if np.linalg.norm(setting.robot.gravity) > 0.0 else []
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
@@ -57,8 +51,6 @@ class BaseTilt(Effect):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shapes : (1, 0) float64
             none
         """

@@ -34,13 +34,7 @@ def unit_body(place: Array) -> Array:
 
 
 def body_columns(signals: Signals) -> Array:
-    """Torque per unit of each standard parameter of the last link, (10, n, N).
-
-    Parameters
-    ----------
-    signals : Signals
-        one piece of motion
-    """
+    """Torque per unit of each standard parameter of the last link, (10, n, N)."""
 
     def made() -> Array:
         state = [np.ascontiguousarray(each.T) for each in (signals.position, signals.velocity, signals.acceleration)]

@@ -56,23 +56,11 @@ class Deflection(Effect):
 
     @staticmethod
     def deflected_joints(setting: Setting) -> list[int]:
-        """Joints that move, and whose transmission carries anything.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """Joints that move, and whose transmission carries anything."""
         return [joint for joint in setting.joints if setting.moves(joint) and setting.is_loaded(joint)]
 
     def touched(self, joint_count: int) -> tuple[int, ...]:
-        """All joints.
-
-        Parameters
-        ----------
-        joint_count : int
-            n
-        """
+        """All joints."""
         return tuple(range(joint_count))
 
     def quantities(
@@ -82,8 +70,6 @@ class Deflection(Effect):
 
         Parameters
         ----------
-        setting : Setting
-            the arm
         coefficients : (1,) float64
             of the effect
         shape : (k,) float64
@@ -115,8 +101,6 @@ class Deflection(Effect):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shapes : (g, k) float64
             values of the shape parameters, `BAND` among them
         """
@@ -137,8 +121,6 @@ def torque_of_deflection(signals: Signals, joint: int, deflection: Array) -> Arr
 
     Parameters
     ----------
-    signals : Signals
-        one piece of motion
     joint : int
         joint index, from 0
     deflection : (N,) float64
@@ -162,8 +144,6 @@ def inertia_of_link(signals: Signals, joint: int) -> Array:
 
     Parameters
     ----------
-    signals : Signals
-        one piece of motion
     joint : int
         joint index, from 0
     """

@@ -80,23 +80,11 @@ class Effect(ABC):
     @classmethod
     @abstractmethod
     def forms(cls, setting: Setting) -> "Sequence[Effect]":
-        """All forms and places worth looking at on this arm and motion.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm and the ranges of its motion
-        """
+        """All forms and places worth looking at on this arm and motion."""
 
     @classmethod
     def farther_forms(cls, setting: Setting) -> "Sequence[Effect]":
-        """Forms that show in a small part of the motion: looked at where all others leave more than noise.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm and the ranges of its motion
-        """
+        """Forms that show in a small part of the motion: looked at where all others leave more than noise."""
         return ()
 
     @abstractmethod
@@ -105,8 +93,6 @@ class Effect(ABC):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shapes : (g, k) float64
             values of the shape parameters
 
@@ -121,8 +107,6 @@ class Effect(ABC):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         coefficients : (c,) float64
             values of the coefficients
         shape : (k,) float64
@@ -186,8 +170,6 @@ class Effect(ABC):
             values of the coefficients
         shape : (k,) float64
             values of the shape parameters
-        alone : bool
-            whether nothing else is known to be missing
         """
         return True
 
@@ -208,55 +190,23 @@ class Effect(ABC):
         return np.array(possible) if any(possible) else np.ones(len(shapes), dtype=bool)
 
     def touched(self, joint_count: int) -> tuple[int, ...]:
-        """Joints whose torque the effect changes: its own one, or all.
-
-        Parameters
-        ----------
-        joint_count : int
-            n
-        """
+        """Joints whose torque the effect changes: its own one, or all."""
         return tuple(range(joint_count)) if self.joint is None else (self.joint,)
 
     def is_free(self, place: int) -> bool:
-        """Whether a shape parameter is estimated between the grid's points.
-
-        Parameters
-        ----------
-        place : int
-            which of the shape parameters
-        """
+        """Whether a shape parameter is estimated between the grid's points."""
         return not self.shapes[place].fixed
 
     def name(self, joint_names: Sequence[str]) -> str:
-        """``effect@joint``, or the effect alone where it belongs to the whole arm.
-
-        Parameters
-        ----------
-        joint_names : sequence of str
-            names of the arm's joints
-        """
+        """``effect@joint``, or the effect alone where it belongs to the whole arm."""
         return self.id if self.joint is None else f"{self.id}@{joint_names[self.joint]}"
 
     def where(self, joint_names: Sequence[str]) -> str:
-        """The place in words.
-
-        Parameters
-        ----------
-        joint_names : sequence of str
-            names of the arm's joints
-        """
+        """The place in words."""
         return "the whole arm" if self.joint is None else joint_names[self.joint]
 
     def unit(self, template: str, setting: Setting) -> str:
-        """A unit with the joint's own units of torque and position.
-
-        Parameters
-        ----------
-        template : str
-            with ``{tau}`` and ``{q}``
-        setting : Setting
-            the arm
-        """
+        """A unit with the joint's own units of torque and position."""
         return self.unit_at(template, setting, self.joint)
 
     @staticmethod
@@ -265,10 +215,6 @@ class Effect(ABC):
 
         Parameters
         ----------
-        template : str
-            with ``{tau}`` and ``{q}``
-        setting : Setting
-            the arm
         joint : int or None
             joint index, from 0; None for the whole arm
         """
@@ -282,8 +228,6 @@ class Effect(ABC):
 
         Parameters
         ----------
-        setting : Setting
-            the arm
         coefficients : (c,) float64
             estimates
         shape : (k,) float64

@@ -42,13 +42,7 @@ class JointSpring(Effect):
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """One a joint that moves.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """One a joint that moves."""
         return [cls(joint) for joint in setting.joints if setting.moves(joint)]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
@@ -56,8 +50,6 @@ class JointSpring(Effect):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shapes : (1, 0) float64
             none
         """
@@ -66,11 +58,7 @@ class JointSpring(Effect):
 
 @dataclass(frozen=True, eq=False)
 class CableForce(Effect):
-    """τ = ±k max(±(q - q_t), 0)^p.
-
-    side : int
-        +1 where it pulls beyond q_t, -1 where below
-    """
+    """τ = ±k max(±(q - q_t), 0)^p."""
 
     of_motion_alone: ClassVar[bool] = True
     may_exceed_measured: ClassVar[bool] = True
@@ -87,13 +75,7 @@ class CableForce(Effect):
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """Both sides of every joint that moves.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """Both sides of every joint that moves."""
         made = []
         for joint in setting.joints:
             if setting.moves(joint):
@@ -129,8 +111,6 @@ class CableForce(Effect):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shapes : (g, 2) float64
             q_t [rad or m], p
         """

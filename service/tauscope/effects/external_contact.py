@@ -54,13 +54,7 @@ class ExternalContact(TimeLocalEffect):
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """A force at the tool of an arm with enough joints, and a torque at every joint.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """A force at the tool of an arm with enough joints, and a torque at every joint."""
         grid, bounds = contact_windows(setting.durations)
         if not len(grid):
             return []
@@ -86,8 +80,6 @@ class ExternalContact(TimeLocalEffect):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shape : (4,) float64
             the window
         """
@@ -104,8 +96,6 @@ class JointContact(ExternalContact):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shape : (4,) float64
             the window
         """
@@ -116,11 +106,6 @@ def transposed_jacobian(signals: Signals) -> Array:
     """J(q)ᵀ of the last link's origin, base axes, (3, n, N): torque that holds it against a unit force.
 
     It is the torque that a unit mass there would ask for in a gravity of one unit along -x, -y, -z.
-
-    Parameters
-    ----------
-    signals : Signals
-        one piece of motion
     """
     robot = signals.robot
     unit_mass = np.zeros(len(STANDARD_PARAMETERS) * robot.joint_count)

@@ -19,13 +19,7 @@ STEEPNESSES = np.array([30.0, 120.0, 500.0, 2000.0])
 
 @dataclass(frozen=True, eq=False)
 class FrictionCoupling(Effect):
-    """Friction of v = q̇_j + s q̇_k, s = ±1: τ_j = F(v), τ_k = s F(v), F(v) = f A(K v) + w v.
-
-    partner : int
-        k, the joint coupled to `joint`
-    sign : int
-        s
-    """
+    """Friction of v = q̇_j + s q̇_k, s = ±1: τ_j = F(v), τ_k = s F(v), F(v) = f A(K v) + w v."""
 
     of_motion_alone: ClassVar[bool] = True
     id: ClassVar[str] = "friction_coupling"
@@ -45,13 +39,7 @@ class FrictionCoupling(Effect):
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """Neighbours, on the sum and on the difference.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """Neighbours, on the sum and on the difference."""
         made = []
         for joint in filter(setting.moves, setting.joints):
             steepness = STEEPNESSES / setting.speed[joint]
@@ -61,23 +49,11 @@ class FrictionCoupling(Effect):
         return made
 
     def touched(self, joint_count: int) -> tuple[int, ...]:
-        """Both joints.
-
-        Parameters
-        ----------
-        joint_count : int
-            n
-        """
+        """Both joints."""
         return (self.partner, self.joint or 0)
 
     def where(self, joint_names: Sequence[str]) -> str:
-        """Both joints by name.
-
-        Parameters
-        ----------
-        joint_names : sequence of str
-            names of the arm's joints
-        """
+        """Both joints by name."""
         relation = "sum" if self.sign > 0 else "difference"
         return f"{joint_names[self.partner]} and {joint_names[self.joint or 0]} (on the {relation} of their speeds)"
 
@@ -86,8 +62,6 @@ class FrictionCoupling(Effect):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shapes : (g, 1) float64
             K [s/rad or s/m]
         """

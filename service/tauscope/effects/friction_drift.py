@@ -27,8 +27,6 @@ class FrictionDrift(Effect):
 
     duration_s : float
         D, of the longest recording [s]
-    by_heat : bool
-        whether friction's own power makes the change, rather than the clock
     """
 
     repeats_with_motion: ClassVar[bool] = False
@@ -49,13 +47,7 @@ class FrictionDrift(Effect):
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """Both ways, a joint that moves.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """Both ways, a joint that moves."""
         longest = max(setting.durations)
         times = TIMES * longest
         grid = times[:, None], 0.5 * times[:1], 1.5 * times[-1:]
@@ -67,8 +59,6 @@ class FrictionDrift(Effect):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shapes : (g, 1) float64
             T [s]
         """

@@ -84,13 +84,7 @@ class JointElasticity(Deflection):
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """One a joint that moves.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """One a joint that moves."""
         bands = BANDS * setting.cutoff_hz
         stiff = np.stack([bands, np.zeros(len(bands))], axis=1)
         made = []
@@ -135,8 +129,6 @@ class JointElasticity(Deflection):
             c [rad/Nm or m/N]
         shape : (2,) float64
             band of the load [Hz], compliance on which the link swings, 0 where it does not [rad/Nm or m/N]
-        alone : bool
-            whether nothing else is known to be missing
         """
         return bool(shape[1] == 0.0 or 1.0 / SAME < coefficients[0] / shape[1] < SAME)
 
@@ -150,8 +142,6 @@ class JointElasticity(Deflection):
 
         Parameters
         ----------
-        setting : Setting
-            the arm
         coefficients : (1,) float64
             c [rad/Nm or m/N]
         shape : (2,) float64

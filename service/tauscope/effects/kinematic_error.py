@@ -40,13 +40,7 @@ class KinematicError(Effect):
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """One for the arm; links and axes are its shapes, the last link left out: what it carries hangs at its frame.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """One for the arm; its shapes are links and axes, without the last link: its load hangs at its own frame."""
         links = np.arange(1.0, setting.robot.joint_count)
         grid = np.stack(np.meshgrid(links, np.arange(1.0, 4.0), indexing="ij"), axis=-1).reshape(-1, 2)
         return [cls(None, grid, grid[0], grid[-1])] if len(grid) else []
@@ -60,8 +54,6 @@ class KinematicError(Effect):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shapes : (g, 2) float64
             number of the link and of the axis, from 1
         """
@@ -73,8 +65,6 @@ class KinematicError(Effect):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         coefficients : (1,) float64
             d [m]
         shape : (2,) float64
@@ -100,8 +90,6 @@ def displaced(robot: Robot, link: int, by: Array) -> Robot:
 
     Parameters
     ----------
-    robot : Robot
-        the arm
     link : int
         index of the link, from 0
     by : (3,) float64

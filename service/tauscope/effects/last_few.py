@@ -9,13 +9,7 @@ Made = TypeVar("Made")
 
 
 class LastFew(Generic[Key, Made]):
-    """Keeps what was asked for last. Threads may ask at once; what two ask for at the same time, both make.
-
-    Parameters
-    ----------
-    count : int
-        how many are kept
-    """
+    """Keeps what was asked for last. Threads may ask at once; what two ask for at the same time, both make."""
 
     def __init__(self, count: int) -> None:
         self._count = count
@@ -23,15 +17,7 @@ class LastFew(Generic[Key, Made]):
         self._lock = Lock()
 
     def get(self, key: Key, make: Callable[[], Made]) -> Made:
-        """What belongs to a key.
-
-        Parameters
-        ----------
-        key : hashable
-            all that it depends on
-        make : callable
-            makes it where it is not kept
-        """
+        """What belongs to a key."""
         with self._lock:
             if key in self._kept:
                 self._kept[key] = found = self._kept.pop(key)

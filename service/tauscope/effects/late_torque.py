@@ -36,23 +36,11 @@ class LateTorque(Effect):
 
     @staticmethod
     def places(setting: Setting) -> Sequence[int | None]:
-        """The whole arm, and every joint of an arm with several.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """The whole arm, and every joint of an arm with several."""
         return (None, *(setting.joints if setting.robot.joint_count > 1 else ()))
 
     def measured(self, signals: Signals) -> Array:
-        """Torque of the model at the joints that are late, (m, N).
-
-        Parameters
-        ----------
-        signals : Signals
-            one piece of motion
-        """
+        """Torque of the model at the joints that are late, (m, N)."""
         return signals.torque[list(self.touched(len(signals.torque)))]
 
 
@@ -69,13 +57,7 @@ class Shift(LateTorque):
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """One a place.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """One a place."""
         return [cls(place, *_constants(setting)) for place in cls.places(setting)]
 
     def late(self, torque: Array, constant: float, signals: Signals) -> Array:
@@ -87,8 +69,6 @@ class Shift(LateTorque):
             as it is [Nm or N]
         constant : float
             T [s]
-        signals : Signals
-            the piece of motion
         """
         return shifted(torque, constant, signals)
 
@@ -97,8 +77,6 @@ class Shift(LateTorque):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shapes : (g, 1) float64
             T [s]
         """
@@ -117,8 +95,6 @@ class Shift(LateTorque):
 
         Parameters
         ----------
-        setting : Setting
-            the arm
         coefficients : (1,) float64
             a
         shape : (1,) float64
@@ -136,9 +112,6 @@ class Lag(Shift):
     """The same with τ_T behind a low-pass filter with n equal time constants T, as sensors and drives have it.
 
     Reported are d = a n T, T and n.
-
-    order : int
-        n
     """
 
     equation: ClassVar[str] = "tau_recorded = tau + d/(n T) (tau_T - tau), (1 + T d/dt)^n tau_T = tau"
@@ -149,13 +122,7 @@ class Lag(Shift):
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """One a place and order.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """One a place and order."""
         places = cls.places(setting)
         return [cls(place, *_constants(setting), order=order) for place in places for order in ORDERS]
 
@@ -168,8 +135,6 @@ class Lag(Shift):
             before it [Nm or N]
         constant : float
             T [s]
-        signals : Signals
-            the piece of motion
         """
         return low_passed(torque, constant, self.order, signals)
 
@@ -180,8 +145,6 @@ class Lag(Shift):
 
         Parameters
         ----------
-        setting : Setting
-            the arm
         coefficients : (1,) float64
             a
         shape : (1,) float64
@@ -213,8 +176,6 @@ def shifted(torque: Array, delay: float, signals: Signals) -> Array:
         as it is [Nm or N]
     delay : float
         [s]
-    signals : Signals
-        the piece of motion, which begins at rest, or as its period ends
     """
     instants = np.arange(torque.shape[1]) / signals.rate_hz
     period = torque.shape[1] / signals.rate_hz if signals.periodic else None
@@ -230,10 +191,6 @@ def low_passed(torque: Array, constant: float, order: int, signals: Signals) -> 
         before it [Nm or N]
     constant : float
         each time constant T of the filter [s]
-    order : int
-        how many there are
-    signals : Signals
-        the piece of motion, which begins settled, or as its period ends
     """
     samples = constant * signals.rate_hz
     kept = float(np.exp(-1.0 / samples))

@@ -27,13 +27,7 @@ class LoadDependentFriction(Effect):
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """One a joint that moves.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """One a joint that moves."""
         return [cls(joint) for joint in setting.joints if setting.moves(joint) and setting.is_loaded(joint)]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
@@ -41,8 +35,6 @@ class LoadDependentFriction(Effect):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shapes : (1, 0) float64
             none
         """

@@ -34,13 +34,7 @@ class NonlinearViscous(Effect):
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """Two a joint that moves: less than in proportion to speed, and more.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """Two a joint that moves: less than in proportion to speed, and more."""
         sides = [
             (powers[:, None], np.array([low]), np.array([high]))
             for powers, (low, high) in zip(POWERS, BOUNDS, strict=True)
@@ -52,8 +46,6 @@ class NonlinearViscous(Effect):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shapes : (g, 1) float64
             p
         """

@@ -7,19 +7,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Coefficient:
-    """A linear coefficient of an effect.
-
-    name : str
-        in the equation
-    unit : str
-        with ``{tau}`` and ``{q}`` in place of the joint's units of torque and position
-    positive : bool
-        whether physics allows no negative value
-    largest : float
-        magnitude beyond which nothing real has it
-    smallest : float
-        magnitude below which it stands for something else
-    """
+    """A linear coefficient of an effect."""
 
     name: str
     unit: str
@@ -30,19 +18,7 @@ class Coefficient:
 
 @dataclass(frozen=True)
 class Shape:
-    """A quantity that shapes an effect's columns and is searched over a grid, then refined between bounds.
-
-    name : str
-        in the equation
-    unit : str
-        as in `Coefficient`
-    logarithmic : bool
-        whether steps are relative ones
-    fixed : bool
-        whether only the grid's own values make sense
-    reported : bool
-        whether it belongs to the effect and not merely to how its column is made
-    """
+    """A quantity that shapes an effect's columns and is searched over a grid, then refined between bounds."""
 
     name: str
     unit: str
@@ -53,19 +29,7 @@ class Shape:
 
 @dataclass(frozen=True)
 class Quantity:
-    """A parameter as a finding reports it.
-
-    name : str
-        in the equation
-    value : float
-        estimate
-    std : float
-        its standard error
-    unit : str
-        SI
-    period : float
-        after which it is the same again; infinite for most
-    """
+    """A parameter as a finding reports it."""
 
     name: str
     value: float

@@ -32,13 +32,7 @@ class Payload(Effect):
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """One for the arm.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """One for the arm."""
         return [cls(None, np.zeros((1, 3)), np.full(3, -FARTHEST_M), np.full(3, FARTHEST_M))]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
@@ -46,8 +40,6 @@ class Payload(Effect):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shapes : (g, 3) float64
             r [m]
         """
@@ -61,8 +53,6 @@ class Payload(Effect):
 
         Parameters
         ----------
-        setting : Setting
-            the arm
         coefficients : (1,) float64
             m [kg]
         shape : (3,) float64

@@ -41,13 +41,7 @@ class PayloadChange(TimeLocalEffect):
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """One for the arm.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """One for the arm."""
         grid = payload_windows(setting.durations)
         longest = max(setting.durations)
         lower = np.array([since(len(setting.durations) - 1), 0.0, 0.0, OUTSIDE, *(-FARTHEST_M,) * 3])
@@ -73,8 +67,6 @@ class PayloadChange(TimeLocalEffect):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shape : (7,) float64
             the window, r [m]
         """
@@ -87,8 +79,6 @@ class PayloadChange(TimeLocalEffect):
 
         Parameters
         ----------
-        setting : Setting
-            the arm
         coefficients : (1,) float64
             m [kg]
         shape : (7,) float64
@@ -112,8 +102,6 @@ class PayloadChange(TimeLocalEffect):
             m [kg]
         shape : (7,) float64
             the window, r [m]
-        names : sequence of str
-            of the training recordings
         durations : sequence of float
             of the same [s]
         """
@@ -137,11 +125,6 @@ def carried(mass: float, shape: Array, durations: Sequence[float]) -> tuple[floa
         the window
     durations : sequence of float
         of the recordings [s]
-
-    Returns
-    -------
-    tuple of float and dict of str to int
-        ±1, and places among the shapes of ``t_on`` and ``t_off``
     """
     scope, start, end = shape[:3]
     if shape[3] == OUTSIDE:

@@ -52,8 +52,6 @@ def possible_orders(setting: Setting, joint: int) -> Array:
 
     Parameters
     ----------
-    setting : Setting
-        the arm and its motion
     joint : int
         joint index, from 0
     """
@@ -65,8 +63,6 @@ def farther_orders(setting: Setting, joint: int) -> Array:
 
     Parameters
     ----------
-    setting : Setting
-        the arm and its motion
     joint : int
         joint index, from 0
     """
@@ -131,11 +127,7 @@ def waves(position: Array, orders: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Periodic(Effect):
-    """Sine and cosine of an order, with a weight of its own.
-
-    geared : bool
-        whether only whole multiples of the motor's revolution can occur
-    """
+    """Sine and cosine of an order, with a weight of its own."""
 
     geared: bool = False
 
@@ -144,24 +136,12 @@ class _Periodic(Effect):
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """One a joint whose motion covers enough cycles.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """One a joint whose motion covers enough cycles."""
         return cls._of_orders(setting, possible_orders)
 
     @classmethod
     def farther_forms(cls, setting: Setting) -> Sequence[Effect]:
-        """The same of orders that show near reversals only.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """The same of orders that show near reversals only."""
         return cls._of_orders(setting, farther_orders)
 
     @classmethod
@@ -179,13 +159,7 @@ class _Periodic(Effect):
         return setting.joints
 
     def is_free(self, place: int) -> bool:
-        """Whether the order lies between the grid's points.
-
-        Parameters
-        ----------
-        place : int
-            the order is the only shape
-        """
+        """Whether the order lies between the grid's points."""
         return not self.geared
 
     def quantities(
@@ -195,8 +169,6 @@ class _Periodic(Effect):
 
         Parameters
         ----------
-        setting : Setting
-            the arm
         coefficients : (2,) float64
             of sine and cosine
         shape : (1,) float64
@@ -254,8 +226,6 @@ class Cogging(_Periodic):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shapes : (g, 1) float64
             k [1/rad or 1/m]
         """
@@ -286,8 +256,6 @@ class TorqueRipple(_Periodic):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shapes : (g, 1) float64
             k [1/rad or 1/m]
         """

@@ -28,13 +28,7 @@ class PlainTerm(Effect):
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """One a joint that moves.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """One a joint that moves."""
         return [cls(joint) for joint in setting.joints if setting.moves(joint)]
 
 
@@ -55,8 +49,6 @@ class ViscousFriction(PlainTerm):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shapes : (1, 0) float64
             none
         """
@@ -80,8 +72,6 @@ class CoulombFriction(PlainTerm):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shapes : (1, 0) float64
             none
         """
@@ -105,8 +95,6 @@ class TorqueOffset(PlainTerm):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shapes : (1, 0) float64
             none
         """
@@ -131,8 +119,6 @@ class StribeckTerm(PlainTerm):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shapes : (g, 1) float64
             δ [s/rad or s/m]
         """

@@ -22,11 +22,7 @@ RADIANS_A_STROKE = np.array([1.0, 2.0, 4.0, 6.0, 9.0, 12.0, 15.0, 18.0])
 
 @dataclass(frozen=True, eq=False)
 class PositionDependentFriction(Effect):
-    """τ = A(q̇) (a cos kq + b sin kq).
-
-    turns : bool
-        whether the joint comes round again: k is a whole number then
-    """
+    """τ = A(q̇) (a cos kq + b sin kq)."""
 
     has_step: ClassVar[bool] = True
     of_motion_and_step: ClassVar[bool] = True
@@ -43,13 +39,7 @@ class PositionDependentFriction(Effect):
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """One a joint that moves.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """One a joint that moves."""
         return [cls._of_joint(setting, joint) for joint in setting.joints if setting.moves(joint)]
 
     @classmethod
@@ -60,13 +50,7 @@ class PositionDependentFriction(Effect):
         return cls(joint, waves[:, None], 0.8 * waves[:1], 1.2 * waves[-1:], turns=turns)
 
     def is_free(self, place: int) -> bool:
-        """Whether k is estimated between the grid's points.
-
-        Parameters
-        ----------
-        place : int
-            k is the only shape
-        """
+        """Whether k is estimated between the grid's points."""
         return not self.turns
 
     def rough_grid(self) -> Array:
@@ -78,8 +62,6 @@ class PositionDependentFriction(Effect):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shapes : (g, 1) float64
             k [1/rad or 1/m]
         """

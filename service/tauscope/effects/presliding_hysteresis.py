@@ -73,13 +73,7 @@ class PreslidingHysteresis(Effect):
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """One a joint that moves both ways.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """One a joint that moves both ways."""
         made = []
         for joint in setting.joints:
             if setting.reverses(joint):
@@ -96,8 +90,6 @@ class PreslidingHysteresis(Effect):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shapes : (g, 1) float64
             x_s [rad or m]
         """

@@ -89,22 +89,10 @@ def catalogue() -> tuple[type[Effect], ...]:
 
 
 def possible_effects(setting: Setting) -> Sequence[Effect]:
-    """Every form of every effect worth looking at beside the nominal model.
-
-    Parameters
-    ----------
-    setting : Setting
-        the arm and the ranges of its motion
-    """
+    """Every form of every effect worth looking at beside the nominal model."""
     return [form for effect in catalogue() if effect.screened for form in effect.forms(setting)]
 
 
 def farther_effects(setting: Setting) -> Sequence[Effect]:
-    """Every form that is worth a look only where something is left.
-
-    Parameters
-    ----------
-    setting : Setting
-        the arm and the ranges of its motion
-    """
+    """Every form that is worth a look only where something is left."""
     return [form for effect in catalogue() if effect.screened for form in effect.farther_forms(setting)]

@@ -24,13 +24,7 @@ class RotorInertia(Effect):
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """One a joint that moves.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """One a joint that moves."""
         return [cls(joint) for joint in setting.joints if setting.moves(joint)]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
@@ -38,8 +32,6 @@ class RotorInertia(Effect):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shapes : (1, 0) float64
             none
         """

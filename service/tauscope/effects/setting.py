@@ -16,8 +16,6 @@ ONE_WAY = 0.1
 class Setting:
     """The arm and the ranges of its recorded motion.
 
-    robot : Robot
-        the arm
     slowest, fastest : (n,) float64
         range of every joint's velocity, the rarest percents left out [rad/s or m/s]
     lowest, highest : (n,) float64

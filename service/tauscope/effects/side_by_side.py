@@ -12,14 +12,6 @@ THREADS = 2
 
 
 def side_by_side(work: Callable[[Item], Done], items: Iterable[Item]) -> list[Done]:
-    """What comes of every item, in their order.
-
-    Parameters
-    ----------
-    work : callable
-        spends its time in NumPy, and changes nothing that the others read
-    items : iterable
-        what it is done on
-    """
+    """What comes of every item, in their order."""
     with ThreadPoolExecutor(THREADS) as threads:
         return list(threads.map(work, items))

@@ -17,8 +17,6 @@ T = TypeVar("T")
 class Signals:
     """One piece of conditioned motion at the recorded rate, samples last, with the fitted model's torque.
 
-    robot : Robot
-        the arm
     rate_hz : float
         sampling rate [Hz]
     time : (P, N) float64
@@ -39,10 +37,6 @@ class Signals:
         standard parameters that stand for the fitted base parameters: all that torque along this chain needs
     links : (10 n,) float64
         standard parameters of the nearest physically consistent links, for another chain or another gravity
-    periodic : bool
-        whether the piece is one period of a motion that repeats
-    of_motion : dict of str to anything
-        what was made of the motion alone, whatever the model: shared by all signals of the same piece
     """
 
     robot: Robot
@@ -63,29 +57,13 @@ class Signals:
     _memory: dict[str, Any] = field(default_factory=dict, repr=False)
 
     def remembered(self, name: str, make: Callable[[], T]) -> T:
-        """What several effects need of the same piece, made once.
-
-        Parameters
-        ----------
-        name : str
-            by which it is known
-        make : callable
-            makes it
-        """
+        """What several effects need of the same piece, made once."""
         if name not in self._memory:
             self._memory[name] = make()
         return self._memory[name]
 
     def remembered_of_motion(self, name: str, make: Callable[[], T]) -> T:
-        """What depends on the motion and not on the model, made once for all models.
-
-        Parameters
-        ----------
-        name : str
-            by which it is known
-        make : callable
-            makes it
-        """
+        """What depends on the motion and not on the model, made once for all models."""
         if name not in self.of_motion:
             self.of_motion[name] = make()
         return self.of_motion[name]

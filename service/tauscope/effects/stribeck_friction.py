@@ -37,13 +37,7 @@ class StribeckFriction(Effect):
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """Two a joint that moves, an exponent each: which of the two it is, only the fitted curves can say.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """Two a joint that moves, an exponent each: which of the two it is, only the fitted curves can say."""
         made = []
         for joint in setting.joints:
             if setting.moves(joint):
@@ -70,8 +64,6 @@ class StribeckFriction(Effect):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shapes : (g, 2) float64
             v_s [rad/s or m/s], α
         """

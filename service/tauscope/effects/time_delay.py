@@ -20,13 +20,7 @@ class TimeDelay(LateTorque):
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """All forms, the small delay first.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """All forms, the small delay first."""
         return [*(cls(place) for place in cls.places(setting)), *Shift.forms(setting), *Lag.forms(setting)]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
@@ -34,8 +28,6 @@ class TimeDelay(LateTorque):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shapes : (1, 0) float64
             none
         """
@@ -49,8 +41,6 @@ class TimeDelay(LateTorque):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         coefficients : (1,) float64
             d [s]
         shape : (0,) float64

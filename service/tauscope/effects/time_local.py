@@ -57,8 +57,6 @@ class TimeLocalEffect(Effect):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shape : (k,) float64
             values of the shape parameters; those of the window do not matter
         """
@@ -82,8 +80,6 @@ class TimeLocalEffect(Effect):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shapes : (g, k) float64
             scope, start [s], end [s], profile, then the effect's own
         """
@@ -102,8 +98,6 @@ class TimeLocalEffect(Effect):
             estimates
         shape : (k,) float64
             values of the shape parameters
-        names : sequence of str
-            of the training recordings
         durations : sequence of float
             of the same [s]
         """
@@ -120,8 +114,6 @@ class TimeLocalEffect(Effect):
         ----------
         shape : (k,) float64
             values of the shape parameters
-        names : sequence of str
-            of the training recordings
         """
         scope = shape[0]
         if scope == EVERY:
@@ -130,14 +122,12 @@ class TimeLocalEffect(Effect):
 
 
 def open_share(shapes: Array, recording: int, time: Array, interval_s: float) -> Array:
-    """w(t) of windows: 1 where one is open, the part of an interval at the samples that its edges cut.
+    """w(t) of windows, (N,): 1 where one is open, the part of an interval at the samples that its edges cut.
 
     Parameters
     ----------
     shapes : (..., k) float64
         scope, start [s], end [s], profile: of one window, or of one a sample
-    recording : int
-        index of the recording, negative for held-out ones
     time : (...) float64
         instants, from the beginning of the recording [s]
     interval_s : float
@@ -165,8 +155,6 @@ def open_samples(shapes: Array, recording: int, time: Array, interval_s: float) 
     ----------
     shapes : (g, k) float64
         scope, start [s], end [s], profile
-    recording : int
-        index of the recording, negative for held-out ones
     time : (N,) float64
         instants in rising order, from the beginning of the recording [s]
     interval_s : float

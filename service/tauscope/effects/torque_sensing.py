@@ -35,13 +35,7 @@ class TorqueGainError(Effect):
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """One a joint.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """One a joint."""
         return [cls(joint) for joint in setting.joints]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
@@ -49,8 +43,6 @@ class TorqueGainError(Effect):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shapes : (1, 0) float64
             none
         """
@@ -84,8 +76,6 @@ class Saturation(Effect):
 
         Parameters
         ----------
-        setting : Setting
-            the arm
         parts : (g,) float64
             levels looked at, relative to the joint's largest torque
         """
@@ -112,8 +102,6 @@ class Saturation(Effect):
 
         Parameters
         ----------
-        signals : Signals
-            one piece of motion
         shapes : (g, 1) float64
             c [Nm or N]
         """
@@ -128,13 +116,7 @@ class TorqueSaturation(Saturation):
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """Both curves at every joint.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """Both curves at every joint."""
         return [*cls.of_levels(setting, COMPRESSIONS), *Clipping.forms(setting)]
 
     def recorded(self, torque: Array, levels: Array) -> Array:
@@ -158,8 +140,6 @@ class TorqueSaturation(Saturation):
             a
         shape : (1,) float64
             c [Nm or N]
-        alone : bool
-            whether nothing else is known to be missing
         """
         return bool(shape[0] >= self.lower[0] * np.sqrt(coefficients[0]))
 
@@ -170,8 +150,6 @@ class TorqueSaturation(Saturation):
 
         Parameters
         ----------
-        setting : Setting
-            the arm
         coefficients : (1,) float64
             a
         shape : (1,) float64
@@ -194,13 +172,7 @@ class Clipping(Saturation):
 
     @classmethod
     def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """One a joint.
-
-        Parameters
-        ----------
-        setting : Setting
-            the arm
-        """
+        """One a joint."""
         return cls.of_levels(setting, CLIPS)
 
     def recorded(self, torque: Array, levels: Array) -> Array:

@@ -48,15 +48,7 @@ class SmoothMaximum:
 
 
 class KinematicUsage:
-    """Usage of the limits of position, velocity and acceleration: exact at every instant.
-
-    Parameters
-    ----------
-    space : SeriesSpace
-        where vectors live
-    limits : MotionLimits
-        limits of every joint
-    """
+    """Usage of the limits of position, velocity and acceleration: exact at every instant."""
 
     def __init__(self, space: SeriesSpace, limits: MotionLimits) -> None:
         samples = SAMPLES_PER_HARMONIC * space.harmonics
@@ -101,8 +93,6 @@ class KinematicUsage:
         ----------
         x : (n, columns) float64
             centre and coefficients
-        fraction : float
-            part of the limits that may be used
         """
         place, velocity, acceleration = self.signed(x)
         swing = place - x[:, 0]
@@ -148,8 +138,6 @@ class StateUsage:
 
     Parameters
     ----------
-    regressor : ExcitationRegressor
-        of the robot
     torque : TorquePrediction or None
         None where there is no prior model or no torque limit
     workspace : WorkspaceUsage or None
@@ -168,8 +156,6 @@ class StateUsage:
 
         Parameters
         ----------
-        motion : MotionSamples
-            N samples
         base : (n, m, N) float64 or None
             base regressor of the same motion, where the caller has it
         """
@@ -181,25 +167,11 @@ class StateUsage:
         return parts
 
     def largest(self, motion: MotionSamples) -> float:
-        """Largest usage of all, 0 where nothing is constrained.
-
-        Parameters
-        ----------
-        motion : MotionSamples
-            N samples
-        """
+        """Largest usage of all, 0 where nothing is constrained."""
         return max((float(part.max()) for part in self.usages(motion)), default=0.0)
 
     def without_inactive(self, limits: MotionLimits, rng: np.random.Generator) -> "StateUsage":
-        """Only what random states within the limits come anywhere near.
-
-        Parameters
-        ----------
-        limits : MotionLimits
-            limits of every joint
-        rng : numpy.random.Generator
-            source of the states
-        """
+        """Only what random states within the limits come anywhere near."""
         unit = [rng.uniform(-1.0, 1.0, (RANDOM_STATES, len(limits.velocity))) for _ in range(3)]
         states = MotionSamples(
             limits.middle + limits.half_range * unit[0], limits.velocity * unit[1], limits.acceleration * unit[2]
@@ -219,8 +191,6 @@ class StateUsage:
 
         Parameters
         ----------
-        motion : MotionSamples
-            N samples
         base : (n, m, N) float64
             base regressor of the same motion
         scale : (count,) float64
@@ -234,8 +204,6 @@ class StateUsage:
 
         Parameters
         ----------
-        motion : MotionSamples
-            N samples
         base : (n, m, N) float64
             base regressor of the same motion
         scale : (count,) float64

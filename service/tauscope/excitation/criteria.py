@@ -34,14 +34,8 @@ class Criterion(StrEnum):
 class CriterionValue:
     """A criterion at one information matrix.
 
-    own : float
-        the criterion alone: ln Cond_F, -ln det / p, or ln cond; infinite where a parameter is not excited
-    cost : float
-        what is minimised: `own`, with its share of -ln det / p
     gradient : (p, p) float64
         derivative of `cost` by A, symmetric
-    condition_number : float
-        of L in the 2-norm
     """
 
     own: float
@@ -55,17 +49,8 @@ def criterion_value(criterion: Criterion, information: Array, information_weight
 
     Parameters
     ----------
-    criterion : Criterion
-        which one
     information : (p, p) float64
         A = LᵀL, symmetric
-    information_weight : float
-        share of -ln det / p that is added to a condition number
-
-    Returns
-    -------
-    CriterionValue
-        with infinite cost and zero gradient where A is singular
     """
     values, vectors = np.linalg.eigh(information)
     low, high = float(values[0]), float(values[-1])
@@ -89,13 +74,5 @@ def criterion_value(criterion: Criterion, information: Array, information_weight
 
 
 def reported_value(criterion: Criterion, own: float) -> float:
-    """The criterion as it is known, its logarithm undone, except for ``log-det``.
-
-    Parameters
-    ----------
-    criterion : Criterion
-        which one
-    own : float
-        `CriterionValue.own`
-    """
+    """The criterion as it is known, its logarithm undone, except for ``log-det``."""
     return own if criterion is Criterion.LOG_DET else float(np.exp(own))

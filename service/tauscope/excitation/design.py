@@ -27,30 +27,8 @@ ACTIVE_CLEARANCE_M = 0.005
 class ExcitationDesign:
     """A designed excitation.
 
-    trajectory : Trajectory
-        what a run plays: the repeated periods, slow reversals, and the first period again
-    series : FourierSeries
-        its repeated part
-    periods : int
-        how often it is repeated
-    criterion : Criterion
-        what was minimised
-    value : float
-        the criterion's value for one period
-    condition_number : float
-        of the stacked, unweighted regressor of one period, in SI units
-    random_value : float
-        the criterion's value of the best random series that the optimiser began with
     history : tuple of (int, int, float, float)
         start, iteration, criterion's value as the optimiser sees it, largest violation of a constraint
-    margins : Margins
-        what is left of every limit
-    active : tuple of str
-        constraints that keep the criterion from getting better, for example ``velocity of joint2``
-    notes : tuple of str
-        what was assumed or could not be done, as sentences
-    evaluations : int
-        motions whose criterion was computed
     seconds : float
         time that the optimiser took [s]
     """
@@ -77,20 +55,6 @@ def design_excitation(
     progress: Callable[[OptimiserProgress], None] = lambda _: None,
 ) -> ExcitationDesign:
     """The best excitation found within the limits: the seed paper's (20) and (21).
-
-    Parameters
-    ----------
-    robot : Robot
-        the arm; its `model`, where there is one, predicts torques
-    options : ExcitationOptions or None
-        what is wished; the defaults where None
-    progress : callable
-        told of every iteration
-
-    Returns
-    -------
-    ExcitationDesign
-        whose trajectory keeps all limits, and begins and ends at rest
 
     Raises
     ------

@@ -8,18 +8,7 @@ from tauscope.trajectory.excitation_document import ExcitationDocument, HistoryP
 
 
 def excitation_document(design: ExcitationDesign) -> ExcitationDocument:
-    """The document of a designed excitation.
-
-    Parameters
-    ----------
-    design : ExcitationDesign
-        the result of `design_excitation`
-
-    Returns
-    -------
-    ExcitationDocument
-        plain data; `model_dump_json(by_alias=True)` writes it
-    """
+    """The document of a designed excitation."""
     trajectory = trajectory_document(design.trajectory)
     return ExcitationDocument(
         robot=trajectory.robot,

@@ -32,21 +32,7 @@ SETTLED = 0.999
 
 @dataclass(frozen=True, eq=False)
 class Feasibility:
-    """What is feasible in one space of series.
-
-    robot : Robot
-        for names and units
-    space : SeriesSpace
-        where vectors live
-    grid : SeriesGrid
-        instants at which torque and workspace are held
-    limits : MotionLimits
-        limits of every joint
-    kinematics : KinematicUsage
-        limits of position, velocity and acceleration
-    states : StateUsage
-        torque and workspace
-    """
+    """What is feasible in one space of series."""
 
     robot: Robot
     space: SeriesSpace
@@ -57,11 +43,6 @@ class Feasibility:
 
     def standing_postures(self, rng: np.random.Generator) -> Array:
         """Postures at which the arm may stand, (K, n), K ≥ 1 [rad or m].
-
-        Parameters
-        ----------
-        rng : numpy.random.Generator
-            source of postures within the position limits
 
         Raises
         ------
@@ -87,8 +68,6 @@ class Feasibility:
         ----------
         postures : (K, n) float64
             where the arm may stand
-        rng : numpy.random.Generator
-            source of coefficients and amplitudes
         """
         n = self.space.joint_count
         at_rest = np.zeros((n, self.space.columns))
@@ -194,13 +173,6 @@ class Feasibility:
 
 def require_room(robot: Robot, limits: MotionLimits) -> None:
     """Refuse limits of a joint that leave no motion.
-
-    Parameters
-    ----------
-    robot : Robot
-        the arm, for its joints' names and units
-    limits : MotionLimits
-        its limits
 
     Raises
     ------

@@ -55,12 +55,6 @@ class ExcitationRegressor:
 
     Parameters
     ----------
-    robot : Robot
-        the chain, gravity and friction shapes
-    base : BaseParameters
-        its identifiable combinations
-    capacity : int
-        largest number of samples
     noise_std : (n,) float64 or None
         expected torque noise of each joint, by which its rows are divided [Nm or N]; equal weights where None
     steepest : (n,) float64 or None
@@ -98,13 +92,7 @@ class ExcitationRegressor:
         return self._first
 
     def base_regressor(self, motion: MotionSamples) -> Array:
-        """Columns of the base parameters, (n, m, N): those of links before a joint are not set.
-
-        Parameters
-        ----------
-        motion : MotionSamples
-            N samples
-        """
+        """Columns of the base parameters, (n, m, N): those of links before a joint are not set."""
         out = np.empty((self.joint_count, len(self.base_columns), len(motion.position)))
         self._regressor.write_shares(motion.position, motion.velocity, motion.acceleration, out)
         return out
@@ -114,8 +102,6 @@ class ExcitationRegressor:
 
         Parameters
         ----------
-        motion : MotionSamples
-            N samples
         base : (n, m, N) float64 or None
             `base_regressor` of the same motion, where the caller has it
         """
@@ -147,13 +133,7 @@ class ExcitationRegressor:
         return information / rows[0].shape[1]
 
     def stacked(self, motion: MotionSamples) -> Array:
-        """L as one matrix, joint after joint, (n N, p), weighted.
-
-        Parameters
-        ----------
-        motion : MotionSamples
-            N samples
-        """
+        """L as one matrix, joint after joint, (n N, p), weighted."""
         count = len(motion.position)
         matrix = np.zeros((self.joint_count * count, self.column_count))
         for joint, (block, columns) in enumerate(zip(self.rows(motion), self._columns, strict=True)):
@@ -165,8 +145,6 @@ class ExcitationRegressor:
 
         Parameters
         ----------
-        motion : MotionSamples
-            N samples
         rows : list of (C_j, N) float64
             from `rows`
         by_information : (p, p) float64
@@ -191,8 +169,6 @@ class ExcitationRegressor:
 
         Parameters
         ----------
-        motion : MotionSamples
-            N samples
         weight : (n, m, N) float64
             derivative by `base_regressor`
         """

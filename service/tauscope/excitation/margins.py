@@ -53,15 +53,7 @@ class Margins:
 
 
 def kinematic_margins(trajectory: Trajectory, limits: MotionLimits) -> Margins:
-    """Margins of position, velocity and acceleration over a whole trajectory; of Fourier series at every instant.
-
-    Parameters
-    ----------
-    trajectory : Trajectory
-        the motion
-    limits : MotionLimits
-        limits of every joint
-    """
+    """Margins of position, velocity and acceleration over a whole trajectory; of Fourier series at every instant."""
     return trajectory_margins(trajectory, limits, None, limits.torque)
 
 
@@ -72,12 +64,6 @@ def trajectory_margins(
 
     Parameters
     ----------
-    trajectory : Trajectory
-        the motion
-    limits : MotionLimits
-        limits of every joint
-    states : StateUsage or None
-        torque prediction and workspace, as far as there are any
     available : (n,) float64
         torque that may be used, infinite where there is no limit [Nm or N]
     """
@@ -101,17 +87,6 @@ def trajectory_margins(
 
 def require_within_limits(trajectory: Trajectory, robot: Robot, limits: MotionLimits, name: str = "trajectory") -> None:
     """Refuse a trajectory that leaves the limits of position, velocity or acceleration at any instant.
-
-    Parameters
-    ----------
-    trajectory : Trajectory
-        the motion
-    robot : Robot
-        the arm, for its joints' names and units
-    limits : MotionLimits
-        its limits
-    name : str
-        what the message calls the trajectory
 
     Raises
     ------

@@ -37,17 +37,7 @@ TOLERANCE = 1e-4
 
 @dataclass(frozen=True)
 class OptimiserProgress:
-    """Where the optimiser is.
-
-    step : str
-        what it does, in words
-    fraction : float
-        part of the iterations that is over, 0 to 1
-    cost : float
-        the criterion at the present motion, as the optimiser sees it
-    best : float
-        the criterion of the best feasible motion so far; infinite while there is none
-    """
+    """Where the optimiser is."""
 
     step: str
     fraction: float
@@ -61,12 +51,6 @@ class HistoryEntry:
 
     start : int
         from which start, counted from 1; 0 for the random series
-    iteration : int
-        number of the iteration from this start
-    own : float
-        the criterion, see `CriterionValue.own`
-    violation : float
-        largest violation of a smooth constraint, 0 where all are kept
     """
 
     start: int
@@ -81,14 +65,8 @@ class OptimiserResult:
 
     x : (n, columns) float64
         the best feasible vector found
-    history : list of HistoryEntry
-        every iteration
-    evaluations : int
-        motions whose criterion was computed
     seconds : float
         time that it took [s]
-    random_value : float
-        criterion of the best random series
     """
 
     x: Array
@@ -102,10 +80,6 @@ class OptimiserResult:
 class Stages:
     """The same question at two resolutions, and its answer without any smoothing.
 
-    coarse : ExcitationProblem
-        few instants: for the way there
-    fine : ExcitationProblem
-        more of them, so that friction's sign may be steeper: for the last steps
     exact : callable
         the criterion of a vector (n, columns) with friction's curve as it is: what candidates are compared by
     """
@@ -181,24 +155,6 @@ def optimise(
     progress: Callable[[OptimiserProgress], None] = lambda _: None,
 ) -> OptimiserResult:
     """The best feasible vector of several starts.
-
-    Parameters
-    ----------
-    stages : Stages
-        criterion and constraints
-    feasibility : Feasibility
-        what is feasible, checked without smoothing
-    rng : numpy.random.Generator
-        source of the random series
-    starts : int
-        number of random series that are improved
-    progress : callable
-        told of every iteration
-
-    Returns
-    -------
-    OptimiserResult
-        whose vector is feasible whatever happened on the way
 
     Raises
     ------

@@ -20,34 +20,10 @@ class ExcitationOptions:
 
     period_s : float
         duration of one period [s]
-    harmonics : int
-        number of harmonics M, 2 or more
-    periods : int
-        how often the period is repeated
-    criterion : Criterion
-        what is minimised
-    information_weight : float
-        share of -ln det(LᵀL)/p that is minimised beside the logarithm of a condition number
-    scaling : ColumnScaling
-        units in which the parameters are counted
     noise_std : (n,) float64 or None
         expected torque noise of each joint, which weights its equations [Nm or N]; equal weights where None
-    limit_fraction : float
-        part of the limits of position, velocity and acceleration that is used, in (0, 1]
-    torque_margin : float
-        part of each torque limit that is kept free, for what the prior model does not know, in [0, 1)
     torque_offset : float
         torque kept free besides [Nm or N]
-    workspace : Workspace
-        floor and boxes to keep clear of
-    slow_postures : int
-        number of postures at which all joints reverse slowly; 0 for none
-    closing_period : bool
-        whether the first period is repeated at the end
-    starts : int
-        number of random series that are improved
-    seed : int
-        of the random series
     """
 
     period_s: float = 10.0

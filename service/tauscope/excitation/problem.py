@@ -18,12 +18,6 @@ Array = NDArray[np.float64]
 class Objective:
     """What is minimised.
 
-    criterion : Criterion
-        function of the information matrix
-    information_weight : float
-        share of -ln det / p beside a condition number
-    regressor : ExcitationRegressor
-        of the robot, its sign functions as steep as the grid resolves
     scaling : (p,) float64
         what each column is divided by
     """
@@ -46,23 +40,7 @@ class _Evaluation:
 
 
 class ExcitationProblem:
-    """Minimise the criterion's cost subject to all usages being at most 1.
-
-    Parameters
-    ----------
-    space : SeriesSpace
-        where vectors live
-    grid : SeriesGrid
-        instants at which the criterion, torque and workspace are looked at
-    fine : SeriesGrid
-        more instants, at which torque and workspace have to hold in the end
-    objective : Objective
-        what is minimised
-    kinematics : KinematicUsage
-        limits of position, velocity and acceleration
-    states : StateUsage
-        torque and workspace, as far as they may matter
-    """
+    """Minimise the criterion's cost subject to all usages being at most 1."""
 
     def __init__(
         self,

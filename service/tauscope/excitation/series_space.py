@@ -24,12 +24,8 @@ class SeriesSpace:
 
     Parameters
     ----------
-    limits : MotionLimits
-        limits of every joint, for the scales
     period_s : float
         fundamental period [s]
-    harmonics : int
-        number of harmonics M, at least `LEAST_HARMONICS`
 
     Raises
     ------
@@ -75,26 +71,14 @@ class SeriesSpace:
         )
 
     def vector(self, series: FourierSeries) -> Array:
-        """The vector of a series that rests at its ends, (n, columns).
-
-        Parameters
-        ----------
-        series : FourierSeries
-            of this period and number of harmonics
-        """
+        """The vector of a series that rests at its ends, (n, columns)."""
         limits = self._limits
         speed = limits.velocity[:, None]
         centre = (series.centre - limits.middle) / limits.half_range
         return np.column_stack([centre, series.cosine / speed @ self._cosine, series.sine / speed @ self._sine])
 
     def grid(self, samples: int) -> "SeriesGrid":
-        """Equispaced instants of one period.
-
-        Parameters
-        ----------
-        samples : int
-            number of instants K
-        """
+        """Equispaced instants of one period."""
         omega = 2.0 * np.pi / self.period_s * self._order
         phase = np.multiply.outer(np.arange(samples) * (self.period_s / samples), omega)
         cosine, sine = np.cos(phase), np.sin(phase)
@@ -111,8 +95,6 @@ class SeriesGrid:
 
     Parameters
     ----------
-    limits : MotionLimits
-        for the scales
     bases : three (K, 2 (M - 1)) float64
         position, velocity and acceleration per coefficient
     """
@@ -139,13 +121,7 @@ class SeriesGrid:
         return MotionSamples(position + limits.middle + limits.half_range * x[:, 0], velocity, acceleration)
 
     def pull_back(self, gradient: MotionGradient) -> Array:
-        """Derivatives by x of a scalar, (n, columns), from those by the motion.
-
-        Parameters
-        ----------
-        gradient : MotionGradient
-            derivatives at the instants
-        """
+        """Derivatives by x of a scalar, (n, columns), from those by the motion."""
         parts = (gradient.position, gradient.velocity, gradient.acceleration)
         speed = self._limits.velocity[:, None]
         coefficients = np.sum([part.T @ basis for part, basis in zip(parts, self._bases, strict=True)], axis=0)

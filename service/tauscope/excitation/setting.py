@@ -47,24 +47,8 @@ SCALING_STATES = 512
 class Setting:
     """One robot's limits, predictions and spaces.
 
-    robot : Robot
-        the arm
-    options : ExcitationOptions
-        what is wished
-    base : BaseParameters
-        its identifiable combinations
-    stated : MotionLimits
-        its limits
-    planned : MotionLimits
-        the part of them that is used
     available : (n,) float64
         torque that may be used, infinite where there is no limit [Nm or N]
-    space : SeriesSpace
-        where vectors live
-    states : StateUsage
-        torque and workspace, as far as they are limited
-    feasibility : Feasibility
-        what keeps all limits
     """
 
     robot: Robot
@@ -80,13 +64,6 @@ class Setting:
     @staticmethod
     def of(robot: Robot, options: ExcitationOptions) -> "Setting":
         """Prepare a design.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        options : ExcitationOptions
-            what is wished
 
         Raises
         ------
@@ -116,31 +93,14 @@ class Setting:
         return Setting(robot, options, base, stated, planned, available, space, states, feasibility)
 
     def stages(self, rng: np.random.Generator) -> Stages:
-        """What the optimiser sees.
-
-        Parameters
-        ----------
-        rng : numpy.random.Generator
-            source of random states, for what may be left out
-        """
+        """What the optimiser sees."""
         states = self.states.without_inactive(self.planned, rng)
         scaling = self._scaling()
         coarse, fine = (self._problem(samples, states, scaling) for samples in SAMPLES_PER_HARMONIC)
         return Stages(coarse, fine, lambda x: self._exact(self.space.series(x), EXACT_SAMPLES, scaling))
 
     def value(self, series: FourierSeries) -> tuple[float, float]:
-        """The criterion of a series and its condition number, with friction's curves as they are.
-
-        Parameters
-        ----------
-        series : FourierSeries
-            the motion
-
-        Returns
-        -------
-        tuple of float
-            the criterion, and the condition number of the stacked, unweighted regressor in SI units
-        """
+        """The criterion of a series and its condition number, with friction's curves as they are."""
         motion = _instants(series, REPORT_SAMPLES)
         plain = ExcitationRegressor(self.robot, self.base, capacity=REPORT_SAMPLES)
         condition_number = criterion_value(Criterion.COND_2, plain.information(plain.rows(motion))).condition_number

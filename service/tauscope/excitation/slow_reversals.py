@@ -65,34 +65,14 @@ STEP_S = 0.02
 
 @dataclass(frozen=True, eq=False)
 class SlowPart:
-    """What follows the repeated periods and leads back to their start.
-
-    segments : tuple of Segment
-        moves and slow reversals; empty where no posture has room for any, or none can be reached slowly
-    postures : int
-        number of postures with slow reversals
-    """
+    """What follows the repeated periods and leads back to their start."""
 
     segments: tuple[Segment, ...]
     postures: int
 
 
 def slow_part(robot: Robot, series: FourierSeries, limits: MotionLimits, states: StateUsage, count: int) -> SlowPart:
-    """Slow reversals at postures of the excitation that lie far apart, and the moves between them.
-
-    Parameters
-    ----------
-    robot : Robot
-        for the kinds of its joints
-    series : FourierSeries
-        the excitation, within all limits
-    limits : MotionLimits
-        limits that moves and reversals keep
-    states : StateUsage
-        torque and workspace
-    count : int
-        number of postures wanted
-    """
+    """Slow reversals at postures of the excitation that lie far apart, and the moves between them."""
     instants = np.arange(float(PLACES)) * (series.period_s / PLACES)
     postures = series.evaluate(instants).position
     swings = [_swing(robot, posture, limits, 1.0) for posture in postures]

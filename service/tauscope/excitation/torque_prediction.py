@@ -25,12 +25,6 @@ class TorquePrediction:
 
     Parameters
     ----------
-    robot : Robot
-        its `model` is what is known
-    base : BaseParameters
-        its identifiable combinations
-    regressor : ExcitationRegressor
-        of the same robot
     velocity : (n,) float64
         speed limits [rad/s or m/s]
     available : (n,) float64
@@ -54,13 +48,7 @@ class TorquePrediction:
         self._small = np.where(np.isfinite(available), SMALL_TORQUE * available, 1.0)
 
     def seen_by(self, regressor: ExcitationRegressor) -> "TorquePrediction":
-        """The same prediction from another regressor's base columns.
-
-        Parameters
-        ----------
-        regressor : ExcitationRegressor
-            of the same robot
-        """
+        """The same prediction from another regressor's base columns."""
         return TorquePrediction(self._robot, self._base_parameters, regressor, self._velocity, self.available)
 
     def torque(self, motion: MotionSamples, base: Array | None = None) -> Array:
@@ -68,8 +56,6 @@ class TorquePrediction:
 
         Parameters
         ----------
-        motion : MotionSamples
-            N samples
         base : (n, m, N) float64 or None
             `ExcitationRegressor.base_regressor` of the same motion, where the caller has it
         """
@@ -81,8 +67,6 @@ class TorquePrediction:
 
         Parameters
         ----------
-        motion : MotionSamples
-            N samples
         base : (n, m, N) float64 or None
             `ExcitationRegressor.base_regressor` of the same motion, where the caller has it
         """
@@ -93,8 +77,6 @@ class TorquePrediction:
 
         Parameters
         ----------
-        motion : MotionSamples
-            N samples
         base : (n, m, N) float64
             `ExcitationRegressor.base_regressor` of the same motion
         weight : (N, n) float64

@@ -47,8 +47,6 @@ class Workspace:
 
     floor_m : float or None
         lowest height z in the base frame [m]; None where there is no floor
-    boxes : tuple of Box
-        forbidden boxes
     tool_m : (3,) float64
         tool point in the last link's frame [m]
     """
@@ -90,15 +88,7 @@ class _Chain:
 
 
 class WorkspaceUsage:
-    """How near the arm comes to what is forbidden: 0 from `REFERENCE_M` on, 1 where it touches.
-
-    Parameters
-    ----------
-    robot : Robot
-        the chain
-    workspace : Workspace
-        what is forbidden
-    """
+    """How near the arm comes to what is forbidden: 0 from `REFERENCE_M` on, 1 where it touches."""
 
     def __init__(self, robot: Robot, workspace: Workspace) -> None:
         self._robot = robot
@@ -131,13 +121,7 @@ class WorkspaceUsage:
         return np.concatenate(columns, axis=1) if columns else np.empty((len(position), 0))
 
     def usage(self, motion: MotionSamples) -> Array:
-        """1 - clearance / `REFERENCE_M`, not below 0, (N, obstacles × points).
-
-        Parameters
-        ----------
-        motion : MotionSamples
-            N samples
-        """
+        """1 - clearance / `REFERENCE_M`, not below 0, (N, obstacles × points)."""
         return np.maximum(1.0 - self.clearance(motion.position) / REFERENCE_M, 0.0)
 
     def pull_back(self, motion: MotionSamples, weight: Array) -> MotionGradient:
@@ -145,8 +129,6 @@ class WorkspaceUsage:
 
         Parameters
         ----------
-        motion : MotionSamples
-            N samples
         weight : (N, obstacles × points) float64
             derivative by `usage`
         """

@@ -51,21 +51,6 @@ def compensation_code(
 ) -> str:
     """Source code that gives the torque of friction and of the found effects.
 
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        the result
-    suffix : str
-        ``.py`` or ``.h``
-    sources : sequence of RecordingSource
-        what the model was made from
-    created : datetime
-        when
-    version : str
-        of Tauscope
-    effort_kind : EffortKind
-        what the recordings hold
-
     Raises
     ------
     ExportError

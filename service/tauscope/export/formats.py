@@ -38,13 +38,7 @@ class ExportFormat(StrEnum):
 
 @dataclass(frozen=True)
 class ExportFile:
-    """How an export is kept and sent.
-
-    name : str
-        of the file
-    media_type : str
-        of the answer that holds it
-    """
+    """How an export is kept and sent."""
 
     name: str
     media_type: str
@@ -62,19 +56,7 @@ EXPORT_FILES: Mapping[ExportFormat, ExportFile] = {
 
 @dataclass(frozen=True, eq=False)
 class ExportInput:
-    """What exports are made from.
-
-    identification : Identification
-        the result
-    sources : sequence of RecordingSource
-        recordings that it was made from
-    effort_kind : EffortKind
-        what they hold
-    urdf : bytes or None
-        the robot's URDF, where its chain comes from one
-    created : datetime
-        when it was identified
-    """
+    """What exports are made from."""
 
     identification: Identification
     sources: Sequence[RecordingSource]
@@ -87,13 +69,6 @@ def make_export(export_format: ExportFormat, given: ExportInput) -> bytes:
     """The content of an export.
 
     Controllers get the delivered friction; simulators the physically consistent links with the friction that fits them.
-
-    Parameters
-    ----------
-    export_format : ExportFormat
-        what to write
-    given : ExportInput
-        what to write it from
 
     Raises
     ------
@@ -121,11 +96,6 @@ def make_export(export_format: ExportFormat, given: ExportInput) -> bytes:
 def compensation_model(given: ExportInput) -> CompensationModel:
     """Friction compensation of an identified robot.
 
-    Parameters
-    ----------
-    given : ExportInput
-        the identification and where it came from
-
     Raises
     ------
     ExportError
@@ -142,13 +112,7 @@ def compensation_model(given: ExportInput) -> CompensationModel:
 
 
 def simulator_models(identification: Identification) -> dict[str, JointModel]:
-    """Physically consistent links, friction and rotors by joint name.
-
-    Parameters
-    ----------
-    identification : Identification
-        the result
-    """
+    """Physically consistent links, friction and rotors by joint name."""
     parameters = identification.consistent_parameters
     robot = identification.robot
     rotors = [_coefficient(identification, parameters, joint, "rotor_inertia") for joint in range(robot.joint_count)]
@@ -161,8 +125,6 @@ def joint_frictions(identification: Identification, parameters: np.ndarray) -> l
 
     Parameters
     ----------
-    identification : Identification
-        the result, for the model's columns and the shape constants
     parameters : (p,) float64
         of the model's columns
     """

@@ -21,10 +21,6 @@ from tauscope.robot.messages import one_line, shown
 class JointModel:
     """One joint's part of the model; None leaves what the file says as it is.
 
-    link : LinkInertia or None
-        the link that the joint carries, in its link frame, bodies on fixed joints included
-    friction : JointFriction or None
-        coefficients
     rotor_inertia : float or None
         the motor's inertia reflected to the joint [kg m² or kg]
     """
@@ -61,19 +57,8 @@ def joint_models(
 
     Parameters
     ----------
-    robot : Robot
-        the arm
-    links : sequence of LinkInertia, length n
-        identified links, in their link frames
-    friction : sequence of JointFriction, length n
-        identified friction
     rotor_inertia : sequence of float or None, length n, optional
         identified rotor inertias [kg m² or kg]
-
-    Returns
-    -------
-    dict of str to JointModel
-        one entry a joint, in chain order
     """
     rotors = [None] * robot.joint_count if rotor_inertia is None else rotor_inertia
     rows = zip(robot.joints, links, friction, rotors, strict=True)
@@ -82,18 +67,6 @@ def joint_models(
 
 def centred(joint: str, link: LinkInertia) -> CentredInertia:
     """Centre of mass and inertia about it: I_c = I - m (sᵀs 1 - s sᵀ), equation (5) reversed.
-
-    Parameters
-    ----------
-    joint : str
-        name of the joint that carries the link, for messages
-    link : LinkInertia
-        inertia about the link frame's origin
-
-    Returns
-    -------
-    CentredInertia
-        mass, centre, inertia
 
     Raises
     ------
@@ -113,13 +86,6 @@ def centred(joint: str, link: LinkInertia) -> CentredInertia:
 def dry_friction_and_damping(joint: str, friction: JointFriction) -> tuple[float, float]:
     """The two numbers that simulators hold: τ_s + τ_sc and τ_v, neither below zero.
 
-    Parameters
-    ----------
-    joint : str
-        the joint's name, for messages
-    friction : JointFriction
-        coefficients
-
     Returns
     -------
     tuple of two float
@@ -135,22 +101,7 @@ def dry_friction_and_damping(joint: str, friction: JointFriction) -> tuple[float
 
 
 def friction_notes(joint: str, friction: JointFriction, format_name: str) -> list[str]:
-    """What is lost of a joint's friction in a format that holds a dry level and a damping.
-
-    Parameters
-    ----------
-    joint : str
-        the joint's name
-    friction : JointFriction
-        coefficients
-    format_name : str
-        "URDF" or "MJCF"
-
-    Returns
-    -------
-    list of str
-        one sentence each; empty where nothing is lost
-    """
+    """What is lost of a joint's friction in a format that holds a dry level and a damping."""
     notes = []
     if friction.stribeck != 0.0:
         notes.append(

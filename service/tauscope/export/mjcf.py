@@ -16,13 +16,7 @@ from tauscope.robot.messages import one_line, shown
 
 @dataclass(frozen=True)
 class MjcfModel:
-    """A MuJoCo model.
-
-    text : str
-        the file
-    notes : tuple of str
-        what the format cannot hold and what was decided; also a comment in the file
-    """
+    """A MuJoCo model."""
 
     text: str
     notes: tuple[str, ...]
@@ -33,18 +27,6 @@ def to_mjcf(robot: Robot, models: Mapping[str, JointModel]) -> MjcfModel:
 
     A body's frame is the link frame, and joint positions are the robot file's. damping = τ_v; frictionloss =
     τ_s + τ_sc, the Coulomb level at speed; armature is the rotor's inertia where it was identified, else 0.
-
-    Parameters
-    ----------
-    robot : Robot
-        chain, limits and gravity
-    models : mapping of str to JointModel
-        link, friction and rotor inertia by joint name; every joint's link must be there
-
-    Returns
-    -------
-    MjcfModel
-        the file and the notes
 
     Raises
     ------

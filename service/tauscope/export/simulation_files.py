@@ -27,17 +27,7 @@ INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 
 
 def improved_robot(diagnosis: Diagnosis, source: Path, target: Path) -> str:
-    """The robot file with the identified links, friction and shapes of friction in place of its own.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        the result
-    source : Path
-        the robot file that it was made with; comments and other keys stay
-    target : Path
-        where the new one goes: a URDF's path is written relative to it
-    """
+    """The robot file with the identified links, friction and shapes of friction in place of its own."""
     yaml = YAML(typ="rt")
     yaml.width = 4096
     data = yaml.load(source.read_text(encoding="utf-8"))
@@ -62,13 +52,7 @@ def improved_robot(diagnosis: Diagnosis, source: Path, target: Path) -> str:
 
 
 def scenario_text(diagnosis: Diagnosis) -> str:
-    """The findings as a scenario file, beside the robot file of `improved_robot`.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        the result
-    """
+    """The findings as a scenario file, beside the robot file of `improved_robot`."""
     model = diagnosis.selection.fit.model
     joints = [joint.name for joint in diagnosis.robot.joints]
     values = dict(zip(model.structure.names, map(float, model.parameters), strict=True))

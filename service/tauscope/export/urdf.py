@@ -19,13 +19,7 @@ _INERTIA = (("ixx", 0, 0), ("ixy", 0, 1), ("ixz", 0, 2), ("iyy", 1, 1), ("iyz", 
 
 @dataclass(frozen=True)
 class PatchedUrdf:
-    """A URDF with the identified model in it.
-
-    data : bytes
-        the file
-    notes : tuple of str
-        what the format cannot hold and what was decided; also a comment in the file
-    """
+    """A URDF with the identified model in it."""
 
     data: bytes
     notes: tuple[str, ...]
@@ -38,18 +32,6 @@ def patch_urdf(source: bytes | Path, models: Mapping[str, JointModel]) -> Patche
     frame's axes. ``<dynamics>`` gets damping = τ_v and friction = τ_s + τ_sc, the Coulomb level at speed. Links on
     fixed joints below are part of the identified link: their own inertials are set to zero, not removed, because
     simulators make up a mass from the shapes of a link that has none.
-
-    Parameters
-    ----------
-    source : bytes or Path
-        the URDF, or where it is
-    models : mapping of str to JointModel
-        what to write, by the URDF's joint names; each link in the frame of the URDF link that its joint carries
-
-    Returns
-    -------
-    PatchedUrdf
-        the new file and the notes
 
     Raises
     ------

@@ -16,16 +16,6 @@ _TAG_END = re.compile(rb"""(?:[^>"']|"[^"]*"|'[^']*')*>""")
 class Element:
     """An element and where it stands in the file, in bytes.
 
-    name : str
-        as written, with its prefix
-    attributes : mapping of str to str
-        values after unescaping
-    start, open_end : int
-        span of the start tag
-    close_start, end : int
-        where the end tag starts and ends; both equal `open_end` for an element that is empty as ``<name/>``
-    children : list of Element
-        child elements
     comments : list of (int, int)
         spans of the comments directly inside
     """
@@ -45,13 +35,7 @@ class Element:
         return self.name[: self.name.rfind(":") + 1]
 
     def named(self, kind: str) -> Iterator["Element"]:
-        """Children of one kind, whatever their prefix.
-
-        Parameters
-        ----------
-        kind : str
-            local name
-        """
+        """Children of one kind, whatever their prefix."""
         return (child for child in self.children if child.name.rpartition(":")[2] == kind)
 
 
@@ -67,13 +51,6 @@ class Edit:
 class XmlText:
     """The bytes of an XML file, its elements, and the edits that are to be made.
 
-    Parameters
-    ----------
-    data : bytes
-        the file, in UTF-8
-    label : str
-        the file's name, for messages
-
     Raises
     ------
     ExportError
@@ -87,15 +64,7 @@ class XmlText:
         self._edits: list[Edit] = []
 
     def set_attributes(self, element: Element, values: Mapping[str, str]) -> None:
-        """Change attributes of an element in place; those that are missing are added after the last one.
-
-        Parameters
-        ----------
-        element : Element
-            of this file
-        values : mapping of str to str
-            new values by attribute name
-        """
+        """Change attributes of an element in place; those that are missing are added after the last one."""
         missing = dict(values)
         last = element.start + 1 + len(element.name.encode())
         for match in _ATTRIBUTE.finditer(self.data, last, element.open_end):
@@ -110,15 +79,7 @@ class XmlText:
             self._edits.append(Edit(last, last, added))
 
     def append_child(self, parent: Element, lines: list[str]) -> None:
-        """Add lines of XML as the last child of an element, indented as its other children are.
-
-        Parameters
-        ----------
-        parent : Element
-            of this file
-        lines : list of str
-            XML; indentation below the first line is kept
-        """
+        """Add lines of XML as the last child of an element, indented as its other children are."""
         inner = self._indent(parent.children[0]) if parent.children else self._indent(parent) + b"  "
         text = b"".join(self.newline + inner + line.encode() for line in lines)
         if parent.close_start == parent.open_end == parent.end:
@@ -133,17 +94,7 @@ class XmlText:
         self._edits.append(Edit(place, stop, text + closing))
 
     def set_comment(self, parent: Element, marker: str, text: str) -> None:
-        """Write a comment right after an element's start tag, or over an earlier one that begins with the same marker.
-
-        Parameters
-        ----------
-        parent : Element
-            of this file
-        marker : str
-            first words of the comment
-        text : str
-            what follows the marker; ASCII, two hyphens in a row are parted
-        """
+        """Write a comment after an element's start tag, or over an earlier one that begins with the same marker."""
         body = f"{marker}{text}".replace("--", "- -").replace("--", "- -")
         comment = f"<!-- {body} -->".encode("ascii", "backslashreplace").replace(b"\n", self.newline)
         for start, stop in parent.comments:

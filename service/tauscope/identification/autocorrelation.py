@@ -41,10 +41,6 @@ class Autoregression:
 
     coefficients : (p,) float64
         a_1 … a_p; empty for white noise
-    innovation_variance : float
-        variance of ε
-    variance : float
-        variance of e
     """
 
     coefficients: Array
@@ -105,8 +101,6 @@ class LaggedProducts:
             consecutive samples
         used : (M,) bool
             which of them count
-        lags : int
-            largest lag K
         """
         sums = LaggedProducts(np.zeros(lags + 1), np.zeros(lags + 1), np.zeros(lags + 1))
         whole = bool(used.all())
@@ -121,13 +115,7 @@ class LaggedProducts:
 
 
 class AutocovarianceSum:
-    """Lagged products of a residual, summed over pieces with samples missing.
-
-    Parameters
-    ----------
-    lags : int
-        largest lag; bounds the order of the model
-    """
+    """Lagged products of a residual, summed over pieces with samples missing."""
 
     def __init__(self, lags: int = LARGEST_ORDER) -> None:
         self._sums = LaggedProducts(np.zeros(lags + 1), np.zeros(lags + 1), np.zeros(lags + 1))
@@ -138,8 +126,6 @@ class AutocovarianceSum:
 
         Parameters
         ----------
-        piece : LaggedProducts
-            its products; lags that only one of the two has are left out
         filtered_white : (K + 1,) float64 or None
             autocovariance of white noise that passed the filter which the residual passed; None where it passed none
         """

@@ -79,15 +79,6 @@ SMOOTHING = np.sqrt(2.0)
 def choose_cutoff(conditioners: Sequence[Conditioner], robot: Robot, base: BaseParameters) -> float | None:
     """Cut-off of the common band, chosen from the data.
 
-    Parameters
-    ----------
-    conditioners : sequence of Conditioner
-        the recordings
-    robot : Robot
-        the arm
-    base : BaseParameters
-        its identifiable combinations
-
     Returns
     -------
     float or None
@@ -118,11 +109,6 @@ def quiet_limit(conditioners: Sequence[Conditioner]) -> float | None:
 
     Where one recording stands the band f_r, its motion has the energy of its noise up to there, which grows as f⁵: all
     of them stand f⁵ = Σ w_r f_r⁵ / Σ w_r, each by the noise w_r that it brings, density times duration.
-
-    Parameters
-    ----------
-    conditioners : sequence of Conditioner
-        the recordings
     """
     limits = np.array([c.noise.joint_limits_hz for c in conditioners])
     moving = np.array([c.moving for c in conditioners])
@@ -292,15 +278,7 @@ def _smoothed(power: Array, frequency: Array) -> Array:
 
 
 def preliminary_terms(motions: Dataset, robot: Robot) -> tuple[JointTerms, ...]:
-    """Friction steps of an ordinary steepness, for fits made before the shape constants are known.
-
-    Parameters
-    ----------
-    motions : Dataset
-        the data, for the joints' typical speeds
-    robot : Robot
-        constants that its file states are used
-    """
+    """Friction steps of an ordinary steepness, for fits made before the shape constants are known."""
     steepness = ORDINARY / rms_speed(islice(motions, ENOUGH_PIECES))
     return tuple(
         JointTerms(joint.friction_shape.k_v or float(default), joint.friction_shape.delta)

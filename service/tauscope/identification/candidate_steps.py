@@ -47,15 +47,7 @@ class JointGrid:
         return len(self.slopes)
 
     def block(self, other: "JointGrid", mine: list[int], theirs: list[int]) -> Array:
-        """Projected Gram matrix between columns of two joints.
-
-        Parameters
-        ----------
-        other : JointGrid
-            the second joint's candidates, or these
-        mine, theirs : list of int
-            candidates of either
-        """
+        """Projected Gram matrix between columns of two joints, (mine, theirs)."""
         product = -self.inner[:, mine].T @ other.inner[:, theirs]
         return product + self.gram[np.ix_(mine, theirs)] if self is other else product
 
@@ -72,14 +64,8 @@ def projected_grids(
 
     Parameters
     ----------
-    motions : iterable of PreparedMotion
-        the data, in pieces
-    structure : ModelStructure
-        the model's columns
     shared : (z,) int
         its global columns that do not depend on any shape constant, ascending
-    solution : Solution
-        the estimate with these columns alone
     noise_std : (n,) float64
         residual standard deviation of every joint, for the weights [Nm or N]
     slopes : list of (g,) float64, length n
@@ -108,15 +94,7 @@ def projected_grids(
 
 
 def total_gain(grids: list[JointGrid], chosen: list[list[int]]) -> float:
-    """What the chosen columns of all joints together take off the criterion.
-
-    Parameters
-    ----------
-    grids : list of JointGrid
-        one a joint
-    chosen : list of list of int
-        its candidates that the model has
-    """
+    """What the chosen columns of all joints together take off the criterion."""
     pairs = list(zip(grids, chosen, strict=True))
     matrix = np.block([[a.block(b, i, j) for b, j in pairs] for a, i in pairs])
     target = np.concatenate([grid.target[indices] for grid, indices in pairs])
@@ -142,10 +120,6 @@ class Conditional:
 
         Parameters
         ----------
-        grids : list of JointGrid
-            one a joint
-        chosen : list of list of int
-            their candidates that the model has
         joint : int
             joint index, from 0
         """
@@ -161,15 +135,7 @@ class Conditional:
         return Conditional(gram - cross.T @ solved[:, :-1], target - cross.T @ solved[:, -1])
 
     def gains(self, options: list[list[int]], *, physical: bool = False) -> Array:
-        """What each option, one or two columns, takes off the criterion.
-
-        Parameters
-        ----------
-        options : list of list of int
-            candidates, all of them one or all of them two
-        physical : bool
-            whether a pair counts only where friction falls from τ_s > 0 to a lower τ_s + τ_sc ≥ 0
-        """
+        """What each option, one or two columns, takes off the criterion, (options,)."""
         first = np.array([option[0] for option in options])
         energy = np.maximum(np.diag(self.gram), np.finfo(float).tiny)
         single = self.target[first] ** 2 / energy[first]

@@ -35,20 +35,10 @@ def parameter_covariance(
 
     Parameters
     ----------
-    motions : iterable of PreparedMotion
-        the data, in pieces; gone through only for joints whose residual is coloured or whose shape was estimated
-    structure : ModelStructure
-        the model's columns
     parameters : (p,) float64
         the estimate
-    factors : sequence of JointFactor, length n
-        of this model on these data
     weight : (n,) float64
         w_j, the weights that the estimate was made with
-    autoregressions : sequence of Autoregression, length n
-        of each joint's residual in the common band
-    shapes : sequence of ShapeParameter
-        shape constants that were estimated, s of them
 
     Returns
     -------

@@ -20,8 +20,6 @@ MEMORY_LIMIT = 256 * 1024 * 1024
 class PreparedMotion:
     """One piece of motion with its rigid-body columns.
 
-    motion : Motion
-        the conditioned motion
     rigid : tuple of (m_j, N) float64, length n
         base regressor L at the recorded rate: of each joint's row the columns of the links that it moves
     reduced_rigid : tuple of (m_j, M) float64, length n
@@ -30,8 +28,6 @@ class PreparedMotion:
         measured torque in the common band, mean of the repetitions
     used : (n, M) bool
         rows that rest on measured torque
-    recording : int
-        index of the recording it came from
     """
 
     motion: Motion
@@ -56,8 +52,6 @@ class PreparedMotion:
 
         Parameters
         ----------
-        structure : ModelStructure
-            the model's columns
         joint : int
             joint index, from 0
         """
@@ -68,8 +62,6 @@ class PreparedMotion:
 
         Parameters
         ----------
-        structure : ModelStructure
-            the model's columns
         joint : int
             joint index, from 0
         """
@@ -82,8 +74,6 @@ class PreparedMotion:
 
         Parameters
         ----------
-        structure : ModelStructure
-            the model's columns
         parameters : (p,) float64
             one parameter set
         """
@@ -101,8 +91,6 @@ class PreparedMotion:
 
         Parameters
         ----------
-        structure : ModelStructure
-            the model's columns
         candidates : (c, p) float64
             parameter sets
 
@@ -126,12 +114,6 @@ class PreparedMotion:
 class Dataset:
     """All pieces of motion of some recordings, in one band, that can be gone through again and again.
 
-    conditioners : sequence of Conditioner
-        one a recording
-    robot : Robot
-        the arm
-    base : BaseParameters
-        its identifiable combinations
     cutoff_hz : float or None
         the common band; None for no filter
     """
@@ -169,19 +151,7 @@ class Dataset:
 
 
 def prepared_motion(motion: Motion, robot: Robot, base: BaseParameters, recording: int) -> PreparedMotion:
-    """One piece of motion with its rigid-body columns, at the recorded rate and in the common band.
-
-    Parameters
-    ----------
-    motion : Motion
-        the conditioned motion
-    robot : Robot
-        the arm
-    base : BaseParameters
-        its identifiable combinations
-    recording : int
-        index of the recording it came from
-    """
+    """One piece of motion with its rigid-body columns, at the recorded rate and in the common band."""
     regressor = TorqueRegressor(robot, columns=base.independent_columns)
     whole = np.empty((robot.joint_count, regressor.column_count, len(motion.position)))
     regressor.write_shares(motion.position, motion.velocity, motion.acceleration, whole)
@@ -205,13 +175,7 @@ def _without_jitter(motion: Motion, moving: Mask) -> Motion:
 
 
 def rms_speed(motions: Iterable[PreparedMotion]) -> Array:
-    """Root mean square of every joint's velocity, at least 1e-9, (n,) [rad/s or m/s].
-
-    Parameters
-    ----------
-    motions : iterable of PreparedMotion
-        the data, in pieces; at least one
-    """
+    """Root mean square of every joint's velocity, at least 1e-9, (n,) [rad/s or m/s]."""
     squares, count = 0.0, 0
     for prepared in motions:
         squares = squares + np.sum(prepared.motion.velocity**2, axis=0)

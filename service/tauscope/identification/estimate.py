@@ -24,15 +24,6 @@ class Estimator(StrEnum):
 def estimate(factors: tuple[JointFactor, ...], size: int, estimator: Estimator) -> tuple[Array, Solution]:
     """LS, or WLS with σ_j estimated from the residual and the equations solved again.
 
-    Parameters
-    ----------
-    factors : tuple of JointFactor
-        one a joint
-    size : int
-        number of parameters p
-    estimator : Estimator
-        how the joints are weighted
-
     Returns
     -------
     tuple of (n,) float64 and Solution
@@ -49,13 +40,7 @@ def estimate(factors: tuple[JointFactor, ...], size: int, estimator: Estimator) 
 
 
 def single_joint_std(factors: tuple[JointFactor, ...]) -> Array:
-    """A first σ_j of every joint: what its own equations leave, solved without the other joints', (n,).
-
-    Parameters
-    ----------
-    factors : tuple of JointFactor
-        one a joint
-    """
+    """A first σ_j of every joint: what its own equations leave, solved without the other joints', (n,)."""
     return _noise_std(factors, [factor.least_squared_residual for factor in factors], 0)
 
 

@@ -86,28 +86,13 @@ def estimate_shapes(
 
     Parameters
     ----------
-    motions : iterable of PreparedMotion
-        the data; gone through once
-    structure : ModelStructure
-        a preliminary model
-    factors : tuple of JointFactor
-        of that model on these data
     noise_std : (n,) float64
         residual standard deviation in the common band, for the weights
     unit : (n,) float64
         one noise variance, inflated by autocorrelation, relative to `noise_std`²: the measure of what the data can
         tell; zeros for the best candidates whatever they are worth
-    stribeck : sequence of bool, length n
-        joints at which a Stribeck term of unknown δ may be proposed
     speed : (n,) float64
         rms velocity of every joint, which the candidates are relative to [rad/s or m/s]
-    tight : sequence of bool, length n, or None
-        joints whose K_v has a small standard error, which is as good as a profile that falls; none where None
-
-    Returns
-    -------
-    tuple of EstimatedShape
-        one a joint
     """
     given = [joint.friction_shape for joint in structure.robot.joints]
     shared = _shared_columns(structure)
@@ -295,13 +280,7 @@ def gentle_range(k_v: float, speed: float) -> tuple[float, float]:
 
 
 def shape_parameters(shapes: Sequence[EstimatedShape]) -> list[tuple[int, str]]:
-    """The constants that were estimated and not merely chosen: they are refined, and share in the covariance.
-
-    Parameters
-    ----------
-    shapes : sequence of EstimatedShape
-        one a joint
-    """
+    """The constants that were estimated and not merely chosen: they are refined, and share in the covariance."""
     estimated: list[tuple[int, str]] = []
     for joint, shape in enumerate(shapes):
         paired = shape.delta is not None and not shape.delta_given

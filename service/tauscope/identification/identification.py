@@ -37,12 +37,8 @@ Progress = Callable[[str], None]
 class Options:
     """What a user may ask of an identification.
 
-    estimator : Estimator
-        LS (17) or WLS (19)
     cutoff_hz : float, None or "auto"
         band that torque and regressor share [Hz]; None for no filter; chosen from the data by default
-    rotor_inertia : bool
-        whether rotors are added where the data ask for them
     """
 
     estimator: Estimator = Estimator.WLS
@@ -54,40 +50,16 @@ class Options:
 class Identification:
     """A model of the arm with what is known about its uncertainty.
 
-    robot : Robot
-        the arm
-    structure : ModelStructure
-        the model's columns
     parameters : (p,) float64
         the model that is delivered: the free estimate, or the consistent one where physics rejects the free one
     free_parameters : (p,) float64
         the LS or WLS estimate
     consistent_parameters : (p,) float64
         the nearest physically consistent parameters in the same columns
-    constrained : bool
-        whether `parameters` are the consistent ones
     covariance : (p + s, p + s) float64
         of the free estimate, and of the logarithms of the estimated shape constants
     undetermined : (p,) bool
         parameters about which the recordings say nothing
-    shapes : tuple of EstimatedShape, length n
-        the friction curves' shape constants
-    consistent : ConsistentParameters
-        full standard parameters of the links
-    condition_number : float
-        of the unweighted regressor
-    residuals : ResidualStatistics
-        of `parameters` on the recordings: fit, noise, autocorrelation
-    consistent_fit, held_out, held_out_consistent : Fit or None
-        fits of the consistent parameters; of `parameters` and of the consistent ones on the held-out recordings
-    cutoff_hz : float or None
-        the band that was used
-    estimator : Estimator
-        how it was weighted
-    conditioning, held_out_conditioning : tuple of ConditioningSummary
-        one a recording
-    identifiable : tuple of dict, length n
-        per joint and coefficient, whether the data can tell it
     """
 
     robot: Robot
@@ -121,24 +93,6 @@ def identify(
     progress: Progress = lambda step: None,
 ) -> Identification:
     """Identify a robot arm from recordings.
-
-    Parameters
-    ----------
-    robot : Robot
-        the arm
-    recordings : sequence of Recording
-        what the model is made from; each one continuous motion
-    held_out : sequence of Recording
-        what it is judged by, never used for the estimate
-    options : Options
-        estimator, band, optional terms
-    progress : callable
-        told the name of each step as it begins
-
-    Returns
-    -------
-    Identification
-        the model and its uncertainty
 
     Raises
     ------

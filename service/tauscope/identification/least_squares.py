@@ -40,8 +40,6 @@ class JointFactor:
         global columns of the model
     triangle : (p_j + 1, p_j + 1) float64
         R_j of [A_j | y_j]
-    rows : int
-        number of equations
     """
 
     columns: NDArray[np.intp]
@@ -98,18 +96,6 @@ class Solution:
 def factorise(motions: Iterable[PreparedMotion], structure: ModelStructure) -> tuple[JointFactor, ...]:
     """One pass over the data: every joint's triangular factor.
 
-    Parameters
-    ----------
-    motions : iterable of PreparedMotion
-        the data, in pieces
-    structure : ModelStructure
-        the model's columns
-
-    Returns
-    -------
-    tuple of JointFactor
-        one a joint
-
     Raises
     ------
     IdentificationError
@@ -143,17 +129,8 @@ def solve(factors: tuple[JointFactor, ...], size: int, noise_std: Array) -> Solu
 
     Parameters
     ----------
-    factors : tuple of JointFactor
-        one a joint
-    size : int
-        number of parameters p
     noise_std : (n,) float64
         σ_j; all ones for LS
-
-    Returns
-    -------
-    Solution
-        the estimate with what its covariance needs
     """
     triangle = stacked_factor(factors, size, noise_std)
     return _solved(triangle[:size, :size], triangle[:size, size])
@@ -164,10 +141,6 @@ def stacked_factor(factors: tuple[JointFactor, ...], size: int, noise_std: Array
 
     Parameters
     ----------
-    factors : tuple of JointFactor
-        one a joint
-    size : int
-        number of parameters p
     noise_std : (n,) float64
         σ_j, by which the equations are divided
     """
@@ -186,8 +159,6 @@ def restricted(factors: tuple[JointFactor, ...], keep: NDArray[np.intp]) -> tupl
 
     Parameters
     ----------
-    factors : tuple of JointFactor
-        factors of the larger model
     keep : (k,) int
         its global columns that stay, ascending; they are numbered anew from 0
     """
@@ -202,15 +173,7 @@ def restricted(factors: tuple[JointFactor, ...], keep: NDArray[np.intp]) -> tupl
 
 
 def condition_number(factors: tuple[JointFactor, ...], size: int) -> float:
-    """Condition number of a regressor: largest over smallest singular value, at most 1/ε: more is rounding.
-
-    Parameters
-    ----------
-    factors : tuple of JointFactor
-        one a joint; the condition number is that of their unweighted equations
-    size : int
-        number of parameters p
-    """
+    """Condition number of a regressor: largest over smallest singular value, at most 1/ε: more is rounding."""
     unweighted = stacked_factor(factors, size, np.ones(len(factors)))[:size, :size]
     singular = np.linalg.svd(unweighted, compute_uv=False)
     return float(singular[0] / max(singular[-1], singular[0] * np.finfo(float).eps, np.finfo(float).tiny))

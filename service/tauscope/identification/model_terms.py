@@ -32,24 +32,7 @@ five standard errors, with the term's two unknowns τ_sc and δ."""
 def choose_model(
     motions: Dataset, robot: Robot, base: BaseParameters, *, rotor_inertia: bool
 ) -> tuple[ModelStructure, tuple[EstimatedShape, ...], tuple[JointFactor, ...]]:
-    """The terms that the data ask for: friction shapes, Stribeck terms, rotors.
-
-    Parameters
-    ----------
-    motions : Dataset
-        the data
-    robot : Robot
-        the arm; shape constants that its file states are kept
-    base : BaseParameters
-        its identifiable combinations
-    rotor_inertia : bool
-        whether rotors may be added
-
-    Returns
-    -------
-    tuple of ModelStructure, tuple of EstimatedShape and tuple of JointFactor
-        the model's columns, its shape constants, and the data's factors in these columns
-    """
+    """The terms that the data ask for: friction shapes, Stribeck terms, rotors."""
     given = [joint.friction_shape for joint in robot.joints]
     separable = separable_rotors(robot, base) if rotor_inertia else (False,) * robot.joint_count
     structure = _with_rotors(ModelStructure(robot, base, preliminary_terms(motions, robot)), separable)

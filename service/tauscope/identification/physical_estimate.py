@@ -31,18 +31,6 @@ def consistent_estimate(structure: ModelStructure, solution: Solution) -> Consis
     Data that no arm could have made may put the estimate millions of standard errors away from any body. The program is
     then solved for a noise ten times as large, and so on: the same nearest point, with a prior that weighs more.
 
-    Parameters
-    ----------
-    structure : ModelStructure
-        the model's columns
-    solution : Solution
-        the free estimate
-
-    Returns
-    -------
-    ConsistentParameters
-        full standard parameters of all links, then the joints' coefficients
-
     Raises
     ------
     IdentificationError
@@ -89,8 +77,6 @@ def in_model_columns(structure: ModelStructure, full: Array) -> Array:
 
     Parameters
     ----------
-    structure : ModelStructure
-        the model's columns, p of them
     full : (10 n + k,) float64
         standard parameters of all links, then the joints' coefficients
 
@@ -107,13 +93,6 @@ def is_rejected(consistent: ConsistentParameters, free: ResidualStatistics) -> b
     """Whether no body can have the free estimate, beyond what noise explains.
 
     The cost of consistency is χ²-like in the noise's own units; a residual that is coloured counts for fewer samples.
-
-    Parameters
-    ----------
-    consistent : ConsistentParameters
-        the nearest consistent model
-    free : ResidualStatistics
-        residuals of the free estimate
     """
     inflation = float(np.mean([model.long_run_ratio for model in free.autoregressions]))
     allowed = stats.chi2.ppf(CONSISTENCY_LEVEL, df=len(consistent.parameters)) * inflation

@@ -15,11 +15,6 @@ FASTEST = 1e4
 def require_motion(conditioners: Sequence[Conditioner]) -> None:
     """Refuse recordings in which no joint leaves the noise of its own encoder, or one moves as nothing can.
 
-    Parameters
-    ----------
-    conditioners : sequence of Conditioner
-        the surveyed recordings
-
     Raises
     ------
     IdentificationError

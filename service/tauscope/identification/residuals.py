@@ -34,8 +34,6 @@ class Fit:
         root mean square of the torque residual at the recorded rate, no filter [Nm or N]
     band_rms : (n,) float64
         the same in the common band
-    relative_error : float
-        ‖τ - τ̂‖ / ‖τ‖ over all joints, in the common band
     """
 
     rms: Array
@@ -47,15 +45,8 @@ class Fit:
 class ResidualStatistics:
     """What the residuals of one parameter set tell.
 
-    fit : Fit
-        sizes of the residual
     period_noise_std : (n,) float64 or None
         standard deviation of the torque noise from what differs between periods; None without enough periods
-    raw_lags, band_lags : tuple of AutocovarianceSum, length n
-        autocovariances of the residual at the recorded rate, and in the common band; one where nothing was filtered or
-        averaged
-    unfiltered : bool
-        whether the common band is the whole spectrum
     """
 
     fit: Fit
@@ -105,17 +96,8 @@ def evaluate(
 
     Parameters
     ----------
-    motions : iterable of PreparedMotion
-        the data, in pieces
-    structure : ModelStructure
-        the model's columns
     candidates : sequence of (p,) float64
         parameter sets
-
-    Returns
-    -------
-    tuple of ResidualStatistics
-        one a parameter set
     """
     sums = [_Sums(structure.robot.joint_count) for _ in candidates]
     for prepared in motions:

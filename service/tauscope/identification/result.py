@@ -142,18 +142,7 @@ class IdentificationDocument(Document):
 
 
 def document(identification: Identification) -> IdentificationDocument:
-    """The document of an identification.
-
-    Parameters
-    ----------
-    identification : Identification
-        the result of `identify`
-
-    Returns
-    -------
-    IdentificationDocument
-        plain data; `model_dump_json(by_alias=True)` writes it
-    """
+    """The document of an identification."""
     result = identification
     names = _standard_names(result.robot.joint_count)
     return IdentificationDocument(

@@ -33,15 +33,6 @@ PROBE_STATES = 30
 def separable_rotors(robot: Robot, base: BaseParameters, seed: int = 0) -> tuple[bool, ...]:
     """Joints whose rotor inertia no combination of link parameters, offsets and viscous friction can imitate.
 
-    Parameters
-    ----------
-    robot : Robot
-        the arm
-    base : BaseParameters
-        its identifiable combinations
-    seed : int
-        of the random states that are probed
-
     Returns
     -------
     tuple of bool, length n
@@ -75,10 +66,6 @@ def needed_rotors(
 
     Parameters
     ----------
-    factors : tuple of JointFactor
-        of the model with all separable rotors
-    structure : ModelStructure
-        that model
     noise_std : (n,) float64
         residual standard deviation of each joint in the common band
     inflation : (n,) float64
@@ -134,13 +121,6 @@ def _needed_gain(structure: ModelStructure, joint: int, inflation: float, rows: 
 
 def kept_columns(structure: ModelStructure, rotors: set[int]) -> np.ndarray:
     """Global columns of a model when only some of its rotors stay.
-
-    Parameters
-    ----------
-    structure : ModelStructure
-        the model with all its rotors
-    rotors : set of int
-        joints whose rotor stays
 
     Returns
     -------

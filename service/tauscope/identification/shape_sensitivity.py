@@ -42,16 +42,10 @@ def columns_with_shapes(
 
     Parameters
     ----------
-    prepared : PreparedMotion
-        one piece of the data
-    structure : ModelStructure
-        the model's columns, p of them
     joint : int
         joint index, from 0
     parameters : (p,) float64
         the coefficients, for the amplitudes c
-    shapes : sequence of ShapeParameter
-        all estimated shape constants, in the order of their global columns p, p + 1, …
 
     Returns
     -------
@@ -87,23 +81,12 @@ def refined_structure(
 
     Parameters
     ----------
-    motions : iterable of PreparedMotion
-        the data; gone through once a step
-    structure : ModelStructure
-        the model with constants near the optimum
     parameters : (p,) float64
         its coefficients
     weight : (n,) float64
         1/σ_j of every joint
-    shapes : sequence of ShapeParameter
-        the constants that were estimated
     speed : (n,) float64
         rms velocity of every joint [rad/s or m/s]
-
-    Returns
-    -------
-    ModelStructure
-        with refined constants; a K_v that runs away stays where it was, a δ ends at an end of its range
     """
     start = structure
     for _ in range(STEPS):
@@ -124,7 +107,7 @@ def refined_structure(
 
 
 def pseudo_inverse(matrix: Array) -> Array:
-    """Inverse of a normal matrix in scaled columns; directions without information are left out.
+    """Inverse (p, p) of a normal matrix in scaled columns; directions without information are left out.
 
     Parameters
     ----------

@@ -24,8 +24,6 @@ class JointTerms:
         slope of the friction's step at zero velocity [s/rad or s/m]
     delta : float or None
         slope of the Stribeck term [s/rad or s/m]; None where the joint has no such term
-    rotor : bool
-        whether the reflected rotor inertia I_a is a parameter
     """
 
     k_v: float
@@ -42,15 +40,7 @@ class JointTerms:
 
 @dataclass(frozen=True, eq=False)
 class ModelStructure:
-    """The linear model's columns in their global order.
-
-    robot : Robot
-        the arm
-    base : BaseParameters
-        its identifiable combinations
-    terms : tuple of JointTerms
-        one a joint
-    """
+    """The linear model's columns in their global order."""
 
     robot: Robot
     base: BaseParameters
@@ -79,8 +69,6 @@ class ModelStructure:
         ----------
         joint : int
             joint index, from 0
-        name : str
-            ``stiction``, ``stribeck``, ``viscous``, ``offset`` or ``rotor_inertia``
         """
         names = self.terms[joint].names
         if name not in names:
@@ -88,7 +76,7 @@ class ModelStructure:
         return self.base_count + sum(len(terms.names) for terms in self.terms[:joint]) + names.index(name)
 
     def joint_columns(self, joint: int) -> NDArray[np.intp]:
-        """Global columns that can be non-zero in a joint's equation: links from it outwards, and its own terms.
+        """Global columns, (p_j,), that can be non-zero in a joint's equation: links from it outwards, its own terms.
 
         Parameters
         ----------
@@ -100,7 +88,7 @@ class ModelStructure:
         return np.concatenate([self.outward_columns(joint), own])
 
     def outward_columns(self, joint: int) -> NDArray[np.intp]:
-        """Base columns of the links that a joint moves.
+        """Base columns of the links that a joint moves, (p_j,).
 
         Parameters
         ----------
@@ -135,11 +123,5 @@ class ModelStructure:
         return np.stack([rows[name]() for name in terms.names])
 
     def with_terms(self, terms: tuple[JointTerms, ...]) -> "ModelStructure":
-        """The same rigid body with other joint terms.
-
-        Parameters
-        ----------
-        terms : tuple of JointTerms
-            one a joint
-        """
+        """The same rigid body with other joint terms."""
         return replace(self, terms=terms)

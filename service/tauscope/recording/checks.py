@@ -18,13 +18,7 @@ _DEGREES_SPAN = 8 * np.pi
 
 @dataclass(frozen=True)
 class Periods:
-    """Repeats of the excitation.
-
-    count : int
-        how many are marked
-    shortest, longest : int
-        number of samples of the shortest and the longest
-    """
+    """Repeats of the excitation."""
 
     count: int
     shortest: int
@@ -35,32 +29,10 @@ class Periods:
 class RecordingReport:
     """What `check_recording` found.
 
-    name : str
-        the path as the user gave it
-    samples : int
-        number of samples N
     duration_s : float
         from the first to the last sample [s]
     rate_hz : float
         1 / median step [Hz]
-    steps : StepMeasures
-        the clock's steps
-    gaps : Gaps
-        where the clock skips
-    effort_kind : EffortKind
-        torque or drive units
-    columns : tuple of str
-        columns that are read
-    ignored_columns : tuple of str
-        columns that nobody reads
-    missed : dict of str to int
-        number of NaN in each column that has any
-    periods : Periods or None
-        repeats of the excitation, where they are marked
-    joints : tuple of JointMeasures
-        ranges and peculiarities, one a joint
-    findings : tuple of Finding
-        what to look at, warnings first
     """
 
     name: str
@@ -85,17 +57,8 @@ def check_recording(
 
     Parameters
     ----------
-    path : str or Path
-        the file or rosbag2 folder
     joint_count : int or None
         joints that the recording must have; None where any number is welcome
-    joint_names : tuple of str or None
-        the robot's joints in chain order, where known
-
-    Returns
-    -------
-    RecordingReport
-        figures and findings
 
     Raises
     ------
@@ -106,18 +69,7 @@ def check_recording(
 
 
 def report_recording(recording: Recording) -> RecordingReport:
-    """Report what a recording holds.
-
-    Parameters
-    ----------
-    recording : Recording
-        the recording
-
-    Returns
-    -------
-    RecordingReport
-        figures and findings
-    """
+    """Report what a recording holds."""
     measures = measure_rows(recording)
     gaps = measure_gaps(recording, measures)
     runs = measures.period_lengths

@@ -16,21 +16,7 @@ _JOINT_COLUMN = re.compile(r"(q|tau|i|qd|qdd|qref|taucmd|temp|qlink)([1-9][0-9]{
 
 @dataclass(frozen=True)
 class ColumnLayout:
-    """Where a table's columns are found in a file.
-
-    names : tuple of str
-        columns of the table, always in the order t, q, tau or i, optional groups, period
-    source : tuple of int
-        index in the file of each of them
-    width : int
-        number of columns of the file
-    joint_count : int
-        number of joints n
-    effort_kind : EffortKind
-        what stands in the effort columns
-    ignored : tuple of str
-        columns of the file that nobody reads
-    """
+    """Where a table's columns are found in a file."""
 
     names: tuple[str, ...]
     source: tuple[int, ...]
@@ -41,17 +27,7 @@ class ColumnLayout:
 
 
 def table_columns(joint_count: int, effort_kind: EffortKind, groups: Sequence[str] = ()) -> tuple[str, ...]:
-    """Names of a table's columns where every joint has every column.
-
-    Parameters
-    ----------
-    joint_count : int
-        number of joints n
-    effort_kind : EffortKind
-        torque (``tau``) or current (``i``)
-    groups : sequence of str
-        optional groups that are present, of `OPTIONAL_GROUPS`, and ``period``
-    """
+    """Names of a table's columns where every joint has every column."""
     prefixes = ["q", effort_kind.value, *(group for group in OPTIONAL_GROUPS if group in groups)]
     names = ["t", *(f"{prefix}{joint}" for prefix in prefixes for joint in range(1, joint_count + 1))]
     return (*names, "period") if "period" in groups else tuple(names)
@@ -59,18 +35,6 @@ def table_columns(joint_count: int, effort_kind: EffortKind, groups: Sequence[st
 
 def find_columns(header: Sequence[str], file: str) -> ColumnLayout:
     """Find the columns of CONTRACT.md in a file's header.
-
-    Parameters
-    ----------
-    header : sequence of str
-        column names as the file has them
-    file : str
-        name of the file, for messages
-
-    Returns
-    -------
-    ColumnLayout
-        order and meaning of the columns
 
     Raises
     ------
@@ -105,12 +69,8 @@ def require_joint_count(found: int, expected: int | None, file: str) -> None:
 
     Parameters
     ----------
-    found : int
-        joints of the recording
     expected : int or None
         joints of the robot; None where any number is welcome
-    file : str
-        name of the file, for messages
 
     Raises
     ------

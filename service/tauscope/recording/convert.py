@@ -22,17 +22,7 @@ FORMATS = (".csv", ".parquet", ".mcap")
 
 @dataclass(frozen=True)
 class Conversion:
-    """What `convert_recording` did.
-
-    source, target : str
-        the files, as the user gave them
-    samples : int
-        number of samples written
-    dropped_columns : tuple of str
-        columns of the source that the target cannot hold, or that nobody reads
-    damage : str or None
-        why the source could not be read further, where it was recovered
-    """
+    """What `convert_recording` did."""
 
     source: str
     target: str
@@ -54,24 +44,6 @@ def convert_recording(
     MCAP holds time from the first sample on in whole nanoseconds, positions, torques and velocities; CSV and Parquet
     hold every column exactly.
 
-    Parameters
-    ----------
-    source : str or Path
-        any file or folder that `read_recording` reads
-    target : str or Path
-        the file to make: .csv, .parquet or .mcap
-    recover : bool
-        keep what comes before the damage of a truncated or damaged MCAP file
-    overwrite : bool
-        replace the target where it exists; never the source
-    joint_names : sequence of str or None
-        the robot's joints in chain order: picked from a log that names joints, written to an MCAP file
-
-    Returns
-    -------
-    Conversion
-        what was written and what was left out
-
     Raises
     ------
     RecordingError
@@ -89,22 +61,6 @@ def write_recording(
     recording: Recording, path: str | Path, *, joint_names: Sequence[str] | None = None, overwrite: bool = False
 ) -> tuple[str, ...]:
     """Write a recording; the file appears under its name only when it is complete.
-
-    Parameters
-    ----------
-    recording : Recording
-        what to write
-    path : str or Path
-        the file to make: .csv, .parquet or .mcap
-    joint_names : sequence of str or None
-        names of the joints in an MCAP file
-    overwrite : bool
-        replace the file where it exists
-
-    Returns
-    -------
-    tuple of str
-        columns that the format cannot hold
 
     Raises
     ------

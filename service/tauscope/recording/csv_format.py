@@ -31,19 +31,10 @@ def read_csv(
 
     Parameters
     ----------
-    path : Path
-        the file
-    name : str
-        what messages call it
     joint_count : int or None
         joints that the recording must have; None where any number is welcome
     spool_above_bytes : int
         size above which the rows go to a temporary file [bytes]
-
-    Returns
-    -------
-    Recording
-        all samples of the file
 
     Raises
     ------
@@ -71,15 +62,7 @@ def read_csv(
 
 
 def write_csv(recording: Recording, file: BinaryIO) -> None:
-    """Write a recording as CSV; every number in the fewest digits that read back as the same float64.
-
-    Parameters
-    ----------
-    recording : Recording
-        what to write
-    file : binary file
-        open for writing
-    """
+    """Write a recording as CSV; every number in the fewest digits that read back as the same float64."""
     table = recording.table
     file.write((",".join(table.names) + "\n").encode())
     for start in range(0, len(table), _ROWS_WRITTEN_AT_ONCE):

@@ -25,17 +25,6 @@ _SHOWN_CHARACTERS = 40
 def parse_quickly(text: bytes, delimiter: bytes, width: int, source: Sequence[int]) -> Array | None:
     """Parse a block of complete lines, or decline.
 
-    Parameters
-    ----------
-    text : bytes
-        whole lines, each ending with a newline
-    delimiter : bytes
-        what separates the fields
-    width : int
-        number of fields of each line
-    source : sequence of int
-        the fields that are wanted, in the order in which they are wanted
-
     Returns
     -------
     (rows, len(source)) float64 or None
@@ -90,19 +79,8 @@ def parse_number(field: bytes, file: str, line: int, column: str) -> float:
 
     Parameters
     ----------
-    field : bytes
-        the text between two separators
-    file : str
-        name of the file, for messages
     line : int
         its line, counted from 1
-    column : str
-        its column's name
-
-    Returns
-    -------
-    float
-        the number, finite or NaN
 
     Raises
     ------
@@ -121,24 +99,12 @@ def parse_number(field: bytes, file: str, line: int, column: str) -> float:
 
 
 def is_number(field: bytes) -> bool:
-    """Whether a field is a decimal number.
-
-    Parameters
-    ----------
-    field : bytes
-        the text between two separators
-    """
+    """Whether a field is a decimal number."""
     return _NUMBER.fullmatch(field.strip(b" \t")) is not None
 
 
 def shown(text: bytes) -> str:
-    """A piece of a file, safe to show on one line of a message.
-
-    Parameters
-    ----------
-    text : bytes
-        any bytes
-    """
+    """A piece of a file, safe to show on one line of a message."""
     words = text.decode("utf-8", "replace")
     return repr(words if len(words) <= _SHOWN_CHARACTERS else words[:_SHOWN_CHARACTERS] + "…")
 

@@ -13,15 +13,6 @@ so, and its text to a twentieth."""
 def require_plausible_inflation(packed_bytes: int, unpacked_bytes: int, name: str) -> None:
     """Refuse a file that unpacks to more than `LARGEST_RATIO` times its size, beyond a size that does no harm.
 
-    Parameters
-    ----------
-    packed_bytes : int
-        size of the file, or of what was read of it
-    unpacked_bytes : int
-        size of what comes out of it
-    name : str
-        what messages call the file
-
     Raises
     ------
     RecordingError

@@ -30,8 +30,6 @@ class JointState:
 
     stamp : int
         time of measurement [ns]
-    names : tuple of str
-        joint names, may be empty
     position, velocity, effort : (n,) float64
         empty where the publisher does not know them
     """
@@ -49,8 +47,6 @@ class JointStates:
 
     stamp : (N,) int64
         time of measurement [ns]
-    names : tuple of str
-        joint names, may be empty
     position, velocity, effort : (N, n) or (N, 0) float64
         one row a message
     """
@@ -67,11 +63,6 @@ class JointStateLayout:
 
     def __init__(self, message: bytes) -> None:
         """Learn the layout.
-
-        Parameters
-        ----------
-        message : bytes
-            one CDR message
 
         Raises
         ------
@@ -91,11 +82,6 @@ class JointStateLayout:
 
     def decode(self, messages: Sequence[bytes]) -> JointStates | None:
         """Decode a batch at once, or decline.
-
-        Parameters
-        ----------
-        messages : sequence of bytes
-            CDR messages
 
         Returns
         -------
@@ -122,11 +108,6 @@ class JointStateLayout:
 def decode_cdr(message: bytes) -> JointState:
     """Decode one CDR message.
 
-    Parameters
-    ----------
-    message : bytes
-        encapsulation header and body
-
     Raises
     ------
     ValueError
@@ -137,11 +118,6 @@ def decode_cdr(message: bytes) -> JointState:
 
 def decode_json(message: bytes) -> JointState:
     """Decode one message in JSON, with the field names of the ROS 2 message.
-
-    Parameters
-    ----------
-    message : bytes
-        a JSON object
 
     Raises
     ------
@@ -161,13 +137,7 @@ def decode_json(message: bytes) -> JointState:
 
 
 def as_batch(message: JointState) -> JointStates:
-    """A batch of one.
-
-    Parameters
-    ----------
-    message : JointState
-        its only message
-    """
+    """A batch of one."""
     arrays = (array[None, :] for array in (message.position, message.velocity, message.effort))
     return JointStates(np.array([message.stamp], dtype=np.int64), message.names, *arrays)
 

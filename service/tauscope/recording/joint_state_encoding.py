@@ -32,15 +32,7 @@ class JointStateEncoder:
     """Writes joint states of the same joints, message after message, into one template."""
 
     def __init__(self, names: Sequence[str], *, has_velocity: bool = True, has_effort: bool = True) -> None:
-        """Lay the template out.
-
-        Parameters
-        ----------
-        names : sequence of str
-            joint names, n of them
-        has_velocity, has_effort : bool
-            whether the arrays have n numbers or none
-        """
+        """Lay the template out."""
         message = bytearray(_ENCAPSULATION + bytes(_STAMP.size))
         _append_string(message, "")
         _append_length(message, len(names))

@@ -20,29 +20,13 @@ class JointStateLog:
     """Joint states of one or several container files that were recorded together."""
 
     def __init__(self, choice: Choice) -> None:
-        """Start empty.
-
-        Parameters
-        ----------
-        choice : Choice
-            what is wanted
-        """
+        """Start empty."""
         self._choice = choice
         self._topics: dict[str, JointStateTopic] = {}
         self._others: list[str] = []
 
     def handler(self, topic: str, type_name: str, encoding: str) -> MessageHandler | None:
-        """Whoever takes the messages of a topic, None where they are not joint states.
-
-        Parameters
-        ----------
-        topic : str
-            the topic's name
-        type_name : str
-            the message type
-        encoding : str
-            how its messages are encoded
-        """
+        """Whoever takes the messages of a topic, None where they are not joint states."""
         known = JOINT_STATE_TYPES if encoding == "cdr" else _JSON_TYPES if encoding == "json" else ()
         if type_name not in known:
             self._others.append(f"{topic} ({type_name}, {encoding})" if type_name else topic)
@@ -65,15 +49,6 @@ class JointStateLog:
 
 def choose_topic(topics: Mapping[str, JointStateTopic], other_topics: Sequence[str], file: str) -> JointStateTopic:
     """The one topic with joint states, or the one that ROS itself would call so.
-
-    Parameters
-    ----------
-    topics : mapping of str to JointStateTopic
-        topics with joint states
-    other_topics : sequence of str
-        what else the log holds, for messages
-    file : str
-        name of the log, for messages
 
     Raises
     ------

@@ -25,12 +25,8 @@ Decoded = TypeVar("Decoded")
 class Choice:
     """What the user wants out of a log.
 
-    file : str
-        name of the log, for messages
     joint_count : int or None
         joints that the recording must have; None where any number is welcome
-    joint_names : tuple of str or None
-        the robot's joints in chain order, where known
     spool_above_bytes : int
         size above which the rows go to a temporary file [bytes]
     """
@@ -45,17 +41,7 @@ class JointStateTopic:
     """Collects the messages of one topic; a fault is kept until it is known whether this topic is the wanted one."""
 
     def __init__(self, topic: str, encoding: str, choice: Choice) -> None:
-        """Start empty.
-
-        Parameters
-        ----------
-        topic : str
-            the topic's name
-        encoding : str
-            ``cdr`` or ``json``
-        choice : Choice
-            what is wanted
-        """
+        """Start empty."""
         self.topic = topic
         self.messages = 0
         self.fault: RecordingError | None = None
@@ -73,8 +59,6 @@ class JointStateTopic:
         ----------
         log_time : int
             when it was logged [ns]
-        message : bytes
-            the encoded message
         """
         self.messages += 1
         if self.fault is None:

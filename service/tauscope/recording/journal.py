@@ -51,15 +51,6 @@ class JournalWriter:
     def __init__(self, path: Path, header: JournalHeader, *, synchronise: bool = False) -> None:
         """Create the file; it must not exist.
 
-        Parameters
-        ----------
-        path : Path
-            the journal
-        header : JournalHeader
-            what all rows have in common
-        synchronise : bool
-            whether every chunk is brought to the disk itself, so that it also survives a power failure
-
         Raises
         ------
         OSError
@@ -120,8 +111,6 @@ class JournalWriter:
         ----------
         time_ns : int
             when, by the clock of the rows [ns]
-        event : mapping
-            plain data with the key ``event``
         """
         self._add(EVENT_TOPIC, time_ns + self.header.epoch_offset_ns, to_json(dict(event), inf_nan_mode="null"))
 

@@ -30,15 +30,7 @@ _READ_BYTES = 2**18
 
 
 def frame(kind: bytes, content: bytes) -> bytes:
-    """One frame.
-
-    Parameters
-    ----------
-    kind : bytes
-        `HEADER`, `ROW` or `EVENT`
-    content : bytes
-        what it carries
-    """
+    """One frame."""
     return FRAME.pack(len(content), kind) + content
 
 
@@ -49,8 +41,6 @@ def event_frame(time_ns: int, event: dict[str, Any]) -> bytes:
     ----------
     time_ns : int
         when, by the clock of the rows [ns]
-    event : dict
-        plain data
     """
     return frame(EVENT, EVENT_TIME.pack(time_ns) + json.dumps(event).encode())
 
@@ -59,26 +49,13 @@ class FrameWriter:
     """Turns the bytes of a pipe into a journal."""
 
     def __init__(self, path: Path, *, synchronise: bool = True) -> None:
-        """Prepare for the first bytes; the journal is created when its header is there.
-
-        Parameters
-        ----------
-        path : Path
-            the journal
-        synchronise : bool
-            whether every chunk is brought to the disk itself
-        """
+        """Prepare for the first bytes; the journal is created when its header is there."""
         self.writer: JournalWriter | None = None
         self._path, self._synchronise = path, synchronise
         self._pending = b""
 
     def feed(self, data: bytes) -> None:
         """Take the next bytes.
-
-        Parameters
-        ----------
-        data : bytes
-            any part of the stream of frames
 
         Raises
         ------
@@ -120,18 +97,7 @@ class FrameWriter:
 
 
 def main(path: str) -> int:
-    """Write a journal from standard input until it ends.
-
-    Parameters
-    ----------
-    path : str
-        the journal
-
-    Returns
-    -------
-    int
-        exit status: 0 where all of it was written
-    """
+    """Write a journal from standard input until it ends."""
     # Whoever interrupts the run shall not lose its recording: this process ends when the pipe does.
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
@@ -156,15 +122,8 @@ def wait_for_writer(path: Path, patience_s: float) -> bool:
 
     Parameters
     ----------
-    path : Path
-        the journal
     patience_s : float
         how long to wait [s]
-
-    Returns
-    -------
-    bool
-        whether it is free
     """
     deadline = time.monotonic() + patience_s
     with path.open("rb") as file:

@@ -25,12 +25,8 @@ LONGEST_HOLD = 1.5
 class Journal:
     """What a journal holds.
 
-    header : JournalHeader
-        what all rows have in common
     rows : (N,) of `journal_row_type`
         the cycles, oldest first
-    events : tuple of dict
-        what happened, in order, without the header
     damage : str or None
         why reading stopped before the file's end, None where the file is whole
     """
@@ -48,16 +44,6 @@ class Journal:
 
 def read_journal(path: Path) -> Journal:
     """Read a journal up to its end or its first damage.
-
-    Parameters
-    ----------
-    path : Path
-        the journal
-
-    Returns
-    -------
-    Journal
-        every cycle of which all messages came through
 
     Raises
     ------
@@ -83,13 +69,6 @@ def journal_recording(journal: Journal, name: str) -> Recording:
     Columns t, q, tau (i where the drives report no torque), qd and temp where they report them, qref, taucmd where
     effort was commanded, and period where the motion is repeated. Where the host commanded effort, tau (i) is the mean
     of what acted before and after the sample; the journal keeps what was reported.
-
-    Parameters
-    ----------
-    journal : Journal
-        what came through
-    name : str
-        what messages call the recording
 
     Raises
     ------

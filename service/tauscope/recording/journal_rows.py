@@ -25,20 +25,8 @@ class Phase(IntEnum):
 class JournalHeader:
     """What all rows of a journal have in common.
 
-    robot : str
-        name of the arm
-    joint_names : tuple of str
-        in chain order, n of them
     rate_hz : float
         cycles a second that were asked for [Hz]
-    mode : str
-        who closed the loop: ``position`` or ``torque``
-    effort_unit : str
-        ``Nm`` where rows hold joint torque (N on prismatic joints), else a drive unit
-    torque_per_effort : tuple of float
-        joint torque per unit of effort, 1 where efforts are torques; n of them
-    has_velocity : bool
-        whether the drives report velocities
     epoch_offset_ns : int
         to be added to a row's time to make it nanoseconds since 1970 [ns]
     """
@@ -64,11 +52,6 @@ class JournalHeader:
     @staticmethod
     def from_dict(data: Any) -> "JournalHeader":
         """The header of plain data.
-
-        Parameters
-        ----------
-        data : object
-            what `to_dict` made, perhaps by way of JSON
 
         Raises
         ------
@@ -96,11 +79,6 @@ def journal_row_type(joint_count: int) -> np.dtype[np.void]:
     ``phase`` as in `Phase`, ``period`` index of the excitation period or NaN; one number a joint: measured
     ``position``, ``velocity``, ``effort``, ``temperature``; ``reference``, ``reference_velocity`` and ``command``
     (effort, NaN where none was commanded).
-
-    Parameters
-    ----------
-    joint_count : int
-        number of joints n
     """
     scalars = [("time_ns", "<i8"), ("lateness_ns", "<i8"), ("phase", "<i8"), ("period", "<f8")]
     groups = ("position", "velocity", "effort", "temperature", "reference", "reference_velocity", "command")

@@ -51,8 +51,6 @@ _UNREADABLE = (
 class Salvage:
     """What was read of a file that may be damaged.
 
-    recording : Recording
-        the samples before the damage
     damage : str or None
         why reading stopped, None where the file is whole
     """
@@ -63,18 +61,6 @@ class Salvage:
 
 def read_mcap(path: Path, choice: Choice) -> Recording:
     """Read the joint states of an MCAP file.
-
-    Parameters
-    ----------
-    path : Path
-        the file
-    choice : Choice
-        what is wanted of it
-
-    Returns
-    -------
-    Recording
-        joints in the order of `choice`, or of the messages; time relative to the first message
 
     Raises
     ------
@@ -88,15 +74,6 @@ def read_mcap(path: Path, choice: Choice) -> Recording:
 
 def add_mcap(path: Path, name: str, log: JointStateLog) -> None:
     """Add the messages of one whole file to a log.
-
-    Parameters
-    ----------
-    path : Path
-        the file
-    name : str
-        what messages call it
-    log : JointStateLog
-        takes the messages
 
     Raises
     ------
@@ -114,18 +91,6 @@ def add_mcap(path: Path, name: str, log: JointStateLog) -> None:
 def recover_mcap(path: Path, choice: Choice) -> Salvage:
     """Read a damaged MCAP file up to the damage.
 
-    Parameters
-    ----------
-    path : Path
-        the file
-    choice : Choice
-        what is wanted of it
-
-    Returns
-    -------
-    Salvage
-        the samples before the damage, and what the damage is
-
     Raises
     ------
     RecordingError
@@ -142,29 +107,12 @@ class MessageSink(Protocol):
     """Whoever wants the messages of an MCAP file."""
 
     def handler(self, topic: str, type_name: str, encoding: str) -> MessageHandler | None:
-        """Whoever takes the messages of a topic, None where nobody does.
-
-        Parameters
-        ----------
-        topic : str
-            the topic's name
-        type_name : str
-            the message type, empty where the file names none
-        encoding : str
-            how its messages are encoded
-        """
+        """Whoever takes the messages of a topic, None where nobody does."""
         ...
 
 
 def scan_mcap(path: Path, sink: MessageSink) -> str | None:
     """Hand the messages of an MCAP file over, in the order of the file, up to its end or its first damage.
-
-    Parameters
-    ----------
-    path : Path
-        the file
-    sink : MessageSink
-        takes them
 
     Returns
     -------

@@ -18,20 +18,6 @@ _LATEST_STAMP_S = 2.0**31
 def write_mcap(recording: Recording, file: BinaryIO, joint_names: Sequence[str] | None = None) -> tuple[str, ...]:
     """Write a recording as ``/joint_states`` of type sensor_msgs/msg/JointState.
 
-    Parameters
-    ----------
-    recording : Recording
-        what to write; torques, not currents
-    file : binary file
-        open for writing
-    joint_names : sequence of str or None
-        names of the joints; joint1, joint2… where not given
-
-    Returns
-    -------
-    tuple of str
-        columns that a JointState cannot hold and that were left out
-
     Raises
     ------
     RecordingError

@@ -39,10 +39,6 @@ class JointMeasures:
 
     position, effort : (float, float)
         least and greatest value, NaN where every sample was missed
-    position_step : float or None
-        the step in multiples of which q moves
-    wraps : int
-        steps of q by about 2π
     first_wrap : float or None
         time of the first of them [s]
     clipped : tuple of (float, int)
@@ -61,8 +57,6 @@ class JointMeasures:
 class Gaps:
     """Steps of the clock beyond 1.9 medians: one lost sample of a regular clock is one.
 
-    count : int
-        number of gaps
     longest : float
         the longest of them [s], 0 without gaps
     longest_at : float or None
@@ -80,14 +74,6 @@ class RowMeasures:
 
     duration : float
         from the first to the last sample [s]
-    steps : StepMeasures
-        of the clock
-    missed : dict of str to int
-        number of NaN in each column that has any
-    period_lengths : tuple of int
-        number of samples of each marked period
-    joints : tuple of JointMeasures
-        one a joint
     """
 
     duration: float
@@ -114,18 +100,7 @@ class _Running:
 
 
 def measure_rows(recording: Recording) -> RowMeasures:
-    """Take every figure that needs no other figure first, and then the clipped samples.
-
-    Parameters
-    ----------
-    recording : Recording
-        at least two samples
-
-    Returns
-    -------
-    RowMeasures
-        the figures
-    """
+    """Take every figure that needs no other figure first, and then the clipped samples."""
     n, columns = recording.joint_count, len(recording.table.names)
     running = _Running(
         least=np.full(columns, np.inf),
@@ -163,20 +138,7 @@ def measure_rows(recording: Recording) -> RowMeasures:
 
 
 def measure_gaps(recording: Recording, measures: RowMeasures) -> Gaps:
-    """Find where the clock skips.
-
-    Parameters
-    ----------
-    recording : Recording
-        the recording
-    measures : RowMeasures
-        its figures, for the median step
-
-    Returns
-    -------
-    Gaps
-        how many gaps, and the longest
-    """
+    """Find where the clock skips."""
     limit = _GAP_FACTOR * measures.steps.median
     count, longest, longest_at = 0, 0.0, None
     for start in range(0, len(recording), _ROWS_AT_ONCE):

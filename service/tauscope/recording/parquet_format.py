@@ -30,19 +30,10 @@ def read_parquet(
 
     Parameters
     ----------
-    path : Path
-        the file
-    name : str
-        what messages call it
     joint_count : int or None
         joints that the recording must have; None where any number is welcome
     spool_above_bytes : int
         size above which the rows go to a temporary file [bytes]
-
-    Returns
-    -------
-    Recording
-        all samples of the file
 
     Raises
     ------
@@ -72,13 +63,6 @@ def read_parquet(
 
 def write_parquet(recording: Recording, file: BinaryIO) -> None:
     """Write a recording as Parquet, float64 columns, checksums on every page.
-
-    Parameters
-    ----------
-    recording : Recording
-        what to write
-    file : binary file
-        open for writing
 
     Raises
     ------

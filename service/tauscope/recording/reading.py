@@ -38,17 +38,8 @@ def read_recording(
 
     Parameters
     ----------
-    path : str or Path
-        the file, or the rosbag2 folder; never written to
     joint_count : int or None
         joints that the recording must have; None where any number is welcome, or as many as `joint_names`
-    joint_names : sequence of str or None
-        the robot's joints in chain order: picks and orders the joints of a log that names them
-
-    Returns
-    -------
-    Recording
-        all samples, checked
 
     Raises
     ------
@@ -71,13 +62,6 @@ def read_recording(
 
 def first_bytes(path: Path, name: str) -> bytes:
     """The first bytes of a regular file, by which formats are told apart.
-
-    Parameters
-    ----------
-    path : Path
-        the file
-    name : str
-        what messages call it
 
     Raises
     ------

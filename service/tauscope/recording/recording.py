@@ -17,19 +17,7 @@ __all__ = ["Array", "EffortKind", "Recording", "Samples", "Table"]
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """One continuous motion as it was measured.
-
-    name : str
-        the path as the user gave it, for messages
-    joint_count : int
-        number of joints n
-    effort_kind : EffortKind
-        torque, or drive units in its place
-    table : Table
-        the rows, columns in the order t, q, tau or i, optional groups, period
-    ignored_columns : tuple of str
-        columns of the file that nobody reads
-    """
+    """One continuous motion as it was measured."""
 
     name: str
     joint_count: int
@@ -81,8 +69,6 @@ class Recording:
         ----------
         effort : (N, n) float64
             `Samples.effort` of this recording [Nm or N, or drive units]
-        robot : Robot
-            the arm, for each joint's sign and torque constant
 
         Returns
         -------
@@ -123,16 +109,12 @@ class Recording:
 
         Parameters
         ----------
-        name : str
-            what messages call it
         time : (N,) float64
             strictly increasing [s]
         position : (N, n) float64
             q [rad or m]
         effort : (N, n) float64
             τ [Nm or N], or drive units
-        effort_kind : EffortKind
-            which of the two `effort` holds
         velocity : (N, n) float64 or None
             qd [rad/s or m/s]
         acceleration : (N, n) float64 or None
@@ -147,11 +129,6 @@ class Recording:
             position behind the transmission [rad or m]
         period : (N,) float64 or None
             index of the repeated excitation period, NaN outside the repeated part
-
-        Returns
-        -------
-        Recording
-            with its own copy of the arrays
 
         Raises
         ------

@@ -24,18 +24,6 @@ _SQLITE_HEADER_BYTES = 100
 def read_rosbag2(folder: Path, choice: Choice) -> Recording:
     """Read the joint states of a rosbag2 folder, its files in the order in which they were recorded.
 
-    Parameters
-    ----------
-    folder : Path
-        the folder
-    choice : Choice
-        what is wanted of it
-
-    Returns
-    -------
-    Recording
-        as `read_mcap` returns it
-
     Raises
     ------
     RecordingError
@@ -60,18 +48,6 @@ def read_rosbag2(folder: Path, choice: Choice) -> Recording:
 
 def read_database(path: Path, choice: Choice) -> Recording:
     """Read the joint states of one rosbag2 SQLite file.
-
-    Parameters
-    ----------
-    path : Path
-        the ``.db3`` file
-    choice : Choice
-        what is wanted of it
-
-    Returns
-    -------
-    Recording
-        as `read_mcap` returns it
 
     Raises
     ------

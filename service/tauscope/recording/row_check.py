@@ -18,15 +18,7 @@ class RowCheck:
     """
 
     def __init__(self, file: str, names: tuple[str, ...]) -> None:
-        """Prepare for the first block.
-
-        Parameters
-        ----------
-        file : str
-            name of the file, for messages
-        names : tuple of str
-            the table's columns, t first
-        """
+        """Prepare for the first block."""
         self._file = file
         self._names = names
         self._period = names.index("period") if "period" in names else None
@@ -39,8 +31,6 @@ class RowCheck:
         ----------
         block : (rows, columns) float64
             the rows
-        place : callable
-            words for a row of this block, such as "line 17"
 
         Raises
         ------
@@ -84,13 +74,6 @@ class RowCheck:
 
 def require_rows(count: int, file: str) -> None:
     """Refuse a file that holds next to nothing.
-
-    Parameters
-    ----------
-    count : int
-        number of samples found
-    file : str
-        name of the file, for messages
 
     Raises
     ------

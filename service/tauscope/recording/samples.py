@@ -62,11 +62,5 @@ class Table(Protocol):
     def __len__(self) -> int: ...
 
     def rows(self, start: int, stop: int) -> Array:
-        """Rows start:stop as one (stop-start, columns) float64 array.
-
-        Parameters
-        ----------
-        start, stop : int
-            first row and the one after the last
-        """
+        """Rows start:stop as one (stop-start, columns) float64 array."""
         ...

@@ -23,8 +23,6 @@ class MemoryTable:
 
         Parameters
         ----------
-        names : tuple of str
-            column names
         data : (N, columns) float64
             the rows; made read-only
         """
@@ -41,13 +39,7 @@ class MemoryTable:
         return len(self._data)
 
     def rows(self, start: int, stop: int) -> Array:
-        """Rows start:stop, a read-only view of shape (stop-start, columns).
-
-        Parameters
-        ----------
-        start, stop : int
-            first row and the one after the last
-        """
+        """Rows start:stop, a read-only view of shape (stop-start, columns)."""
         return self._data[start:stop]
 
 
@@ -59,13 +51,7 @@ class SpooledTable:
     """
 
     def __init__(self, names: tuple[str, ...]) -> None:
-        """Open an empty spool.
-
-        Parameters
-        ----------
-        names : tuple of str
-            column names
-        """
+        """Open an empty spool."""
         self._names = names
         self._row_bytes = 8 * len(names)
         self._length = 0
@@ -93,13 +79,7 @@ class SpooledTable:
         self._length += len(block)
 
     def rows(self, start: int, stop: int) -> Array:
-        """Rows start:stop, a read-only copy of shape (stop-start, columns).
-
-        Parameters
-        ----------
-        start, stop : int
-            first row and the one after the last
-        """
+        """Rows start:stop, a read-only copy of shape (stop-start, columns)."""
         start, stop, _ = slice(start, stop).indices(self._length)
         block = np.empty((max(stop - start, 0), len(self._names)))
         target = block.reshape(-1).view(np.uint8).data
@@ -123,10 +103,6 @@ class TableBuilder:
 
         Parameters
         ----------
-        names : tuple of str
-            column names
-        expected_rows : int
-            a guess of the final number of rows, which saves copies; wrong guesses do no harm
         spool_above_bytes : int
             size of the rows above which they go to a temporary file [bytes]
         """

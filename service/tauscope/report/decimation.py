@@ -17,8 +17,6 @@ def envelope_indices(values: Array, most: int) -> NDArray[np.intp]:
     ----------
     values : (N,) float64
         the curve
-    most : int
-        number of samples to keep at most
 
     Returns
     -------

@@ -45,24 +45,7 @@ def diagnosis_report(
     provenance: Provenance,
     planned: PlannedExperiment | None = None,
 ) -> str:
-    """A self-contained HTML page on a diagnosis.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        the result
-    document : DiagnosisDocument
-        the same as plain data
-    provenance : Provenance
-        where it came from
-    planned : PlannedExperiment or None
-        the motion to record next, where one was planned
-
-    Returns
-    -------
-    str
-        HTML with inline figures: no script, no request to anywhere
-    """
+    """A self-contained HTML page on a diagnosis."""
     plots = diagnosis_plots(diagnosis)
     units = [torque_unit(joint.type) for joint in diagnosis.robot.joints]
     sections = [

@@ -10,13 +10,7 @@ MOST_SHIFTS = 12
 
 
 def located_table(document: DiagnosisDocument) -> Table:
-    """Where the mismatch is, joint by joint.
-
-    Parameters
-    ----------
-    document : DiagnosisDocument
-        the result
-    """
+    """Where the mismatch is, joint by joint."""
     rows = []
     for entry in document.mismatch:
         place, time = entry.where, entry.time
@@ -36,13 +30,7 @@ def located_table(document: DiagnosisDocument) -> Table:
 
 
 def detectable_table(document: DiagnosisDocument) -> Table:
-    """The smallest size that these data would have shown: a row an effect, a column a joint.
-
-    Parameters
-    ----------
-    document : DiagnosisDocument
-        the result
-    """
+    """The smallest size that these data would have shown: a row an effect, a column a joint."""
     places: list[str | None] = [*document.joints, None]
     found = {(entry.effect, entry.joint): entry for entry in document.detectable}
     places = [place for place in places if any(joint == place for _, joint in found)]
@@ -56,13 +44,7 @@ def detectable_table(document: DiagnosisDocument) -> Table:
 
 
 def residual_table(document: DiagnosisDocument) -> Table:
-    """Residuals before and after, on training and held-out recordings.
-
-    Parameters
-    ----------
-    document : DiagnosisDocument
-        the result
-    """
+    """Residuals before and after, on training and held-out recordings."""
     train, held_out = document.fit.train, document.fit.held_out
     columns = ["joint", "before", "after"]
     values = [train.rms_before, train.rms_after]
@@ -74,13 +56,7 @@ def residual_table(document: DiagnosisDocument) -> Table:
 
 
 def difference_table(document: DiagnosisDocument) -> Table:
-    """What the simulation has wrong.
-
-    Parameters
-    ----------
-    document : DiagnosisDocument
-        the result
-    """
+    """What the simulation has wrong."""
     rows = [
         (e.parameter, *(significant(value, 4) for value in (e.simulation, e.real)), significant(e.difference_in_std, 3))
         for e in document.parameter_differences
@@ -89,13 +65,7 @@ def difference_table(document: DiagnosisDocument) -> Table:
 
 
 def shift_table(document: DiagnosisDocument) -> Table:
-    """What the left-out effects had done to the parameters.
-
-    Parameters
-    ----------
-    document : DiagnosisDocument
-        the result
-    """
+    """What the left-out effects had done to the parameters."""
     rows = [
         (e.parameter, *(significant(value, 4) for value in (e.before, e.after)), significant(e.shift_in_std, 3))
         for e in document.parameter_shifts[:MOST_SHIFTS]

@@ -42,13 +42,7 @@ DEVIATIONS = 1.96
 
 
 def effect_title(effect: str) -> str:
-    """An effect's id as a heading.
-
-    Parameters
-    ----------
-    effect : str
-        id of the effect
-    """
+    """An effect's id as a heading."""
     return effect.replace("_", " ").capitalize()
 
 
@@ -64,24 +58,12 @@ def place_title(joint: str | None) -> str:
 
 
 def file_title(name: str) -> str:
-    """A recording's name without its folders.
-
-    Parameters
-    ----------
-    name : str
-        as the recording was given
-    """
+    """A recording's name without its folders."""
     return PurePath(name).name or name
 
 
 def noise_ratios(document: DiagnosisDocument) -> tuple[list[float], list[float], bool]:
-    """Residual over noise of every joint, before and after; and whether on held-out motion.
-
-    Parameters
-    ----------
-    document : DiagnosisDocument
-        the result
-    """
+    """Residual over noise of every joint, before and after; and whether on held-out motion."""
     fit = document.fit.held_out or document.fit.train
     before, after = (
         [noise_ratio(rms, noise) for rms, noise in zip(own, document.noise_std, strict=True)]
@@ -91,13 +73,7 @@ def noise_ratios(document: DiagnosisDocument) -> tuple[list[float], list[float],
 
 
 def summary_sentences(document: DiagnosisDocument) -> Iterator[str]:
-    """What was compared, what it comes to, and how much better unseen motion is predicted.
-
-    Parameters
-    ----------
-    document : DiagnosisDocument
-        the result
-    """
+    """What was compared, what it comes to, and how much better unseen motion is predicted."""
     yield f"Compared with {AGAINST[document.against]}: {VERDICTS[document.verdict]}."
     before, after, held_out = noise_ratios(document)
     if document.findings and after != before:
@@ -112,13 +88,7 @@ def summary_sentences(document: DiagnosisDocument) -> Iterator[str]:
 
 
 def cautions(document: DiagnosisDocument) -> Iterator[str]:
-    """What a reader has to know before acting on it.
-
-    Parameters
-    ----------
-    document : DiagnosisDocument
-        the result
-    """
+    """What a reader has to know before acting on it."""
     if document.fit.held_out is None:
         yield "No recording was held out: nothing here was tested on motion that the model has not seen."
     for finding in document.findings:
@@ -137,15 +107,7 @@ def cautions(document: DiagnosisDocument) -> Iterator[str]:
 
 
 def location_sentence(entry: MismatchEntry, joint_type: JointType) -> str:
-    """Where one joint's mismatch concentrates.
-
-    Parameters
-    ----------
-    entry : MismatchEntry
-        of the joint
-    joint_type : JointType
-        how it moves, for units
-    """
+    """Where one joint's mismatch concentrates."""
     if not entry.significant:
         return f"{entry.joint}: nothing but noise."
     text = f"{entry.joint}: {significant(entry.excess_rms, 3)} {torque_unit(joint_type)} rms beyond the noise"
@@ -167,15 +129,7 @@ def _share(share: float) -> str:
 
 
 def finding_facts(finding: FindingEntry, total_gain: float) -> list[tuple[str, str]]:
-    """What is known of a finding, in the order in which one asks.
-
-    Parameters
-    ----------
-    finding : FindingEntry
-        the finding
-    total_gain : float
-        what all findings take off the residual's energy
-    """
+    """What is known of a finding, in the order in which one asks."""
     facts = [
         (each.name, f"{value}{unit}" if reach == ABSENT else f"{value} ± {reach}{unit} (95 %)")
         for each in finding.parameters
@@ -191,13 +145,7 @@ def finding_facts(finding: FindingEntry, total_gain: float) -> list[tuple[str, s
 
 
 def constancy_sentence(document: DiagnosisDocument) -> str:
-    """Whether the parameters hold from one recording to the next.
-
-    Parameters
-    ----------
-    document : DiagnosisDocument
-        the result
-    """
+    """Whether the parameters hold from one recording to the next."""
     p_value = document.constancy.p_value
     if document.constancy.moved:
         moved = counted(len(document.constancy.moved), "parameter")

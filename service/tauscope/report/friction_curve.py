@@ -55,17 +55,8 @@ def friction_curve(identification: Identification, series: Sequence[TorqueSeries
 
     Parameters
     ----------
-    identification : Identification
-        the model and its covariance
-    series : sequence of TorqueSeries
-        what the model was made from
     joint : int
         joint index, from 0
-
-    Returns
-    -------
-    FrictionCurve
-        ready to draw
     """
     speed = np.concatenate([one.velocity[:, joint] for one in series])
     residual = np.concatenate([one.residual[:, joint] for one in series])

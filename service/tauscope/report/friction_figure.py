@@ -23,19 +23,8 @@ def friction_figure(
 
     Parameters
     ----------
-    name : str
-        unique on the page
-    curves : sequence of FrictionCurve
-        one a joint
-    titles : sequence of str
-        names of the joints
     units : sequence of (str, str)
         units of velocity and of torque, one pair a joint
-
-    Returns
-    -------
-    str
-        inline SVG
     """
     columns = min(COLUMNS, max(len(curves), 2))
     rows = math.ceil(len(curves) / columns)

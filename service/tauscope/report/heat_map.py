@@ -20,22 +20,7 @@ _MOST_LETTERS = 16
 
 
 def heat_map(histograms: Sequence[ResidualHistogram], joints: Sequence[str], *, after: bool) -> Markup:
-    """Draw the map.
-
-    Parameters
-    ----------
-    histograms : sequence of ResidualHistogram
-        one a joint and variable
-    joints : sequence of str
-        names of the joints, in the order of the rows
-    after : bool
-        of what the model with all findings leaves, and not of what the one without them does
-
-    Returns
-    -------
-    Markup
-        inline SVG
-    """
+    """Draw the map."""
     height = _TOP + _ROW * len(joints) + _LEGEND
     group = (_WIDTH - _LABELS - _GAP * (len(VARIABLES) - 1)) / len(VARIABLES)
     parts = [f'<svg class="heat" viewBox="0 0 {_WIDTH:g} {height:g}">']
@@ -59,13 +44,7 @@ def heat_map(histograms: Sequence[ResidualHistogram], joints: Sequence[str], *, 
 
 
 def heat_table(histograms: Sequence[ResidualHistogram]) -> Table:
-    """The numbers of both maps.
-
-    Parameters
-    ----------
-    histograms : sequence of ResidualHistogram
-        one a joint and variable
-    """
+    """The numbers of both maps."""
     rows = [
         (each.joint, each.variable, *(significant(number, 3) for number in cell), significant(each.noise, 3))
         for each in histograms

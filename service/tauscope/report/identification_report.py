@@ -42,20 +42,6 @@ def identification_report(
 ) -> str:
     """A self-contained HTML page on an identification.
 
-    Parameters
-    ----------
-    identification : Identification
-        the result
-    recordings, held_out : sequence of Recording
-        what it was made from, and judged by
-    provenance : Provenance
-        where all of it came from
-
-    Returns
-    -------
-    str
-        HTML with inline figures: no script, no request to anywhere
-
     Raises
     ------
     RecordingError

@@ -11,22 +11,7 @@ ROW_INCHES = 0.55
 
 
 def motion_figure(name: str, trajectory: Trajectory, joints: list[str]) -> str:
-    """Draw every joint's position over time.
-
-    Parameters
-    ----------
-    name : str
-        unique on the page
-    trajectory : Trajectory
-        the motion
-    joints : list of str
-        names of the joints
-
-    Returns
-    -------
-    str
-        inline SVG
-    """
+    """Draw every joint's position over time."""
     sampled = trajectory.evaluate(np.linspace(0.0, trajectory.duration_s, MOST_SAMPLES))
 
     def draw(figure: Figure) -> None:

@@ -11,15 +11,7 @@ from tauscope.report.table import Table
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure on the page.
-
-    svg : str
-        inline SVG of our own making
-    label : str
-        what it shows, for those who do not see it
-    caption : str
-        how to read it
-    """
+    """A figure on the page."""
 
     svg: Markup
     label: str
@@ -28,15 +20,7 @@ class Drawing:
 
 @dataclass(frozen=True)
 class Numbers:
-    """What a figure was drawn from, folded away: a table to read, or comma-separated text to copy.
-
-    title : str
-        what they are
-    table : Table or None
-        as cells
-    text : str or None
-        a heading line, then a line a sample
-    """
+    """What a figure was drawn from, folded away: a table to read, or comma-separated text to copy."""
 
     title: str
     table: Table | None = None
@@ -47,14 +31,8 @@ class Numbers:
 class Card:
     """One thing of several that are ranked.
 
-    title, place : str
-        what it is, and where
     probability : float
         from 0 to 1
-    chance : str
-        the same in words
-    statement : str
-        in plain words
     facts : sequence of (str, str)
         what is known about it
     """
@@ -69,23 +47,7 @@ class Card:
 
 @dataclass(frozen=True)
 class Part:
-    """A piece of a section; what is None is left out.
-
-    title : str or None
-        heading
-    card : Card or None
-        one of several findings
-    figure : Drawing or None
-        drawing
-    table : Table or None
-        numbers
-    numbers : Numbers or None
-        what the figure was drawn from
-    command : str or None
-        what to type
-    note : str or None
-        small print
-    """
+    """A piece of a section; what is None is left out."""
 
     title: str | None = None
     card: Card | None = None
@@ -98,17 +60,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Section:
-    """A section of the page.
-
-    anchor : str
-        its name in links
-    title : str
-        heading
-    parts : sequence of Part
-        what it shows
-    sentences : sequence of str
-        what it says first
-    """
+    """A section of the page."""
 
     anchor: str
     title: str
@@ -118,15 +70,7 @@ class Section:
 
 @dataclass(frozen=True)
 class KeyFigure:
-    """A number that stands large at the top.
-
-    title : str
-        what it is
-    value : str
-        the number
-    remark : str
-        how to read it
-    """
+    """A number that stands large at the top."""
 
     title: str
     value: str
@@ -135,25 +79,7 @@ class KeyFigure:
 
 @dataclass(frozen=True)
 class Page:
-    """Everything on the page.
-
-    robot : str
-        name of the robot
-    subtitle : str
-        date, estimator, recordings
-    key_figures : sequence of KeyFigure
-        at the top
-    sentences, cautions : sequence of str
-        what the result says, and what to know before using it
-    sections : sequence of Section
-        the rest
-    footer : str
-        what made it
-    kind : str
-        what the page is about, in a word
-    headline : str or None
-        the answer in a few words
-    """
+    """Everything on the page."""
 
     robot: str
     subtitle: str
@@ -175,11 +101,6 @@ def render(page: Page) -> str:
     """The page as one HTML file that asks nothing of any network and runs no script.
 
     All text is escaped; what no file could hold (control characters, broken Unicode of a file name) is spelled out.
-
-    Parameters
-    ----------
-    page : Page
-        what to show
     """
     environment = Environment(
         loader=PackageLoader("tauscope.report"), autoescape=True, undefined=StrictUndefined, finalize=_printable

@@ -18,20 +18,7 @@ LONGEST_LABEL = 62
 
 
 def parameter_figure(name: str, entries: Sequence[BaseParameterEntry]) -> str:
-    """Draw base parameters with their 95 % intervals.
-
-    Parameters
-    ----------
-    name : str
-        unique on the page
-    entries : sequence of BaseParameterEntry
-        what the data can tell
-
-    Returns
-    -------
-    str
-        inline SVG
-    """
+    """Draw base parameters with their 95 % intervals."""
     panels: dict[str, list[BaseParameterEntry]] = {}
     for entry in entries:
         panels.setdefault(base_parameter_unit(entry.terms), []).append(entry)

@@ -14,24 +14,7 @@ HEIGHT_INCHES = 3.5
 
 
 def proof_figure(name: str, overlay: TorqueOverlay, spectrum: ResidualSpectrum | None, unit: str) -> str:
-    """Draw torque, residual and the residual's spectrum of one joint, without and with the findings.
-
-    Parameters
-    ----------
-    name : str
-        unique on the page
-    overlay : TorqueOverlay
-        measured and modelled torque
-    spectrum : ResidualSpectrum or None
-        of the same joint, where the motion is long enough for one
-    unit : str
-        of the torque
-
-    Returns
-    -------
-    str
-        inline SVG
-    """
+    """Draw torque, residual and the residual's spectrum of one joint, without and with the findings."""
     time, measured, before, after = (
         np.array(values) for values in (overlay.time, overlay.measured, overlay.before, overlay.after)
     )

@@ -19,12 +19,6 @@ LIBRARIES = ("tauscope", "numpy", "scipy", "clarabel")
 class InputFile:
     """One file that was read.
 
-    role : str
-        ``robot``, ``urdf``, ``recording``, ``held out`` or ``compared with``
-    path : str
-        as the user gave it
-    size_bytes : int
-        its size
     sha256 : str
         of its bytes, in hexadecimal
     """
@@ -39,14 +33,8 @@ class InputFile:
 class Provenance:
     """Where a result comes from.
 
-    command : tuple of str
-        words of the command line that makes it again; empty where there is none
-    inputs : tuple of InputFile
-        what was read
     versions : tuple of (str, str)
         name and version of what computed it
-    created : datetime
-        when
     """
 
     command: tuple[str, ...]
@@ -65,24 +53,6 @@ def record_provenance(
     compared: Sequence[str] = (),
 ) -> Provenance:
     """Hash all inputs and note the versions.
-
-    Parameters
-    ----------
-    command : sequence of str
-        words of the command line that makes the result again
-    robot : Robot
-        the arm; its robot file and URDF are inputs
-    recordings, held_out : sequence of str
-        paths of the recordings
-    created : datetime
-        when the result was made
-    compared : sequence of str
-        paths of recordings or a model that they were compared with
-
-    Returns
-    -------
-    Provenance
-        all of it
 
     Raises
     ------
@@ -103,13 +73,7 @@ def versions() -> tuple[tuple[str, str], ...]:
 
 
 def installed_version(package: str) -> str:
-    """Version of an installed package.
-
-    Parameters
-    ----------
-    package : str
-        its name on the package index
-    """
+    """Version of an installed package."""
     try:
         return version(package)
     except PackageNotFoundError:
@@ -118,18 +82,6 @@ def installed_version(package: str) -> str:
 
 def input_files(role: str, path: str) -> Iterator[InputFile]:
     """The file of a path, or the files in it where it is a folder.
-
-    Parameters
-    ----------
-    role : str
-        what it was read as
-    path : str
-        file or folder
-
-    Yields
-    ------
-    InputFile
-        with size and hash
 
     Raises
     ------

@@ -13,15 +13,7 @@ _PLAIN_RANGE = (1e-4, 1e7)
 
 
 def significant(value: float | None, digits: int = 4) -> str:
-    """A number to some significant digits, without an exponent where it is of usual size.
-
-    Parameters
-    ----------
-    value : float or None
-        the number
-    digits : int
-        significant digits
-    """
+    """A number to some significant digits, without an exponent where it is of usual size."""
     if value is None or not math.isfinite(value):
         return ABSENT
     if value == 0.0:
@@ -33,31 +25,12 @@ def significant(value: float | None, digits: int = 4) -> str:
 
 
 def given(value: float | None) -> str:
-    """A number that somebody stated, as it was stated: no digits are added.
-
-    Parameters
-    ----------
-    value : float or None
-        the number
-    """
+    """A number that somebody stated, as it was stated: no digits are added."""
     return ABSENT if value is None or not math.isfinite(value) else f"{value:.6g}"
 
 
 def with_uncertainty(value: float, std: float | None) -> tuple[str, str]:
-    """A value and its standard error: the error to two significant digits, the value to the same decimal place.
-
-    Parameters
-    ----------
-    value : float
-        the estimate
-    std : float or None
-        its standard error; None, zero or infinite where there is none
-
-    Returns
-    -------
-    tuple of two str
-        value and error, each `ABSENT` where there is no number
-    """
+    """A value and its standard error: the error to two significant digits, the value to the same decimal place."""
     if std is None or not math.isfinite(std) or std <= 0.0:
         return f"{float(f'{value:.3e}'):g}", ABSENT
     decimals = 1 - math.floor(math.log10(std))
@@ -71,13 +44,7 @@ def with_uncertainty(value: float, std: float | None) -> tuple[str, str]:
 
 
 def percent(share: float | None) -> str:
-    """A share as per cent, to two significant digits or a tenth.
-
-    Parameters
-    ----------
-    share : float or None
-        1 is the whole
-    """
+    """A share as per cent, to two significant digits or a tenth."""
     if share is None or not math.isfinite(share):
         return ABSENT
     hundredths = 100.0 * share
@@ -87,50 +54,22 @@ def percent(share: float | None) -> str:
 
 
 def counted(count: int, thing: str) -> str:
-    """A number of things: ``1 joint``, ``3 joints``.
-
-    Parameters
-    ----------
-    count : int
-        how many
-    thing : str
-        name of one
-    """
+    """A number of things: ``1 joint``, ``3 joints``."""
     return f"{count} {thing}" if count == 1 else f"{count} {thing}s"
 
 
 def torque_unit(joint_type: JointType) -> str:
-    """Unit of what drives a joint.
-
-    Parameters
-    ----------
-    joint_type : JointType
-        how the joint moves
-    """
+    """Unit of what drives a joint."""
     return "N" if joint_type is JointType.PRISMATIC else "Nm"
 
 
 def velocity_unit(joint_type: JointType) -> str:
-    """Unit of a joint's velocity.
-
-    Parameters
-    ----------
-    joint_type : JointType
-        how the joint moves
-    """
+    """Unit of a joint's velocity."""
     return "m/s" if joint_type is JointType.PRISMATIC else "rad/s"
 
 
 def state_unit(variable: str, joint_type: JointType) -> str:
-    """Unit of a variable that a residual may depend on.
-
-    Parameters
-    ----------
-    variable : str
-        ``velocity``, ``position``, ``load``, ``acceleration``, ``time``, ``temperature`` or ``motor_position``
-    joint_type : JointType
-        how the joint moves
-    """
+    """Unit of a variable that a residual may depend on."""
     position = "m" if joint_type is JointType.PRISMATIC else "rad"
     units = {"velocity": f"{position}/s", "position": position, "acceleration": f"{position}/s²", "time": "s"}
     return {**units, "load": torque_unit(joint_type), "temperature": "°C", "motor_position": "rad"}.get(variable, "")
@@ -148,13 +87,7 @@ def chance(probability: float) -> str:
 
 
 def power_of_ten(value: float) -> str:
-    """A number on a logarithmic axis.
-
-    Parameters
-    ----------
-    value : float
-        a power of ten, or one with a sign, or zero
-    """
+    """A number on a logarithmic axis."""
     if 1e-3 < abs(value) < 1e4 or value == 0.0:
         return f"{value:g}".replace("-", "\N{MINUS SIGN}")
     exponent = round(math.log10(abs(value)))
@@ -164,13 +97,7 @@ def power_of_ten(value: float) -> str:
 
 
 def base_parameter_unit(terms: Iterable[str]) -> str:
-    """Unit of a combination of standard parameters: that of its first, whose coefficient is one.
-
-    Parameters
-    ----------
-    terms : iterable of str
-        names of the standard parameters in it, e.g. ``m2``, ``msx2``
-    """
+    """Unit of a combination of standard parameters: that of its first, whose coefficient is one."""
     first = next(iter(terms))
     if first.startswith("I"):
         return "kg m²"

@@ -11,20 +11,7 @@ ROW_INCHES = 0.24
 
 
 def residual_figure(name: str, document: IdentificationDocument) -> str:
-    """Draw every joint's residual as a multiple of its noise.
-
-    Parameters
-    ----------
-    name : str
-        unique on the page
-    document : IdentificationDocument
-        the result
-
-    Returns
-    -------
-    str
-        inline SVG
-    """
+    """Draw every joint's residual as a multiple of its noise."""
     fits = {"own recordings": (document.fit.train, PREDICTED, "o")}
     if document.fit.held_out is not None:
         fits["held out"] = (document.fit.held_out, HELD_OUT, "D")

@@ -20,12 +20,6 @@ MOST_PIECES = 8
 class TorqueSeries:
     """One continuous piece of a recording beside what the model says.
 
-    recording : str
-        name of the file
-    repetitions : int
-        periods that were averaged for the estimate; the torque is that of the first of them
-    rate_hz : float
-        sampling rate
     time : (N,) float64
         [s]
     velocity : (N, n) float64
@@ -51,20 +45,7 @@ class TorqueSeries:
 
 
 def torque_series(identification: Identification, recording: Recording) -> TorqueSeries:
-    """The longest of the first pieces of a recording, with the delivered model's torque.
-
-    Parameters
-    ----------
-    identification : Identification
-        the model
-    recording : Recording
-        one of those that it was made from or judged by
-
-    Returns
-    -------
-    TorqueSeries
-        at the recorded rate, no filter
-    """
+    """The longest of the first pieces of a recording, with the delivered model's torque."""
     longest = max(islice(_pieces(identification, recording), MOST_PIECES), key=lambda piece: len(piece.motion.time))
     motion = longest.motion
     return TorqueSeries(

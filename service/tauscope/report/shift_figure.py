@@ -18,39 +18,13 @@ TICKS = (3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 10000.0)
 
 
 def shift_figure(name: str, document: DiagnosisDocument) -> str:
-    """Draw how far parameters moved when the findings were added, in standard errors.
-
-    Parameters
-    ----------
-    name : str
-        unique on the page
-    document : DiagnosisDocument
-        with at least one shift
-
-    Returns
-    -------
-    str
-        inline SVG
-    """
+    """Draw how far parameters moved when the findings were added, in standard errors."""
     entries = document.parameter_shifts[:MOST]
     return _bars(name, [e.parameter for e in entries], [e.shift_in_std for e in entries])
 
 
 def difference_figure(name: str, document: DiagnosisDocument) -> str:
-    """Draw how far the arm's parameters are from the simulation's, in standard errors.
-
-    Parameters
-    ----------
-    name : str
-        unique on the page
-    document : DiagnosisDocument
-        with at least one difference
-
-    Returns
-    -------
-    str
-        inline SVG
-    """
+    """Draw how far the arm's parameters are from the simulation's, in standard errors."""
     entries = document.parameter_differences[:MOST]
     return _bars(name, [e.parameter for e in entries], [e.difference_in_std for e in entries])
 

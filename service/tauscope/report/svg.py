@@ -75,22 +75,7 @@ _DRAWING = Lock()
 
 
 def draw_svg(name: str, height_inches: float, draw: Callable[[Figure], None]) -> str:
-    """Draw a figure and return it as an ``<svg>`` element that can stand in a page beside others.
-
-    Parameters
-    ----------
-    name : str
-        unique on the page: letters, digits and dashes; begins every id in the drawing
-    height_inches : float
-        height of the drawing for a width of `WIDTH_INCHES`
-    draw : callable
-        draws into the figure that it is given
-
-    Returns
-    -------
-    str
-        SVG without prolog, metadata or any address
-    """
+    """Draw a figure and return it as an ``<svg>`` element that can stand in a page beside others."""
     with _DRAWING, mpl.rc_context(_STYLE):
         figure = Figure(figsize=(WIDTH_INCHES, height_inches), layout="constrained")
         canvas = FigureCanvasSVG(figure)

@@ -6,15 +6,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Table:
-    """Cells as text.
-
-    columns : sequence of str
-        headings
-    rows : sequence of sequences of str
-        cells
-    words : int
-        number of leading columns that hold words; the others hold numbers
-    """
+    """Cells as text."""
 
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]

@@ -11,15 +11,7 @@ _COEFFICIENTS = ("stiction", "stribeck", "viscous", "offset", "k_v", "delta")
 
 
 def fit_table(document: IdentificationDocument, robot: Robot) -> Table:
-    """Noise and residual of every joint.
-
-    Parameters
-    ----------
-    document : IdentificationDocument
-        the result
-    robot : Robot
-        the arm, for units
-    """
+    """Noise and residual of every joint."""
     fit = document.fit
     unseen = fit.held_out.rms if fit.held_out else [None] * len(document.joints)
     rows = []
@@ -35,13 +27,7 @@ def fit_table(document: IdentificationDocument, robot: Robot) -> Table:
 
 
 def friction_table(document: IdentificationDocument) -> Table:
-    """Friction coefficients with standard errors; in brackets what the data cannot tell.
-
-    Parameters
-    ----------
-    document : IdentificationDocument
-        the result
-    """
+    """Friction coefficients with standard errors; in brackets what the data cannot tell."""
     rows = []
     for entry in document.friction:
         cells = [entry.joint]
@@ -58,25 +44,13 @@ def friction_table(document: IdentificationDocument) -> Table:
 
 
 def rotor_table(document: IdentificationDocument) -> Table:
-    """Reflected rotor inertia where the data ask for it.
-
-    Parameters
-    ----------
-    document : IdentificationDocument
-        the result
-    """
+    """Reflected rotor inertia where the data ask for it."""
     rows = [[entry.joint, *with_uncertainty(entry.value, entry.std)] for entry in document.rotor_inertia]
     return Table(("joint", "I_a [kg m², kg]", "± std"), rows)
 
 
 def base_parameter_table(document: IdentificationDocument) -> Table:
-    """Base parameters with standard errors.
-
-    Parameters
-    ----------
-    document : IdentificationDocument
-        the result
-    """
+    """Base parameters with standard errors."""
     undetermined = set(document.undetermined)
     rows = []
     for entry in document.base_parameters:
@@ -86,13 +60,7 @@ def base_parameter_table(document: IdentificationDocument) -> Table:
 
 
 def link_table(document: IdentificationDocument) -> Table:
-    """Mass, centre of mass and inertia of every link.
-
-    Parameters
-    ----------
-    document : IdentificationDocument
-        the result
-    """
+    """Mass, centre of mass and inertia of every link."""
     rows = []
     for number, link in enumerate(document.links, start=1):
         centre = [moment / link.mass if link.mass > 0.0 else None for moment in link.first_moment]
@@ -103,13 +71,7 @@ def link_table(document: IdentificationDocument) -> Table:
 
 
 def conditioning_table(document: IdentificationDocument) -> Table:
-    """What every recording holds, and what was done to it.
-
-    Parameters
-    ----------
-    document : IdentificationDocument
-        the result
-    """
+    """What every recording holds, and what was done to it."""
     rows = []
     for used, entries in (("estimate", document.conditioning), ("held out", document.held_out_conditioning)):
         for entry in entries:
@@ -123,12 +85,6 @@ def conditioning_table(document: IdentificationDocument) -> Table:
 
 
 def input_table(provenance: Provenance) -> Table:
-    """Files with their hashes.
-
-    Parameters
-    ----------
-    provenance : Provenance
-        where the result came from
-    """
+    """Files with their hashes."""
     rows = [[entry.path, entry.role, entry.sha256, str(entry.size_bytes)] for entry in provenance.inputs]
     return Table(("file", "read as", "SHA-256", "bytes"), rows, words=3)

@@ -23,21 +23,10 @@ def torque_figure(name: str, series: TorqueSeries, joint: int, noise_std: float,
 
     Parameters
     ----------
-    name : str
-        unique on the page
-    series : TorqueSeries
-        what to draw
     joint : int
         joint index, from 0
     noise_std : float
         σ of the sensor noise [Nm or N]
-    unit : str
-        of the torque
-
-    Returns
-    -------
-    str
-        inline SVG
     """
     enlarged = worst_part(series.residual[:, joint], ENLARGED_SHARE)
 
@@ -66,8 +55,6 @@ def torque_columns(series: TorqueSeries, joint: int) -> dict[str, list[float]]:
 
     Parameters
     ----------
-    series : TorqueSeries
-        what is drawn
     joint : int
         joint index, from 0
     """
@@ -83,13 +70,6 @@ def worst_part(residual: Array, share: float) -> slice:
     ----------
     residual : (N,) float64
         NaN where nothing was measured
-    share : float
-        length of the stretch, as a part of N
-
-    Returns
-    -------
-    slice
-        start and stop are set
     """
     length = min(max(int(len(residual) * share), 2), len(residual))
     total = np.concatenate([[0.0], np.cumsum(np.nan_to_num(residual) ** 2)])

@@ -37,18 +37,7 @@ _CONSTANTS = {
 
 
 def fit_sentences(document: IdentificationDocument) -> list[str]:
-    """How well the model explains the torque.
-
-    Parameters
-    ----------
-    document : IdentificationDocument
-        the result
-
-    Returns
-    -------
-    list of str
-        plain sentences
-    """
+    """How well the model explains the torque."""
     train, held_out = document.fit.train, document.fit.held_out
     error = f"Relative error, sensor noise included: {percent(train.relative_error)} on the model's own recordings"
     if held_out is None:
@@ -66,53 +55,24 @@ def fit_sentences(document: IdentificationDocument) -> list[str]:
 
 
 def cautions(document: IdentificationDocument) -> list[str]:
-    """What a reader has to know before using the numbers.
-
-    Parameters
-    ----------
-    document : IdentificationDocument
-        the result
-
-    Returns
-    -------
-    list of str
-        plain sentences; empty where there is nothing to say
-    """
+    """What a reader has to know before using the numbers."""
     return [*_about_parameters(document), *_about_friction(document), *_about_samples(document)]
 
 
 def noise_words(document: IdentificationDocument) -> str:
-    """Where the noise figures come from.
-
-    Parameters
-    ----------
-    document : IdentificationDocument
-        the result
-    """
+    """Where the noise figures come from."""
     if document.noise_method == "periods":
         return "from differences between repeated periods, whatever the model"
     return "from the whitened residual"
 
 
 def band_words(document: IdentificationDocument) -> str:
-    """The band in which torque and model are compared.
-
-    Parameters
-    ----------
-    document : IdentificationDocument
-        the result
-    """
+    """The band in which torque and model are compared."""
     return "all frequencies" if document.cutoff_hz is None else f"0 – {significant(document.cutoff_hz, 3)} Hz"
 
 
 def masked_samples(document: IdentificationDocument) -> int:
-    """How many samples of all recordings were not used: no position, no torque, or a piece too short to filter.
-
-    Parameters
-    ----------
-    document : IdentificationDocument
-        the result
-    """
+    """How many samples of all recordings were not used: no position, no torque, or a piece too short to filter."""
     entries = (*document.conditioning, *document.held_out_conditioning)
     return sum(entry.missed_positions + entry.dropped + sum(entry.missed_torques) for entry in entries)
 

@@ -12,8 +12,6 @@ def read_bounded(path: Path, limit: int) -> bytes:
 
     Parameters
     ----------
-    path : Path
-        the file
     limit : int
         largest size that is accepted [bytes]
 
@@ -49,13 +47,6 @@ def _first_bytes(path: Path, count: int) -> bytes:
 
 def decode_utf8(data: bytes, label: str) -> str:
     """Text of UTF-8 bytes, without a byte order mark.
-
-    Parameters
-    ----------
-    data : bytes
-        content of a file
-    label : str
-        name of the file, for the message
 
     Raises
     ------

@@ -21,26 +21,10 @@ class JointSummary:
 
     number : int
         from 1, base first
-    name : str
-        of the joint
-    type : JointType
-        how it moves
-    limits : JointLimits
-        what it may do
-    gear_ratio : float or None
-        motor turns per joint turn
-    torque_constant : float
-        joint Nm (N) per recorded unit
-    sign : int
-        -1 where the recorded torque is wired the other way round
     origin : tuple of three float
         origin of the link frame at q = 0, in the frame of the link before [m]
-    axis : tuple of three float
-        unit vector of the joint axis, in the frame of the link before
     mass : float or None
         of the link that the joint carries, as the model believes [kg]
-    before, after : tuple of 16 float
-        homogeneous transforms, row by row: link frame = frame of the link before · before · motion about z · after
     """
 
     number: int
@@ -61,18 +45,12 @@ class JointSummary:
 class RobotReport:
     """A robot file at a glance.
 
-    name : str
-        of the robot
-    source : str
-        path of the robot file
     joints : tuple of JointSummary
         base first
     gravity : tuple of three float
         in the base frame [m/s²]
     total_mass : float or None
         of all moving links, as the model believes [kg]; None without a model
-    findings : tuple of Finding
-        errors first, then warnings, then what is good to know
     """
 
     name: str
@@ -90,11 +68,6 @@ class RobotReport:
 
 def check_robot(path: Path | str) -> RobotReport:
     """The report on a robot file; a model that no rigid body can have is among its findings.
-
-    Parameters
-    ----------
-    path : Path or str
-        the robot file
 
     Raises
     ------

@@ -24,8 +24,6 @@ class DenavitHartenbergRow:
         along x [m]
     alpha : float
         α, about x [rad]
-    type : JointType
-        how the joint moves
     """
 
     theta: float

@@ -35,8 +35,6 @@ class DenavitHartenbergRowDocument(Document):
         along x [m]
     alpha : float
         α [rad]
-    type : JointType
-        revolute where not stated
     """
 
     theta: Number
@@ -47,15 +45,7 @@ class DenavitHartenbergRowDocument(Document):
 
 
 class UrdfDocument(Document):
-    """Where the URDF is, and between which of its links the chain runs.
-
-    file : str
-        path, seen from the robot file
-    base : str
-        link that stands still
-    tip : str
-        last link of the chain
-    """
+    """Where the URDF is, and between which of its links the chain runs."""
 
     file: Name
     base: Name
@@ -66,15 +56,7 @@ Rows = list[DenavitHartenbergRowDocument]
 
 
 class KinematicsDocument(Document):
-    """The chain, described in exactly one way.
-
-    dh : list of rows, or None
-        standard Denavit-Hartenberg parameters
-    mdh : list of rows, or None
-        modified Denavit-Hartenberg parameters
-    urdf : UrdfDocument or None
-        a chain of a URDF
-    """
+    """The chain, described in exactly one way."""
 
     dh: Rows | None = Field(default=None, min_length=1, max_length=MOST_JOINTS)
     mdh: Rows | None = Field(default=None, min_length=1, max_length=MOST_JOINTS)
@@ -124,23 +106,7 @@ class FrictionShapeDocument(Document):
 
 
 class JointDocument(Document):
-    """One joint.
-
-    name : str
-        unique in the arm
-    limits : LimitsDocument or None
-        what it may do
-    gear_ratio : float or None
-        motor turns per joint turn
-    torque_constant : float or None
-        joint Nm (N) per recorded unit
-    sign : int or None
-        1 or -1
-    friction_shape : FrictionShapeDocument or None
-        shape of its friction curve
-    drive : dict or None
-        plain data for the driver
-    """
+    """One joint."""
 
     name: Name
     limits: LimitsDocument | None = None
@@ -199,13 +165,7 @@ class FrictionDocument(Document):
 
 
 class ModelDocument(Document):
-    """What the user's simulation believes.
-
-    links : list of LinkDocument, or None
-        one a link
-    friction : list of FrictionDocument, or None
-        one a joint
-    """
+    """What the user's simulation believes."""
 
     links: list[LinkDocument] | None = Field(default=None, min_length=1, max_length=MOST_JOINTS)
     friction: list[FrictionDocument] | None = Field(default=None, min_length=1, max_length=MOST_JOINTS)
@@ -214,16 +174,8 @@ class ModelDocument(Document):
 class RobotDocument(Document):
     """The whole robot file.
 
-    name : str
-        of the robot
-    kinematics : KinematicsDocument
-        the chain
     gravity : list of three float
         in the base frame [m/s²]
-    joints : list of JointDocument, or None
-        in chain order
-    model : ModelDocument or None
-        what the simulation believes
     """
 
     name: Name
@@ -246,8 +198,6 @@ class RobotDocument(Document):
 class PlacementDocument(Document):
     """A fixed rigid displacement x ↦ R x + p.
 
-    rotation : list of three rows of three float
-        R
     translation : list of three float
         p [m]
     """
@@ -257,15 +207,7 @@ class PlacementDocument(Document):
 
 
 class SegmentDocument(Document):
-    """One joint of the chain.
-
-    type : JointType
-        how the joint moves
-    before : PlacementDocument
-        up to the joint's motion
-    after : PlacementDocument
-        from the joint's motion on
-    """
+    """One joint of the chain."""
 
     type: Motion
     before: PlacementDocument
@@ -273,20 +215,12 @@ class SegmentDocument(Document):
 
 
 class PlainKinematicsDocument(KinematicsDocument):
-    """The chain of a robot made from plain data: also as placements, which need no file beside it.
-
-    segments : list of SegmentDocument, or None
-        the chain as placements
-    """
+    """The chain of a robot made from plain data: also as placements, which need no file beside it."""
 
     segments: list[SegmentDocument] | None = Field(default=None, min_length=1, max_length=MOST_JOINTS)
 
 
 class PlainRobotDocument(RobotDocument):
-    """A robot made from plain data.
-
-    kinematics : PlainKinematicsDocument
-        the chain
-    """
+    """A robot made from plain data."""
 
     kinematics: PlainKinematicsDocument

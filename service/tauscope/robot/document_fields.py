@@ -16,15 +16,7 @@ DEEPEST_DRIVE = 16
 
 
 def refusal(text: str, key: str | None = None) -> PydanticCustomError:
-    """The error of a field, worded by us.
-
-    Parameters
-    ----------
-    text : str
-        what is wrong and what to do
-    key : str or None
-        the key of the mapping that the error is about, where the field is the whole mapping
-    """
+    """The error of a field, worded by us."""
     return PydanticCustomError("refused", "{text}", {"text": text, "key": key})
 
 

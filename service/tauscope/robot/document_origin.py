@@ -34,13 +34,7 @@ class DocumentOrigin:
     lines: Mapping[Place, int] = field(default_factory=dict)
 
     def where(self, place: Place) -> str:
-        """Where an entry stands, as ``arm.yaml:12: joints[2].limits.position (joint 3, 'wrist')``.
-
-        Parameters
-        ----------
-        place : tuple
-            keys and indices that lead to the entry
-        """
+        """Where an entry stands, as ``arm.yaml:12: joints[2].limits.position (joint 3, 'wrist')``."""
         line = self._line(place)
         path = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in place).lstrip(".")
         parts = [self.label if line is None else f"{self.label}:{line}"]
@@ -49,24 +43,11 @@ class DocumentOrigin:
         return ": ".join(parts)
 
     def error(self, place: Place, text: str) -> RobotFileError:
-        """The error of an entry.
-
-        Parameters
-        ----------
-        place : tuple
-            keys and indices that lead to the entry
-        text : str
-            what is wrong and what to do
-        """
+        """The error of an entry."""
         return RobotFileError(one_line(f"{self.where(place)}: {text}"))
 
     def validated(self, kind: type[DocumentType]) -> DocumentType:
         """The data as a validated document.
-
-        Parameters
-        ----------
-        kind : type
-            class of the document
 
         Raises
         ------

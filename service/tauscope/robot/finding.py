@@ -14,15 +14,7 @@ class Severity(StrEnum):
 
 @dataclass(frozen=True)
 class Finding:
-    """One remark on a robot.
-
-    severity : Severity
-        how much it matters
-    where : str
-        file, line and place that it is about
-    text : str
-        what is so, and what to do about it
-    """
+    """One remark on a robot."""
 
     severity: Severity
     where: str

@@ -10,26 +10,14 @@ MOST_CANDIDATES = 1000
 
 
 def one_line(text: str) -> str:
-    """A message as one printable line: white space folded, control characters escaped, cut where it is endless.
-
-    Parameters
-    ----------
-    text : str
-        any text, perhaps with parts of a user's file in it
-    """
+    """A message as one printable line: white space folded, control characters escaped, cut where it is endless."""
     folded = " ".join(text.split())
     printable = "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in folded)
     return printable if len(printable) <= LONGEST_MESSAGE else printable[: LONGEST_MESSAGE - 1] + "…"
 
 
 def shown(value: object) -> str:
-    """A value of the user's file as a message shows it: quoted text, and cut where it is long.
-
-    Parameters
-    ----------
-    value : object
-        plain data: text, a number, a list, a mapping or None
-    """
+    """A value of the user's file as a message shows it: quoted text, and cut where it is long."""
     if isinstance(value, dict):
         return "a mapping"
     if isinstance(value, list | tuple):
@@ -45,15 +33,7 @@ def shown(value: object) -> str:
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """A hint at what was meant: the known name nearest to `name`, or the known names where none is near.
-
-    Parameters
-    ----------
-    name : str
-        what the user wrote
-    known : iterable of str
-        what could have been written
-    """
+    """A hint at what was meant: the known name nearest to `name`, or the known names where none is near."""
     names = sorted(islice(known, MOST_CANDIDATES))
     match = get_close_matches(name[:200], names, n=1, cutoff=0.6)
     if match:

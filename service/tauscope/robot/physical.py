@@ -25,26 +25,14 @@ SMALLEST = float(np.finfo(np.float64).tiny)
 
 @dataclass(frozen=True)
 class Defect:
-    """Why no rigid body has these parameters.
-
-    severity : Severity
-        WARNING where rounded digits explain it, else ERROR
-    text : str
-        the condition that fails, with its numbers
-    """
+    """Why no rigid body has these parameters."""
 
     severity: Severity
     text: str
 
 
 def pseudo_inertia(link: LinkInertia) -> Array:
-    """The pseudo-inertia [[Σ, h], [hᵀ, m]] with Σ = ½ tr(I) 1 - I, shape (4, 4) [kg m², kg m, kg].
-
-    Parameters
-    ----------
-    link : LinkInertia
-        inertial parameters, about the origin of the frame in which they are given
-    """
+    """The pseudo-inertia [[Σ, h], [hᵀ, m]] with Σ = ½ tr(I) 1 - I, shape (4, 4) [kg m², kg m, kg]."""
     matrix = np.empty((4, 4))
     matrix[:3, :3] = 0.5 * np.trace(link.inertia) * np.eye(3) - link.inertia
     matrix[:3, 3] = matrix[3, :3] = link.first_moment
@@ -53,13 +41,7 @@ def pseudo_inertia(link: LinkInertia) -> Array:
 
 
 def find_defect(link: LinkInertia) -> Defect | None:
-    """What makes the parameters impossible for a rigid body, or None where a body can have them.
-
-    Parameters
-    ----------
-    link : LinkInertia
-        inertial parameters, about any origin
-    """
+    """What makes the parameters impossible for a rigid body, or None where a body can have them."""
     offset = float(np.linalg.norm(link.first_moment))
     if link.mass < 0.0:
         return Defect(Severity.ERROR, f"mass {link.mass:g} kg is negative")

@@ -9,15 +9,7 @@ Array = NDArray[np.float64]
 
 
 def compose(first: Placement, second: Placement) -> Placement:
-    """One displacement after the other: R = R₁ R₂, p = p₁ + R₁ p₂.
-
-    Parameters
-    ----------
-    first : Placement
-        the outer displacement
-    second : Placement
-        the inner one, seen from the frame that `first` leads to
-    """
+    """One displacement after the other: R = R₁ R₂, p = p₁ + R₁ p₂."""
     return Placement(first.rotation @ second.rotation, first.translation + first.rotation @ second.translation)
 
 

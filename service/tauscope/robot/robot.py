@@ -60,22 +60,8 @@ class FrictionShape:
 class Joint:
     """One joint: its name, its limits and what turns a recorded drive signal into joint torque.
 
-    name : str
-        unique in the arm
-    type : JointType
-        how it moves
-    limits : JointLimits
-        what it may do
     gear_ratio : float or None
         motor turns per joint turn; None where not stated
-    torque_constant : float
-        joint torque per recorded unit [Nm or N, per recorded unit]
-    sign : int
-        -1 where the recorded torque is wired the other way round, else 1
-    friction_shape : FrictionShape
-        shape of its friction curve
-    drive : mapping or None
-        what its drive needs to know, as plain data: see the driver's own documentation
     """
 
     name: str
@@ -109,13 +95,6 @@ class Segment:
     The joint turns about, or slides along, the z axis between the two placements. Standard DH puts a and α into
     `after`, modified DH into `before`; a URDF puts the axis' orientation into both, so that the link frame stays the
     URDF's own.
-
-    type : JointType
-        how the joint moves
-    before : Placement
-        joint frame at rest, seen from the link frame before
-    after : Placement
-        link frame, seen from the moved joint frame
     """
 
     type: JointType
@@ -177,13 +156,7 @@ class FrictionCoefficients:
 
 @dataclass(frozen=True)
 class Model:
-    """What the user's simulation believes; None where the robot file says nothing.
-
-    links : tuple of LinkInertia, or None
-        one a link
-    friction : tuple of FrictionCoefficients, or None
-        one a joint
-    """
+    """What the user's simulation believes; None where the robot file says nothing."""
 
     links: tuple[LinkInertia, ...] | None = None
     friction: tuple[FrictionCoefficients, ...] | None = None
@@ -193,24 +166,10 @@ class Model:
 class Robot:
     """A robot arm as its robot file describes it.
 
-    name : str
-        as the robot file calls it
     joints : tuple of Joint
         base first
-    segments : tuple of Segment
-        one a joint: the chain
     gravity : (3,) float64
         acceleration of gravity in the base frame [m/s²]
-    model : Model
-        what the user's simulation believes
-    source : Path or None
-        the robot file, for messages and for the files that it names
-    urdf : Path or None
-        the URDF, where the kinematics come from one
-    urdf_links : tuple of tuples of str
-        for each link the URDF links that move with it as one body, its own first; empty without a URDF
-    findings : tuple of Finding
-        what the reader left out, took as zero or found doubtful: worth showing beside any result
     """
 
     name: str

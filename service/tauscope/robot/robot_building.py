@@ -52,15 +52,6 @@ class _Chain:
 def build_robot(document: RobotDocument, origin: DocumentOrigin, urdf_source: UrdfSource) -> Robot:
     """The robot of a document, with what is impossible about its model among the findings, as errors.
 
-    Parameters
-    ----------
-    document : RobotDocument
-        the validated document
-    origin : DocumentOrigin
-        where it came from, for messages
-    urdf_source : callable
-        looks up the URDF that the document names
-
     Raises
     ------
     RobotFileError
@@ -85,13 +76,7 @@ def build_robot(document: RobotDocument, origin: DocumentOrigin, urdf_source: Ur
 
 
 def tolerated(severity: Severity) -> Severity:
-    """A severity that does not refuse the robot: an error becomes a warning.
-
-    Parameters
-    ----------
-    severity : Severity
-        the severity as it was found
-    """
+    """A severity that does not refuse the robot: an error becomes a warning."""
     return Severity.WARNING if severity is Severity.ERROR else severity
 
 

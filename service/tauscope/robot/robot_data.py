@@ -21,15 +21,6 @@ def robot_from_dict(
 
     No file is opened: a URDF that the data name is taken from `urdf_files`.
 
-    Parameters
-    ----------
-    data : mapping
-        the robot file's content; `kinematics` may hold ``segments`` instead, as `robot_to_dict` writes them
-    label : str
-        what messages call the data
-    urdf_files : mapping of str to bytes or None
-        content of URDF files by the name that the data give them
-
     Raises
     ------
     RobotFileError
@@ -44,15 +35,6 @@ def robot_from_dict(
 
 def robot_from_yaml(data: bytes, label: str = "robot", urdf_files: Mapping[str, bytes] | None = None) -> Robot:
     """The robot of an uploaded robot file; as `robot_from_dict` this opens no file.
-
-    Parameters
-    ----------
-    data : bytes
-        content of the robot file
-    label : str
-        what messages call it
-    urdf_files : mapping of str to bytes or None
-        content of URDF files by the name that the robot file gives them
 
     Raises
     ------
@@ -69,11 +51,6 @@ def robot_to_dict(robot: Robot) -> dict[str, Any]:
     """Everything that computing with the robot needs, as plain data without files beside it.
 
     `robot_from_dict` gives the same robot back, but for the paths of its files, the URDF's link names and its findings.
-
-    Parameters
-    ----------
-    robot : Robot
-        the robot
     """
     segments = [
         {"type": s.type.value, "before": _placement(s.before), "after": _placement(s.after)} for s in robot.segments

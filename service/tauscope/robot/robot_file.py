@@ -20,16 +20,6 @@ LARGEST_ROBOT_FILE = 1024 * 1024
 def read_robot(path: Path | str) -> Robot:
     """The robot that a robot file describes.
 
-    Parameters
-    ----------
-    path : Path or str
-        the robot file; a URDF that it names is looked up beside it
-
-    Returns
-    -------
-    Robot
-        `findings` holds what was left out or is doubtful
-
     Raises
     ------
     RobotFileError
@@ -42,11 +32,6 @@ def read_robot(path: Path | str) -> Robot:
 
 def load_robot(path: Path | str) -> Robot:
     """The robot of a robot file, even where its model is impossible: then `findings` holds the errors.
-
-    Parameters
-    ----------
-    path : Path or str
-        the robot file
 
     Raises
     ------
@@ -70,13 +55,6 @@ def load_robot(path: Path | str) -> Robot:
 def parse_robot_file(data: bytes, label: str) -> tuple[RobotDocument, DocumentOrigin]:
     """The validated document of a robot file's bytes, and where it came from.
 
-    Parameters
-    ----------
-    data : bytes
-        content of the file
-    label : str
-        name of the file, for messages
-
     Raises
     ------
     RobotFileError
@@ -95,11 +73,6 @@ def parse_robot_file(data: bytes, label: str) -> tuple[RobotDocument, DocumentOr
 
 def refuse_unphysical(robot: Robot) -> Robot:
     """The robot itself, if a rigid body can have the mass and inertia of each link of its model.
-
-    Parameters
-    ----------
-    robot : Robot
-        as it was read, with errors among its findings where a link is impossible
 
     Raises
     ------

@@ -28,20 +28,10 @@ MOVING = frozenset({"revolute", "continuous", "prismatic"})
 class UrdfChain:
     """What a URDF says of the chain between two links, one entry a moving joint.
 
-    joint_names : tuple of str
-        names of the moving joints
-    segments : tuple of Segment
-        the chain, fixed joints merged
-    limits : tuple of JointLimits
-        from `<limit>`
     links : tuple of LinkInertia, or None
         about the link frames; a link without any `<inertial>` is zero, None where no link has one
     friction : tuple of FrictionCoefficients, or None
         from `<dynamics>`; None where no joint has it
-    link_names : tuple of tuples of str
-        URDF links that move as one body, the one that the joint carries first
-    findings : tuple of Finding
-        what was left out or is doubtful; an ERROR where an inertial belongs to no rigid body
     """
 
     joint_names: tuple[str, ...]
@@ -55,17 +45,6 @@ class UrdfChain:
 
 def read_urdf_chain(data: bytes, label: str, base: str, tip: str) -> UrdfChain:
     """The chain from link `base` to link `tip`.
-
-    Parameters
-    ----------
-    data : bytes
-        content of the URDF file
-    label : str
-        name of the file, for messages
-    base : str
-        link that stands still
-    tip : str
-        last link of the chain
 
     Raises
     ------

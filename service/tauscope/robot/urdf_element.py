@@ -22,62 +22,24 @@ Element = Any
 
 
 def where(label: str, element: Element) -> str:
-    """File, line and name of an element.
-
-    Parameters
-    ----------
-    label : str
-        the file
-    element : Element
-        the element
-    """
+    """File, line and name of an element."""
     name = element.get("name")
     kind = etree.QName(element).localname
     return f"{label}:{element.sourceline}: {kind}" + (f" {shown(name)}" if name else "")
 
 
 def urdf_error(label: str, element: Element, text: str) -> RobotFileError:
-    """The error of an element.
-
-    Parameters
-    ----------
-    label : str
-        the file
-    element : Element
-        the element
-    text : str
-        what is wrong and what to do
-    """
+    """The error of an element."""
     return RobotFileError(one_line(f"{where(label, element)}: {text}"))
 
 
 def children(element: Element, kind: str) -> list[Element]:
-    """Child elements of one kind, whatever their namespace.
-
-    Parameters
-    ----------
-    element : Element
-        the parent
-    kind : str
-        local name of the children
-    """
+    """Child elements of one kind, whatever their namespace."""
     return [child for child in element if isinstance(child.tag, str) and etree.QName(child).localname == kind]
 
 
 def only_child(label: str, element: Element, kind: str, findings: list[Finding]) -> Element | None:
-    """The child of one kind, or None; of several the first counts, as in ROS' own parser, and a finding says so.
-
-    Parameters
-    ----------
-    label : str
-        the file
-    element : Element
-        the parent
-    kind : str
-        local name of the child
-    findings : list of Finding
-        where the remark is added
-    """
+    """The child of one kind, or None; of several the first counts, as in ROS' own parser, and a finding says so."""
     found = children(element, kind)
     if len(found) > 1:
         text = f"holds {len(found)} <{kind}> elements; the first counts, as in ROS' own parser: remove the others"
@@ -90,12 +52,6 @@ def number(label: str, element: Element, key: str, default: float | None = None)
 
     Parameters
     ----------
-    label : str
-        the file
-    element : Element
-        the element
-    key : str
-        name of the attribute
     default : float or None
         value where the attribute is absent; None where it must be there
 
@@ -115,15 +71,6 @@ def number(label: str, element: Element, key: str, default: float | None = None)
 def bounded_number(label: str, element: Element, key: str) -> float:
     """A number in an attribute that must be there, of a size that SI quantities of an arm have.
 
-    Parameters
-    ----------
-    label : str
-        the file
-    element : Element
-        the element
-    key : str
-        name of the attribute
-
     Raises
     ------
     RobotFileError
@@ -137,14 +84,8 @@ def vector(label: str, element: Element | None, key: str, default: tuple[float, 
 
     Parameters
     ----------
-    label : str
-        the file
     element : Element or None
         the element; None where the whole element is absent
-    key : str
-        name of the attribute
-    default : tuple of three float
-        value where the attribute is absent
 
     Raises
     ------
@@ -161,17 +102,7 @@ def vector(label: str, element: Element | None, key: str, default: tuple[float, 
 
 
 def origin(label: str, element: Element, findings: list[Finding]) -> Placement:
-    """The placement of an element's ``<origin>``, the identity where it has none.
-
-    Parameters
-    ----------
-    label : str
-        the file
-    element : Element
-        a joint or an inertial
-    findings : list of Finding
-        where remarks are added
-    """
+    """The placement of an element's ``<origin>``, the identity where it has none."""
     node = only_child(label, element, "origin", findings)
     roll, pitch, yaw = (float(angle) for angle in vector(label, node, "rpy", (0.0, 0.0, 0.0)))
     return Placement(rotation_of_roll_pitch_yaw(roll, pitch, yaw), vector(label, node, "xyz", (0.0, 0.0, 0.0)))

@@ -38,12 +38,8 @@ def lumped_inertia(
 
     Parameters
     ----------
-    label : str
-        the file
     bodies : iterable of (Element, Placement)
         link elements, with the placement of each in the frame of the link that they move with
-    findings : list of Finding
-        where remarks are added; an ERROR where an inertial belongs to no rigid body
 
     Raises
     ------

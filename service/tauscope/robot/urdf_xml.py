@@ -18,19 +18,7 @@ XACRO = frozenset({"http://www.ros.org/wiki/xacro", "http://ros.org/wiki/xacro"}
 
 @dataclass(frozen=True)
 class UrdfJoint:
-    """A joint of a URDF.
-
-    name : str
-        unique in the file
-    type : str
-        revolute, continuous, prismatic, fixed, floating or planar
-    parent : str
-        name of the link that carries it
-    child : str
-        name of the link that it carries
-    element : Element
-        the joint element
-    """
+    """A joint of a URDF."""
 
     name: str
     type: str
@@ -41,17 +29,7 @@ class UrdfJoint:
 
 @dataclass(frozen=True)
 class UrdfTree:
-    """Links and joints of a URDF.
-
-    label : str
-        the file, for messages
-    links : mapping of str to Element
-        link elements by name
-    parent_joint : mapping of str to UrdfJoint
-        the joint that carries a link; the root has none
-    child_joints : mapping of str to tuple of UrdfJoint
-        the joints that a link carries
-    """
+    """Links and joints of a URDF."""
 
     label: str
     links: Mapping[str, Element]
@@ -61,13 +39,6 @@ class UrdfTree:
 
 def parse_urdf(data: bytes, label: str) -> UrdfTree:
     """Links and joints of URDF text.
-
-    Parameters
-    ----------
-    data : bytes
-        content of the file
-    label : str
-        name of the file, for messages
 
     Raises
     ------

@@ -28,8 +28,6 @@ Place = tuple[str | int, ...]
 class YamlContent:
     """Plain data of a YAML document.
 
-    data : dict, list, str, int, float, bool or None
-        the document
     lines : dict of tuple to int
         for each entry's place the line, from 1, on which it stands
     """
@@ -52,15 +50,7 @@ class _BoundedComposer(Composer):
         self.open_nodes = 0
 
     def compose_node(self, parent: Any, index: Any) -> Any:
-        """One node of the document, counted.
-
-        Parameters
-        ----------
-        parent : Node or None
-            the collection that holds the node
-        index : int, Node or None
-            where in the collection
-        """
+        """One node of the document, counted."""
         line = self.parser.peek_event().start_mark.line + 1
         self.entries += 1
         if self.entries > MOST_ENTRIES:
@@ -76,13 +66,6 @@ class _BoundedComposer(Composer):
 
 def read_yaml(text: str, label: str) -> YamlContent:
     """Plain data of one YAML document.
-
-    Parameters
-    ----------
-    text : str
-        the document
-    label : str
-        name of the file, for messages
 
     Raises
     ------
@@ -127,17 +110,7 @@ class _PlainBuilder:
         self.entries = 0
 
     def value(self, node: Any, place: Place, line: int) -> Any:
-        """Plain data of a node.
-
-        Parameters
-        ----------
-        node : Node
-            the node
-        place : tuple
-            where it stands
-        line : int
-            the line to name, that of its key where it has one
-        """
+        """Plain data of a node."""
         self.entries += 1
         if self.entries > MOST_ENTRIES or len(place) > DEEPEST:
             raise self._error(line, "aliases (*name) expand without end; write the entries out")

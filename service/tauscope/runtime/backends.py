@@ -15,13 +15,7 @@ from tauscope_drivers import Backend
 
 @dataclass(frozen=True)
 class Connection:
-    """A backend, not connected yet, and what its time is.
-
-    backend : Backend
-        the arm
-    is_real_time : bool
-        whether its clock is the machine's; else it is as fast as it computes
-    """
+    """A backend, not connected yet, and what its time is."""
 
     backend: Backend
     is_real_time: bool
@@ -44,26 +38,6 @@ def make_backend(
     backends: "Mapping[str, BackendFactory] | None" = None,
 ) -> Connection:
     """The backend of a name.
-
-    Parameters
-    ----------
-    name : str
-        ``sim``, ``dynamixel`` or ``canopen``
-    robot : Robot
-        the arm
-    settings : mapping
-        the backend's own: for ``sim`` the keys ``time`` (virtual or real), ``scenario`` (a file), ``start`` (the
-        posture in which it stands at first, one number a joint) and, in real time, ``socket`` (of a simulated arm that
-        runs already; without it one is started for this run, and ends soon after it)
-    folder : Path or None
-        where the backend may keep files of its own; a temporary folder where None
-    backends : mapping of str to callable, or None
-        the backends that there are; `BACKENDS` where None
-
-    Returns
-    -------
-    Connection
-        not connected yet
 
     Raises
     ------

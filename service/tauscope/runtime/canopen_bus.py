@@ -24,28 +24,11 @@ class CanopenBus:
     name = "canopen"
 
     def is_meant(self, robot: Robot) -> bool:
-        """Whether a joint's ``drive`` block has a ``node_id``.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """Whether a joint's ``drive`` block has a ``node_id``."""
         return any("node_id" in (joint.drive or {}) for joint in robot.joints)
 
     def backend(self, robot: Robot, settings: Mapping[str, Any], folder: Path | None) -> Backend:
-        """The arm, not connected yet.
-
-        Parameters
-        ----------
-        robot : Robot
-            with a ``drive`` block on every joint
-        settings : mapping
-            ``interface`` and ``channel`` in place of the robot file's, and ``patience_s``: how much longer than the bus
-            takes an answer is waited for
-        folder : Path or None
-            not needed
-        """
+        """The arm, not connected yet."""
         del folder
         from tauscope_drivers.canopen import CanopenArm
 
@@ -60,13 +43,7 @@ class CanopenBus:
         return can_interfaces()
 
     def examine(self, robot: Robot) -> list[Finding]:
-        """Bus, and every drive that the robot file names.
-
-        Parameters
-        ----------
-        robot : Robot
-            with a ``drive`` block on every joint
-        """
+        """Bus, and every drive that the robot file names."""
         from tauscope_drivers.canopen import examine
 
         with drivers_words():
@@ -77,8 +54,6 @@ class CanopenBus:
 
         Parameters
         ----------
-        port : str
-            ``INTERFACE:CHANNEL`` as python-can names them, such as ``socketcan:can0``
         bit_rates : sequence of int or None
             to try [bit/s]; the usual ones where None
         """
@@ -91,15 +66,7 @@ class CanopenBus:
             yield from scan_bus(interface, channel, bit_rates)
 
     def planned_frames(self, robot: Robot, request: FrameRequest) -> Iterator[PlannedFrame]:
-        """The frames of a run, without a bus.
-
-        Parameters
-        ----------
-        robot : Robot
-            with a ``drive`` block on every joint, which states the drive's rated torque
-        request : FrameRequest
-            which run
-        """
+        """The frames of a run, without a bus."""
         from tauscope_drivers.canopen import plan_frames
 
         with drivers_words():

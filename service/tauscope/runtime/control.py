@@ -35,22 +35,7 @@ def control(
     backends: Mapping[str, BackendFactory] = BACKENDS,
     recorder: OpenRecorder = open_recorder,
 ) -> int:
-    """Carry a run out, in the main thread of a process of its own.
-
-    Parameters
-    ----------
-    folder : Path
-        holds ``order.json`` and ``run.json``
-    backends : mapping of str to callable
-        the backends that there are
-    recorder : callable
-        opens the journal
-
-    Returns
-    -------
-    int
-        exit status: 0 where the run's end is told in ``run.json``
-    """
+    """Carry a run out, in the main thread of a process of its own."""
     report = _event_pipe()
     try:
         lock = RunLock(folder)

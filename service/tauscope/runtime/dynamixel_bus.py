@@ -22,28 +22,11 @@ class DynamixelBus:
     name = "dynamixel"
 
     def is_meant(self, robot: Robot) -> bool:
-        """Whether a joint's ``drive`` block has a servo's ``id``.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """Whether a joint's ``drive`` block has a servo's ``id``."""
         return any("id" in (joint.drive or {}) for joint in robot.joints)
 
     def backend(self, robot: Robot, settings: Mapping[str, Any], folder: Path | None) -> Backend:
-        """The arm, not connected yet.
-
-        Parameters
-        ----------
-        robot : Robot
-            with a ``drive`` block on every joint
-        settings : mapping
-            ``port`` in place of the robot file's, and ``patience_s``: how much longer than the bus takes an answer is
-            waited for
-        folder : Path or None
-            not needed
-        """
+        """The arm, not connected yet."""
         del folder
         from tauscope_drivers.dynamixel import DynamixelArm
 
@@ -58,13 +41,7 @@ class DynamixelBus:
         return serial_adapters()
 
     def examine(self, robot: Robot) -> list[Finding]:
-        """Port, and every servo that the robot file names.
-
-        Parameters
-        ----------
-        robot : Robot
-            with a ``drive`` block on every joint
-        """
+        """Port, and every servo that the robot file names."""
         from tauscope_drivers.dynamixel import examine
 
         with drivers_words():
@@ -75,8 +52,6 @@ class DynamixelBus:
 
         Parameters
         ----------
-        port : str
-            serial device
         bit_rates : sequence of int or None
             baud rates to try [bit/s]; all that servos can be set to where None
         """
@@ -86,15 +61,7 @@ class DynamixelBus:
             yield from scan_bus(port, USUAL_BAUDS if bit_rates is None else bit_rates)
 
     def planned_frames(self, robot: Robot, request: FrameRequest) -> Iterator[PlannedFrame]:
-        """The frames of a run, without a port.
-
-        Parameters
-        ----------
-        robot : Robot
-            with a ``drive`` block on every joint, which names the servo's model
-        request : FrameRequest
-            which run
-        """
+        """The frames of a run, without a port."""
         from tauscope_drivers.dynamixel import plan_frames
 
         with drivers_words():
@@ -113,8 +80,6 @@ def dynamixel_joints(robot: Robot, port: Any = None) -> list["DynamixelJoint"]:
 
     Parameters
     ----------
-    robot : Robot
-        with a ``drive`` block on every joint
     port : object
         serial device in place of the robot file's; None for that
 

@@ -18,8 +18,6 @@ def predicted_torque(robot: Robot, position: Array, velocity: Array, acceleratio
 
     Parameters
     ----------
-    robot : Robot
-        the arm
     position, velocity, acceleration : (N, n) float64
         the motion [rad or m, and per s, per s²]
 
@@ -44,8 +42,6 @@ def inertia_along(robot: Robot, position: Array) -> tuple[Array, int] | None:
 
     Parameters
     ----------
-    robot : Robot
-        the arm
     position : (N, n) float64
         the motion [rad or m]
 

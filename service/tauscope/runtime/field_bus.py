@@ -35,10 +35,6 @@ _USUAL_PATIENCE_S = 0.002
 class FrameRequest:
     """Of which run the frames are asked for.
 
-    mode : ControlMode
-        who closes the loop
-    limits : DriveLimits
-        what the drives enforce
     watchdog_s : float
         time of silence after which they stop by themselves [s]
     targets : (K, n) float64
@@ -61,26 +57,11 @@ class FieldBus(Protocol):
     """As ``--backend`` calls it."""
 
     def is_meant(self, robot: Robot) -> bool:
-        """Whether the robot file's ``drive`` blocks speak of this bus.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """Whether the robot file's ``drive`` blocks speak of this bus."""
         ...
 
     def backend(self, robot: Robot, settings: Mapping[str, Any], folder: Path | None) -> Backend:
         """The arm as a backend, not connected yet.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        settings : mapping
-            of the backend
-        folder : Path or None
-            for files of its own
 
         Raises
         ------
@@ -96,11 +77,6 @@ class FieldBus(Protocol):
     def examine(self, robot: Robot) -> list[Finding]:
         """Adapter and every drive that the robot file names.
 
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-
         Raises
         ------
         AcquisitionError
@@ -113,8 +89,6 @@ class FieldBus(Protocol):
 
         Parameters
         ----------
-        port : str
-            where the bus hangs
         bit_rates : sequence of int or None
             to try [bit/s]; the usual ones where None
 
@@ -128,13 +102,6 @@ class FieldBus(Protocol):
     def planned_frames(self, robot: Robot, request: FrameRequest) -> Iterator[PlannedFrame]:
         """The frames of a run, without a port.
 
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        request : FrameRequest
-            which run
-
         Raises
         ------
         AcquisitionError
@@ -145,15 +112,6 @@ class FieldBus(Protocol):
 
 def check_settings(bus: str, settings: Mapping[str, Any], known: Sequence[str]) -> float:
     """Patience of a bus: how much longer than it takes an answer is waited for [s].
-
-    Parameters
-    ----------
-    bus : str
-        its name
-    settings : mapping
-        of the backend
-    known : sequence of str
-        which there are beside ``patience_s``
 
     Raises
     ------
@@ -173,15 +131,6 @@ def check_settings(bus: str, settings: Mapping[str, Any], known: Sequence[str]) 
 
 def drive_blocks(robot: Robot, example: str, bus_settings: Mapping[str, Any]) -> list[tuple[Joint, dict[str, Any]]]:
     """Every joint with its ``drive`` block; the first of them says which bus.
-
-    Parameters
-    ----------
-    robot : Robot
-        the arm
-    example : str
-        least that such a block states
-    bus_settings : mapping
-        keys of the first block, in place of the robot file's
 
     Raises
     ------

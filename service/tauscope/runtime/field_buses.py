@@ -16,11 +16,6 @@ FIELD_BUSES: Mapping[str, FieldBus] = {bus.name: bus for bus in (DynamixelBus(),
 def find_bus(name: str) -> FieldBus:
     """The field bus of a name.
 
-    Parameters
-    ----------
-    name : str
-        ``dynamixel`` or ``canopen``
-
     Raises
     ------
     AcquisitionError
@@ -33,11 +28,6 @@ def find_bus(name: str) -> FieldBus:
 
 def bus_of(robot: Robot) -> FieldBus:
     """The field bus that a robot file's ``drive`` blocks speak of.
-
-    Parameters
-    ----------
-    robot : Robot
-        the arm
 
     Raises
     ------

@@ -39,16 +39,12 @@ class Guard:
 
         Parameters
         ----------
-        limits : GuardLimits
-            what the arm is held to
         period_s : float
             nominal time between commands [s]
         watchdog_s : float
             time without a command after which the device stops by itself [s]
         enabled_ns : int
             when the arm was enabled, which started that time [ns]
-        stale_misses : int
-            readings in a row that a joint may not fail to answer
         stale_s : float
             time after which a joint that does not answer counts as lost, if that is sooner [s]
         """
@@ -70,10 +66,6 @@ class Guard:
 
         Parameters
         ----------
-        state : ArmState
-            the arm as it was last read
-        setpoint : Setpoint
-            the command
         now_ns : int
             the present instant by the backend's clock [ns]
         due_ns : int

@@ -27,10 +27,6 @@ _ROOM = 1.05
 class GuardLimits:
     """Limits of every joint; infinite where there is none.
 
-    joints : tuple of str
-        names, for messages
-    units : tuple of str
-        unit of each joint's position: rad or m
     position_low, position_high : (n,) float64
         range of the targets [rad or m]
     velocity : (n,) float64
@@ -82,8 +78,6 @@ def guard_limits(
 
     Parameters
     ----------
-    robot : Robot
-        the arm
     low, high : (n,) float64
         range of the motion's positions [rad or m]
     speed : (n,) float64

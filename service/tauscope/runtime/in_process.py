@@ -33,30 +33,6 @@ def run_trajectory(
 
     A run in real time belongs into a process of its own (`tauscope.runtime.RunProcess`), which does nothing else.
 
-    Parameters
-    ----------
-    robot : Robot
-        the arm
-    trajectory : Trajectory
-        the motion
-    connect : callable
-        makes the backend
-    folder : Path
-        takes record, journal and recording; made where it is missing, refused where it holds a run
-    options : RunOptions or None
-        how the run is to be made; defaults where None
-    backend_name : str
-        what the record calls the backend
-    stops : Stops or None
-        where requests to stop are found
-    report : callable or None
-        takes the events
-
-    Returns
-    -------
-    RunRecord
-        in an end state, as ``run.json`` in the folder
-
     Raises
     ------
     AcquisitionError
@@ -75,11 +51,6 @@ def run_trajectory(
 def prepare_folder(folder: Path) -> None:
     """Make a run's folder.
 
-    Parameters
-    ----------
-    folder : Path
-        must not hold a run
-
     Raises
     ------
     AcquisitionError
@@ -96,17 +67,6 @@ def prepare_folder(folder: Path) -> None:
 
 def open_recorder(path: Path, header: JournalHeader, stops: Stops, is_real_time: bool) -> Recorder:
     """Open a journal in the way that suits the arm's time.
-
-    Parameters
-    ----------
-    path : Path
-        the journal
-    header : JournalHeader
-        what all rows have in common
-    stops : Stops
-        a request to stop ends the waiting for it
-    is_real_time : bool
-        whether the loop must not be held up
 
     Raises
     ------

@@ -26,17 +26,7 @@ class GuardedArm:
     """An arm that can only be commanded through its guard; nothing else calls `Backend.exchange`."""
 
     def __init__(self, backend: Backend, guard: Guard, state: ArmState) -> None:
-        """Take over an arm that has just been enabled.
-
-        Parameters
-        ----------
-        backend : Backend
-            enabled
-        guard : Guard
-            judges every command
-        state : ArmState
-            as `Backend.enable` returned it
-        """
+        """Take over an arm that has just been enabled."""
         self._backend, self._guard = backend, guard
         self.state = state
 
@@ -50,8 +40,6 @@ class GuardedArm:
 
         Parameters
         ----------
-        setpoint : Setpoint
-            the command
         due_ns : int
             when it was to be sent [ns]
 
@@ -73,20 +61,8 @@ class GuardedArm:
 class Cycles:
     """What the loop does to each cycle, and what it keeps of all of them.
 
-    plan : Plan
-        targets of every cycle
-    arm : GuardedArm
-        takes them
-    metronome : Metronome
-        says when
-    recorder : Recorder
-        takes what was measured
-    stops : Stops
-        looked at in every cycle
     control : TorqueControl or None
         closes the loop in torque mode; None where the drives do
-    each_cycle : callable
-        told after every cycle; has to be quick
     worst_following : (n,) float64
         largest distance of arm and target so far [rad or m]
     late : (n,) int64

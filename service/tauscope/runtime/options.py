@@ -56,13 +56,6 @@ class RunOptions(StoredModel, strict=False):
 def cycle_rate_hz(options: RunOptions, capabilities: Capabilities) -> float:
     """Cycles a second of a run.
 
-    Parameters
-    ----------
-    options : RunOptions
-        what was asked for
-    capabilities : Capabilities
-        what the backend can do
-
     Raises
     ------
     AcquisitionError
@@ -87,10 +80,6 @@ def chosen_stop_policy(
 
     Parameters
     ----------
-    options : RunOptions
-        what was asked for
-    joints : sequence of Joint
-        the robot's, with ``stop_policy`` under ``drive`` where it is stated
     capabilities : Capabilities or None
         what the device can do by itself; None where it is not known yet
 

@@ -35,13 +35,6 @@ class RunOrder(StoredModel):
 def write_order(folder: Path, order: RunOrder) -> None:
     """Write ``order.json``.
 
-    Parameters
-    ----------
-    folder : Path
-        the run's
-    order : RunOrder
-        what is to be done
-
     Raises
     ------
     OSError
@@ -52,11 +45,6 @@ def write_order(folder: Path, order: RunOrder) -> None:
 
 def read_order(folder: Path) -> RunOrder:
     """Read ``order.json``.
-
-    Parameters
-    ----------
-    folder : Path
-        the run's
 
     Raises
     ------

@@ -40,8 +40,6 @@ class Plan:
         index of the excitation period, NaN outside the repeated part
     phase : (N,) int64
         ramp or motion, as in `tauscope.recording.journal_rows.Phase`
-    limits : GuardLimits
-        what the guard holds the run to
     """
 
     rate_hz: float
@@ -81,21 +79,8 @@ def make_plan(
 
     Parameters
     ----------
-    robot : Robot
-        the arm
-    trajectory : Trajectory
-        the motion
     start : (n,) float64
         where the arm stands [rad or m]
-    options : RunOptions
-        how the run is to be made
-    capabilities : Capabilities
-        what the backend can do
-
-    Returns
-    -------
-    Plan
-        every target of which the guard will accept, if the arm follows
 
     Raises
     ------

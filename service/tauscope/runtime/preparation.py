@@ -19,20 +19,6 @@ LEAST_CYCLES_A_WATCHDOG = 2
 def prepare(task: RunTask, backend: Backend, state: ArmState) -> Plan:
     """Plan a run for the arm as it was found, or refuse it: no torque is on yet.
 
-    Parameters
-    ----------
-    task : RunTask
-        what is to be run
-    backend : Backend
-        connected
-    state : ArmState
-        as `Backend.connect` returned it
-
-    Returns
-    -------
-    Plan
-        every target of every cycle
-
     Raises
     ------
     AcquisitionError
@@ -59,21 +45,7 @@ def prepare(task: RunTask, backend: Backend, state: ArmState) -> Plan:
 
 
 def journal_header(robot: Robot, plan: Plan, backend: Backend, state: ArmState, mode: str) -> JournalHeader:
-    """What all rows of a run's journal have in common.
-
-    Parameters
-    ----------
-    robot : Robot
-        the arm
-    plan : Plan
-        what it will do
-    backend : Backend
-        connected
-    state : ArmState
-        as it was read last
-    mode : str
-        who closes the loop
-    """
+    """What all rows of a run's journal have in common."""
     unit = backend.capabilities.effort_unit
     return JournalHeader(
         robot=robot.name,

@@ -20,43 +20,19 @@ INTERVAL_S = 0.2
 
 
 def state_event(state: RunState, at: datetime) -> dict[str, Any]:
-    """The event of a transition.
-
-    Parameters
-    ----------
-    state : RunState
-        the new state
-    at : datetime
-        the moment
-    """
+    """The event of a transition."""
     return {"event": "state", "state": state.value, "at": at.isoformat()}
 
 
 def end_event(record: RunRecord) -> dict[str, Any]:
-    """The last event of a run.
-
-    Parameters
-    ----------
-    record : RunRecord
-        what is known of it
-    """
+    """The last event of a run."""
     problem = None if record.problem is None else record.problem.detail
     samples = 0 if record.recording is None else record.recording.samples
     return {"event": "end", "state": record.state.value, "problem": problem, "stop": record.stop, "samples": samples}
 
 
 def progress_event(cycles: Cycles, state: RunState, recent: int) -> dict[str, Any]:
-    """How far a run is, and how near to its limits it has come.
-
-    Parameters
-    ----------
-    cycles : Cycles
-        the loop
-    state : RunState
-        where the run stands
-    recent : int
-        cycles whose lateness is told
-    """
+    """How far a run is, and how near to its limits it has come."""
     plan, limits = cycles.plan, cycles.plan.limits
     target = plan.position[cycles.metronome.index]
     room = np.minimum(target - limits.position_low, limits.position_high - target)
@@ -90,27 +66,13 @@ class ProgressReporter:
     """Reports at most every `INTERVAL_S` of the machine's time, whatever clock the run keeps."""
 
     def __init__(self, report: Report) -> None:
-        """Report to someone.
-
-        Parameters
-        ----------
-        report : callable
-            takes the events
-        """
+        """Report to someone."""
         self._report = report
         self._last = time.monotonic()
         self._last_cycle = 0
 
     def __call__(self, cycles: Cycles, state: RunState) -> None:
-        """Report where it is time to.
-
-        Parameters
-        ----------
-        cycles : Cycles
-            the loop
-        state : RunState
-            where the run stands
-        """
+        """Report where it is time to."""
         now = time.monotonic()
         if now - self._last < INTERVAL_S:
             return

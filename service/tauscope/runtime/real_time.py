@@ -40,16 +40,6 @@ def real_time(priority: int = PRIORITY) -> Iterator[RealTime]:
 
     The other threads that there are become real-time too, below it: one that holds the interpreter's lock, and is kept
     from its processor by another program, would hold up the loop as well.
-
-    Parameters
-    ----------
-    priority : int
-        of SCHED_FIFO, `BESIDE` + 1 to 99
-
-    Yields
-    ------
-    RealTime
-        what was permitted
     """
     locked = _lock_memory()
     gc.collect()

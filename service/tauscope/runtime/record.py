@@ -33,13 +33,7 @@ class ProcessName(StoredModel):
 
     @staticmethod
     def of(pid: int) -> "ProcessName":
-        """The name of a living process.
-
-        Parameters
-        ----------
-        pid : int
-            its number
-        """
+        """The name of a living process."""
         return ProcessName(pid=pid, start=process_start(pid))
 
     @property
@@ -52,13 +46,6 @@ class ProcessName(StoredModel):
 def write_process(folder: Path, pid: int) -> None:
     """Keep which process was started for a run, as soon as it was: it may never come to say so itself.
 
-    Parameters
-    ----------
-    folder : Path
-        the run's
-    pid : int
-        number of the control process
-
     Raises
     ------
     OSError
@@ -68,13 +55,7 @@ def write_process(folder: Path, pid: int) -> None:
 
 
 def read_process(folder: Path) -> ProcessName | None:
-    """The process that was started for a run; None where none was, or nobody knows.
-
-    Parameters
-    ----------
-    folder : Path
-        the run's
-    """
+    """The process that was started for a run; None where none was, or nobody knows."""
     try:
         return ProcessName.model_validate_json((folder / PROCESS_FILE).read_bytes())
     except (OSError, ValidationError):
@@ -100,13 +81,7 @@ class RunProblem(StoredModel):
 
     @staticmethod
     def of(violation: Violation) -> "RunProblem":
-        """The problem that a violation is.
-
-        Parameters
-        ----------
-        violation : Violation
-            the guard's objection
-        """
+        """The problem that a violation is."""
         return RunProblem(
             code=AcquisitionError.code,
             detail=str(violation),
@@ -156,15 +131,6 @@ class RunRecord(StoredModel):
     def moved(self, state: RunState, now: datetime | None = None, **changes: object) -> "RunRecord":
         """The record after a transition.
 
-        Parameters
-        ----------
-        state : RunState
-            the new state
-        now : datetime or None
-            the present moment; the machine's where None
-        changes : object
-            other fields that change with it
-
         Raises
         ------
         ValueError
@@ -177,15 +143,7 @@ class RunRecord(StoredModel):
 
 
 def new_record(robot: str, backend: str, mode: str, now: datetime | None = None) -> RunRecord:
-    """The record of a run that has not begun.
-
-    Parameters
-    ----------
-    robot, backend, mode : str
-        names of the arm, of the backend, and of who closes the loop
-    now : datetime or None
-        the present moment; the machine's where None
-    """
+    """The record of a run that has not begun."""
     created = Transition(state=RunState.CREATED, at=now or datetime.now(UTC))
     owner = ProcessName.of(os.getpid())
     return RunRecord(state=RunState.CREATED, robot=robot, backend=backend, mode=mode, history=(created,), owner=owner)
@@ -193,13 +151,6 @@ def new_record(robot: str, backend: str, mode: str, now: datetime | None = None)
 
 def write_record(folder: Path, record: RunRecord) -> None:
     """Write ``run.json``, whole or not at all.
-
-    Parameters
-    ----------
-    folder : Path
-        the run's
-    record : RunRecord
-        what is known
 
     Raises
     ------
@@ -211,11 +162,6 @@ def write_record(folder: Path, record: RunRecord) -> None:
 
 def read_record(folder: Path) -> RunRecord:
     """Read ``run.json``.
-
-    Parameters
-    ----------
-    folder : Path
-        the run's
 
     Raises
     ------

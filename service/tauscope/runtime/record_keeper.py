@@ -13,13 +13,7 @@ class RecordKeeper:
     """Writes the newest record; records that are overtaken while the disk is busy are left out."""
 
     def __init__(self, folder: Path) -> None:
-        """Start the thread.
-
-        Parameters
-        ----------
-        folder : Path
-            the run's
-        """
+        """Start the thread."""
         self._folder = folder
         self._newest: RunRecord | None = None
         self._problem: str | None = None
@@ -30,13 +24,7 @@ class RecordKeeper:
         self._thread.start()
 
     def keep(self, record: RunRecord) -> None:
-        """Have a record written; returns at once.
-
-        Parameters
-        ----------
-        record : RunRecord
-            the newest
-        """
+        """Have a record written; returns at once."""
         with self._changed:
             self._newest = record
             self._changed.notify_all()

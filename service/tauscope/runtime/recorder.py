@@ -60,8 +60,6 @@ class Recorder(Protocol):
         ----------
         time_ns : int
             when, by the clock of the rows [ns]
-        event : mapping
-            plain data with the key ``event``
         """
         ...
 
@@ -75,13 +73,6 @@ class DirectRecorder:
 
     def __init__(self, path: Path, header: JournalHeader) -> None:
         """Open the journal.
-
-        Parameters
-        ----------
-        path : Path
-            the journal
-        header : JournalHeader
-            what all rows have in common
 
         Raises
         ------
@@ -117,8 +108,6 @@ class DirectRecorder:
         ----------
         time_ns : int
             when, by the clock of the rows [ns]
-        event : mapping
-            plain data with the key ``event``
         """
         self._write()
         self._writer.write_event(time_ns, event)
@@ -152,19 +141,7 @@ class RecorderProcess:
     def __init__(
         self, path: Path, header: JournalHeader, *, may_wait: bool = False, command: Sequence[str] | None = None
     ) -> None:
-        """Start the process; `wait_until_open` says when the journal is there.
-
-        Parameters
-        ----------
-        path : Path
-            the journal
-        header : JournalHeader
-            what all rows have in common
-        may_wait : bool
-            whether a full pipe is waited for, as is right in virtual time, or the row lost and counted
-        command : sequence of str or None
-            another program that reads the frames, for tests
-        """
+        """Start the process; `wait_until_open` says when the journal is there."""
         row_bytes = journal_row_type(header.joint_count).itemsize
         if row_bytes + FRAME.size > _LARGEST_FRAME:
             raise _cannot_open(path, f"a cycle of {header.joint_count} joints is larger than a pipe takes at once")
@@ -188,11 +165,6 @@ class RecorderProcess:
 
     def wait_until_open(self, stops: Stops) -> None:
         """Wait until the journal is open.
-
-        Parameters
-        ----------
-        stops : Stops
-            a request to stop ends the waiting
 
         Raises
         ------
@@ -228,8 +200,6 @@ class RecorderProcess:
         ----------
         time_ns : int
             when, by the clock of the rows [ns]
-        event : mapping
-            plain data with the key ``event``
         """
         content = event_frame(time_ns, dict(event))
         if len(content) <= _LARGEST_FRAME:

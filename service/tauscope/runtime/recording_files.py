@@ -14,22 +14,7 @@ UNKNOWN_LOSS = -1
 
 
 def save_recording(folder: Path, *, is_whole: bool, lost_rows: int) -> RecordingFiles:
-    """Write what a journal holds of the motion as CSV, and as Parquet where pyarrow is installed.
-
-    Parameters
-    ----------
-    folder : Path
-        the run's
-    is_whole : bool
-        whether the motion was played to its end
-    lost_rows : int
-        cycles that the journal did not take; `UNKNOWN_LOSS` where nobody knows
-
-    Returns
-    -------
-    RecordingFiles
-        what was written, and what is missing: never an exception, the arm's run is over either way
-    """
+    """Write what a journal holds of the motion as CSV, and as Parquet where pyarrow is installed."""
     remarks: list[str] = []
     files: list[str] = []
     samples = 0

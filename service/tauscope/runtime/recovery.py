@@ -50,15 +50,8 @@ def recover_runs(folder: Path, *, patience_s: float = PATIENCE_S) -> tuple[RunRe
 
     Parameters
     ----------
-    folder : Path
-        the folder that holds the runs' folders
     patience_s : float
         time that a control process whose owner is gone gets to stop its arm [s]
-
-    Returns
-    -------
-    tuple of RunRecord
-        the runs that were changed
 
     Raises
     ------
@@ -77,12 +70,6 @@ def recover_run(
 
     Parameters
     ----------
-    folder : Path
-        the run's
-    is_own : bool
-        whether the caller is the run's owner, and knows that its control process has ended
-    was_asked_to_stop : bool
-        whether the owner had asked it to: a process that is still being loaded then ends without a word
     patience_s : float
         time that a control process whose owner is gone gets to stop its arm [s]
 

@@ -34,17 +34,7 @@ class Run:
     """Takes a run through its states."""
 
     def __init__(self, task: RunTask, record: RunRecord, around: Surroundings) -> None:
-        """Prepare; nothing happens before `execute`.
-
-        Parameters
-        ----------
-        task : RunTask
-            what is to be run
-        record : RunRecord
-            the run as it was created
-        around : Surroundings
-            what it talks to
-        """
+        """Prepare; nothing happens before `execute`."""
         self.record = record
         self._task, self._around = task, around
         self._policy = chosen_stop_policy(task.options, task.robot.joints)
@@ -56,13 +46,7 @@ class Run:
         self._progress = ProgressReporter(self._tell)
 
     def execute(self) -> RunRecord:
-        """Run to the end, whatever that is.
-
-        Returns
-        -------
-        RunRecord
-            in an end state
-        """
+        """Run to the end, whatever that is."""
         cause: BaseException | None = None
         try:
             self._move()

@@ -18,11 +18,6 @@ class RunLock:
     def __init__(self, folder: Path) -> None:
         """Take the folder.
 
-        Parameters
-        ----------
-        folder : Path
-            the run's
-
         Raises
         ------
         AcquisitionError
@@ -45,8 +40,6 @@ def wait_until_free(folder: Path, patience_s: float) -> RunLock | None:
 
     Parameters
     ----------
-    folder : Path
-        the run's
     patience_s : float
         how long to wait [s]
 

@@ -44,21 +44,6 @@ class RunProcess:
     ) -> None:
         """Start the process.
 
-        Parameters
-        ----------
-        folder : Path
-            takes order, record, journal and recording; refused where it holds a run
-        order : RunOrder
-            what is to be done
-        robot : Robot
-            the order's, for the record
-        report : callable or None
-            takes the events, in a thread of this object
-        beats_by_itself : bool
-            whether that thread says that the owner is alive; else the owner calls `beat`, and is stopped with its work
-        command : sequence of str or None
-            another program in place of ``python -m tauscope.runtime.control``, for tests; gets the folder
-
         Raises
         ------
         AcquisitionError
@@ -124,11 +109,6 @@ class RunProcess:
         ----------
         timeout_s : float or None
             how long; for good where None [s]
-
-        Returns
-        -------
-        RunRecord
-            in an end state
 
         Raises
         ------

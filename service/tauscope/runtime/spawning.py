@@ -19,11 +19,6 @@ def child_environment() -> dict[str, str]:
 def process_start(pid: int) -> int | None:
     """When a process was started, in the kernel's ticks; with its number it names a process for good.
 
-    Parameters
-    ----------
-    pid : int
-        number of the process
-
     Returns
     -------
     int or None

@@ -43,24 +43,10 @@ gone: that is `interrupted`, and the device's watchdog has stopped the arm."""
 
 
 def may_follow(before: RunState, after: RunState) -> bool:
-    """Whether a run may go from one state to another.
-
-    Parameters
-    ----------
-    before : RunState
-        where the run stands
-    after : RunState
-        where it would go
-    """
+    """Whether a run may go from one state to another."""
     return after in TRANSITIONS[before]
 
 
 def after_stop(state: RunState) -> RunState:
-    """Where a request to stop leads: legal in every state, and without effect on a run that stops or has ended.
-
-    Parameters
-    ----------
-    state : RunState
-        where the run stands
-    """
+    """Where a request to stop leads: legal in every state, and without effect on a run that stops or has ended."""
     return state if state is RunState.STOPPING or state.is_end else RunState.STOPPING

@@ -37,10 +37,6 @@ class StopListener:
 
         Parameters
         ----------
-        command_pipe : int
-            descriptor on which the owner writes `BEAT` and `STOP`
-        stop_file : Path
-            a file whose existence is a request
         heartbeat_s : float
             silence on the pipe after which the owner counts as gone [s]
         """
@@ -65,15 +61,7 @@ class StopListener:
         self._is_done = True
 
     def request(self, source: StopSource, detail: str) -> None:
-        """Ask; the first request counts.
-
-        Parameters
-        ----------
-        source : StopSource
-            who wants it
-        detail : str
-            one line: how it came
-        """
+        """Ask; the first request counts."""
         if self.requested is None:
             self.requested = StopRequest(source, detail)
             self._asked_at = time.monotonic()

@@ -18,13 +18,7 @@ class StopSource(StrEnum):
 
 @dataclass(frozen=True)
 class StopRequest:
-    """One request.
-
-    source : StopSource
-        who wants it
-    detail : str
-        one line: how it came
-    """
+    """One request."""
 
     source: StopSource
     detail: str
@@ -36,13 +30,7 @@ class StopRequest:
 
 
 class StopAskedError(Exception):
-    """Breaks a run out of whatever it is doing because it was asked to stop.
-
-    Parameters
-    ----------
-    request : StopRequest
-        the request
-    """
+    """Breaks a run out of whatever it is doing because it was asked to stop."""
 
     def __init__(self, request: StopRequest) -> None:
         super().__init__(request.detail)
@@ -74,15 +62,7 @@ class ManualStop:
         self.acknowledged = False
 
     def request(self, detail: str = "asked to stop", source: StopSource = StopSource.OPERATOR) -> None:
-        """Ask; the first request counts.
-
-        Parameters
-        ----------
-        detail : str
-            one line: how it came
-        source : StopSource
-            who wants it
-        """
+        """Ask; the first request counts."""
         if self.requested is None:
             self.requested = StopRequest(source, detail)
 
@@ -96,11 +76,6 @@ class ManualStop:
 
 def raise_if_requested(stops: Stops) -> None:
     """Break out of a run that was asked to stop.
-
-    Parameters
-    ----------
-    stops : Stops
-        where requests are found
 
     Raises
     ------

@@ -23,29 +23,13 @@ class Keeper(Protocol):
     """Takes a run's record whenever it changes."""
 
     def keep(self, record: RunRecord) -> None:
-        """Keep the newest record; must not take time.
-
-        Parameters
-        ----------
-        record : RunRecord
-            what is known
-        """
+        """Keep the newest record; must not take time."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class RunTask:
-    """What is to be run.
-
-    robot : Robot
-        the arm
-    trajectory : Trajectory
-        the motion
-    options : RunOptions
-        how
-    connect : callable
-        makes the backend; called once
-    """
+    """What is to be run."""
 
     robot: Robot
     trajectory: Trajectory
@@ -55,19 +39,7 @@ class RunTask:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What a run talks to while it runs.
-
-    folder : Path
-        where journal and recording go
-    stops : Stops
-        where requests to stop are found
-    keeper : Keeper
-        takes the record whenever it changes
-    open_recorder : callable
-        opens the journal
-    report : callable
-        takes the events
-    """
+    """What a run talks to while it runs."""
 
     folder: Path
     stops: Stops

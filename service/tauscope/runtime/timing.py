@@ -41,14 +41,10 @@ class Metronome:
 
         Parameters
         ----------
-        clock : Clock
-            by which it waits
         start_ns : int
             first deadline [ns]
         period_ns : int
             time between deadlines [ns]
-        cycles : int
-            number of deadlines
         """
         self._clock, self._start, self._period, self._cycles = clock, start_ns, period_ns, cycles
         self._lateness: NDArray[np.int64] = np.zeros(cycles, dtype=np.int64)
@@ -105,13 +101,7 @@ class Metronome:
         )
 
     def recent_lateness_us(self, cycles: int) -> Mapping[str, float]:
-        """Percentiles of the last cycles' lateness [µs].
-
-        Parameters
-        ----------
-        cycles : int
-            how many to look at
-        """
+        """Percentiles of the last cycles' lateness [µs]."""
         return lateness_percentiles(self._lateness[max(self.played - cycles, 0) : self.played] * 1e-3)
 
 

@@ -30,12 +30,8 @@ class TorqueControl:
 
         Parameters
         ----------
-        plan : Plan
-            targets, feed-forward and limits
         inertia : (K, n, n) float64
             H at every `stride`-th cycle of the plan [kg m², kg m, kg]
-        stride : int
-            cycles from one H to the next
         bandwidth_rad_s : float
             ω [rad/s]
         """
@@ -50,15 +46,7 @@ class TorqueControl:
         self._velocity = np.zeros(inertia.shape[1])
 
     def torque(self, cycle: int, state: ArmState) -> Array:
-        """Torque for a cycle [Nm or N], shape (n,).
-
-        Parameters
-        ----------
-        cycle : int
-            row of the plan
-        state : ArmState
-            the arm as it was last read; a joint that did not answer counts as where it was
-        """
+        """Torque for a cycle [Nm or N], shape (n,)."""
         position, velocity = self._observed(state)
         plan = self._plan
         wanted = self._proportional * (plan.position[cycle] - position)
@@ -83,10 +71,6 @@ def torque_control(robot: Robot, plan: Plan, bandwidth_rad_s: float) -> TorqueCo
 
     Parameters
     ----------
-    robot : Robot
-        the arm
-    plan : Plan
-        what it shall do
     bandwidth_rad_s : float
         ω [rad/s]
 

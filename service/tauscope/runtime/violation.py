@@ -39,16 +39,10 @@ class Rule(StrEnum):
 class Violation:
     """One objection.
 
-    rule : Rule
-        what was not satisfied
     joint : str or None
         name of the joint; None where it concerns the whole arm
     value : float or None
         what was found, in the rule's unit; None where it is no number
-    limit : float or None
-        what would have been allowed, in the rule's unit
-    detail : str
-        one line for the user, with the place and the next step
     """
 
     rule: Rule
@@ -63,13 +57,7 @@ class Violation:
 
 
 class GuardViolationError(AcquisitionError):
-    """The guard let a command not pass: nothing was sent, and the arm is to be stopped.
-
-    Parameters
-    ----------
-    violation : Violation
-        what it objects to
-    """
+    """The guard let a command not pass: nothing was sent, and the arm is to be stopped."""
 
     def __init__(self, violation: Violation) -> None:
         super().__init__(str(violation))

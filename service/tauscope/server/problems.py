@@ -18,15 +18,7 @@ TYPE_PREFIX = "/docs/errors/"
 
 @dataclass(frozen=True)
 class ProblemKind:
-    """What all problems of a code have in common.
-
-    code : str
-        stable name, the last part of the problem's type
-    status : HTTPStatus
-        of the answer
-    title : str
-        the kind of problem in a few words
-    """
+    """What all problems of a code have in common."""
 
     code: str
     status: HTTPStatus
@@ -111,38 +103,14 @@ class ProblemError(HTTPException):
         errors: Sequence[FieldError] | None = None,
         headers: Mapping[str, str] | None = None,
     ) -> None:
-        """Make the exception.
-
-        Parameters
-        ----------
-        code : str
-            one of `KINDS`
-        detail : str
-            one line for the user
-        errors : sequence of FieldError or None
-            fields in question
-        headers : mapping or None
-            further headers of the answer
-        """
+        """Make the exception."""
         super().__init__(KINDS[code].status, detail, headers)
         self.code = code
         self.errors = None if errors is None else list(errors)
 
 
 def make_problem(code: str, detail: str, instance: str, errors: Sequence[FieldError] | None = None) -> Problem:
-    """The problem of a code.
-
-    Parameters
-    ----------
-    code : str
-        one of `KINDS`; any other counts as internal
-    detail : str
-        what is wrong, where, and what to do
-    instance : str
-        path of the request
-    errors : sequence of FieldError or None
-        fields in question
-    """
+    """The problem of a code."""
     kind = KINDS.get(code, KINDS["internal"])
     return Problem(
         type=f"{TYPE_PREFIX}{kind.code}",
@@ -156,44 +124,18 @@ def make_problem(code: str, detail: str, instance: str, errors: Sequence[FieldEr
 
 
 def problem_answer(problem: Problem, headers: Mapping[str, str] | None = None) -> Response:
-    """The answer that holds a problem.
-
-    Parameters
-    ----------
-    problem : Problem
-        what is answered
-    headers : mapping of str to str, or None
-        further headers
-    """
+    """The answer that holds a problem."""
     content = problem.model_dump_json(exclude_none=True)
     return Response(content, problem.status, dict(headers or {}), media_type=MEDIA_TYPE)
 
 
 def answer_code(request: Request, code: str, detail: str) -> Response:
-    """The answer to a request that ends in a problem.
-
-    Parameters
-    ----------
-    request : Request
-        what is answered
-    code : str
-        one of `KINDS`
-    detail : str
-        what is wrong, where, and what to do
-    """
+    """The answer to a request that ends in a problem."""
     return problem_answer(make_problem(code, detail, request.url.path))
 
 
 def field_errors(details: Sequence[Any], *, within: str = "") -> list[FieldError]:
-    """Pydantic's errors as fields of a request.
-
-    Parameters
-    ----------
-    details : sequence of dict
-        of `ValidationError.errors()`
-    within : str
-        where the validated data stand in the request, for example "body"
-    """
+    """Pydantic's errors as fields of a request."""
     fields = []
     for detail in details[:100]:
         steps = [within, *detail["loc"]] if within else detail["loc"]
@@ -203,39 +145,19 @@ def field_errors(details: Sequence[Any], *, within: str = "") -> list[FieldError
 
 
 def invalid_request(error: ValidationError, *, within: str) -> ProblemError:
-    """The problem of data that do not fit their model.
-
-    Parameters
-    ----------
-    error : ValidationError
-        of the model
-    within : str
-        where the data stand in the request, for example "body" or "part request"
-    """
+    """The problem of data that do not fit their model."""
     fields = field_errors(error.errors(include_url=False, include_context=False, include_input=False), within=within)
     return ProblemError("invalid-request", summarised(fields), errors=fields)
 
 
 def summarised(fields: Sequence[FieldError]) -> str:
-    """One line on the fields in question.
-
-    Parameters
-    ----------
-    fields : sequence of FieldError
-        at least one
-    """
+    """One line on the fields in question."""
     more = f" (the first of {len(fields)} errors)" if len(fields) > 1 else ""
     return f"{fields[0].field}: {fields[0].message}{more}"
 
 
 def problem_responses(*codes: str) -> dict[int | str, dict[str, Any]]:
-    """Problems that a route may answer with, for the OpenAPI document.
-
-    Parameters
-    ----------
-    codes : str
-        of `KINDS`
-    """
+    """Problems that a route may answer with, for the OpenAPI document."""
     responses: dict[int | str, dict[str, Any]] = {}
     for code in codes:
         kind = KINDS[code]

@@ -36,8 +36,6 @@ def trajectory_csv(trajectory: Trajectory, rate_hz: float) -> str:
 
     Parameters
     ----------
-    trajectory : Trajectory
-        the motion
     rate_hz : float
         samples a second [Hz]
     """
@@ -57,22 +55,6 @@ def parse_trajectory_csv(text: str, name: str, robot: str, joints: tuple[str, ..
 
     Velocity and acceleration that the file lacks come from a quintic spline through the positions that rests at both
     ends.
-
-    Parameters
-    ----------
-    text : str
-        content of the file
-    name : str
-        what messages call the file
-    robot : str
-        name of the robot that is to play it
-    joints : tuple of str
-        names of its joints; as many positions are expected
-
-    Returns
-    -------
-    Trajectory
-        one sampled segment
 
     Raises
     ------

@@ -115,13 +115,7 @@ class TrajectoryDocument(TrajectoryPart):
 
 
 def trajectory_document(trajectory: Trajectory) -> TrajectoryDocument:
-    """The document of a trajectory.
-
-    Parameters
-    ----------
-    trajectory : Trajectory
-        the motion
-    """
+    """The document of a trajectory."""
     limits, design = trajectory.limits, trajectory.design
     return TrajectoryDocument(
         robot=trajectory.robot,
@@ -142,11 +136,6 @@ def trajectory_document(trajectory: Trajectory) -> TrajectoryDocument:
 
 def trajectory_of(document: TrajectoryDocument) -> Trajectory:
     """The trajectory that a document describes.
-
-    Parameters
-    ----------
-    document : TrajectoryDocument
-        plain data whose lists may still be of the wrong length
 
     Raises
     ------

@@ -25,18 +25,6 @@ DEFAULT_RATE_HZ = 500.0
 def read_trajectory(path: str | Path, robot: Robot) -> Trajectory:
     """Read a trajectory for a robot: JSON (``.json``) or CSV (anything else).
 
-    Parameters
-    ----------
-    path : str or Path
-        the file
-    robot : Robot
-        the arm that is to play it: its number of joints must agree
-
-    Returns
-    -------
-    Trajectory
-        at rest at both ends; whether it keeps the arm's limits is asked by `require_within_limits`
-
     Raises
     ------
     ExcitationError
@@ -55,20 +43,6 @@ def read_trajectory(path: str | Path, robot: Robot) -> Trajectory:
 
 def parse_trajectory_json(text: str | bytes, name: str, robot: Robot) -> Trajectory:
     """The trajectory of a JSON document.
-
-    Parameters
-    ----------
-    text : str or bytes
-        the document, schema ``tauscope.trajectory/1``, or an excitation's, ``tauscope.excitation/1``, that holds one
-    name : str
-        what messages call it
-    robot : Robot
-        the arm that is to play it
-
-    Returns
-    -------
-    Trajectory
-        equal to the one that was written, to the last digit
 
     Raises
     ------
@@ -92,13 +66,7 @@ def parse_trajectory_json(text: str | bytes, name: str, robot: Robot) -> Traject
 
 
 def trajectory_json(trajectory: Trajectory) -> str:
-    """A trajectory as a JSON document, schema ``tauscope.trajectory/1``.
-
-    Parameters
-    ----------
-    trajectory : Trajectory
-        the motion
-    """
+    """A trajectory as a JSON document, schema ``tauscope.trajectory/1``."""
     return trajectory_document(trajectory).model_dump_json(by_alias=True, indent=1) + "\n"
 
 
@@ -107,10 +75,6 @@ def write_trajectory(trajectory: Trajectory, path: str | Path, *, rate_hz: float
 
     Parameters
     ----------
-    trajectory : Trajectory
-        the motion
-    path : str or Path
-        the file; replaced where it exists
     rate_hz : float
         samples a second of a CSV file [Hz]
 

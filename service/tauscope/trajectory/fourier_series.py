@@ -80,11 +80,6 @@ class FourierSeries:
         ----------
         time : (N,) float64
             instants since the start of a period [s]
-
-        Returns
-        -------
-        MotionSamples
-            q, q̇, q̈ at these instants
         """
         omega = self.frequencies
         phase = np.multiply.outer(time, omega)
@@ -107,13 +102,6 @@ def between_samples(harmonics: int, samples: int) -> float:
 
     Ehlich and Zeller's bound for degree M and K > 2 M samples a period: what holds at the samples with this factor to
     spare holds at every instant.
-
-    Parameters
-    ----------
-    harmonics : int
-        degree M
-    samples : int
-        number K of equispaced samples a period
     """
     if samples <= 2 * harmonics:
         raise ExcitationError(f"{samples} samples a period cannot bound {harmonics} harmonics; take more samples")

@@ -31,8 +31,6 @@ class MotionLimits:
         largest acceleration [rad/s² or m/s²]
     torque : (n,) float64
         largest torque, infinite where none is stated [Nm or N]
-    assumed : tuple of str
-        limits that nobody stated, as sentences fit for a report
     """
 
     position_low: Array
@@ -53,13 +51,7 @@ class MotionLimits:
         return 0.5 * (self.position_high - self.position_low)
 
     def scaled(self, fraction: float) -> "MotionLimits":
-        """A part of every limit, positions about the middle of their range.
-
-        Parameters
-        ----------
-        fraction : float
-            part of each limit, in (0, 1]
-        """
+        """A part of every limit, positions about the middle of their range."""
         return MotionLimits(
             self.middle - fraction * self.half_range,
             self.middle + fraction * self.half_range,
@@ -71,13 +63,7 @@ class MotionLimits:
 
 
 def motion_limits(robot: Robot) -> MotionLimits:
-    """The limits of a robot's joints; where none is stated a careful default, named in `MotionLimits.assumed`.
-
-    Parameters
-    ----------
-    robot : Robot
-        the arm
-    """
+    """The limits of a robot's joints; where none is stated a careful default, named in `MotionLimits.assumed`."""
     assumed: list[str] = []
     low, high, velocity, acceleration, torque = (np.empty(robot.joint_count) for _ in range(5))
     for j, joint in enumerate(robot.joints):

@@ -60,10 +60,6 @@ class Segment(Protocol):
 class FourierSegment:
     """Whole periods of a Fourier series.
 
-    series : FourierSeries
-        at rest at the ends of its period
-    repeats : int
-        how often it is played
     first_period : int or None
         index of the first repeat in a recording's column `period`; None where it is not to be counted
     """
@@ -158,8 +154,6 @@ class PathSegment:
 
     It visits only postures that the series visits: where that keeps clear of obstacles, so does this.
 
-    series : FourierSeries
-        F
     from_s, to_s : float
         instants of the series at which it begins and ends [s]
     duration_s : float
@@ -208,8 +202,6 @@ class SampledSegment:
 
     time : (K,) float64
         instants of the samples, from 0, increasing [s]
-    motion : MotionSamples
-        q, q̇, q̈ at these instants
     label : (K,) float64 or None
         index of the repeated excitation period from each sample on, NaN outside; None where there is none
     """

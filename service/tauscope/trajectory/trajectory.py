@@ -63,17 +63,9 @@ class TrajectorySamples:
 class DesignRecord:
     """How a trajectory was made and what it is good for.
 
-    criterion : str
-        what was minimised
-    value : float
-        its value
-    condition_number : float
-        of the stacked, unweighted regressor of the repeated part
     margins : mapping of str to tuple of float or None
         for each kind of limit (``position``, ``velocity``, ``acceleration``, ``torque``) the part of the limit that is
         left, one a joint; None where there is no limit
-    seed : int
-        of the optimiser's starts
     """
 
     criterion: str
@@ -87,12 +79,6 @@ class DesignRecord:
 class Trajectory:
     """A motion of all joints, piece after piece, twice continuously differentiable, at rest at both ends.
 
-    robot : str
-        name of the robot that it was made for
-    joints : tuple of str
-        names of the joints
-    segments : tuple of Segment
-        the pieces in order
     limits : MotionLimits or None
         limits that it was made to keep; None where nobody knows
     design : DesignRecord or None
@@ -179,11 +165,6 @@ class Trajectory:
         ----------
         time : (N,) float64
             ascending instants since the start [s]
-
-        Returns
-        -------
-        TrajectorySamples
-            q, q̇, q̈ and the period index
         """
         shape = (len(time), self.joint_count)
         result = TrajectorySamples(time, np.empty(shape), np.empty(shape), np.empty(shape), np.full(len(time), np.nan))
@@ -211,8 +192,6 @@ class Trajectory:
         ----------
         posture : (n,) float64
             where the arm stands [rad or m]
-        limits : MotionLimits
-            velocity and acceleration of which the ramp uses `RAMP_FRACTION`
         """
         return replace(self, segments=(ramp(posture, self.start, limits), *self.segments))
 
@@ -227,15 +206,6 @@ def ramp(start: Array, end: Array, limits: MotionLimits, *, fraction: float = RA
     ----------
     start, end : (n,) float64
         postures [rad or m]
-    limits : MotionLimits
-        limits of every joint
-    fraction : float
-        part of the velocity and acceleration limits that it may use, in (0, 1]
-
-    Returns
-    -------
-    MoveSegment
-        at least `SHORTEST_RAMP_S` long
 
     Raises
     ------

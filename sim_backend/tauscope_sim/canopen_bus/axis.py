@@ -17,8 +17,6 @@ class AxisMode(Enum):
 class AxisDemand:
     """What a drive wants of its joint until the next demand.
 
-    mode : AxisMode
-        what it does
     position : float
         target where the mode is position [rad or m]
     torque : float
@@ -57,12 +55,8 @@ class AxisMeasurement:
 class AxisScale:
     """Counts and per mille of an emulated drive.
 
-    counts_per_radian : float
-        position counts for one radian (metre) of the joint
     rated_torque_mnm : int
         object 0x6076, at the motor shaft [mNm]
-    gear_ratio : float
-        motor turns per joint turn
     """
 
     counts_per_radian: float

@@ -20,13 +20,7 @@ class CanSocket:
     baud = 1_000_000
 
     def __init__(self, interface: str) -> None:
-        """Listen.
-
-        Parameters
-        ----------
-        interface : str
-            ``can0``, ``vcan0`` …
-        """
+        """Listen."""
         self._socket = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
         self._socket.bind((interface,))
         self._socket.setblocking(False)
@@ -44,13 +38,7 @@ class CanSocket:
         return bytes(received)
 
     def write(self, data: bytes) -> None:
-        """Send frames, one after the other; what the kernel has no room for is lost.
-
-        Parameters
-        ----------
-        data : bytes
-            whole frames
-        """
+        """Send frames, one after the other; what the kernel has no room for is lost."""
         for start in range(0, len(data), _FRAME.size):
             with contextlib.suppress(OSError):
                 self._socket.send(data[start : start + _FRAME.size])
@@ -64,13 +52,7 @@ class SocketLine:
     """Frames in the kernel's form; implements `Line`."""
 
     def take(self, data: bytes) -> tuple[list[Frame], bytes]:
-        """Standard data frames for the bus; others go nowhere, for no drive listens to them.
-
-        Parameters
-        ----------
-        data : bytes
-            whole frames
-        """
+        """Standard data frames for the bus; others go nowhere, for no drive listens to them."""
         frames = []
         for identifier, length, payload in _FRAME.iter_unpack(data):
             if identifier <= _HIGHEST_IDENTIFIER and length <= _LONGEST:
@@ -78,12 +60,6 @@ class SocketLine:
         return frames, b""
 
     def text(self, frame: Frame) -> bytes:
-        """A frame as the kernel takes it.
-
-        Parameters
-        ----------
-        frame : tuple of int and bytes
-            identifier and payload
-        """
+        """A frame as the kernel takes it."""
         identifier, payload = frame
         return _FRAME.pack(identifier, len(payload), payload)

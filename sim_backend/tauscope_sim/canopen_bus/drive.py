@@ -36,15 +36,7 @@ class EmulatedDrive:
     """A drive with its node on the bus."""
 
     def __init__(self, node_id: int, scale: AxisScale) -> None:
-        """Power up.
-
-        Parameters
-        ----------
-        node_id : int
-            1 to 127
-        scale : AxisScale
-            its counts and per mille
-        """
+        """Power up."""
         self.node_id = node_id
         self.scale = scale
         self.power_up()
@@ -66,8 +58,6 @@ class EmulatedDrive:
 
         Parameters
         ----------
-        frame : tuple of int and bytes
-            identifier and payload
         now_s : float
             when it came [s]
         """
@@ -119,13 +109,7 @@ class EmulatedDrive:
         return AxisDemand(AxisMode.HOLDING, torque_cap=cap)
 
     def measure(self, measurement: AxisMeasurement) -> None:
-        """Let the sensors see the joint.
-
-        Parameters
-        ----------
-        measurement : AxisMeasurement
-            of the joint now
-        """
+        """Let the sensors see the joint."""
         put, scale = self.dictionary.put, self.scale
         put(0x6064, round(measurement.position * scale.counts_per_radian))
         put(0x606C, round(measurement.velocity * scale.counts_per_radian))
@@ -135,13 +119,7 @@ class EmulatedDrive:
         self._show_status()
 
     def fail(self, error_code: int) -> None:
-        """Go into fault and say so.
-
-        Parameters
-        ----------
-        error_code : int
-            0x603F
-        """
+        """Go into fault and say so."""
         self.power.fail()
         self._report(error_code)
 

@@ -47,12 +47,6 @@ class DrivenArm:
 
         Parameters
         ----------
-        drives : sequence of EmulatedDrive
-            one a joint
-        robot : Robot
-            the arm; its model block has to hold the links
-        scenario : Scenario
-            what is concealed in it
         position : (n,) float64
             where it stands [rad or m]
         period_s : float
@@ -101,13 +95,7 @@ class DrivenArm:
                 target.follow(wanted, None, time_s / self._period_s)
 
     def step(self, tick: int) -> None:
-        """One period: torque from the demands of this instant, and the motion until the next.
-
-        Parameters
-        ----------
-        tick : int
-            number of the period
-        """
+        """One period: torque from the demands of this instant, and the motion until the next."""
         demands = self._demands()
         for joints, target in self._targets.values():
             target.advance(tick)
@@ -122,14 +110,7 @@ class DrivenArm:
             self._plant.advance(torque, self._period_s)
 
     def measure(self, part: float = 0.0) -> None:
-        """Let the drives see their joints: real ones sample at SYNC, and their loops are faster than the steps here.
-
-        Parameters
-        ----------
-        part : float
-            of a period that has passed since the last tick, 0 to 1: what is seen has gone on as in the period before,
-            torque no farther than to what it has been since the tick
-        """
+        """Let the drives see their joints: real ones sample at SYNC, and their loops are faster than the steps here."""
         position, velocity, torque = self._seen + part * (self._seen - self._seen_before)
         at_tick = self._seen[2]
         torque = np.clip(torque, np.minimum(at_tick, self.torque), np.maximum(at_tick, self.torque))

@@ -28,16 +28,10 @@ class CanEmulator:
 
         Parameters
         ----------
-        drives : sequence of EmulatedDrive
-            in the order of the joints
-        driven : DrivenArm
-            what they move, in periods of `STEP_S` of the device clock
         now_s : float
             present instant [s]
         bit_rate : float
             of the bus; infinite where frames shall arrive at once [bit/s]
-        line : Line
-            frames as the master's end takes and gives them
         """
         self.drives = tuple(drives)
         self.driven = driven
@@ -78,8 +72,6 @@ class CanEmulator:
 
         Parameters
         ----------
-        data : bytes
-            as it came
         now_s : float
             when [s]
         """
@@ -106,8 +98,6 @@ class CanEmulator:
         ----------
         now_s : float
             present instant [s]
-        most_steps : int
-            after which it waits to be asked again
         """
         self._clock.catch_up(now_s, self._step, most_steps)
 

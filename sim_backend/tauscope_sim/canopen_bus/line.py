@@ -9,21 +9,9 @@ class Line(Protocol):
     """Turns what a master sends into frames, and frames into what it reads."""
 
     def take(self, data: bytes) -> tuple[list[Frame], bytes]:
-        """Frames for the bus, and what the adapter answers by itself.
-
-        Parameters
-        ----------
-        data : bytes
-            of the host
-        """
+        """Frames for the bus, and what the adapter answers by itself."""
         ...
 
     def text(self, frame: Frame) -> bytes:
-        """A frame of the bus as the host reads it.
-
-        Parameters
-        ----------
-        frame : tuple of int and bytes
-            identifier and payload
-        """
+        """A frame of the bus as the host reads it."""
         ...

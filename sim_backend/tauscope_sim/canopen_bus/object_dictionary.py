@@ -21,13 +21,7 @@ class Abort(IntEnum):
 
 
 class AbortError(Exception):
-    """A transfer is refused.
-
-    Parameters
-    ----------
-    code : Abort
-        why
-    """
+    """A transfer is refused."""
 
     def __init__(self, code: Abort) -> None:
         super().__init__(code.name)
@@ -40,19 +34,7 @@ WriteHook = Callable[[int], None]
 
 @dataclass
 class Entry:
-    """One entry.
-
-    bytes : int
-        its size
-    value : int
-        its present value
-    signed : bool
-        whether it is an INTEGER
-    writable : bool
-        whether a master may write it
-    hook : callable or None
-        called before a master's value is kept
-    """
+    """One entry."""
 
     bytes: int
     value: int = 0
@@ -86,47 +68,21 @@ class ObjectDictionary:
 
         Parameters
         ----------
-        index, subindex : int
-            its place
         size : int
             1, 2 or 4 [bytes]
-        value : int
-            at power-up
-        signed : bool
-            whether it is an INTEGER
-        writable : bool
-            whether a master may write it
-        hook : callable or None
-            called before a master's value is kept
         """
         entry = self.entries[index, subindex] = Entry(size, value, signed, writable, hook)
         return entry
 
     def get(self, index: int, subindex: int = 0) -> int:
-        """Value of an entry.
-
-        Parameters
-        ----------
-        index, subindex : int
-            its place
-        """
+        """Value of an entry."""
         try:
             return self.entries[index, subindex].value
         except KeyError:
             raise self._missing(index, subindex) from None
 
     def put(self, index: int, value: int, subindex: int = 0) -> None:
-        """Set an entry from within the drive, whoever may write it.
-
-        Parameters
-        ----------
-        index : int
-            its place
-        value : int
-            kept within the entry's size
-        subindex : int
-            its place
-        """
+        """Set an entry from within the drive, whoever may write it."""
         entry = self._entry(index, subindex)
         bits = 8 * entry.bytes
         low, high = (-(1 << bits - 1), (1 << bits - 1) - 1) if entry.signed else (0, (1 << bits) - 1)
@@ -134,11 +90,6 @@ class ObjectDictionary:
 
     def read(self, index: int, subindex: int) -> bytes:
         """Value of an entry as a master gets it, little end first.
-
-        Parameters
-        ----------
-        index, subindex : int
-            its place
 
         Raises
         ------
@@ -150,13 +101,6 @@ class ObjectDictionary:
 
     def write(self, index: int, subindex: int, data: bytes) -> None:
         """A master's write.
-
-        Parameters
-        ----------
-        index, subindex : int
-            its place
-        data : bytes
-            little end first
 
         Raises
         ------

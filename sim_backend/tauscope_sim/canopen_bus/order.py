@@ -26,27 +26,14 @@ _SOCKET = "socketcan:"
 class CanOrder:
     """What to emulate.
 
-    robot : str
-        robot file whose ``drive`` blocks say which drives there are, and whose links they move
     start : tuple of float
         where the joints stand [rad or m]
-    port : str
-        where the name of the pseudo terminal is linked to, or the SocketCAN interface behind ``socketcan:``
-    control : str
-        Unix socket for the test
-    scenario : str or None
-        scenario file of what is concealed in the arm
     rated_torque_mnm : tuple of int
         object 0x6076 of each drive, at the motor shaft [mNm]
     torque_noise : float
         standard deviation of what the drives measure of the torque [Nm or N]
     bit_rate : int
         of the bus [bit/s]
-    stepped : bool
-        whether time passes only when `EmulatorProcess.advance_to` says so, and frames arrive at once; else it is the
-        machine's
-    trace : str or None
-        file that what the drives do is appended to
     """
 
     module: ClassVar[str] = "tauscope_sim.canopen_bus"
@@ -68,13 +55,7 @@ class CanOrder:
 
     @staticmethod
     def from_json(text: str) -> "CanOrder":
-        """The order in a text.
-
-        Parameters
-        ----------
-        text : str
-            as `to_json` writes it
-        """
+        """The order in a text."""
         document = json.loads(text)
         tuples = {name: tuple(document[name]) for name in ("start", "rated_torque_mnm")}
         return CanOrder(**{**document, **tuples})

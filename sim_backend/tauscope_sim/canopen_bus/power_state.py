@@ -29,13 +29,7 @@ class PowerStateMachine:
         self._last_word = 0
 
     def command(self, word: int) -> None:
-        """Follow a controlword by one transition.
-
-        Parameters
-        ----------
-        word : int
-            0x6040
-        """
+        """Follow a controlword by one transition."""
         rising_reset = bool(word & _RESET and not self._last_word & _RESET)
         self._last_word = word
         if self.state is PowerState.FAULT:

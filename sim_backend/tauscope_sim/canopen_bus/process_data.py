@@ -15,13 +15,7 @@ _HIGHEST_SYNCHRONOUS = 240
 
 @dataclass(frozen=True)
 class _Pdo:
-    """Where a PDO's identifier, its transmission type and what it holds are written.
-
-    cob_id, transmission : Entry
-        subindices 1 and 2 of its communication parameter
-    mapping : int
-        index of the mapping parameter
-    """
+    """Where a PDO's identifier, its transmission type and what it holds are written."""
 
     cob_id: Entry
     transmission: Entry
@@ -38,15 +32,7 @@ class ProcessData:
     """The PDOs of one node; RPDOs wait for SYNC, TPDOs are sampled at it."""
 
     def __init__(self, dictionary: ObjectDictionary, node_id: int) -> None:
-        """Add the parameters of all PDOs, which are off at power-up.
-
-        Parameters
-        ----------
-        dictionary : ObjectDictionary
-            of the node
-        node_id : int
-            1 to 127
-        """
+        """Add the parameters of all PDOs, which are off at power-up."""
         self._dictionary = dictionary
         self._waiting: dict[int, bytes] = {}
         self._syncs = 0
@@ -65,15 +51,7 @@ class ProcessData:
         return _Pdo(cob_id, transmission, mapping)
 
     def take(self, identifier: int, payload: bytes) -> bool:
-        """Keep a frame for the next SYNC; False where it is no RPDO of this node.
-
-        Parameters
-        ----------
-        identifier : int
-            of the frame
-        payload : bytes
-            of the frame
-        """
+        """Keep a frame for the next SYNC; False where it is no RPDO of this node."""
         for number, pdo in enumerate(self._received):
             if pdo.identifier == identifier:
                 if pdo.transmission.value <= _HIGHEST_SYNCHRONOUS:

@@ -10,15 +10,7 @@ _COMMAND = 0xE0
 
 
 def answer_request(dictionary: ObjectDictionary, request: bytes) -> bytes | None:
-    """Answer to a request; None where the frame is no request.
-
-    Parameters
-    ----------
-    dictionary : ObjectDictionary
-        read or written
-    request : bytes
-        payload of the frame
-    """
+    """Answer to a request; None where the frame is no request."""
     if len(request) != 8 or request[0] & _COMMAND == _ABORT:
         return None
     index, subindex = int.from_bytes(request[1:3], "little"), request[3]

@@ -26,11 +26,6 @@ class SerialLine:
         """Frames for the bus, and what the adapter answers.
 
         Extended and remote frames are acknowledged and go nowhere: no drive listens to them.
-
-        Parameters
-        ----------
-        data : bytes
-            of the host, in pieces of any length
         """
         *lines, self._pending = (self._pending + data).split(_END)
         if len(self._pending) > _LONGEST_LINE:
@@ -42,13 +37,7 @@ class SerialLine:
         return frames, answers
 
     def text(self, frame: Frame) -> bytes:
-        """A frame of the bus as the host reads it; nothing where the channel is closed.
-
-        Parameters
-        ----------
-        frame : tuple of int and bytes
-            identifier and payload
-        """
+        """A frame of the bus as the host reads it; nothing where the channel is closed."""
         identifier, payload = frame
         if not self.is_open:
             return b""

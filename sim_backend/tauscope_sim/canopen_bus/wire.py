@@ -53,8 +53,6 @@ class Wire:
 
         Parameters
         ----------
-        frame : tuple of int and bytes
-            identifier and payload
         now_s : float
             present instant [s]
         """
@@ -83,25 +81,13 @@ class Wire:
 
         Parameters
         ----------
-        node_id : int
-            1 to 127
-        kind : FaultKind
-            lose, corrupt, late or duplicate
-        count : int
-            to how many frames
         seconds : float
             how late [s]
         """
         self._faults[node_id] = (kind, count, seconds)
 
     def duration_s(self, frame: Frame) -> float:
-        """Time of a frame on the wire, with as many stuffed bits as mixed data have [s].
-
-        Parameters
-        ----------
-        frame : tuple of int and bytes
-            identifier and payload
-        """
+        """Time of a frame on the wire, with as many stuffed bits as mixed data have [s]."""
         bits = _FRAME_BITS + 8 * len(frame[1])
         return (bits + bits / (4.0 * _BITS_PER_STUFFED_BIT)) * self._bit_s
 

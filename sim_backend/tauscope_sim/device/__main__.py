@@ -24,18 +24,7 @@ READY = "ready"
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the device until it is asked to end, or until it has been alone for long enough.
-
-    Parameters
-    ----------
-    arguments : list of str or None
-        of the command line; None takes those of the process
-
-    Returns
-    -------
-    int
-        exit status
-    """
+    """Run the device until it is asked to end, or until it has been alone for long enough."""
     options = _parser().parse_args(arguments)
     try:
         robot = _robot(options.robot)

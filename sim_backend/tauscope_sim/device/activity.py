@@ -47,25 +47,11 @@ _BY_POLICY = {
 
 
 def commanded_by(mode: ControlMode) -> Activity:
-    """What enabling leads to.
-
-    Parameters
-    ----------
-    mode : ControlMode
-        who closes the loop
-    """
+    """What enabling leads to."""
     return _BY_MODE[mode]
 
 
 def stopped_by(activity: Activity, policy: StopPolicy) -> Activity:
-    """What a stop leads to; the activity itself where there is nothing to stop.
-
-    Parameters
-    ----------
-    activity : Activity
-        what the drives are doing
-    policy : StopPolicy
-        how they shall stop
-    """
+    """What a stop leads to; the activity itself where there is nothing to stop."""
     asked = _BY_POLICY[policy]
     return asked if asked in TRANSITIONS[activity] else activity

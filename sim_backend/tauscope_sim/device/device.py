@@ -56,10 +56,6 @@ class SimulatedDevice:
 
     Parameters
     ----------
-    robot : Robot
-        the arm; its model block has to hold the links
-    scenario : Scenario
-        what is concealed, the noise and the latency
     start_position : (n,) float64 or None
         where the arm stands; None is `tauscope_sim.device.posture.resting_posture` [rad or m]
     start_ns : int
@@ -150,12 +146,6 @@ class SimulatedDevice:
 
         Parameters
         ----------
-        mode : ControlMode
-            who closes the loop
-        limits : DriveLimits
-            what the drives enforce
-        stop_policy : StopPolicy
-            what they do when the watchdog fires
         watchdog_s : float
             time without setpoints after which it does [s]
 
@@ -181,8 +171,6 @@ class SimulatedDevice:
 
         Parameters
         ----------
-        setpoint : Setpoint
-            finite targets for every joint
         sent_ns : int or None
             when it was sent, by the device's clock; None for now [ns]
 
@@ -201,13 +189,7 @@ class SimulatedDevice:
             self._pending.append(((sent_ns - self._start_ns) / TICK_NS + self._latency_ticks, kept))
 
     def stop(self, policy: StopPolicy | None = None) -> None:
-        """Stop the arm; legal at any time. Setpoints that are still on their way are forgotten.
-
-        Parameters
-        ----------
-        policy : StopPolicy or None
-            how; None is the policy that the arm was enabled with, and changes nothing on an arm that is not enabled
-        """
+        """Stop the arm; legal at any time. Setpoints that are still on their way are forgotten."""
         if policy is None and self._enabling is not None and self._activity in COMMANDED:
             policy = self._enabling.stop_policy
         self._enabling = None
@@ -215,13 +197,7 @@ class SimulatedDevice:
             self._stop(policy)
 
     def lose_host(self, detail: str) -> None:
-        """The host is gone: what the watchdog would find out in its time.
-
-        Parameters
-        ----------
-        detail : str
-            how the device knows, in one line
-        """
+        """The host is gone: what the watchdog would find out in its time."""
         if self._activity in COMMANDED:
             self._trip(FaultCode.WATCHDOG, None, detail)
         self._enabling = None
@@ -258,11 +234,6 @@ class SimulatedDevice:
 
     def inject(self, injection: Injection) -> None:
         """Make a disturbance happen.
-
-        Parameters
-        ----------
-        injection : Injection
-            which, to which joint, and when
 
         Raises
         ------

@@ -9,13 +9,7 @@ Array = NDArray[np.float64]
 
 
 class Disturbances:
-    """What acts now.
-
-    Parameters
-    ----------
-    joint_count : int
-        number of joints n
-    """
+    """What acts now."""
 
     def __init__(self, joint_count: int) -> None:
         self.slip: Array = np.zeros(joint_count)
@@ -36,13 +30,7 @@ class Disturbances:
         return bool(self._injections)
 
     def add(self, injection: Injection) -> None:
-        """Take note of a disturbance.
-
-        Parameters
-        ----------
-        injection : Injection
-            which, to which joint, and when
-        """
+        """Take note of a disturbance."""
         self.any = True
         self._injections.append(injection)
 

@@ -38,12 +38,6 @@ class Drives:
 
     Parameters
     ----------
-    robot : Robot
-        the arm
-    scenario : Scenario
-        what is concealed: a commissioned arm's drives are tuned to the arm as it is
-    motion : Motion
-        where the arm stands
     tick_s : float
         time between two ticks [s]
     """
@@ -58,17 +52,7 @@ class Drives:
         self._commanded_torque: Array | None = None
 
     def enable(self, before: Activity, motion: Motion, limits: DriveLimits) -> None:
-        """Take the arm over where it stands, or go on holding it where it is held.
-
-        Parameters
-        ----------
-        before : Activity
-            what the drives were doing
-        motion : Motion
-            of the motors
-        limits : DriveLimits
-            what is enforced from now on
-        """
+        """Take the arm over where it stands, or go on holding it where it is held."""
         self._servo.set_torque_limit(limits.torque)
         if before is not Activity.HOLDING:
             self._servo.begin()
@@ -83,10 +67,6 @@ class Drives:
 
         Parameters
         ----------
-        activity : Activity
-            what the drives are doing
-        setpoint : Setpoint
-            of the host
         arrival : float
             when it arrived [ticks]
         """
@@ -96,15 +76,7 @@ class Drives:
             self._commanded_torque = setpoint.torque
 
     def hold(self, before: Activity, motion: Motion) -> None:
-        """Bring the joints to rest and hold them.
-
-        Parameters
-        ----------
-        before : Activity
-            what the drives were doing
-        motion : Motion
-            of the motors
-        """
+        """Bring the joints to rest and hold them."""
         if before is Activity.TRACKING or self._waits_for_torque(before):
             self._servo.absorb(self._target.feed_forward)
             self._target.brake()
@@ -115,17 +87,7 @@ class Drives:
         self._target.limit(low, high, np.full_like(low, np.inf))
 
     def torque(self, activity: Activity, motion: Motion, tick: int) -> Array:
-        """Torque of all joints, (n,) [Nm or N].
-
-        Parameters
-        ----------
-        activity : Activity
-            what the drives are doing
-        motion : Motion
-            of the motors
-        tick : int
-            number of the tick
-        """
+        """Torque of all joints, (n,) [Nm or N]."""
         if activity is Activity.FREE:
             return self._zero
         if activity is Activity.DAMPING:
@@ -142,11 +104,6 @@ class Drives:
         """What takes the arm beyond its limits in torque control, where no target keeps it within them.
 
         A joint that could not be stopped any more within its range counts as outside already.
-
-        Parameters
-        ----------
-        motion : Motion
-            of the motors
 
         Returns
         -------

@@ -45,8 +45,6 @@ class Disturbance(StrEnum):
 class Injection:
     """One disturbance, for tests of what stands above the device.
 
-    kind : Disturbance
-        what happens
     joint : int
         joint number, counted from 1
     start_ns : int
@@ -79,12 +77,8 @@ def device_fault(code: FaultCode, joint: int | None, detail: str) -> Fault:
 
     Parameters
     ----------
-    code : FaultCode
-        which fault
     joint : int or None
         joint number, counted from 1; None for the whole arm
-    detail : str
-        what happened, in one line
     """
     return Fault(code.value, joint, detail, REMEDIES[code])
 
@@ -97,13 +91,7 @@ class FaultLatch:
         self.faults: tuple[Fault, ...] = ()
 
     def latch(self, fault: Fault) -> None:
-        """Keep a fault.
-
-        Parameters
-        ----------
-        fault : Fault
-            what the device reports
-        """
+        """Keep a fault."""
         self._faults.setdefault((fault.code, fault.joint), fault)
         self.faults = tuple(self._faults.values())
 

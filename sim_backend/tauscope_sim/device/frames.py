@@ -39,15 +39,7 @@ class FrameKind(IntEnum):
 
 @dataclass(frozen=True)
 class Frame:
-    """One message.
-
-    kind : FrameKind
-        what it is
-    sequence : int
-        number of the request, that of its reply too
-    body : bytes
-        content
-    """
+    """One message."""
 
     kind: FrameKind
     sequence: int
@@ -70,11 +62,6 @@ class FrameBuffer:
 
     def feed(self, data: bytes) -> list[Frame]:
         """Take what arrived and return the frames that are complete.
-
-        Parameters
-        ----------
-        data : bytes
-            next part of the stream
 
         Raises
         ------

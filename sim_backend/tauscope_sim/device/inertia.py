@@ -24,13 +24,6 @@ class InertiaSchedule:
 
     For a joint with a compliant transmission H is scaled down to a multiple of its rotor's inertia, which is all that
     the drive feels between two ticks.
-
-    Parameters
-    ----------
-    robot : Robot
-        the arm; its model block has to hold the links
-    effects : sequence of PhysicalEffect
-        what is concealed in it
     """
 
     def __init__(self, robot: Robot, effects: Sequence[PhysicalEffect]) -> None:

@@ -17,8 +17,6 @@ def checked_limits(limits: DriveLimits, position: Array) -> DriveLimits:
 
     Parameters
     ----------
-    limits : DriveLimits
-        as the host states them
     position : (n,) float64
         where the arm stands [rad or m]
 
@@ -48,13 +46,6 @@ def checked_limits(limits: DriveLimits, position: Array) -> DriveLimits:
 def checked_setpoint(setpoint: Setpoint, joint_count: int) -> Setpoint:
     """The setpoint in arrays of its own.
 
-    Parameters
-    ----------
-    setpoint : Setpoint
-        as the host sends it
-    joint_count : int
-        number of joints n
-
     Raises
     ------
     DriverError
@@ -74,13 +65,7 @@ def checked_setpoint(setpoint: Setpoint, joint_count: int) -> Setpoint:
 
 
 def refused(message: str) -> DriverError:
-    """The error of a request that the device does not carry out.
-
-    Parameters
-    ----------
-    message : str
-        one line
-    """
+    """The error of a request that the device does not carry out."""
     return DriverError(DriverErrorKind.REFUSED, message)
 
 

@@ -16,10 +16,6 @@ class Mechanism:
 
     Parameters
     ----------
-    robot : Robot
-        the arm; its model block has to hold the links
-    scenario : Scenario
-        what is concealed, and the sensors
     start_position : (n,) float64 or None
         where the arm stands; None is `resting_posture` [rad or m]
     tick_s : float
@@ -58,8 +54,6 @@ class Mechanism:
         ----------
         torque : (n,) float64
             of the drives from this tick on [Nm or N]
-        tick : int
-            number of the tick
 
         Raises
         ------
@@ -77,25 +71,13 @@ class Mechanism:
             self.true = self._plant.state
 
     def put_back(self, tick: int) -> None:
-        """Carry the arm back to where it began, with all that it conceals as when new.
-
-        Parameters
-        ----------
-        tick : int
-            number of the tick
-        """
+        """Carry the arm back to where it began, with all that it conceals as when new."""
         self._plant.place(self._start)
         self.true = self._plant.state
         self.rest(tick)
 
     def rest(self, tick: int) -> None:
-        """Take the reading of an arm in its brakes.
-
-        Parameters
-        ----------
-        tick : int
-            number of the tick
-        """
+        """Take the reading of an arm in its brakes."""
         self._torque = self._zero
         self._take(self._zero, tick)
 

@@ -25,23 +25,12 @@ class BadMessageError(ValueError):
 
 
 def encode_document(document: Mapping[str, Any]) -> bytes:
-    """Plain data as JSON.
-
-    Parameters
-    ----------
-    document : mapping
-        without not-a-number and infinity
-    """
+    """Plain data as JSON."""
     return json.dumps(document, allow_nan=False).encode()
 
 
 def decode_document(body: bytes) -> dict[str, Any]:
     """Plain data from JSON.
-
-    Parameters
-    ----------
-    body : bytes
-        of a frame
 
     Raises
     ------
@@ -64,21 +53,12 @@ def encode_setpoint(sent_ns: int, setpoint: Setpoint) -> bytes:
     ----------
     sent_ns : int
         present instant of the machine's monotonic clock [ns]
-    setpoint : Setpoint
-        targets of one cycle
     """
     return _INSTANT.pack(sent_ns) + np.concatenate([setpoint.position, setpoint.torque]).astype("<f8").tobytes()
 
 
 def decode_setpoint(body: bytes, joint_count: int) -> tuple[int, Setpoint]:
     """Instant and setpoint of an exchange; whether its numbers are finite is the device's matter.
-
-    Parameters
-    ----------
-    body : bytes
-        of a frame
-    joint_count : int
-        number of joints n
 
     Raises
     ------
@@ -92,13 +72,7 @@ def decode_setpoint(body: bytes, joint_count: int) -> tuple[int, Setpoint]:
 
 
 def encode_state(state: ArmState) -> bytes:
-    """Time, position, velocity, effort, temperature, enabled, and the faults as JSON where there are any.
-
-    Parameters
-    ----------
-    state : ArmState
-        one reading
-    """
+    """Time, position, velocity, effort, temperature, enabled, and the faults as JSON where there are any."""
     numbers = np.concatenate([state.position, state.velocity, state.effort, state.temperature]).astype("<f8")
     faults = json.dumps([_fault_document(fault) for fault in state.faults]).encode() if state.faults else b""
     head = _STATE_HEAD.pack(state.time_ns, len(state.position))
@@ -107,11 +81,6 @@ def encode_state(state: ArmState) -> bytes:
 
 def decode_state(body: bytes) -> ArmState:
     """The reading that `encode_state` wrote.
-
-    Parameters
-    ----------
-    body : bytes
-        of a frame
 
     Raises
     ------
@@ -131,24 +100,13 @@ def decode_state(body: bytes) -> ArmState:
 
 
 def encode_error(error: DriverError) -> bytes:
-    """A refusal.
-
-    Parameters
-    ----------
-    error : DriverError
-        what the device raised
-    """
+    """A refusal."""
     faults = [_fault_document(fault) for fault in error.faults]
     return encode_document({"kind": error.kind.value, "message": str(error), "faults": faults})
 
 
 def decode_error(body: bytes) -> DriverError:
     """The error that `encode_error` wrote.
-
-    Parameters
-    ----------
-    body : bytes
-        of a frame
 
     Raises
     ------
@@ -168,12 +126,6 @@ def encode_enable(mode: ControlMode, limits: DriveLimits, stop_policy: StopPolic
 
     Parameters
     ----------
-    mode : ControlMode
-        who closes the loop
-    limits : DriveLimits
-        what the drives enforce; not-a-number goes as text too: refusing it is the device's matter
-    stop_policy : StopPolicy
-        what the device does when its watchdog fires
     watchdog_s : float
         time of the watchdog [s]
     """
@@ -188,11 +140,6 @@ def encode_enable(mode: ControlMode, limits: DriveLimits, stop_policy: StopPolic
 
 def decode_enable(body: bytes) -> tuple[ControlMode, DriveLimits, StopPolicy, float]:
     """The arguments of `encode_enable`.
-
-    Parameters
-    ----------
-    body : bytes
-        of a frame
 
     Raises
     ------
@@ -211,23 +158,12 @@ def decode_enable(body: bytes) -> tuple[ControlMode, DriveLimits, StopPolicy, fl
 
 
 def encode_stop(policy: StopPolicy) -> bytes:
-    """A request to stop.
-
-    Parameters
-    ----------
-    policy : StopPolicy
-        how
-    """
+    """A request to stop."""
     return encode_document({"policy": policy.value})
 
 
 def decode_stop(body: bytes) -> StopPolicy:
     """The policy of `encode_stop`.
-
-    Parameters
-    ----------
-    body : bytes
-        of a frame
 
     Raises
     ------
@@ -241,23 +177,12 @@ def decode_stop(body: bytes) -> StopPolicy:
 
 
 def encode_injection(injection: Injection) -> bytes:
-    """A disturbance for a test.
-
-    Parameters
-    ----------
-    injection : Injection
-        which
-    """
+    """A disturbance for a test."""
     return encode_document({**vars(injection), "kind": injection.kind.value})
 
 
 def decode_injection(body: bytes) -> Injection:
     """The disturbance that `encode_injection` wrote.
-
-    Parameters
-    ----------
-    body : bytes
-        of a frame
 
     Raises
     ------

@@ -20,11 +20,6 @@ REACH = 1.0
 def resting_posture(robot: Robot) -> Array:
     """Zero, or the end of each joint's range nearest to it; elsewhere where a joint has next to no inertia there.
 
-    Parameters
-    ----------
-    robot : Robot
-        the arm; its model block has to hold the links
-
     Returns
     -------
     (n,) float64

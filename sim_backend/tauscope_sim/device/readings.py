@@ -40,13 +40,6 @@ class Readings:
     Position and torque are what `Scenario.sensors` makes of them. Velocity is the drive's estimate: exact where the
     encoder is, else with white noise as large as the encoder's error times `VELOCITY_BANDWIDTH`.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        the sensors' effects, noise and resolution, and the seed
-    robot : Robot
-        the arm
-
     Raises
     ------
     ScenarioError
@@ -63,13 +56,7 @@ class Readings:
         self._reading: tuple[Array, Array, Array] | None = None
 
     def of(self, sample: Sample) -> tuple[Array, Array, Array]:
-        """Position, velocity and torque as the drives report them, each (n,).
-
-        Parameters
-        ----------
-        sample : Sample
-            the true state
-        """
+        """Position, velocity and torque as the drives report them, each (n,)."""
         if self._reading is None or sample is not self._sample:
             position, torque = self._sensors.measure(sample.time_s, sample.position, sample.torque)
             velocity = sample.velocity

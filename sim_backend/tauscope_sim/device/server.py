@@ -44,8 +44,6 @@ _PEER = struct.Struct("3i")
 class Punctuality:
     """How well the device kept to the machine's clock.
 
-    overruns : int
-        passes that began later than `LATE_NS` after the one before was due
     largest_lag_ns : int
         the latest of them [ns]
     """
@@ -80,12 +78,6 @@ class DeviceServer:
 
     Parameters
     ----------
-    device : SimulatedDevice
-        whose time began at a recent instant of the monotonic clock
-    listener : socket.socket
-        listening
-    trace : TraceWriter
-        the device's own record
     linger_s : float
         how long it goes on without a host [s]
     """
@@ -256,11 +248,5 @@ class DeviceServer:
 
 
 def peer_process(connection: socket.socket) -> int:
-    """Id of the process at the other end of a Unix socket, as the kernel knows it.
-
-    Parameters
-    ----------
-    connection : socket.socket
-        connected
-    """
+    """Id of the process at the other end of a Unix socket, as the kernel knows it."""
     return _PEER.unpack(connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _PEER.size))[0]

@@ -43,10 +43,6 @@ class Servo:
 
     Parameters
     ----------
-    robot : Robot
-        its torque limits are what the motors can give; its viscous friction bounds the stiffness k
-    inertia : InertiaSchedule
-        scales the gains
     tick_s : float
         time between two ticks [s]
     """

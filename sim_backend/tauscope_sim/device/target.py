@@ -26,13 +26,7 @@ _LEAP = 0.02
 
 
 def catching_up_acceleration(robot: Robot) -> Array:
-    """Acceleration with which each joint catches up, (n,): an arm that runs out of torque on the way overshoots.
-
-    Parameters
-    ----------
-    robot : Robot
-        the arm
-    """
+    """Acceleration with which each joint catches up, (n,): an arm that runs out of torque on the way overshoots."""
     stated = [joint.limits.acceleration for joint in robot.joints]
     return np.array([DEFAULT_ACCELERATION if limit is None else ROOM * limit for limit in stated])
 
@@ -125,13 +119,7 @@ class Target:
         self._ticks_left = round(STOP_TIME_S / self._tick_s) if self.velocity.any() else 0
 
     def advance(self, tick: int) -> None:
-        """Move on by one tick.
-
-        Parameters
-        ----------
-        tick : int
-            the present tick
-        """
+        """Move on by one tick."""
         if not self._braking and self._spline.starved(tick):
             self.brake()
         if not self._braking:

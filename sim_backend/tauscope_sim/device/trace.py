@@ -22,13 +22,6 @@ class TraceWriter:
     """Appends lines to a CSV file: time, activity, faults, true position and velocity of each joint.
 
     Each line is written at once and by itself, so that the file is complete up to the last line when the process dies.
-
-    Parameters
-    ----------
-    path : Path
-        file; must not exist
-    device : SimulatedDevice
-        whose life is recorded
     """
 
     def __init__(self, path: Path, device: SimulatedDevice) -> None:
@@ -68,10 +61,6 @@ class DeviceTrace:
 
     time_ns : (N,) int64
         device time: the machine's monotonic clock [ns]
-    activity : tuple of Activity
-        what the drives were doing
-    faults : tuple of tuples of str
-        codes of the latched faults
     position : (N, n) float64
         true position of the links [rad or m]
     velocity : (N, n) float64
@@ -87,11 +76,6 @@ class DeviceTrace:
 
 def read_trace(path: Path) -> DeviceTrace:
     """Read a trace, also while it is being written: a last line that is not complete is left out.
-
-    Parameters
-    ----------
-    path : Path
-        file of a `TraceWriter`
 
     Raises
     ------

@@ -23,15 +23,7 @@ _LONGEST_SOCKET_PATH = 107
 
 @dataclass(frozen=True, eq=False)
 class DeviceProcess:
-    """A running device process.
-
-    process : subprocess.Popen
-        of which `pid` is the device's process id
-    socket : Path
-        where `RemoteSimulatedArm` connects
-    trace : Path
-        the device's own record; see `tauscope_sim.device.trace`
-    """
+    """A running device process."""
 
     process: "subprocess.Popen[bytes]"
     socket: Path
@@ -67,21 +59,10 @@ def start_device(
 
     Parameters
     ----------
-    robot : Robot or Path
-        the arm, or its robot file; it needs a model block
-    folder : Path
-        existing folder for the socket ``device.sock``, the trace ``device.csv`` and the messages ``device.log``
-    scenario : Path or None
-        scenario file; None conceals nothing
     start_position : sequence of n float or None
         where the arm stands; None is `tauscope_sim.device.posture.resting_posture` [rad or m]
     linger_s : float
         how long the process goes on without a host [s]
-
-    Returns
-    -------
-    DeviceProcess
-        ready for a connection
 
     Raises
     ------

@@ -51,10 +51,6 @@ class RemoteSimulatedArm:
 
     Parameters
     ----------
-    path : Path
-        socket of the device process
-    joint_count : int
-        number of joints n
     reply_timeout_s : float
         how long one cycle waits for its reply [s]
     """
@@ -133,28 +129,14 @@ class RemoteSimulatedArm:
 
         Parameters
         ----------
-        mode : ControlMode
-            who closes the loop
-        limits : DriveLimits
-            what the drives enforce
-        stop_policy : StopPolicy
-            what the device does by itself when its watchdog fires
         watchdog_s : float
             time without `exchange` after which it does [s]
-        cycle_s : float or None
-            not needed: the device finds its host's pace
         """
         del cycle_s
         return self._state_after(FrameKind.ENABLE, encode_enable(mode, limits, stop_policy, watchdog_s))
 
     def exchange(self, setpoint: Setpoint) -> ArmState:
-        """Write the setpoints, read the arm; see `drivers.Backend`.
-
-        Parameters
-        ----------
-        setpoint : Setpoint
-            finite targets for every joint
-        """
+        """Write the setpoints, read the arm; see `drivers.Backend`."""
         body = encode_setpoint(self._clock.now_ns(), checked_setpoint(setpoint, self._count))
         try:
             reply = self._request(FrameKind.EXCHANGE, body, self._reply_timeout_s)
@@ -164,11 +146,6 @@ class RemoteSimulatedArm:
 
     def stop(self, policy: StopPolicy) -> ArmState:
         """Stop the arm; where there is no connection the device has done so by itself, and nothing is known of it.
-
-        Parameters
-        ----------
-        policy : StopPolicy
-            how
 
         Raises
         ------
@@ -190,13 +167,7 @@ class RemoteSimulatedArm:
         return decode_document(self._patiently(FrameKind.STATUS).body)
 
     def inject(self, injection: Injection) -> ArmState:
-        """Make a disturbance happen, for a test.
-
-        Parameters
-        ----------
-        injection : Injection
-            which, to which joint, and when
-        """
+        """Make a disturbance happen, for a test."""
         return self._state_after(FrameKind.INJECT, encode_injection(injection))
 
     def put_back(self) -> ArmState:

@@ -17,10 +17,6 @@ class SimulatedArm:
 
     Parameters
     ----------
-    robot : Robot
-        the arm; its model block has to hold the links
-    scenario : Scenario or None
-        what is concealed, the noise and the latency; None conceals nothing
     start_position : (n,) float64 or None
         where the arm stands; None is `tauscope_sim.device.posture.resting_posture` [rad or m]
 
@@ -82,16 +78,8 @@ class SimulatedArm:
 
         Parameters
         ----------
-        mode : ControlMode
-            who closes the loop
-        limits : DriveLimits
-            what the drives enforce
-        stop_policy : StopPolicy
-            what the device does by itself when its watchdog fires
         watchdog_s : float
             time without `exchange` after which it does, in virtual time [s]
-        cycle_s : float or None
-            not needed: the device finds its host's pace
         """
         del cycle_s
         self._require_connection()
@@ -99,25 +87,13 @@ class SimulatedArm:
         return self.device.read()
 
     def exchange(self, setpoint: Setpoint) -> ArmState:
-        """Write the setpoints, read the arm; see `drivers.Backend`.
-
-        Parameters
-        ----------
-        setpoint : Setpoint
-            finite targets for every joint
-        """
+        """Write the setpoints, read the arm; see `drivers.Backend`."""
         self._require_connection()
         self.device.command(setpoint, self._clock.now_ns())
         return self.device.read()
 
     def stop(self, policy: StopPolicy) -> ArmState:
-        """Stop the arm; legal at any time, also while disconnected.
-
-        Parameters
-        ----------
-        policy : StopPolicy
-            how
-        """
+        """Stop the arm; legal at any time, also while disconnected."""
         self.device.stop(policy)
         return self.device.read()
 

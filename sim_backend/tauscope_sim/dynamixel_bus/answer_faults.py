@@ -11,10 +11,6 @@ class AnswerFaults:
 
     kind : FaultKind or None
         None for nothing
-    count : int
-        how many answers are left
-    seconds : float
-        how late
     """
 
     kind: FaultKind | None = None
@@ -26,8 +22,6 @@ class AnswerFaults:
 
         Parameters
         ----------
-        frame : bytes
-            as it was sent
         due_s : float
             when it would arrive [s]
         """

@@ -28,13 +28,7 @@ class MovedArm(Protocol):
         ...
 
     def torque(self, demands: Sequence[Demand]) -> Array:
-        """Torque with which the servos meet their demands now, (n,) [Nm or N].
-
-        Parameters
-        ----------
-        demands : sequence of Demand
-            one a joint
-        """
+        """Torque with which the servos meet their demands now, (n,) [Nm or N]."""
         ...
 
     def advance(self, torque: Array, duration_s: float) -> None:
@@ -93,13 +87,7 @@ class Pendulums:
         return self._position.copy(), self._velocity.copy()
 
     def torque(self, demands: Sequence[Demand]) -> Array:
-        """Torque of the position loops where a target is tracked, else what is demanded.
-
-        Parameters
-        ----------
-        demands : sequence of Demand
-            one a joint
-        """
+        """Torque of the position loops where a target is tracked, else the demand, (n,)."""
         omega = 2.0 * np.pi * BANDWIDTH_HZ
         torque = np.zeros(self.joint_count)
         for joint, demand in enumerate(demands):

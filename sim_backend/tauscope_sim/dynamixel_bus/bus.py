@@ -28,17 +28,7 @@ class EmulatedBus:
     """Servos on one line."""
 
     def __init__(self, servos: Sequence[EmulatedServo], *, fast_sync_read: bool = True, paced: bool = True) -> None:
-        """Connect servos.
-
-        Parameters
-        ----------
-        servos : sequence of EmulatedServo
-            each with an ID of its own
-        fast_sync_read : bool
-            whether their firmware knows Fast Sync Read
-        paced : bool
-            whether bytes take the time of their baud rate
-        """
+        """Connect servos."""
         self.servos = {servo.servo: servo for servo in servos}
         self.schedule = FaultSchedule()
         self._fast = fast_sync_read
@@ -68,8 +58,6 @@ class EmulatedBus:
 
         Parameters
         ----------
-        data : bytes
-            as they came
         now_s : float
             when [s]
         """
@@ -84,8 +72,6 @@ class EmulatedBus:
 
         Parameters
         ----------
-        instructions : iterable of Instruction
-            that were heard
         now_s : float
             present instant [s]
         """

@@ -23,13 +23,7 @@ _SIZE = 1024
 
 
 class WriteRefusedError(Exception):
-    """A write that the servo does not take.
-
-    Parameters
-    ----------
-    error : int
-        number of the error for the status packet
-    """
+    """A write that the servo does not take."""
 
     def __init__(self, error: int) -> None:
         super().__init__(error)
@@ -40,13 +34,7 @@ class ControlMemory:
     """Items by name, bytes by address."""
 
     def __init__(self, specification: ServoSpecification) -> None:
-        """As delivered, with what the specification says otherwise.
-
-        Parameters
-        ----------
-        specification : ServoSpecification
-            of the servo
-        """
+        """As delivered, with what the specification says otherwise."""
         self._specification = specification
         table = ControlTable.getControlTable(specification.model_number)
         self.items = {name: (item.address, item.size) for name, item in table.items() if "Indirect" not in name}
@@ -59,40 +47,18 @@ class ControlMemory:
         return name in self.items
 
     def get(self, name: str) -> int:
-        """Value of an item; 0 where the model has none.
-
-        Parameters
-        ----------
-        name : str
-            as ROBOTIS calls it
-        """
+        """Value of an item; 0 where the model has none."""
         return self._values.get(name, 0)
 
     def put(self, name: str, value: int) -> None:
-        """Set an item as the servo itself does, without asking whether it may be written.
-
-        Parameters
-        ----------
-        name : str
-            as ROBOTIS calls it
-        value : int
-            what it becomes; cut to what fits
-        """
+        """Set an item as the servo itself does, without asking whether it may be written."""
         if name in self.items:
             bits = 8 * self.items[name][1]
             value %= 1 << bits
             self._values[name] = value - (1 << bits) if name in _SIGNED and value >> bits - 1 else value
 
     def read(self, address: int, length: int) -> bytes:
-        """A stretch of the table; what is not defined reads as zero.
-
-        Parameters
-        ----------
-        address : int
-            of the first byte
-        length : int
-            number of bytes
-        """
+        """A stretch of the table; what is not defined reads as zero."""
         if address + length > _SIZE or length == 0:
             raise WriteRefusedError(ACCESS_ERROR)
         stretch = bytearray(length)
@@ -116,18 +82,6 @@ class ControlMemory:
 
     def write(self, address: int, data: bytes) -> list[str]:
         """Write whole items as a master does.
-
-        Parameters
-        ----------
-        address : int
-            of the first byte
-        data : bytes
-            values of one item or of several that follow one another
-
-        Returns
-        -------
-        list of str
-            what was written
 
         Raises
         ------
@@ -200,13 +154,7 @@ class ControlMemory:
             self.put(name, value)
 
     def is_eeprom(self, name: str) -> bool:
-        """Whether an item survives power-off, and cannot be written under torque.
-
-        Parameters
-        ----------
-        name : str
-            as ROBOTIS calls it
-        """
+        """Whether an item survives power-off, and cannot be written under torque."""
         address = self.items[name][0]
         return any(first <= address < after for first, after in self._specification.figures.eeprom)
 

@@ -26,12 +26,6 @@ class DynamixelEmulator:
 
         Parameters
         ----------
-        bus : EmulatedBus
-            of the servos
-        order : sequence of int
-            ID of the servo of each joint
-        arm : MovedArm
-            what they move
         now_s : float
             present instant [s]
         latency_s : float
@@ -77,8 +71,6 @@ class DynamixelEmulator:
 
         Parameters
         ----------
-        data : bytes
-            as they came
         now_s : float
             when [s]
         """
@@ -115,8 +107,6 @@ class DynamixelEmulator:
         ----------
         now_s : float
             present instant [s]
-        most_steps : int
-            after which it waits to be asked again
         """
         self._clock.catch_up(now_s, self._step, most_steps)
 

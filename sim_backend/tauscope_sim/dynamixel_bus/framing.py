@@ -18,12 +18,6 @@ _library = Protocol2PacketHandler()
 class Instruction:
     """What a master asks.
 
-    servo : int
-        ID, or `BROADCAST_ID`
-    code : int
-        instruction
-    parameters : bytes
-        without stuffing
     length : int
         of the frame on the wire [bytes]
     """
@@ -35,17 +29,7 @@ class Instruction:
 
 
 def status_frame(servo: int, error: int, data: bytes) -> bytes:
-    """A status packet with stuffing and checksum.
-
-    Parameters
-    ----------
-    servo : int
-        ID of the sender
-    error : int
-        error byte
-    data : bytes
-        parameters
-    """
+    """A status packet with stuffing and checksum."""
     length = len(data) + 4
     packet = [*_HEADER, servo, length & 0xFF, length >> 8, _STATUS, error, *data, 0, 0]
     packet = _library.addStuffing(packet)
@@ -58,10 +42,6 @@ def fast_status_frame(answers: list[tuple[int, int, bytes]], servos: int, length
 
     Parameters
     ----------
-    answers : list of tuple of int, int and bytes
-        ID, error and data of each servo that answers
-    servos : int
-        number of servos that were asked
     length : int
         data of each [bytes]
     """
@@ -81,13 +61,7 @@ class InstructionParser:
         self._buffer = bytearray()
 
     def feed(self, received: bytes) -> list[Instruction]:
-        """Instructions that are complete now.
-
-        Parameters
-        ----------
-        received : bytes
-            what has come since
-        """
+        """Instructions that are complete now."""
         self._buffer += received
         found: list[Instruction] = []
         while True:

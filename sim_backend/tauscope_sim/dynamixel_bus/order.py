@@ -17,31 +17,12 @@ from tauscope_sim.emulation.pseudo_terminal import PseudoTerminal
 class DynamixelOrder:
     """What to emulate.
 
-    servos : tuple of ServoSpecification
-        one a joint
     start : tuple of float
         where the joints stand [rad or m]
-    robot : str or None
-        robot file whose links the servos move; a pendulum a joint where None
-    scenario : str or None
-        scenario file of what is concealed in that arm
     weight : float
         m g l of the pendulums [Nm]
-    fast_sync_read : bool
-        whether the firmware knows Fast Sync Read
-    paced : bool
-        whether bytes take the time of their baud rate
     latency_s : float
         latency of the adapter [s]
-    stepped : bool
-        whether time passes only when `EmulatorProcess.advance_to` says so, and answers come at once; else it is the
-        machine's
-    port : str
-        where the name of the pseudo terminal is linked to
-    control : str
-        Unix socket for the test
-    trace : str or None
-        file that what the device does is appended to
     """
 
     module: ClassVar[str] = "tauscope_sim.dynamixel_bus"
@@ -65,13 +46,7 @@ class DynamixelOrder:
 
     @staticmethod
     def from_json(text: str) -> "DynamixelOrder":
-        """The order in a text.
-
-        Parameters
-        ----------
-        text : str
-            as `to_json` writes it
-        """
+        """The order in a text."""
         document = json.loads(text)
         servos = tuple(ServoSpecification(**servo) for servo in document.pop("servos"))
         return DynamixelOrder(servos=servos, **{**document, "start": tuple(document["start"])})

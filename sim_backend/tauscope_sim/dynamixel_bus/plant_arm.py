@@ -30,10 +30,6 @@ class PlantArm:
 
         Parameters
         ----------
-        robot : Robot
-            the arm; its model block has to hold the links
-        scenario : Scenario
-            what is concealed in it
         position : (n,) float64
             where it stands [rad or m]
         """
@@ -54,13 +50,7 @@ class PlantArm:
         return self._position, self._velocity
 
     def torque(self, demands: Sequence[Demand]) -> Array:
-        """Torque of the position loops where a target is tracked, else what is demanded.
-
-        Parameters
-        ----------
-        demands : sequence of Demand
-            one a joint
-        """
+        """Torque of the position loops where a target is tracked, else the demand, (n,)."""
         cap = np.array([demand.cap for demand in demands])
         wanted = np.array([demand.torque for demand in demands])
         tracking = np.array([demand.tracks for demand in demands])

@@ -7,13 +7,7 @@ _MODEL_NUMBERS = {"XM430-W350": 1020, "XM540-W270": 1120, "XL330-M288": 1200, "P
 
 
 def servos_of(robot: Robot) -> tuple[ServoSpecification, ...]:
-    """The servos of a robot file's ``drive`` blocks; an XM430-W350 where no model is named.
-
-    Parameters
-    ----------
-    robot : Robot
-        with a ``drive`` block on every joint
-    """
+    """The servos of a robot file's ``drive`` blocks; an XM430-W350 where no model is named."""
     return tuple(
         ServoSpecification(
             servo=drive["id"],
@@ -29,11 +23,5 @@ def servos_of(robot: Robot) -> tuple[ServoSpecification, ...]:
 
 
 def robot_baud(robot: Robot) -> int:
-    """Baud rate of the bus, which stands on the first joint [bit/s].
-
-    Parameters
-    ----------
-    robot : Robot
-        with ``drive`` blocks
-    """
+    """Baud rate of the bus, which stands on the first joint [bit/s]."""
     return (robot.joints[0].drive or {}).get("baud", 1_000_000)

@@ -32,15 +32,7 @@ class EmulatedServo:
     """A servo on the bus and at its joint."""
 
     def __init__(self, specification: ServoSpecification, *, seed: int = 0) -> None:
-        """Power up.
-
-        Parameters
-        ----------
-        specification : ServoSpecification
-            what it is
-        seed : int
-            of the noise of its current
-        """
+        """Power up."""
         self.specification = specification
         self.memory = ControlMemory(specification)
         self.encoder_offset_counts = 0
@@ -95,13 +87,6 @@ class EmulatedServo:
     def write(self, address: int, data: bytes) -> None:
         """Write to the control table and do what that means.
 
-        Parameters
-        ----------
-        address : int
-            of the first byte
-        data : bytes
-            one item or several
-
         Raises
         ------
         WriteRefusedError
@@ -123,15 +108,7 @@ class EmulatedServo:
                 memory.put("Error Code", 0)
 
     def register(self, address: int, data: bytes) -> None:
-        """Keep a write for the instruction Action.
-
-        Parameters
-        ----------
-        address : int
-            of the first byte
-        data : bytes
-            one item or several
-        """
+        """Keep a write for the instruction Action."""
         self._registered = (address, data)
         self.memory.put("Registered Instruction", 1)
 
@@ -151,11 +128,6 @@ class EmulatedServo:
 
     def clear(self, what: bytes) -> None:
         """Carry out the instruction Clear: an error of the Y series, where its cause is gone.
-
-        Parameters
-        ----------
-        what : bytes
-            parameters of the instruction
 
         Raises
         ------
@@ -178,13 +150,7 @@ class EmulatedServo:
         self._loop.release()
 
     def fail(self, error: int) -> None:
-        """Find a hardware error; the servo lets go where Shutdown says so.
-
-        Parameters
-        ----------
-        error : int
-            `OVERHEATING`, `OVERLOAD` …
-        """
+        """Find a hardware error; the servo lets go where Shutdown says so."""
         if "Error Code" in self.memory:
             self.memory.put("Error Code", _Y_CODES[error])
         self.memory.put("Hardware Error Status", self.memory.get("Hardware Error Status") | error)
@@ -241,9 +207,6 @@ class EmulatedServo:
         ----------
         now_s : float
             present instant [s]
-        part : float
-            of the present period of the servo's loop that is over, 0 to 1: between two periods' measurements it shows
-            what lies between them
         """
         older, newer = self._means(0), self._means(1)
         position, velocity, current = ((1.0 - part) * old + part * new for old, new in zip(older, newer, strict=True))

@@ -12,8 +12,6 @@ CURRENT_MODE, POSITION_MODE, EXTENDED_MODE, CURRENT_BASED_MODE = 0, 3, 4, 5
 class Demand:
     """What a servo wants of its joint until its loop runs again.
 
-    tracks : bool
-        whether it tracks a target; else it exerts `torque`
     position : float
         target [rad or m]
     speed : float
@@ -39,15 +37,7 @@ class ServoLoop:
     """Goals to demands: a target that moves no faster than Profile Velocity, or plain current."""
 
     def __init__(self, specification: ServoSpecification, memory: ControlMemory) -> None:
-        """At rest.
-
-        Parameters
-        ----------
-        specification : ServoSpecification
-            of the servo
-        memory : ControlMemory
-            its control table
-        """
+        """At rest."""
         self._specification = specification
         self._memory = memory
         self._target: float | None = None

@@ -7,10 +7,6 @@ from dataclasses import dataclass, field, replace
 class ModelFigures:
     """What distinguishes one model of servo from another.
 
-    counts_per_turn : int
-        of the horn
-    zero_count : int
-        count at half its range
     velocity_unit : float
         one unit of Present Velocity [rad/s]
     milliampere : float
@@ -21,14 +17,8 @@ class ModelFigures:
         [units]
     pwm_limit : int
         [units]
-    modes : tuple of int
-        operating modes that it has
     goal_current_caps_position : bool
         whether Goal Current is the cap of mode 3 (P, Y); in mode 5 it always is
-    eeprom : tuple of tuple of int
-        stretches of the control table that cannot be written under torque: first address, first one after
-    gear_ratio : int
-        Electronic Gear Ratio as delivered (Y), by which the motor's counts and speeds are divided
     """
 
     counts_per_turn: int
@@ -97,24 +87,14 @@ MODELS: dict[int, ModelFigures] = {
 class ServoSpecification:
     """One emulated servo and the joint that it moves.
 
-    servo : int
-        ID
-    model_number : int
-        a key of `MODELS`
-    firmware : int
-        version
     baud : int
         [bit/s]
     torque_per_milliampere : float
         at the joint [Nm/mA or N/mA]
-    direction : int
-        -1 where it turns against the joint
     reduction : float
         turns of the horn per turn of the joint
     current_noise_ma : float
         standard deviation of what Present Current reads while there is torque [mA]
-    registers : dict of str to int
-        items that differ from the delivered state at power-up: stale goals, torque left on …
     """
 
     servo: int

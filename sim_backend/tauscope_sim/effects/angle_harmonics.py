@@ -16,14 +16,8 @@ class AngleHarmonics(JointEffect):
 
     joint : int
         its number, counted from 1
-    amplitude : list of float
-        a_i, a number or one an order
-    order : list of float
-        k_i, periods a turn of the joint or motor (2π k_i a metre)
     phase : list of float
         φ_i, a number or one an order [rad]
-    angle : str
-        ``joint`` or ``motor``
     """
 
     amplitude: Numbers
@@ -32,13 +26,7 @@ class AngleHarmonics(JointEffect):
     angle: Annotated[str, one_of("joint", "motor")] = "joint"
 
     def check(self, robot: Robot) -> None:
-        """Refuse lists that do not match, and a motor's angle without a gear ratio.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """Refuse lists that do not match, and a motor's angle without a gear ratio."""
         super().check(robot)
         for key in ("amplitude", "phase"):
             count = len(getattr(self, key))
@@ -50,13 +38,7 @@ class AngleHarmonics(JointEffect):
             raise self.refused("angle", "is motor, but the robot file states no gear_ratio for this joint; state it")
 
     def sine_and_slope(self, robot: Robot) -> tuple[Callable[[float], float], Callable[[float], float]]:
-        """s(q) and ds/dq.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """s(q) and ds/dq."""
         ratio = (self.joint_of(robot).gear_ratio or 1.0) if self.angle == "motor" else 1.0
         count = len(self.order)
         amplitude, phase = (value * count if len(value) == 1 else value for value in (self.amplitude, self.phase))

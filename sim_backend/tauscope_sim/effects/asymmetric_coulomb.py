@@ -23,13 +23,7 @@ class AsymmetricCoulomb(FrictionLaw):
     amplitude: Number
 
     def law(self, robot: Robot) -> Law:
-        """τ and its derivatives.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """τ and its derivatives."""
         k_v = self.steepness(robot)
 
         def torque(q: float, v: float) -> float:

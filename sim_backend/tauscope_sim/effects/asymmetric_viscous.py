@@ -21,13 +21,7 @@ class AsymmetricViscous(JointLaw):
     amplitude: Number
 
     def law(self, robot: Robot) -> Law:
-        """τ and its derivatives.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """τ and its derivatives."""
         return (
             lambda q, v: self.amplitude * max(v, 0.0),
             lambda q, v: (0.0, self.amplitude if v > 0.0 else 0.0),

@@ -23,24 +23,12 @@ class BaseTilt(Effect):
     about_y: Number = 0.0
 
     def check(self, robot: Robot) -> None:
-        """Refuse a base that is not tilted.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """Refuse a base that is not tilted."""
         super().check(robot)
         if self.about_x == 0.0 and self.about_y == 0.0:
             raise self.refused("about_x", "and about_y are zero; state one of them [rad]")
 
     def alter(self, robot: Robot) -> Robot:
-        """The arm on its tilted base.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """The arm on its tilted base."""
         turned = rotation_about_x(self.about_x) @ rotation_about_y(self.about_y) @ robot.gravity
         return replace(robot, gravity=turned)

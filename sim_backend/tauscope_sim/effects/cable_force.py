@@ -24,10 +24,6 @@ class CableForce(JointLaw):
         k [Nm/rad^p or N/m^p]
     angle : float
         q_c, where it begins [rad or m]
-    side_of_angle : str
-        ``above`` or ``below``
-    exponent : float
-        p
     """
 
     effect_id: ClassVar[str] = "cable_force"
@@ -38,13 +34,7 @@ class CableForce(JointLaw):
     exponent: Exponent = 1.5
 
     def law(self, robot: Robot) -> Law:
-        """τ and its derivatives.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """τ and its derivatives."""
         sign = 1.0 if self.side_of_angle == "above" else -1.0
 
         def torque(q: float, v: float) -> float:

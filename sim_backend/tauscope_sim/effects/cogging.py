@@ -14,23 +14,13 @@ class Cogging(AngleHarmonics, JointLaw):
         its number, counted from 1
     amplitude : list of float
         a_i, a number or one an order [Nm or N]
-    order : list of float
-        k_i, periods a turn of the joint or motor
     phase : list of float
         φ_i, a number or one an order [rad]
-    angle : str
-        ``joint`` or ``motor``
     """
 
     effect_id: ClassVar[str] = "cogging"
 
     def law(self, robot: Robot) -> Law:
-        """τ and its derivatives.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """τ and its derivatives."""
         sine, slope = self.sine_and_slope(robot)
         return (lambda q, v: sine(q)), (lambda q, v: (slope(q), 0.0))

@@ -23,13 +23,7 @@ class CoulombFriction(FrictionLaw):
     level: Number
 
     def law(self, robot: Robot) -> Law:
-        """τ and its derivatives.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """τ and its derivatives."""
         k_v = self.steepness(robot)
 
         def torque(q: float, v: float) -> float:

@@ -24,11 +24,6 @@ class ScenarioEntry(Document):
     def check(self, robot: Robot) -> None:
         """Refuse an entry that this robot cannot have.
 
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-
         Raises
         ------
         ScenarioError
@@ -39,15 +34,7 @@ class ScenarioEntry(Document):
             raise self.refused("joint", f"is {joint}, but the arm has {robot.joint_count} joints")
 
     def refused(self, key: str, text: str) -> ScenarioError:
-        """The error of one key.
-
-        Parameters
-        ----------
-        key : str
-            the key
-        text : str
-            what is wrong with it and what to do
-        """
+        """The error of one key."""
         return ScenarioError(f"{self.effect_id}.{key}: {text}")
 
 
@@ -58,23 +45,11 @@ class Effect(ScenarioEntry):
     """
 
     def alter(self, robot: Robot) -> Robot:
-        """The arm as it really is, before its model is built.
-
-        Parameters
-        ----------
-        robot : Robot
-            as its robot file, and the effects before this one, describe it
-        """
+        """The arm as it really is, before its model is built."""
         return robot
 
     def added_rotor_inertia(self, robot: Robot) -> Array:
-        """Reflected inertia of the motors of rigid joints, (n,) [kg m² or kg].
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """Reflected inertia of the motors of rigid joints, (n,) [kg m² or kg]."""
         return np.zeros(robot.joint_count)
 
     def transmission(self) -> Transmission | None:
@@ -82,15 +57,7 @@ class Effect(ScenarioEntry):
         return None
 
     def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
-        """What it adds to the equations of motion.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm, altered
-        coordinates : Coordinates
-            places of links and motors
-        """
+        """What it adds to the equations of motion."""
         return ()
 
 
@@ -109,13 +76,7 @@ class JointEffect(Effect):
         return self.joint - 1
 
     def joint_of(self, robot: Robot) -> Joint:
-        """The joint that it concerns.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """The joint that it concerns."""
         return robot.joints[self.index]
 
 
@@ -131,24 +92,12 @@ class SmoothSignEffect(JointEffect):
     k_v: Positive | None = None
 
     def check(self, robot: Robot) -> None:
-        """Refuse a joint that does not exist or has no K_v.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """Refuse a joint that does not exist or has no K_v."""
         super().check(robot)
         self.steepness(robot)
 
     def steepness(self, robot: Robot) -> float:
-        """K_v [s/rad or s/m].
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """K_v [s/rad or s/m]."""
         k_v = self.k_v if self.k_v is not None else self.joint_of(robot).friction_shape.k_v
         if k_v is None:
             raise self.refused("k_v", "is missing, and the robot file states none for this joint; state k_v [s/rad]")

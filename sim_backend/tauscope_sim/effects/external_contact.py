@@ -40,8 +40,6 @@ class ExternalContact(Effect):
         t₀ [s]
     duration : float
         T [s]
-    profile : str
-        ``half_sine`` or ``rectangular``
     """
 
     effect_id: ClassVar[str] = "external_contact"
@@ -54,13 +52,7 @@ class ExternalContact(Effect):
     profile: Annotated[str, one_of("half_sine", "rectangular")] = "half_sine"
 
     def check(self, robot: Robot) -> None:
-        """Refuse anything but a force, or a joint and a torque.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """Refuse anything but a force, or a joint and a torque."""
         super().check(robot)
         if self.force is not None and (self.joint is not None or self.torque is not None):
             raise self.refused(
@@ -70,15 +62,7 @@ class ExternalContact(Effect):
             raise self.refused("force", "is missing; state it, or joint and torque")
 
     def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
-        """The contact.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        coordinates : Coordinates
-            places of links and motors
-        """
+        """The contact."""
         return (_Contact(self),)
 
 

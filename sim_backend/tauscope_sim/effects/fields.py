@@ -57,13 +57,7 @@ Seed = Annotated[int, BeforeValidator(_seed)]
 
 
 def one_of(*words: str) -> Any:
-    """Validator of a key that is one of a few words.
-
-    Parameters
-    ----------
-    words : str
-        the words
-    """
+    """Validator of a key that is one of a few words."""
 
     def check(value: Any) -> str:
         if not isinstance(value, str) or value not in words:

@@ -24,8 +24,6 @@ class FrictionCoupling(SmoothSignEffect):
         K_v; that of the joint's friction_shape where None [s/rad or s/m]
     other_joint : int
         k, counted from 1
-    of : str
-        ``sum`` or ``difference`` of the motions
     coulomb : float
         c [Nm or N]
     viscous : float
@@ -39,13 +37,7 @@ class FrictionCoupling(SmoothSignEffect):
     viscous: Number = 0.0
 
     def check(self, robot: Robot) -> None:
-        """Refuse a joint that does not exist or is coupled with itself.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """Refuse a joint that does not exist or is coupled with itself."""
         super().check(robot)
         if self.other_joint > robot.joint_count:
             raise self.refused("other_joint", f"is {self.other_joint}, but the arm has {robot.joint_count} joints")
@@ -53,15 +45,7 @@ class FrictionCoupling(SmoothSignEffect):
             raise self.refused("other_joint", f"is {self.joint} too; name the joint that it is coupled with")
 
     def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
-        """The coupling.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        coordinates : Coordinates
-            places of links and motors
-        """
+        """The coupling."""
         joints = (self.index, self.other_joint - 1)
         places = (coordinates.motor(joints[0]), coordinates.motor(joints[1]))
         sign = 1.0 if self.of == "sum" else -1.0

@@ -54,27 +54,13 @@ class FrictionDrift(JointEffect):
     initial_temperature: Number = AMBIENT
 
     def check(self, robot: Robot) -> None:
-        """Refuse a joint without friction.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """Refuse a joint without friction."""
         super().check(robot)
         if robot.model.friction is None:
             raise self.refused("joint", "has no friction in the robot file that could drift; state model.friction")
 
     def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
-        """The warming joint.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        coordinates : Coordinates
-            places of links and motors
-        """
+        """The warming joint."""
         friction = (robot.model.friction or ())[self.index]
         shape = shape_constants([friction], [self.joint_of(robot).friction_shape])[0]
         place = coordinates.motor(self.index)

@@ -34,25 +34,11 @@ class JointLaw(JointEffect):
     side: ClassVar[Side] = Side.MOTOR
 
     def law(self, robot: Robot) -> Law:
-        """τ(q, v) and its derivatives.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """τ(q, v) and its derivatives."""
         raise NotImplementedError
 
     def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
-        """The law as a term of the equations of motion.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        coordinates : Coordinates
-            places of links and motors
-        """
+        """The law as a term of the equations of motion."""
         place = self.index if self.side is Side.LINK else coordinates.motor(self.index)
         return (_LawTerm(self.index, place, self.side, self.law(robot)),)
 

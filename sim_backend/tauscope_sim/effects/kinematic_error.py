@@ -34,13 +34,7 @@ class KinematicError(Effect):
     rotation: Vector = Field(default_factory=zero_vector)
 
     def check(self, robot: Robot) -> None:
-        """Refuse a link that does not exist and an error of nothing.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """Refuse a link that does not exist and an error of nothing."""
         super().check(robot)
         if self.link > robot.joint_count:
             raise self.refused("link", f"is {self.link}, but the arm has {robot.joint_count} links")
@@ -48,13 +42,7 @@ class KinematicError(Effect):
             raise self.refused("translation", "and rotation are zero; state one of them")
 
     def alter(self, robot: Robot) -> Robot:
-        """The arm as it was built.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """The arm as it was built."""
         index = self.link - 1
         segment = robot.segments[index]
         rotation = Rotation.from_rotvec(self.rotation).as_matrix() @ segment.after.rotation

@@ -30,27 +30,13 @@ class LoadDependentFriction(SmoothSignEffect):
     mu: Positive
 
     def check(self, robot: Robot) -> None:
-        """Refuse friction that would lock the transmission.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """Refuse friction that would lock the transmission."""
         super().check(robot)
         if self.mu > LARGEST_GAIN:
             raise self.refused("mu", f"is {self.mu:g}: the transmission locks itself; make it at most {LARGEST_GAIN:g}")
 
     def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
-        """The friction of the load.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        coordinates : Coordinates
-            places of links and motors
-        """
+        """The friction of the load."""
         return (_LoadFriction(self.index, coordinates.motor(self.index), self.mu, self.steepness(robot)),)
 
 

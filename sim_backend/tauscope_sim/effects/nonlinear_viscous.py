@@ -19,8 +19,6 @@ class NonlinearViscous(JointLaw):
         its number, counted from 1
     amplitude : float
         c, friction at 1 rad/s or 1 m/s [Nm or N]
-    exponent : float
-        p
     """
 
     effect_id: ClassVar[str] = "nonlinear_viscous"
@@ -29,13 +27,7 @@ class NonlinearViscous(JointLaw):
     exponent: Exponent
 
     def law(self, robot: Robot) -> Law:
-        """τ and its derivatives.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """τ and its derivatives."""
 
         def torque(q: float, v: float) -> float:
             return math.copysign(self.amplitude * abs(v) ** self.exponent, self.amplitude * v)

@@ -36,13 +36,7 @@ class Payload(Effect):
     moments: Vector = Field(default_factory=zero_vector)
 
     def check(self, robot: Robot) -> None:
-        """Refuse moments of inertia that no body has.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """Refuse moments of inertia that no body has."""
         super().check(robot)
         if min(self.moments) < 0.0 or 2.0 * max(self.moments) > sum(self.moments) * (1.0 + 1e-9):
             raise self.refused("moments", "no body has these: none may be negative or exceed the sum of the others")
@@ -54,13 +48,7 @@ class Payload(Effect):
         return LinkInertia(self.mass, self.mass * offset, about_origin).to_vector()
 
     def alter(self, robot: Robot) -> Robot:
-        """The arm with the body on its last link.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """The arm with the body on its last link."""
         if robot.model.links is None:
             return robot
         *others, last = robot.model.links

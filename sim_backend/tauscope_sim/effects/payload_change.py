@@ -33,13 +33,7 @@ class PayloadChange(Payload):
     end: Positive | None = None
 
     def check(self, robot: Robot) -> None:
-        """Refuse a payload that never changes.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """Refuse a payload that never changes."""
         super().check(robot)
         if self.end is None and self.start <= 0.0:
             raise self.refused("start", "is missing: without start and end nothing changes; state one, or use payload")
@@ -47,25 +41,11 @@ class PayloadChange(Payload):
             raise self.refused("end", f"is {self.end:g} s, not after start ({self.start:g} s); state a later instant")
 
     def alter(self, robot: Robot) -> Robot:
-        """The arm itself: the body comes later.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """The arm itself: the body comes later."""
         return robot
 
     def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
-        """The changes.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        coordinates : Coordinates
-            places of links and motors
-        """
+        """The changes."""
         return (_Change(self),)
 
 

@@ -21,8 +21,6 @@ class PositionDependentFriction(FrictionLaw):
         K_v; that of the joint's friction_shape where None [s/rad or s/m]
     amplitude : float
         c [Nm or N]
-    order : float
-        k, periods a turn (1/m)
     phase : float
         φ [rad]
     """
@@ -33,13 +31,7 @@ class PositionDependentFriction(FrictionLaw):
     phase: Number = 0.0
 
     def law(self, robot: Robot) -> Law:
-        """τ and its derivatives.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """τ and its derivatives."""
         k_v = self.steepness(robot)
 
         def torque(q: float, v: float) -> float:

@@ -34,8 +34,6 @@ class PreslidingHysteresis(JointEffect):
         its number, counted from 1
     distance : float
         x_s, over which friction builds up [rad or m]
-    bristles : str
-        ``dahl`` or ``lugre``
     damping : float
         σ₁ of the LuGre model [Nm s/rad or N s/m]
     """
@@ -46,13 +44,7 @@ class PreslidingHysteresis(JointEffect):
     damping: NotNegative = 0.0
 
     def check(self, robot: Robot) -> None:
-        """Refuse a joint without Coulomb friction, and damping of Dahl's bristles.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """Refuse a joint without Coulomb friction, and damping of Dahl's bristles."""
         super().check(robot)
         friction = robot.model.friction
         coefficients = friction[self.index] if friction is not None else None
@@ -62,15 +54,7 @@ class PreslidingHysteresis(JointEffect):
             raise self.refused("damping", "belongs to the LuGre model; state bristles: lugre or remove it")
 
     def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
-        """The bristles.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        coordinates : Coordinates
-            places of links and motors
-        """
+        """The bristles."""
         friction = (robot.model.friction or ())[self.index]
         shape = shape_constants([friction], [self.joint_of(robot).friction_shape])[0]
         levels = (friction.stiction, friction.stribeck if self.bristles == "lugre" else 0.0)

@@ -25,13 +25,7 @@ class RotorInertia(JointEffect):
     inertia: Positive
 
     def added_rotor_inertia(self, robot: Robot) -> Array:
-        """J at its joint, (n,) [kg m² or kg].
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """J at its joint, (n,) [kg m² or kg]."""
         inertia = np.zeros(robot.joint_count)
         inertia[self.index] = self.inertia
         return inertia

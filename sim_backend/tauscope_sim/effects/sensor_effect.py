@@ -39,11 +39,5 @@ class SensorEffect(ScenarioEntry):
     """An effect between the arm and the recording."""
 
     def channel(self, joint_count: int) -> Channel:
-        """The effect at work on an arm.
-
-        Parameters
-        ----------
-        joint_count : int
-            number of joints n
-        """
+        """The effect at work on an arm."""
         raise NotImplementedError

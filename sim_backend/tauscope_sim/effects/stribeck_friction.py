@@ -24,8 +24,6 @@ class StribeckFriction(FrictionLaw):
         c [Nm or N]
     velocity : float
         v_s [rad/s or m/s]
-    exponent : float
-        α
     """
 
     effect_id: ClassVar[str] = "stribeck_friction"
@@ -34,13 +32,7 @@ class StribeckFriction(FrictionLaw):
     exponent: Exponent = 2.0
 
     def law(self, robot: Robot) -> Law:
-        """τ and its derivatives.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """τ and its derivatives."""
         k_v = self.steepness(robot)
 
         def decay(v: float) -> float:

@@ -35,25 +35,13 @@ class TimeDelay(SensorEffect):
     joint: JointNumber | None = None
 
     def check(self, robot: Robot) -> None:
-        """Refuse a delay that no channel has.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """Refuse a delay that no channel has."""
         super().check(robot)
         if abs(self.delay) > LONGEST_DELAY:
             raise self.refused("delay", f"is {self.delay:g} s; state at most {LONGEST_DELAY:g} s")
 
     def channel(self, joint_count: int) -> Channel:
-        """The delay line.
-
-        Parameters
-        ----------
-        joint_count : int
-            number of joints n
-        """
+        """The delay line."""
         columns = slice(None) if self.joint is None else slice(self.joint - 1, self.joint)
         return _DelayLine(self.delay, columns)
 

@@ -17,8 +17,6 @@ class TorqueGainError(SensorEffect):
 
     joint : int
         its number, counted from 1
-    gain : float
-        recorded torque by true torque
     """
 
     effect_id: ClassVar[str] = "torque_gain_error"
@@ -26,13 +24,7 @@ class TorqueGainError(SensorEffect):
     gain: Nonzero
 
     def channel(self, joint_count: int) -> Channel:
-        """The scaling.
-
-        Parameters
-        ----------
-        joint_count : int
-            number of joints n
-        """
+        """The scaling."""
         gains = np.ones(joint_count)
         gains[self.joint - 1] = self.gain
         return _Gain(gains)

@@ -20,11 +20,5 @@ class TorqueOffset(JointLaw):
     torque: Number
 
     def law(self, robot: Robot) -> Law:
-        """τ and its derivatives.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """τ and its derivatives."""
         return (lambda q, v: self.torque), (lambda q, v: (0.0, 0.0))

@@ -20,24 +20,14 @@ class TorqueRipple(AngleHarmonics):
         its number, counted from 1
     amplitude : list of float
         a_i, a number or one an order [Nm/Nm]
-    order : list of float
-        k_i, periods a turn of the joint or motor
     phase : list of float
         φ_i, a number or one an order [rad]
-    angle : str
-        ``joint`` or ``motor``
     """
 
     effect_id: ClassVar[str] = "torque_ripple"
 
     def check(self, robot: Robot) -> None:
-        """Refuse a ripple larger than the load.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """Refuse a ripple larger than the load."""
         super().check(robot)
         repeats = len(self.order) if len(self.amplitude) == 1 else 1
         total = repeats * sum(abs(amplitude) for amplitude in self.amplitude)
@@ -45,15 +35,7 @@ class TorqueRipple(AngleHarmonics):
             raise self.refused("amplitude", f"adds up to {total:g} of the load; make it at most {LARGEST_GAIN:g}")
 
     def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
-        """The gain of the load.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        coordinates : Coordinates
-            places of links and motors
-        """
+        """The gain of the load."""
         return (_Ripple(self.index, coordinates.motor(self.index), *self.sine_and_slope(robot)),)
 
 

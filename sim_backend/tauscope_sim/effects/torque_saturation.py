@@ -23,8 +23,6 @@ class TorqueSaturation(SensorEffect):
         its number, counted from 1
     level : float
         c [Nm or N]
-    shape : str
-        ``compression`` or ``clip``
     """
 
     effect_id: ClassVar[str] = "torque_saturation"
@@ -33,13 +31,7 @@ class TorqueSaturation(SensorEffect):
     shape: Annotated[str, one_of("compression", "clip")] = "compression"
 
     def channel(self, joint_count: int) -> Channel:
-        """The saturation.
-
-        Parameters
-        ----------
-        joint_count : int
-            number of joints n
-        """
+        """The saturation."""
         return _Saturation(self.joint - 1, self.level, self.shape == "clip")
 
 

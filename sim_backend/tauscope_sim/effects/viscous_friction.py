@@ -21,11 +21,5 @@ class ViscousFriction(JointLaw):
     coefficient: Number
 
     def law(self, robot: Robot) -> Law:
-        """τ and its derivatives.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """τ and its derivatives."""
         return (lambda q, v: self.coefficient * v), (lambda q, v: (0.0, self.coefficient))

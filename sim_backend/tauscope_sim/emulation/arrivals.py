@@ -29,13 +29,7 @@ class Arrivals:
     """Bytes that a port has received, each piece with its instant, as long as the ``with`` block lasts."""
 
     def __init__(self, port: Port) -> None:
-        """Nothing is received yet.
-
-        Parameters
-        ----------
-        port : Port
-            read by nobody else
-        """
+        """Nothing is received yet."""
         self._port = port
         self._pieces: list[tuple[bytes, int]] = []
         self._lock = threading.Lock()
@@ -61,15 +55,7 @@ class Arrivals:
         return self._wake
 
     def take(self) -> tuple[list[tuple[bytes, int]], int]:
-        """What came since the last call, the oldest first, and the instant before which nothing more has come.
-
-        Returns
-        -------
-        pieces : list of bytes and int
-            each with its instant by `time.monotonic_ns`
-        until_ns : int
-            by the same clock
-        """
+        """What came since the last call, the oldest first, and the instant before which nothing more has come."""
         with contextlib.suppress(BlockingIOError):
             os.eventfd_read(self._wake)
         with self._lock:

@@ -19,8 +19,6 @@ ALL_STEPS = ceil(LONGEST_CATCH_UP_S / STEP_S)
 class DeviceClock:
     """How far devices have come; what a machine that stood still made them miss is lost, and told.
 
-    tick : int
-        number of the step, by the devices' own time
     lost_s : float
         time that was never stepped through [s]
     """
@@ -48,10 +46,6 @@ class DeviceClock:
         ----------
         now_s : float
             present instant [s]
-        step : callable
-            takes one step, which ends at `DeviceClock.now_s`
-        most_steps : int
-            how many steps are taken
         """
         if now_s - self.now_s > LONGEST_CATCH_UP_S:
             self.lost_s += now_s - self.now_s - LONGEST_CATCH_UP_S

@@ -33,8 +33,6 @@ class Emulator(Protocol):
 
         Parameters
         ----------
-        data : bytes
-            as they came
         now_s : float
             when [s]
         """
@@ -47,8 +45,6 @@ class Emulator(Protocol):
         ----------
         now_s : float
             present instant [s]
-        most_steps : int
-            after which it waits to be asked again
         """
         ...
 
@@ -67,13 +63,7 @@ class Emulator(Protocol):
         ...
 
     def answer(self, request: dict[str, Any]) -> dict[str, int] | None:
-        """Do what a test asks; returns ``{"value": …}`` where it asks for one.
-
-        Parameters
-        ----------
-        request : dict
-            as `EmulatorProcess` writes it; ``advance_to`` and ``reset`` are the server's own, and done already
-        """
+        """Do what a test asks; returns ``{"value": …}`` where it asks for one."""
         ...
 
 
@@ -94,13 +84,7 @@ class Port(Protocol):
         ...
 
     def write(self, data: bytes) -> None:
-        """Send to the master; lost where there is none, or where it reads nothing.
-
-        Parameters
-        ----------
-        data : bytes
-            whole frames
-        """
+        """Send to the master; lost where there is none, or where it reads nothing."""
         ...
 
     def close(self) -> None:

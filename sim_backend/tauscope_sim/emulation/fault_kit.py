@@ -36,18 +36,10 @@ class FaultKind(StrEnum):
 class InjectedFault:
     """One fault.
 
-    kind : FaultKind
-        what happens
-    device : int
-        ID of a servo or of a node; of no matter for a power dip
     at_s : float
         when, by the emulator's clock, and in what a test asks for counted from then; at once where that has passed [s]
-    count : int
-        for how many answers
     seconds : float
         how late, or how long [s]
-    counts : int
-        how far an encoder jumps
     """
 
     kind: FaultKind
@@ -63,8 +55,6 @@ def faults_from(documents: Iterable[dict[str, Any]], now_s: float) -> list[Injec
 
     Parameters
     ----------
-    documents : iterable of dict
-        fields of `InjectedFault`, the instants counted from now
     now_s : float
         present instant [s]
     """
@@ -90,13 +80,7 @@ class FaultSchedule:
         self._number = 0
 
     def add(self, faults: Iterable[InjectedFault]) -> None:
-        """Plan faults.
-
-        Parameters
-        ----------
-        faults : iterable of InjectedFault
-            in any order
-        """
+        """Plan faults."""
         for fault in faults:
             self._number += 1
             heapq.heappush(self._queue, _Scheduled(fault.at_s, self._number, fault))
@@ -108,8 +92,6 @@ class FaultSchedule:
         ----------
         now_s : float
             present instant [s]
-        carry_out : callable
-            takes the fault
         """
         while self._queue and self._queue[0].at_s <= now_s:
             carry_out(heapq.heappop(self._queue).fault)

@@ -23,13 +23,7 @@ class EmulatorProcess(Generic[_Order]):
     """An emulator that lives as long as the ``with`` block, or as the process that started it."""
 
     def __init__(self, order: _Order) -> None:
-        """Nothing is started yet.
-
-        Parameters
-        ----------
-        order : EmulatorOrder
-            what to emulate
-        """
+        """Nothing is started yet."""
         self.order = order
         self._process: subprocess.Popen[bytes] | None = None
         self._socket: socket.socket | None = None
@@ -75,13 +69,7 @@ class EmulatorProcess(Generic[_Order]):
         return self._process.pid
 
     def ask(self, request: dict[str, Any]) -> dict[str, Any]:
-        """A request to the emulator, and its state; see `Emulator.answer`.
-
-        Parameters
-        ----------
-        request : dict
-            plain data
-        """
+        """A request to the emulator, and its state; see `Emulator.answer`."""
         if self._socket is None:
             raise RuntimeError("the emulator was not started")
         self._socket.sendall(json.dumps(request).encode() + b"\n")
@@ -99,39 +87,15 @@ class EmulatorProcess(Generic[_Order]):
         return self.ask({})
 
     def inject(self, *faults: InjectedFault) -> None:
-        """Set faults off.
-
-        Parameters
-        ----------
-        *faults : InjectedFault
-            their instants counted from now
-        """
+        """Set faults off."""
         self.ask({"inject": [asdict(fault) for fault in faults]})
 
     def get(self, device: int, place: str | tuple[int, int]) -> int:
-        """What a device holds.
-
-        Parameters
-        ----------
-        device : int
-            ID of a servo or of a node
-        place : str or tuple of int
-            item of a servo's control table as ROBOTIS calls it, or index and subindex of an object
-        """
+        """What a device holds."""
         return self.ask({"get": [device, place]})["value"]
 
     def put(self, device: int, place: str | tuple[int, int], value: int) -> None:
-        """Set what a device holds, behind the master's back.
-
-        Parameters
-        ----------
-        device : int
-            ID of a servo or of a node
-        place : str or tuple of int
-            item of a servo's control table as ROBOTIS calls it, or index and subindex of an object
-        value : int
-            that fits it
-        """
+        """Set what a device holds, behind the master's back."""
         self.ask({"put": [device, place, value]})
 
     def advance_to(self, instant_s: float) -> None:

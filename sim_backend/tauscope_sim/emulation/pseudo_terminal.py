@@ -18,13 +18,7 @@ class PseudoTerminal:
     """
 
     def __init__(self, link: str) -> None:
-        """Open one in raw mode.
-
-        Parameters
-        ----------
-        link : str
-            path that shall point to the far end, in place of an older one
-        """
+        """Open one in raw mode."""
         self._near, far = os.openpty()
         tty.setraw(far)
         self._link = link
@@ -50,13 +44,7 @@ class PseudoTerminal:
             raise
 
     def write(self, data: bytes) -> None:
-        """Send to the master; lost where there is none, or where it reads nothing.
-
-        Parameters
-        ----------
-        data : bytes
-            whole frames
-        """
+        """Send to the master; lost where there is none, or where it reads nothing."""
         with contextlib.suppress(BlockingIOError, OSError):
             os.write(self._near, data)
 

@@ -29,13 +29,7 @@ class EmulatorServer:
     """Runs an emulator until its standard input ends, against the machine's clock or one that a test moves on."""
 
     def __init__(self, order: EmulatorOrder) -> None:
-        """Open everything.
-
-        Parameters
-        ----------
-        order : EmulatorOrder
-            what to emulate
-        """
+        """Open everything."""
         self._order = order
         self._port = order.open_port()
         self._tests = _listen(order.control)

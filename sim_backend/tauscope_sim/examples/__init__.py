@@ -9,16 +9,6 @@ from tauscope.errors import NotFoundError
 def example_robot(name: str) -> Path:
     """Path of a robot file that comes with Tauscope.
 
-    Parameters
-    ----------
-    name : str
-        its name without suffix: ``paper_arm`` is the arm of the seed paper's Table 1
-
-    Returns
-    -------
-    Path
-        the installed robot file
-
     Raises
     ------
     NotFoundError

@@ -17,8 +17,6 @@ def compliant_transmissions(effects: Sequence[PhysicalEffect], rotor_inertia: Ar
 
     Parameters
     ----------
-    effects : sequence of PhysicalEffect
-        what is concealed
     rotor_inertia : (n,) float64
         that effects give to the motors of rigid joints [kg m² or kg]
 
@@ -53,8 +51,6 @@ class Compliance:
     ----------
     transmissions : mapping of int to Transmission
         by joint, counted from 0
-    coordinates : Coordinates
-        places of links and motors
     """
 
     def __init__(self, transmissions: Mapping[int, Transmission], coordinates: Coordinates) -> None:
@@ -63,27 +59,11 @@ class Compliance:
         """of the motors, in the order of the coordinates [kg m² or kg]"""
 
     def torque(self, moment: Moment) -> list[float]:
-        """Torque that each compliant joint's link receives [Nm or N].
-
-        Parameters
-        ----------
-        moment : Moment
-            positions and velocities
-        """
+        """Torque that each compliant joint's link receives [Nm or N]."""
         return [part.torque(*_twist(moment, joint, motor)) for joint, motor, part in self._parts]
 
     def linearise(self, moment: Moment, forces: Forces, slopes: Slopes) -> None:
-        """Add stiffness and damping between motors and links.
-
-        Parameters
-        ----------
-        moment : Moment
-            positions, velocities and loads
-        forces : Forces
-            whose gains say how much of the load the motor feels
-        slopes : Slopes
-            what is added to
-        """
+        """Add stiffness and damping between motors and links."""
         for joint, motor, part in self._parts:
             felt = 1.0 + forces.load_gain[joint] + np.sign(moment.load[joint]) * forces.load_friction[joint]
             matrices = (slopes.by_position, slopes.by_velocity)

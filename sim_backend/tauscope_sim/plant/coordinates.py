@@ -11,8 +11,6 @@ class Coordinates:
     joints stand behind the links: N = n + number of compliant joints. All in joint units: a motor's angle is divided by
     its gear ratio.
 
-    joint_count : int
-        number of joints n
     compliant : tuple of int
         joints whose transmission gives way, counted from 0, ascending
     """

@@ -25,13 +25,6 @@ class EquationsOfMotion:
 
         H(q) q̈ + h + c + link = T,      J θ̈ + friction + motor + T (1 + g) + |T| f = u.
 
-    Parameters
-    ----------
-    robot : Robot
-        the arm as its robot file describes it
-    effects : sequence of PhysicalEffect
-        what is concealed, applied in this order
-
     Raises
     ------
     RobotFileError
@@ -84,8 +77,6 @@ class EquationsOfMotion:
 
         Parameters
         ----------
-        states : list of float
-            internal states, m numbers
         ambient : float
             temperature of joints that no term heats [°C]
         """
@@ -101,8 +92,6 @@ class EquationsOfMotion:
         ----------
         time : float
             t [s]
-        vector : list of float
-            y: N positions, N velocities, m internal states
         drive : list of float
             u, torque of the drives on the joint's side, one a joint [Nm or N]
         """
@@ -145,8 +134,6 @@ class EquationsOfMotion:
         ----------
         time : float
             t [s]
-        vector : list of float
-            y
         """
         return self._sum_forces(time, vector)
 

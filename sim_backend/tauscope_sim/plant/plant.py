@@ -61,10 +61,6 @@ class Plant:
 
     Parameters
     ----------
-    robot : Robot
-        the arm; its model block has to hold the links
-    effects : sequence of PhysicalEffect
-        what is concealed; see `tauscope_sim.effects`
     step_s : float
         longest step of the integration [s]
 

@@ -18,8 +18,6 @@ class RigidBodies:
 
     Parameters
     ----------
-    robot : Robot
-        the arm; its model block has to hold the links
     rotor_inertia : (n,) float64
         reflected inertia of the motors of rigid joints, added to the diagonal of H [kg m² or kg]
     """
@@ -96,8 +94,6 @@ class RigidBodies:
 
         Parameters
         ----------
-        carrier : object
-            whose payload it is; one at a time
         payload : (10,) float64 or None
             standard parameters in the last link's frame, in the order of `tauscope.robot.robot.STANDARD_PARAMETERS`;
             None drops it

@@ -27,15 +27,7 @@ UNIT = 0.1
 
 
 class Attempt(NamedTuple):
-    """A step that may be taken; states as lists, 2N + m numbers each.
-
-    second_order : list of float
-        y⁺
-    first_order : list of float
-        y + h k₁, the linearly implicit Euler step: it has no fixed points but the true ones, however long the step
-    error : float
-        largest difference of the two in a velocity or internal state, by what may pass; NaN where one is not finite
-    """
+    """A step that may be taken; states as lists, 2N + m numbers each."""
 
     second_order: list[float]
     first_order: list[float]
@@ -53,11 +45,6 @@ class RosenbrockStep:
 
     It is solved once an attempt, for the matrix K with κ = K r. States are lists: a call into NumPy takes longer than
     the few numbers of an arm.
-
-    Parameters
-    ----------
-    equations : EquationsOfMotion
-        f and the stiff part of its Jacobian
     """
 
     def __init__(self, equations: EquationsOfMotion) -> None:
@@ -76,8 +63,6 @@ class RosenbrockStep:
         ----------
         time : float
             t [s]
-        vector : list of float
-            y
         drive : list of float
             torque of the drives, one a joint, constant during the step [Nm or N]
         """
@@ -102,8 +87,6 @@ class RosenbrockStep:
         ----------
         step : float
             h [s]
-        tolerance : float
-            error of a velocity or internal state of size zero that may pass; it grows with its size
         """
         scale = GAMMA * step
         solution = self._solution(scale)

@@ -20,8 +20,6 @@ def settled(equations: EquationsOfMotion, motor_position: Array) -> Array:
 
     Parameters
     ----------
-    equations : EquationsOfMotion
-        of the arm
     motor_position : (n,) float64
         θ [rad or m]
 

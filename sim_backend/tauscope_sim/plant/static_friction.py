@@ -27,15 +27,6 @@ class _Law(NamedTuple):
 class StaticFriction(Term):
     """Friction τ_f = τ_s (2/π) arctan(K_v v) + τ_sc (2/π) arctan(δ v) + τ_v v of every joint, v the motor's velocity.
 
-    Parameters
-    ----------
-    friction : sequence of FrictionCoefficients
-        τ_s, τ_sc, τ_v, one entry a joint
-    friction_shape : sequence of FrictionShape
-        K_v and δ, one entry a joint
-    coordinates : Coordinates
-        places of links and motors
-
     Raises
     ------
     RobotFileError
@@ -55,30 +46,14 @@ class StaticFriction(Term):
         ]
 
     def act(self, moment: Moment, forces: Forces) -> None:
-        """Add τ_f.
-
-        Parameters
-        ----------
-        moment : Moment
-            where
-        forces : Forces
-            what is added to
-        """
+        """Add τ_f."""
         velocity, friction = moment.velocity, forces.friction
         for joint, place, stiction, k_v, stribeck, delta, viscous in self._laws:
             v = velocity[place]
             friction[joint] += stiction * atan(k_v * v) + stribeck * atan(delta * v) + viscous * v
 
     def linearise(self, moment: Moment, slopes: Slopes) -> None:
-        """Add dτ_f/dv.
-
-        Parameters
-        ----------
-        moment : Moment
-            where
-        slopes : Slopes
-            what is added to
-        """
+        """Add dτ_f/dv."""
         for _, place, stiction, k_v, stribeck, delta, viscous in self._laws:
             x, y = k_v * moment.velocity[place], delta * moment.velocity[place]
             slope = stiction * k_v / (1.0 + x * x) + stribeck * delta / (1.0 + y * y) + viscous

@@ -24,15 +24,7 @@ AMBIENT = 25.0
 
 
 class Moment:
-    """The state at which terms are evaluated; plain lists, because terms read single numbers.
-
-    Parameters
-    ----------
-    coordinates : Coordinates
-        places of links and motors
-    bodies : RigidBodies
-        the multibody system, at the same positions and velocities
-    """
+    """The state at which terms are evaluated; plain lists, because terms read single numbers."""
 
     def __init__(self, coordinates: Coordinates, bodies: RigidBodies) -> None:
         self.bodies = bodies
@@ -51,13 +43,7 @@ class Moment:
 
 
 class Forces:
-    """Torque that the drives have to overcome, summed over the terms; lists by joint, as in `Moment`.
-
-    Parameters
-    ----------
-    joint_count : int
-        number of joints n
-    """
+    """Torque that the drives have to overcome, summed over the terms; lists by joint, as in `Moment`."""
 
     def __init__(self, joint_count: int) -> None:
         self._none = [0.0] * joint_count
@@ -78,15 +64,7 @@ class Forces:
 
 
 class Slopes:
-    """Derivatives for the implicit part of the integration; an omitted or approximate one costs stability, not order.
-
-    Parameters
-    ----------
-    size : int
-        number of coordinates N
-    state_count : int
-        number of internal states m
-    """
+    """Derivatives for the implicit part of the integration; an approximate one costs stability, not order."""
 
     def __init__(self, size: int, state_count: int) -> None:
         total = size + state_count
@@ -128,50 +106,22 @@ class Term:
         ----------
         time : float
             its first instant: the placing of the arm, or one of `event_times` [s]
-        bodies : RigidBodies
-            the multibody system, whose load may be changed here
         """
 
     def act(self, moment: Moment, forces: Forces) -> None:
-        """Add the torque that the drives have to overcome.
-
-        Parameters
-        ----------
-        moment : Moment
-            where; without load and friction
-        forces : Forces
-            what is added to
-        """
+        """Add the torque that the drives have to overcome."""
 
     def linearise(self, moment: Moment, slopes: Slopes) -> None:
-        """Add the derivatives of torque and rates.
-
-        Parameters
-        ----------
-        moment : Moment
-            where
-        slopes : Slopes
-            what is added to
-        """
+        """Add the derivatives of torque and rates."""
 
     def rates(self, moment: Moment, rates: list[float]) -> None:
-        """Write the rates of the term's own internal states.
-
-        Parameters
-        ----------
-        moment : Moment
-            where
-        rates : list of float
-            of all terms' states; the term's own begin at `first_state` [1/s times the state's unit]
-        """
+        """Write the rates of the term's own internal states."""
 
     def report_temperature(self, states: list[float], temperature: Array) -> None:
         """Write the temperature of the joints that the term heats.
 
         Parameters
         ----------
-        states : list of float
-            internal states of all terms
         temperature : (n,) float64
             of all joints [°C]
         """
@@ -229,23 +179,11 @@ class PhysicalEffect(Protocol):
     """What the plant asks of a concealed effect."""
 
     def alter(self, robot: Robot) -> Robot:
-        """The arm as it really is, before its model is built.
-
-        Parameters
-        ----------
-        robot : Robot
-            as its robot file, and the effects before this one, describe it
-        """
+        """The arm as it really is, before its model is built."""
         ...
 
     def added_rotor_inertia(self, robot: Robot) -> Array:
-        """Reflected inertia of the motors of rigid joints, (n,) [kg m² or kg].
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm
-        """
+        """Reflected inertia of the motors of rigid joints, (n,) [kg m² or kg]."""
         ...
 
     def transmission(self) -> Transmission | None:
@@ -253,13 +191,5 @@ class PhysicalEffect(Protocol):
         ...
 
     def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
-        """What it adds to the equations of motion.
-
-        Parameters
-        ----------
-        robot : Robot
-            the arm, altered
-        coordinates : Coordinates
-            places of links and motors
-        """
+        """What it adds to the equations of motion."""
         ...

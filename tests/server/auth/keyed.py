@@ -6,7 +6,7 @@ from pathlib import Path
 from fastapi import FastAPI
 from starlette.testclient import TestClient
 
-from server.http.conftest import HOST
+from server.conftest import HOST
 from tauscope.server.auth.keys import KeyFile
 from tauscope.server.auth.scopes import Scope
 

@@ -9,7 +9,7 @@ from fastapi import FastAPI
 from starlette.testclient import TestClient
 
 from server.auth.keyed import client_with, make_keys
-from server.http.conftest import HOST, IDENTIFICATIONS, RECORDINGS
+from server.conftest import HOST, IDENTIFICATIONS, RECORDINGS
 from server.http.motions import ROBOT, move_document
 from server.http.problem_check import assert_problem
 from server.queue.controls import HandControls

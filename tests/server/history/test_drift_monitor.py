@@ -4,7 +4,6 @@ from datetime import timedelta
 
 import pytest
 
-from databases import address, database, postgres
 from identified import NOON, candidate, identified
 from tauscope.errors import StoreError
 from tauscope.server.history.drift_monitor import DriftMonitor
@@ -12,8 +11,6 @@ from tauscope.server.history.model_history import ModelHistory
 from tauscope.server.store.database.database import Database
 from tauscope.server.store.database.facts import ItemMetadata
 from tauscope.server.store.database.index import Index
-
-__all__ = ["address", "database", "postgres"]
 
 
 @pytest.fixture

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from databases import address, database, postgres
 from snapshots import SNAPSHOTS, unpacked
 from tauscope.errors import StoreError
 from tauscope.server.history.indexer import ChangedItem, Indexer, open_index
@@ -21,8 +20,6 @@ from tauscope.server.store.database.facts import ItemEntry, ItemQuery
 from tauscope.server.store.database.index import Index
 from tauscope.server.store.layout import RECORDINGS, item_stores
 from tauscope.server.store.recordings import RecordingStore
-
-__all__ = ["address", "database", "postgres"]
 
 WAYS_TO_END = {
     ("identification", "succeeded"): 2,

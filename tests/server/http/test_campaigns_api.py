@@ -7,7 +7,7 @@ import pytest
 from ruamel.yaml import YAML
 from starlette.testclient import TestClient
 
-from server.http.conftest import connected
+from server.conftest import connected
 from server.http.event_stream import read_events
 from server.http.motions import ROBOT
 from server.http.problem_check import assert_problem

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from server.http.conftest import RECORDINGS
+from server.conftest import RECORDINGS
 from server.http.problem_check import assert_problem
 from tauscope.diagnosis import DiagnosisDocument
 from tauscope.diagnosis.documents.plots import DiagnosisPlots

@@ -10,7 +10,7 @@ from anyio import CapacityLimiter
 from fastapi import Request
 from starlette.testclient import TestClient
 
-from server.http.conftest import IDENTIFICATIONS, connected
+from server.conftest import IDENTIFICATIONS, connected
 from server.http.event_stream import Event, read_events
 from server.http.problem_check import assert_problem
 from server.queue.executors import InlineExecutor, ManualExecutor

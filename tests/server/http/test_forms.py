@@ -9,7 +9,7 @@ from hypothesis import settings as examples
 from hypothesis import strategies as st
 from starlette.testclient import TestClient
 
-from server.http.conftest import IDENTIFICATIONS, RECORDINGS, connected
+from server.conftest import IDENTIFICATIONS, RECORDINGS, connected
 from server.queue.executors import ManualExecutor
 from tauscope.server.http import Settings, create_app
 from tauscope.server.store.names import is_file_name

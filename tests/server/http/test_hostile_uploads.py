@@ -10,7 +10,7 @@ import pytest
 from mcap.writer import CompressionType, Writer
 from starlette.testclient import TestClient
 
-from server.http.conftest import RECORDINGS
+from server.conftest import RECORDINGS
 from server.http.motions import ROBOT
 from server.http.problem_check import assert_problem
 from tauscope.recording import inflation

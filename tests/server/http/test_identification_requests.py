@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from server.http.conftest import IDENTIFICATIONS, RECORDINGS
+from server.conftest import IDENTIFICATIONS, RECORDINGS
 from server.http.problem_check import assert_problem
 from tauscope.server.http import Settings
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from server.http.conftest import IDENTIFICATIONS, RECORDINGS, connected
+from server.conftest import IDENTIFICATIONS, RECORDINGS, connected
 from server.http.problem_check import assert_problem
 from server.queue.executors import InlineExecutor
 from snapshots import SNAPSHOTS, unpacked

@@ -32,8 +32,8 @@ def operations(document: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
 
 def test_the_committed_document_is_the_present_one() -> None:
     hint = (
-        "the interface changed: raise API_VERSION in service/api/app.py, run `python tests/api/write_openapi.py`,"
-        " and note it in CHANGELOG.md"
+        "the interface changed: raise API_VERSION in service/tauscope/server/http/app.py,"
+        " run `python tests/server/http/write_openapi.py`, and note it in CHANGELOG.md"
     )
     assert COMMITTED.read_text(encoding="utf-8") == document_text(), hint
 

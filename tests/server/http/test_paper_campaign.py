@@ -8,7 +8,7 @@ import httpx2
 import pytest
 from ruamel.yaml import YAML
 
-from server.http.conftest import IDENTIFICATIONS
+from server.conftest import IDENTIFICATIONS
 from server.http.event_stream import read_events
 from server.http.serving import served
 from server.queue.paper_files import PAPER_ROBOT

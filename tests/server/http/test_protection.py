@@ -8,7 +8,7 @@ import pytest
 from pydantic import ValidationError
 from starlette.testclient import TestClient
 
-from server.http.conftest import IDENTIFICATIONS, connected
+from server.conftest import IDENTIFICATIONS, connected
 from server.http.problem_check import assert_problem
 from server.queue.executors import InlineExecutor
 from tauscope.errors import TauscopeError

@@ -3,7 +3,7 @@
 import asyncio
 import threading
 
-from server.http.conftest import connected
+from server.conftest import connected
 from server.queue.executors import InlineExecutor
 from server.queue.waiting import wait_until
 from tauscope.server.http import Settings, create_app

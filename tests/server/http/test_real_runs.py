@@ -12,7 +12,7 @@ import httpx2
 import numpy as np
 import pytest
 
-from server.http.conftest import RECORDINGS
+from server.conftest import RECORDINGS
 from server.http.event_stream import Event, read_events
 from server.http.serving import Served, served
 from server.queue.paper_files import PAPER_ROBOT

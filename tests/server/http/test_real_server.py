@@ -11,7 +11,7 @@ from typing import Any
 import httpx2
 import pytest
 
-from server.http.conftest import IDENTIFICATIONS, RECORDINGS
+from server.conftest import IDENTIFICATIONS, RECORDINGS
 from server.http.problem_check import assert_problem
 from server.http.serving import served
 from tauscope.errors import TauscopeError

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from starlette.testclient import TestClient
 
-from server.http.conftest import RECORDINGS
+from server.conftest import RECORDINGS
 from server.http.problem_check import assert_problem
 from server.queue.executors import ManualExecutor
 from tauscope.server.http import Settings

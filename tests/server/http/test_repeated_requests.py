@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from starlette.testclient import TestClient
 
 from server.auth.keyed import client_with, make_keys
-from server.http.conftest import HOST, IDENTIFICATIONS, RECORDINGS, connected
+from server.conftest import HOST, IDENTIFICATIONS, RECORDINGS, connected
 from server.http.motions import ROBOT, move_document
 from server.http.problem_check import assert_problem
 from server.queue.controls import HandControls, finish_at_once

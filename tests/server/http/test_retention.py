@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from server.http.conftest import IDENTIFICATIONS, RECORDINGS, connected
+from server.conftest import IDENTIFICATIONS, RECORDINGS, connected
 from server.http.motions import ROBOT
 from server.queue.executors import InlineExecutor, ManualExecutor
 from server.queue.waiting import wait_until

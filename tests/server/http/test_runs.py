@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from server.http.conftest import IDENTIFICATIONS, RECORDINGS, connected
+from server.conftest import IDENTIFICATIONS, RECORDINGS, connected
 from server.http.event_stream import read_events
 from server.http.motions import ROBOT, ROBOT_FILE, move_csv, move_document
 from server.http.problem_check import assert_problem

@@ -6,7 +6,7 @@ import re
 import numpy as np
 from starlette.testclient import TestClient
 
-from server.http.conftest import IDENTIFICATIONS, RECORDINGS
+from server.conftest import IDENTIFICATIONS, RECORDINGS
 
 
 def columns(content: bytes) -> tuple[dict[str, int], dict[str, np.ndarray]]:

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from server.http.conftest import IDENTIFICATIONS, RECORDINGS, connected
+from server.conftest import IDENTIFICATIONS, RECORDINGS, connected
 from server.http.motions import ROBOT
 from server.http.problem_check import assert_problem
 from server.queue.controls import HandControls

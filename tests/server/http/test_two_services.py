@@ -12,13 +12,10 @@ import httpx2
 import psycopg
 import pytest
 
-from databases import postgres
 from patience import eventually
 from postgres import Postgres
 from shared_data import REPOSITORY
 from snapshots import SNAPSHOTS, unpacked
-
-__all__ = ["postgres"]
 
 pytestmark = [pytest.mark.slow, pytest.mark.system, pytest.mark.timeout(1200)]
 

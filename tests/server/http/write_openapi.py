@@ -1,4 +1,4 @@
-"""The committed OpenAPI document: `python tests/api/write_openapi.py` writes it anew, under a version of its own.
+"""The committed OpenAPI document: `python tests/server/http/write_openapi.py` writes it under a version of its own.
 
 ``openapi_versions.json`` holds the hash of every version's document: a version that is there already is not given to
 another document. ``--amend`` does so all the same, for a version that nobody outside the branch has seen.
@@ -37,7 +37,7 @@ def write(amend: bool) -> str | None:
     text, versions = document_text(), known_versions()
     version = json.loads(text)["info"]["version"]
     if versions.get(version, document_hash(text)) != document_hash(text) and not amend:
-        return f"version {version} is another document: raise API_VERSION in service/api/app.py"
+        return f"version {version} is another document: raise API_VERSION in service/tauscope/server/http/app.py"
     COMMITTED.write_text(text, encoding="utf-8")
     VERSIONS.write_text(json.dumps({**versions, version: document_hash(text)}, indent=1) + "\n", encoding="utf-8")
     return None

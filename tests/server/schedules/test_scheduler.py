@@ -8,7 +8,6 @@ from typing import Any, cast
 
 import pytest
 
-from databases import address, database, postgres
 from tauscope.errors import NotFoundError, StoreError, TauscopeError
 from tauscope.server.control.device_claims import BusyError
 from tauscope.server.control.interlock import FOLDER
@@ -20,8 +19,6 @@ from tauscope.server.schedules.repository import ScheduleRepository
 from tauscope.server.schedules.scheduler import Scheduler
 from tauscope.server.store.database.database import Database
 from tauscope.server.store.database.index import Index
-
-__all__ = ["address", "database", "postgres"]
 
 START = datetime(2026, 11, 2, 12, 0, tzinfo=UTC)
 

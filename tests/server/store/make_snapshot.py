@@ -1,6 +1,6 @@
 """Makes the data folder of a version by driving its service; the result is committed, this runs once a release.
 
-python tests/store/make_snapshot.py tests/store/snapshots/0.1.0.tar.xz
+python tests/server/store/make_snapshot.py tests/server/store/snapshots/0.1.0.tar.xz
 """
 
 import sys
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from starlette.testclient import TestClient
 
-from server.http.conftest import connected
+from server.conftest import connected
 from server.queue.executors import InlineExecutor, ManualExecutor
 from tauscope.server.http import Settings, create_app
 

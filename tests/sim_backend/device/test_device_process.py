@@ -78,9 +78,7 @@ def device(process: DeviceProcess) -> DeviceProcess:
 @pytest.fixture
 def host(device: DeviceProcess) -> Iterator["subprocess.Popen[str]"]:
     """A host process that has the arm in motion."""
-    script = HOST.format(
-        tests=str(REPOSITORY / "tests"), socket=str(device.socket), watchdog=WATCHDOG_S
-    )
+    script = HOST.format(tests=str(REPOSITORY / "tests"), socket=str(device.socket), watchdog=WATCHDOG_S)
     with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "moving\n"

@@ -32,18 +32,6 @@ logging.getLogger(eds.__name__).setLevel(logging.ERROR)
 class DescribedObject:
     """One entry of the object dictionary as a file describes it.
 
-    name : str
-        in the maker's words
-    index, subindex : int
-        its place
-    data_type : int
-        number of CiA 301
-    access : str
-        ``ro``, ``wo``, ``rw``, ``rwr``, ``rww`` or ``const``
-    is_mappable : bool
-        whether a PDO may hold it
-    value_text : str or None
-        value that a DCF gives it, as written there
     value : bytes or None
         the same as it is transferred, little end first; None where it is not of its type
     """
@@ -67,8 +55,6 @@ class DescribedObject:
 class DeviceFile:
     """What a file says of a drive.
 
-    name : str
-        of the file, for messages
     objects : mapping
         of (index, subindex) to DescribedObject
     vendor, product, revision : int or None
@@ -87,13 +73,6 @@ class DeviceFile:
 
 def read_device_file(path: Path, node_id: int) -> DeviceFile:
     """Read a file.
-
-    Parameters
-    ----------
-    path : Path
-        of the EDS or DCF file
-    node_id : int
-        that values with ``$NODEID`` are meant for
 
     Raises
     ------

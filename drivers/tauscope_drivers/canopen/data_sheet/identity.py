@@ -12,27 +12,12 @@ class OptionalReader(Protocol):
     """What reads a drive's entries."""
 
     def read_optional(self, entry: DriveObject) -> int | None:
-        """Value of an entry; None where the drive has none.
-
-        Parameters
-        ----------
-        entry : DriveObject
-            what to read
-        """
+        """Value of an entry; None where the drive has none."""
         ...
 
 
 def require_identity(file: DeviceFile, dictionary: OptionalReader, place: str) -> None:
     """Refuse a drive of another vendor, product or revision than its file states; what it does not tell passes.
-
-    Parameters
-    ----------
-    file : DeviceFile
-        of the drive that is meant
-    dictionary : OptionalReader
-        of the drive that is there
-    place : str
-        joint and node, for the message
 
     Raises
     ------

@@ -28,13 +28,6 @@ _WRITTEN_WHERE_THERE = (objects.INTERPOLATION_VALUE, objects.INTERPOLATION_EXPON
 def require_needed(file: DeviceFile, *, reads_rated_torque: bool) -> None:
     """Refuse a drive without an object that the driver needs of every drive, or with one of another kind.
 
-    Parameters
-    ----------
-    file : DeviceFile
-        of the drive
-    reads_rated_torque : bool
-        whether the robot file leaves it to the drive (0x6076)
-
     Raises
     ------
     DataSheetError
@@ -55,13 +48,6 @@ def require_needed(file: DeviceFile, *, reads_rated_torque: bool) -> None:
 
 def require_target(file: DeviceFile, mode: ControlMode) -> None:
     """Refuse a drive that takes no targets of a mode.
-
-    Parameters
-    ----------
-    file : DeviceFile
-        of the drive
-    mode : ControlMode
-        who closes the loop
 
     Raises
     ------

@@ -26,15 +26,7 @@ _TEXTS = ("VISIBLE_STRING", "UNICODE_STRING", "OCTET_STRING")
 
 @dataclass(frozen=True)
 class Setting:
-    """A value for a drive.
-
-    entry : DriveObject
-        where it is kept; of 0 bits where it is a text
-    data : bytes
-        as transferred
-    text : str
-        as the file writes it
-    """
+    """A value for a drive."""
 
     entry: DriveObject
     data: bytes
@@ -45,10 +37,6 @@ class Setting:
 class Settings:
     """The values of a DCF file; none of an EDS file.
 
-    written : tuple of Setting
-        in the order of their places
-    left_out : mapping of str to tuple of DescribedObject
-        by the reason
     torque_cap : int or None
         largest torque (0x6072), which the driver sets itself and never above this [‰ of the rated torque]
     """
@@ -60,11 +48,6 @@ class Settings:
 
 def settings_of(file: DeviceFile) -> Settings:
     """Values that a drive is given before it is commissioned.
-
-    Parameters
-    ----------
-    file : DeviceFile
-        of the drive
 
     Raises
     ------

@@ -34,11 +34,6 @@ class DataSheetError(ValueError):
 def read_sections(text: str) -> Sections:
     """Sections that describe the device and its objects; compact arrays are written out.
 
-    Parameters
-    ----------
-    text : str
-        content of the file
-
     Raises
     ------
     DataSheetError
@@ -66,13 +61,7 @@ def read_sections(text: str) -> Sections:
 
 
 def library_text(sections: Sections) -> str:
-    """The sections for the library's reader: parents before their subindices, and known keywords alone.
-
-    Parameters
-    ----------
-    sections : dict of dicts
-        from `read_sections`
-    """
+    """The sections for the library's reader: parents before their subindices, and known keywords alone."""
     lines: list[str] = []
     for name in sorted(sections, key=lambda name: "sub" in name):
         known = ((key, value) for key, value in sections[name].items() if key in _KEYWORDS.values())

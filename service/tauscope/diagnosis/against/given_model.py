@@ -40,10 +40,6 @@ TERMS = ("stiction", "stribeck", "viscous", "offset")
 class Given:
     """A model that recordings are compared with.
 
-    values : mapping of str to float
-        nominal parameters by name; what is not there it says nothing of
-    std : mapping of str to float
-        standard errors where the values are estimates; none is zero
     lacking : tuple of (int, str)
         joint indices and nominal terms that it does not have
     """
@@ -55,16 +51,6 @@ class Given:
 
 def against_model(diagnosis: Diagnosis) -> Diagnosis:
     """The diagnosis compared with the robot file's model.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        of real recordings
-
-    Returns
-    -------
-    Diagnosis
-        with differences, and findings that only this comparison shows
 
     Raises
     ------
@@ -80,22 +66,7 @@ def against_model(diagnosis: Diagnosis) -> Diagnosis:
 
 
 def against_simulation(diagnosis: Diagnosis, simulated: Sequence[Recording], options: Options) -> Diagnosis:
-    """The diagnosis compared with recordings from a simulator, on motions of its own.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        of real recordings
-    simulated : sequence of Recording
-        what the simulator records
-    options : Options
-        of the identification
-
-    Returns
-    -------
-    Diagnosis
-        without the effects that the simulator shows too; these are differences where their sizes differ
-    """
+    """The diagnosis compared with recordings from a simulator, on motions of its own."""
     fit = fit_to_simulation(diagnosis, simulated, options)
     names = diagnosis.selection.fit.model.structure.names
     values = dict(zip(names, (float(value) for value in fit.values), strict=True))
@@ -114,15 +85,7 @@ def against_simulation(diagnosis: Diagnosis, simulated: Sequence[Recording], opt
 
 
 def beside(diagnosis: Diagnosis, missing: Sequence[Finding]) -> Diagnosis:
-    """The diagnosis beside a model that has all of its findings but some: where it has all, their misfit is no news.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        of real recordings
-    missing : sequence of Finding
-        those that it does not have
-    """
+    """The diagnosis beside a model that has all of its findings but some: where it has all, their misfit is no news."""
     has_all = bool(diagnosis.findings) and not any(finding.in_model for finding in missing)
     before = diagnosis.misfit_after if has_all else diagnosis.misfit_before
     return replace(diagnosis, findings=tuple(missing), misfit_before=before)
@@ -149,17 +112,7 @@ def _stated(diagnosis: Diagnosis) -> Given:
 
 
 def compared(diagnosis: Diagnosis, given: Given, kind: Literal["model", "simulation"]) -> Diagnosis:
-    """Findings that the given model makes, then what it has wrong beside them.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        of real recordings
-    given : Given
-        what they are compared with
-    kind : str
-        ``model`` or ``simulation``
-    """
+    """Findings that the given model makes, then what it has wrong beside them."""
     plain = replace(diagnosis, findings=tuple(finding for finding in diagnosis.findings if finding.in_model))
     found = with_plain_terms(plain, given.lacking)
     fit = found.selection.fit
@@ -196,25 +149,11 @@ def _given_sizes(diagnosis: Diagnosis, given: Given) -> FitSizes:
 
 
 def is_wrong(difference: ParameterDifference, several: float) -> bool:
-    """Whether the given value is not the arm's.
-
-    Parameters
-    ----------
-    difference : ParameterDifference
-        of one parameter
-    several : float
-        standard errors from which it counts
-    """
+    """Whether the given value is not the arm's."""
     size = max(abs(difference.real), abs(difference.simulation))
     return abs(difference.in_std) > several and abs(difference.real - difference.simulation) > NEGLIGIBLE * size
 
 
 def ordered(differences: Sequence[ParameterDifference]) -> tuple[ParameterDifference, ...]:
-    """Most standard errors first.
-
-    Parameters
-    ----------
-    differences : sequence of ParameterDifference
-        in any order
-    """
+    """Most standard errors first."""
     return tuple(sorted(differences, key=lambda each: -abs(each.in_std)))

@@ -38,8 +38,6 @@ def payload_finding(diagnosis: Diagnosis, surplus: Array, covariance: Array) -> 
 
     Parameters
     ----------
-    diagnosis : Diagnosis
-        of real recordings
     surplus : (m,) float64
         real less given base parameters
     covariance : (m, m) float64

@@ -14,15 +14,7 @@ TERMS = ("stiction", "stribeck", "viscous", "offset")
 
 
 def against_saved(diagnosis: Diagnosis, saved: ExtendedModel) -> Diagnosis:
-    """The diagnosis compared with a saved model: what that has already is no finding, at most another value.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        of recordings
-    saved : ExtendedModel
-        of the same arm
-    """
+    """The diagnosis compared with a saved model: what that has already is no finding, at most another value."""
     values = dict(zip(saved.structure.names, map(float, saved.parameters), strict=True))
     joints = [joint.name for joint in diagnosis.robot.joints]
     lacking = tuple(

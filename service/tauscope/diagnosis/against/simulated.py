@@ -43,17 +43,7 @@ class SimulatedFit:
 
 
 def fit_to_simulation(diagnosis: Diagnosis, simulated: Sequence[Recording], options: Options) -> SimulatedFit:
-    """Fit the final model of a diagnosis to a simulator's recordings.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        of real recordings
-    simulated : sequence of Recording
-        what the simulator records
-    options : Options
-        of the identification
-    """
+    """Fit the final model of a diagnosis to a simulator's recordings."""
     found = identify(diagnosis.robot, simulated, (), options)
     final = diagnosis.selection.fit
     lasting = [term for term in final.model.terms if not isinstance(term.effect, TimeLocalEffect)]

@@ -41,22 +41,7 @@ UNKNOWN = "unknown"
 def document(
     diagnosis: Diagnosis, planned: PlannedExperiment | None = None, trajectory: str | None = None
 ) -> DiagnosisDocument:
-    """The document of a diagnosis.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        the result of `diagnose`, or of its comparison with a given model
-    planned : PlannedExperiment or None
-        the next motion, where one was planned
-    trajectory : str or None
-        file that holds it
-
-    Returns
-    -------
-    DiagnosisDocument
-        plain data; `model_dump_json(by_alias=True)` writes it
-    """
+    """The document of a diagnosis."""
     names = [joint.name for joint in diagnosis.robot.joints]
     return DiagnosisDocument(
         robot=diagnosis.robot.name,
@@ -81,13 +66,7 @@ def document(
 
 
 def parameter_names(diagnosis: Diagnosis) -> list[str]:
-    """Readable names of all parameters of the final model, in their order.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        the result
-    """
+    """Readable names of all parameters of the final model, in their order."""
     model = diagnosis.selection.fit.model
     joints = [joint.name for joint in diagnosis.robot.joints]
     names = [*model.structure.names, *(f"log {name} {joints[joint]}" for joint, name in model.constants)]

@@ -76,13 +76,7 @@ class DiagnosisPlots(Document):
 
 
 def diagnosis_plots(diagnosis: Diagnosis) -> DiagnosisPlots:
-    """What a diagnosis is drawn from.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        the result
-    """
+    """What a diagnosis is drawn from."""
     observations = diagnosis.fitter.observations
     before = residual_rows(diagnosis.selection.nominal.model, observations)
     after = residual_rows(diagnosis.selection.fit.model, observations)

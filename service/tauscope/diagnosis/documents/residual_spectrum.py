@@ -36,13 +36,7 @@ class ResidualSpectrum(Document):
 
 
 def residual_spectra(diagnosis: Diagnosis) -> list[ResidualSpectrum]:
-    """Spectra of all joints; none where no stretch of motion is long enough.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        the result
-    """
+    """Spectra of all joints; none where no stretch of motion is long enough."""
     observations, held_out = judging_observations(diagnosis)
     longest = max((piece.rows for piece in observations), default=0)
     if longest < FEWEST:
@@ -72,8 +66,6 @@ def noise_density(noise: JointNoise, frequency: Array, rate_hz: float) -> Array:
 
     Parameters
     ----------
-    noise : JointNoise
-        of the joint
     frequency : (F,) float64
         [Hz]
     rate_hz : float

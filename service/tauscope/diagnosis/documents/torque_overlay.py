@@ -28,26 +28,14 @@ class TorqueOverlay(Document):
 
 
 def judging_observations(diagnosis: Diagnosis) -> tuple[Observations, bool]:
-    """The held-out rows, or the training rows where there are none, as measured; and whether they are held out.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        the result
-    """
+    """The held-out rows, or the training rows where there are none, as measured; and whether they are held out."""
     held_out = diagnosis.held_out
     rows = diagnosis.fitter.observations if held_out is None else held_out.observations
     return rows.as_measured or rows, held_out is not None
 
 
 def torque_overlays(diagnosis: Diagnosis) -> list[TorqueOverlay]:
-    """Every joint's torque where the findings take most off its residual.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        the result
-    """
+    """Every joint's torque where the findings take most off its residual."""
     observations, held_out = judging_observations(diagnosis)
     models = (diagnosis.selection.nominal.model, diagnosis.selection.fit.model)
     predicted = [[predicted_rows(model, piece) for model in models] for piece in observations]

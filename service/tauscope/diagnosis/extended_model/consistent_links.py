@@ -12,13 +12,7 @@ SMALLEST = 1e-12
 
 
 def consistent_links(diagnosis: Diagnosis) -> tuple[LinkInertia, ...]:
-    """The nearest physically consistent links to the final model, in the metric of its covariance.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        the result
-    """
+    """The nearest physically consistent links to the final model, in the metric of its covariance."""
     fit = diagnosis.selection.fit
     structure, size = fit.model.structure, fit.model.structure.size
     covariance = fit.covariance[:size, :size] * diagnosis.inflation

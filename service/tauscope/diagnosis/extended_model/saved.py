@@ -74,13 +74,7 @@ class ModelDocument(Document):
 
 
 def model_document(diagnosis: Diagnosis) -> ModelDocument:
-    """The final model of a diagnosis as a document.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        the result
-    """
+    """The final model of a diagnosis as a document."""
     model = diagnosis.selection.fit.model
     structure = model.structure
     names = [joint.name for joint in diagnosis.robot.joints]
@@ -110,13 +104,6 @@ def model_document(diagnosis: Diagnosis) -> ModelDocument:
 def read_model(path: Path, robot: Robot) -> ExtendedModel:
     """The extended model of a file.
 
-    Parameters
-    ----------
-    path : Path
-        the file
-    robot : Robot
-        the arm that it was made for
-
     Raises
     ------
     IdentificationError
@@ -139,13 +126,6 @@ def read_model(path: Path, robot: Robot) -> ExtendedModel:
 
 def restored(document: ModelDocument, robot: Robot) -> ExtendedModel:
     """The extended model of a document.
-
-    Parameters
-    ----------
-    document : ModelDocument
-        as `model_document` made it
-    robot : Robot
-        the arm that it was made for
 
     Raises
     ------

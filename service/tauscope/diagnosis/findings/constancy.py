@@ -29,15 +29,7 @@ KNOWN = 1e-8
 
 @dataclass(frozen=True)
 class Move:
-    """A parameter that is not the same in two groups of rows.
-
-    parameter : int
-        its place in the model
-    between : tuple of two str
-        the groups
-    shift_in_std : float
-        second less first, in standard errors of the difference
-    """
+    """A parameter that is not the same in two groups of rows."""
 
     parameter: int
     between: tuple[str, str]
@@ -46,13 +38,7 @@ class Move:
 
 @dataclass(frozen=True)
 class Constancy:
-    """What the groups say.
-
-    p_value : float
-        chance of such differences if the parameters are the same
-    moves : tuple of Move
-        the most clearly moved parameters
-    """
+    """What the groups say."""
 
     p_value: float
     moves: tuple[Move, ...]
@@ -77,19 +63,7 @@ class _Group:
 
 
 def constancy(fitter: Fitter, fit: Fit, held_out: Fitter | None, inflation: float) -> Constancy:
-    """Compare the parameters of all recordings, or of the halves of a single one; held-out ones are one more.
-
-    Parameters
-    ----------
-    fitter : Fitter
-        of the training recordings
-    fit : Fit
-        the model fitted to them
-    held_out : Fitter or None
-        of the held-out recordings
-    inflation : float
-        factor by which the residual exceeds the modelled noise
-    """
+    """Compare the parameters of all recordings, or of the halves of a single one; held-out ones are one more."""
     inflation = max(inflation, fit.inflation())
     size = fit.model.size
     columns = fitter.columns(fit.model)

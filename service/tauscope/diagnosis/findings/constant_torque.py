@@ -30,16 +30,8 @@ def instead_of_a_constant(
 
     Parameters
     ----------
-    effect : TorqueOffset
-        the constant
-    without : Fit
-        the model whose constant is held at zero
     gain : float
         what the constant takes off that model's residual [noise variances]
-    screen : Screen
-        of the training recordings
-    fitter : Fitter
-        of the same
     """
     enough = gain - EQUIVALENT * without.inflation()
     there = {(term.effect.id, term.effect.joint) for term in without.model.terms}
@@ -56,15 +48,7 @@ def instead_of_a_constant(
 
 
 def with_better_than_constants(selection: Selection, selector: Selector) -> Selection:
-    """The selection with what explains a joint's torque better than its constant in the constant's place.
-
-    Parameters
-    ----------
-    selection : Selection
-        what was selected beside a model that has constants
-    selector : Selector
-        that has selected it
-    """
+    """The selection with what explains a joint's torque better than its constant in the constant's place."""
     constants = {term.effect.joint for term in selection.fit.model.terms if term.effect.id in WITH_A_CONSTANT}
     for joint in range(selector.screen.observations.robot.joint_count):
         place = selection.nominal.model.structure.coefficient(joint, TorqueOffset.term)

@@ -17,16 +17,10 @@ POWER = 0.9
 class Detectable:
     """The smallest effect that would have been named.
 
-    effect : str
-        its id
     joint : int or None
         joint index, from 0
     minimum : float or None
         size of the first coefficient [unit]; None where nothing shows it
-    unit : str
-        as in the effect's coefficients
-    visible : bool
-        whether any size could show in torque and position along this motion
     """
 
     effect: str
@@ -37,17 +31,7 @@ class Detectable:
 
 
 def detectable(candidates: Sequence[Candidate], level: float, inflation: float) -> tuple[Detectable, ...]:
-    """Smallest sizes that are found in nine of ten such data sets.
-
-    Parameters
-    ----------
-    candidates : sequence of Candidate
-        all forms beside the fitted model
-    level : float
-        chance of a false name that each form is given
-    inflation : float
-        factor by which the residual exceeds the modelled noise
-    """
+    """Smallest sizes that are found in nine of ten such data sets."""
     best: dict[tuple[str, int | None], Detectable] = {}
     for each in candidates:
         key = (each.effect.id, each.effect.joint)
@@ -69,19 +53,7 @@ def detectable(candidates: Sequence[Candidate], level: float, inflation: float) 
 def detectable_parameters(
     fit: Fit, kinds: Sequence[type[PlainTerm]], level: float, inflation: float
 ) -> tuple[Detectable, ...]:
-    """The same for effects that are parameters of the nominal model, from their standard errors.
-
-    Parameters
-    ----------
-    fit : Fit
-        of the final model
-    kinds : sequence of PlainTerm classes
-        which of them
-    level : float
-        chance of a false name that each is given
-    inflation : float
-        factor by which the residual exceeds the modelled noise
-    """
+    """The same for effects that are parameters of the nominal model, from their standard errors."""
     found = []
     for kind in kinds:
         for joint in range(fit.model.structure.robot.joint_count):
@@ -95,15 +67,7 @@ def detectable_parameters(
 
 
 def needed_strength(candidate: Candidate, level: float) -> float:
-    """Noncentrality λ at which a form is significant with probability `POWER`.
-
-    Parameters
-    ----------
-    candidate : Candidate
-        number of coefficients and of shapes
-    level : float
-        chance of a false name that it is given
-    """
+    """Noncentrality λ at which a form is significant with probability `POWER`."""
     return _strength(candidate.count, candidate.shapes_tried, level)
 
 

@@ -28,12 +28,8 @@ EXPLAINED = 20.0
 class ParameterDifference:
     """One parameter that a simulation has wrong.
 
-    parameter : str
-        its name
     simulation, real : float
         its values [SI]
-    std : float
-        standard error of the difference
     """
 
     parameter: str
@@ -51,42 +47,10 @@ class ParameterDifference:
 class Diagnosis:
     """What was found.
 
-    identification : Identification
-        the nominal model
-    setting : Setting
-        the arm and the ranges of its motion
-    selection : Selection
-        nominal and final model, and what was tried
-    findings : tuple of Finding
-        most explained energy first
-    mismatch : tuple of JointMismatch
-        one a joint
-    misfit_before, misfit_after : LackOfFit
-        what nominal and final model leave
-    constancy : Constancy
-        of the final model's parameters
-    detectable : tuple of Detectable
-        one an effect and place
-    before, after : FitSizes
-        residuals of the model that the recordings are compared with, and of the final one
     noise_std : (n,) float64
         torque noise a sample at the recorded rate [Nm or N]
-    pure_error : bool
-        whether the noise is known from repetitions
-    level : float
-        chance of a false name that each form was given
     cutoff_hz : float
         band of the comparison [Hz]
-    screen : Screen
-        of the training recordings
-    fitter : Fitter
-        of the same
-    held_out : HeldOut or None
-        the others
-    against : str
-        ``identified``, ``model`` or ``simulation``
-    differences : tuple of ParameterDifference
-        what the given model has wrong
     """
 
     identification: Identification
@@ -152,11 +116,5 @@ class Diagnosis:
         return 1.0 if self.pure_error else self.selection.fit.inflation()
 
     def with_findings(self, added: Sequence[Finding]) -> "Diagnosis":
-        """The same with more findings.
-
-        Parameters
-        ----------
-        added : sequence of Finding
-            in any order
-        """
+        """The same with more findings."""
         return replace(self, findings=in_order([*self.findings, *added]))

@@ -15,13 +15,7 @@ from tauscope.effects.parameters import Quantity
 
 @dataclass(frozen=True, eq=False)
 class Elsewhere:
-    """The same effect far from where it was found.
-
-    chance : float
-        of this in place of what was found
-    term : Term
-        the effect there
-    """
+    """The same effect far from where it was found."""
 
     chance: float
     term: Term
@@ -34,8 +28,6 @@ def spread(found: Sequence[Quantity], elsewhere: Sequence[tuple[float, Sequence[
 
     Parameters
     ----------
-    found : sequence of Quantity
-        as they were found
     elsewhere : sequence of (float, sequence of Quantity)
         chance of another optimum, and the parameters there
     """

@@ -44,29 +44,12 @@ class FitSizes:
 class Finding:
     """Effects of one kind at one place: one term, or several orders of a periodic torque.
 
-    terms : tuple of Term
-        as in the final model
     covariances : tuple of (k, k) float64
         of each term's coefficients and shapes, in the arm's own torque (`model.torque_scale`)
     gain : float
         what they take off the residual's energy beside all other findings [noise variances]
-    probability : float
-        that it is this effect: neither one of its equivalents, nor an error of a larger effect's curve, nor what stands
-        in for a law that the catalogue does not have
-    before, after : FitSizes
-        residuals of the model without it, and with all findings
-    alternatives : tuple of Option
-        what explains nearly as much in its place
     confirmed : bool or None
         by motion that was not used; None where there was none
-    in_model : bool
-        whether the terms stand in the final model beside its nominal part, and not within that
-    behind : Effect or None
-        the effect that leads at its joint, of whose curve it may be an error
-    as_law : float
-        chance that it is a law of the catalogue, and does not stand in for another one
-    elsewhere : tuple of Elsewhere
-        other orders and kinds that explain nearly as much, in the arm's own torque; of a finding of one term
     """
 
     terms: tuple[Term, ...]
@@ -90,17 +73,7 @@ class Finding:
 
 
 def sizes(model: ExtendedModel, fitter: Fitter, held_out: HeldOut | None) -> FitSizes:
-    """Raw residuals of a model on training and held-out recordings.
-
-    Parameters
-    ----------
-    model : ExtendedModel
-        the model
-    fitter : Fitter
-        of the training recordings
-    held_out : HeldOut or None
-        the others
-    """
+    """Raw residuals of a model on training and held-out recordings."""
     train = _rms(model, fitter.observations)
     return FitSizes(train, None if held_out is None else _rms(model, held_out.observations))
 
@@ -118,23 +91,7 @@ def selected_findings(
     left: LackOfFit,
     inflation: float,
 ) -> tuple[Finding, ...]:
-    """Terms of one effect at one place together, each compared with the model without it.
-
-    Parameters
-    ----------
-    selection : Selection
-        what was selected
-    screen : Screen
-        of the training recordings
-    fitter : Fitter
-        of the same
-    held_out : HeldOut or None
-        the others
-    left : LackOfFit
-        what the final model leaves
-    inflation : float
-        factor by which the residual exceeds the modelled noise
-    """
+    """Terms of one effect at one place together, each compared with the model without it."""
     fit = selection.fit
     covariance = fitter.covariance(fit) * inflation
     groups = groups_of(fit.model)
@@ -205,28 +162,12 @@ def _likely(options: Sequence[Option], without: Fit, screen: Screen, held_out: H
 
 
 def in_order(found: Sequence[Finding]) -> tuple[Finding, ...]:
-    """Findings, most explained energy first.
-
-    Parameters
-    ----------
-    found : sequence of Finding
-        in any order
-    """
+    """Findings, most explained energy first."""
     return tuple(sorted(found, key=lambda each: -each.gain))
 
 
 def without_nominal(fit: Fit, place: int, fitter: Fitter) -> Fit:
-    """The model fitted anew with one of its nominal parameters held at zero.
-
-    Parameters
-    ----------
-    fit : Fit
-        the model
-    place : int
-        of the parameter among Θ
-    fitter : Fitter
-        of the recordings
-    """
+    """The model fitted anew with one of its nominal parameters held at zero."""
     parameters = fit.model.parameters.copy()
     parameters[place] = 0.0
     return fitter.fit(replace(fit.model, parameters=parameters, held=(*fit.model.held, place)))

@@ -13,15 +13,7 @@ from tauscope.diagnosis.selection.choice import Choice
 
 
 def kinds_elsewhere(choice: Choice, inflation: float) -> tuple[Elsewhere, ...]:
-    """The other kinds of a finding with their chances.
-
-    Parameters
-    ----------
-    choice : Choice
-        the finding's, weighed against its kinds
-    inflation : float
-        factor by which the residual exceeds the modelled noise
-    """
+    """The other kinds of a finding with their chances."""
     behind = np.array([max(each.behind, 0.0) for each in choice.kinds])
     weights = np.exp(-0.5 * behind / inflation)
     chances = weights / (1.0 + weights.sum())

@@ -27,14 +27,8 @@ CONCENTRATED = 0.45
 class Place:
     """A range of a variable in which excess residual concentrates.
 
-    variable : str
-        ``velocity``, ``position``, ``load``, ``acceleration``, ``time`` or ``motor_position``
     low, high : float
         the range [SI]
-    share : float
-        of the excess that lies within it
-    recording : str or None
-        for ``time``, in which recording
     """
 
     variable: str
@@ -54,10 +48,6 @@ class JointMismatch:
         root of what the residual's power exceeds the noise's by, in the common band [Nm or N]
     explained : float
         what the findings take off the whitened residual's energy [noise variances]
-    place : Place or None
-        where it concentrates, most of all but in time
-    time : Place or None
-        when it concentrates, where it does
     """
 
     joint: int
@@ -68,17 +58,7 @@ class JointMismatch:
 
 
 def locate(selection: Selection, observations: Observations, left: Sequence[bool]) -> tuple[JointMismatch, ...]:
-    """Excess residual of every joint.
-
-    Parameters
-    ----------
-    selection : Selection
-        models without and with findings
-    observations : Observations
-        the rows that both were fitted to
-    left : sequence of bool, length n
-        whether more than noise is left with the findings
-    """
+    """Excess residual of every joint."""
     nominal, fit = selection.nominal, selection.fit
     before = residual_rows(nominal.model, observations)
     after = residual_rows(fit.model, observations) if selection.choices else None

@@ -32,21 +32,7 @@ PARTS = 8
 
 
 def orders_elsewhere(term: Term, error: float, without: Fit, screen: Screen, inflation: float) -> tuple[Elsewhere, ...]:
-    """Orders of a wave beyond its own error, with their chances; empty for what is no wave, or of a known order.
-
-    Parameters
-    ----------
-    term : Term
-        as it was found
-    error : float
-        standard error of its order
-    without : Fit
-        the model without it
-    screen : Screen
-        of the training recordings
-    inflation : float
-        factor by which the residual exceeds the modelled noise
-    """
+    """Orders of a wave beyond its own error, with their chances; empty for what is no wave, or of a known order."""
     effect = term.effect
     if not effect.repeats or not effect.is_free(0) or error <= 0.0:
         return ()

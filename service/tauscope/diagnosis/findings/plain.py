@@ -28,25 +28,13 @@ Lacking = Collection[tuple[int, str]]
 
 
 def undeclared_offsets(diagnosis: Diagnosis) -> Lacking:
-    """The constants of all joints where the robot file states friction: it cannot state them.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        of the recordings
-    """
+    """The constants of all joints where the robot file states friction: it cannot state them."""
     robot = diagnosis.robot
     return [(joint, "offset") for joint in range(robot.joint_count)] if states_friction(robot) else ()
 
 
 def states_friction(robot: Robot) -> bool:
-    """Whether a robot file states friction of its own; that of a URDF is often a placeholder.
-
-    Parameters
-    ----------
-    robot : Robot
-        the arm
-    """
+    """Whether a robot file states friction of its own; that of a URDF is often a placeholder."""
     return robot.model.friction is not None and robot.urdf is None
 
 
@@ -55,8 +43,6 @@ def with_plain_terms(diagnosis: Diagnosis, lacking: Lacking) -> Diagnosis:
 
     Parameters
     ----------
-    diagnosis : Diagnosis
-        of the recordings
     lacking : collection of (int, str)
         what the given model does not have
     """

@@ -26,19 +26,7 @@ DOUBTED = 0.5
 
 
 def certainty_as_law(effect: Effect, nominal: Fit, fit: Fit, without: Fit, left: LackOfFit) -> float:
-    """Chance that a finding is a law of the catalogue, and not what comes nearest to another one.
-
-    Parameters
-    ----------
-    effect : Effect
-        of the finding
-    nominal, fit : Fit
-        models without and with all findings
-    without : Fit
-        the model without this finding
-    left : LackOfFit
-        what the model with all of them leaves
-    """
+    """Chance that a finding is a law of the catalogue, and not what comes nearest to another one."""
     if effect.id in EXPECTED:
         return 1.0
     touched = list(effect.touched(len(left.structured)))

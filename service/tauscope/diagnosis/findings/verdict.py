@@ -16,17 +16,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Evidence:
-    """What the verdict rests on.
-
-    findings : int
-        confirmed effects
-    misfit_before, misfit_after : bool
-        whether more than noise is left without and with them
-    parameters_hold : bool
-        whether the parameters are the same from one recording to the next
-    predicts : bool
-        whether the model says of held-out motion what there is, to within a little more than the noise
-    """
+    """What the verdict rests on."""
 
     findings: int
     misfit_before: bool
@@ -36,13 +26,7 @@ class Evidence:
 
 
 def verdict(evidence: Evidence) -> Verdict:
-    """The verdict on some evidence.
-
-    Parameters
-    ----------
-    evidence : Evidence
-        results of the tests
-    """
+    """The verdict on some evidence."""
     if evidence.findings:
         return Verdict.PARTLY_EXPLAINED if evidence.misfit_after else Verdict.EXPLAINED
     if evidence.misfit_before:

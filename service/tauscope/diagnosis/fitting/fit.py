@@ -42,11 +42,6 @@ AT_LIMIT = 1e-6
 class Fit:
     """An extended model at its optimum.
 
-    model : ExtendedModel
-        with fitted parameters
-    projection : Projection
-        of its columns there, without those that would lead out of their bounds; its residual is what one more linear
-        step would leave
     energy : float
         Σ r² that the model leaves, the prior's included [noise variances]
     joint_energies : (n,) float64
@@ -67,13 +62,7 @@ class Fit:
         return self.spread @ self.spread.T
 
     def inflation(self, *, at_least: float = 1.0) -> float:
-        """Residual energy per degree of freedom: what is left is more than the modelled noise by this factor.
-
-        Parameters
-        ----------
-        at_least : float
-            1 where the noise is known; less where its size is no more than a guess that the fit may correct
-        """
+        """Residual energy per degree of freedom: what is left is more than the modelled noise by this factor."""
         return max(at_least, self.energy / self.projection.freedom)
 
 
@@ -81,8 +70,6 @@ class Fit:
 class Tried:
     """A model as it is.
 
-    model : ExtendedModel
-        the model
     residual : list of (R_j,) float64
         what it leaves, whitened
     """
@@ -98,13 +85,7 @@ class Tried:
 
 
 class Fitter:
-    """Fits extended models to the same observations.
-
-    Parameters
-    ----------
-    observations : Observations
-        the data, noise known
-    """
+    """Fits extended models to the same observations."""
 
     def __init__(self, observations: Observations) -> None:
         self.observations = observations
@@ -112,15 +93,7 @@ class Fitter:
         self._without: LastFew[tuple[Fit, tuple[int, ...]], Fit] = LastFew(KEPT)
 
     def fit(self, model: ExtendedModel, *, steps: int = STEPS) -> Fit:
-        """Fit all parameters.
-
-        Parameters
-        ----------
-        model : ExtendedModel
-            where to start
-        steps : int
-            most Gauss–Newton steps
-        """
+        """Fit all parameters."""
         limits = _constants_limits(model)
         at = self.linear_optimum(model)
         projection = self._project(at)
@@ -169,11 +142,6 @@ class Fitter:
         """The model with the best Θ and coefficients for its shapes.
 
         A step in a shape that is cut short would else leave coefficients that belong to another shape.
-
-        Parameters
-        ----------
-        model : ExtendedModel
-            with the constants and shapes that it keeps
         """
         at = self._tried(model)
         linear = np.ones(model.size, dtype=bool)
@@ -189,60 +157,28 @@ class Fitter:
         return self._tried(_stepped(model, step))
 
     def without(self, fit: Fit, places: Sequence[int]) -> Fit:
-        """The model fitted anew without some of its terms; the last few are kept, as several ask for the same.
-
-        Parameters
-        ----------
-        fit : Fit
-            the model
-        places : sequence of int
-            of the terms that are left out
-        """
+        """The model fitted anew without some of its terms; the last few are kept, as several ask for the same."""
         terms = [term for place, term in enumerate(fit.model.terms) if place not in places]
         key = fit, tuple(sorted(places))
         return self._without.get(key, lambda: self.fit(with_terms(fit.model, terms)))
 
     def projected(self, model: ExtendedModel) -> Fit:
-        """The linear step at a model as it is, without moving it.
-
-        Parameters
-        ----------
-        model : ExtendedModel
-            the model
-        """
+        """The linear step at a model as it is, without moving it."""
         projection = self._project(self._tried(model))
         return Fit(model, projection, projection.energy, _energies(projection.residual), projection.spread)
 
     def covariance(self, fit: Fit) -> Array:
-        """Covariance of all parameters, those that a term displaced as uncertain as they would be without that, (p, p).
-
-        Parameters
-        ----------
-        fit : Fit
-            the model at its optimum
-        """
+        """Covariance of all parameters, (p, p); a term does not make those that it displaced more certain."""
         if not any(term.displaced for term in fit.model.terms):
             return fit.covariance
         return self.projected(with_terms(fit.model, [replace(t, displaced=()) for t in fit.model.terms])).covariance
 
     def white_residual(self, model: ExtendedModel) -> list[Array]:
-        """Whitened residual of a model as it is, (R_j,) a joint.
-
-        Parameters
-        ----------
-        model : ExtendedModel
-            the model
-        """
+        """Whitened residual of a model as it is, (R_j,) a joint."""
         return self._white.residual(model)
 
     def columns(self, model: ExtendedModel) -> list[JointColumns]:
-        """Whitened columns of all parameters of a model, one entry a joint.
-
-        Parameters
-        ----------
-        model : ExtendedModel
-            the model
-        """
+        """Whitened columns of all parameters of a model, one entry a joint."""
         return self._white.all(model)
 
     def _tried(self, model: ExtendedModel) -> Tried:

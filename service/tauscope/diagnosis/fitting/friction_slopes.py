@@ -29,13 +29,7 @@ CLEARLY_BETTER = 12.0
 
 
 def open_slopes(identification: Identification) -> list[int]:
-    """Joints whose slope neither the robot file states nor the identification could tell.
-
-    Parameters
-    ----------
-    identification : Identification
-        the result
-    """
+    """Joints whose slope neither the robot file states nor the identification could tell."""
     return [
         joint
         for joint, (shape, identifiable) in enumerate(
@@ -50,10 +44,6 @@ def with_fitting_slopes(model: ExtendedModel, fitter: Fitter, joints: Sequence[i
 
     Parameters
     ----------
-    model : ExtendedModel
-        the nominal model
-    fitter : Fitter
-        of the training recordings
     joints : sequence of int
         whose slopes are open, from 0
     speed : (n,) float64
@@ -69,13 +59,7 @@ def with_fitting_slopes(model: ExtendedModel, fitter: Fitter, joints: Sequence[i
 
 
 def open_stribeck(identification: Identification) -> list[int]:
-    """Joints without a Stribeck term, of which the robot file does not say that they have none.
-
-    Parameters
-    ----------
-    identification : Identification
-        the result
-    """
+    """Joints without a Stribeck term, of which the robot file does not say that they have none."""
     return [
         joint
         for joint, (shape, terms) in enumerate(zip(identification.shapes, identification.structure.terms, strict=True))
@@ -88,10 +72,6 @@ def with_fitting_stribeck(model: ExtendedModel, fitter: Fitter, joints: Sequence
 
     Parameters
     ----------
-    model : ExtendedModel
-        the nominal model
-    fitter : Fitter
-        of the training recordings
     joints : sequence of int
         that have no such term yet, from 0
     speed : (n,) float64

@@ -72,19 +72,7 @@ class LackOfFit:
 
 
 def lack_of_fit(fit: Fit, observations: Observations, *, pure_error: bool, seed: int = 0) -> LackOfFit:
-    """Test what a model leaves.
-
-    Parameters
-    ----------
-    fit : Fit
-        the model at its optimum
-    observations : Observations
-        the rows that it was fitted to
-    pure_error : bool
-        whether their noise is known from repetitions
-    seed : int
-        of the random features
-    """
+    """Test what a model leaves."""
     joints = observations.robot.joint_count
     omnibus, pure = np.ones(joints), np.ones(joints)
     excess, measurable, structured = np.zeros(joints), np.zeros(joints), np.zeros(joints)
@@ -114,13 +102,7 @@ def lack_of_fit(fit: Fit, observations: Observations, *, pure_error: bool, seed:
 
 
 def pure_error_rows(observations: Observations) -> Array:
-    """Degrees of freedom of what differs between repetitions, (n,).
-
-    Parameters
-    ----------
-    observations : Observations
-        the data
-    """
+    """Degrees of freedom of what differs between repetitions, (n,)."""
     found = np.zeros(observations.robot.joint_count)
     for piece in observations:
         number, motion = piece.prepared.recording, piece.prepared.motion

@@ -18,12 +18,8 @@ def log_likelihood(model: ExtendedModel, covariance: Array, new: Fitter) -> floa
 
     Parameters
     ----------
-    model : ExtendedModel
-        as fitted elsewhere
     covariance : (p, p) float64
         of its parameters there
-    new : Fitter
-        of the new recordings, their noise known
     """
     energy, along, gram = 0.0, np.zeros(model.size), np.zeros((model.size, model.size))
     for residual, columns in zip(new.white_residual(model), new.columns(model), strict=True):

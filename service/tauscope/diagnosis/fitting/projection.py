@@ -53,10 +53,6 @@ class Projection:
         what the model leaves
     step : (p,) float64
         the fitted parameters
-    prior_energy : float
-        Σ r² of the prior's rows
-    independent : float or None
-        independent rows, where rows are closer than their band asks for
     """
 
     spread: Array
@@ -105,12 +101,8 @@ def project(
 
     Parameters
     ----------
-    columns : sequence of JointColumns
-        one a joint
     target : sequence of (R_j,) float64
         what is fitted, one a joint
-    size : int
-        number of parameters p
     prior : tuple of (s, p) float64 and (s,) float64, optional
         rows of what is known beforehand, of unit variance, and their right-hand side
     """
@@ -129,12 +121,8 @@ def fitted_parameters(columns: Sequence[JointColumns], target: Sequence[Array], 
 
     Parameters
     ----------
-    columns : sequence of JointColumns
-        one a joint
     target : sequence of (R_j,) float64
         what is fitted, one a joint
-    size : int
-        number of parameters p
     """
     spread = _spread(columns, np.zeros((0, size)))
     inner = np.zeros(size)
@@ -164,8 +152,6 @@ def moments(projection: Projection, columns: Mapping[int, Array]) -> Moments:
 
     Parameters
     ----------
-    projection : Projection
-        the model
     columns : mapping of int to (g, c, R_j) float64
         whitened columns at every joint that the candidate touches
     """
@@ -183,13 +169,6 @@ def moments(projection: Projection, columns: Mapping[int, Array]) -> Moments:
 
 def statistics(found: Moments, positive: Sequence[bool]) -> tuple[Array, Array]:
     """What each shape takes off the residual's energy, and the coefficients with which it does.
-
-    Parameters
-    ----------
-    found : Moments
-        of a candidate
-    positive : sequence of bool, length c
-        coefficients that cannot be negative: those that would be are left out
 
     Returns
     -------

@@ -56,15 +56,7 @@ to a fifth of it; what a band does to all of them alike is looked at apart."""
 
 
 def row_weightings(observations: Observations, model: ExtendedModel) -> tuple[RowWeighting, ...]:
-    """How much the whitened rows count, one entry a joint.
-
-    Parameters
-    ----------
-    observations : Observations
-        the data, noise known
-    model : ExtendedModel
-        the nominal model
-    """
+    """How much the whitened rows count, one entry a joint."""
     fit = Fitter(observations).fit(model)  # an identification leaves alone what it cannot tell, however large it is
     weightings = weightings_of_motion(observations, fit.model)
     if fit.inflation() <= FAR_OFF:
@@ -77,15 +69,7 @@ def row_weightings(observations: Observations, model: ExtendedModel) -> tuple[Ro
 
 
 def weightings_of_motion(observations: Observations, model: ExtendedModel) -> tuple[RowWeighting, ...]:
-    """The same by a model that is right about friction, whatever torque was measured.
-
-    Parameters
-    ----------
-    observations : Observations
-        the data, noise known
-    model : ExtendedModel
-        the model
-    """
+    """The same by a model that is right about friction, whatever torque was measured."""
     whole = observations.with_weightings(())
     weightings = []
     for joint, noise in enumerate(observations.noise):

@@ -15,19 +15,7 @@ from tauscope.diagnosis.fitting.lack_of_fit import LackOfFit, lack_of_fit
 
 
 def without_spilled(misfit: LackOfFit, fit: Fit, fitter: Fitter, *, pure_error: bool) -> LackOfFit:
-    """A lack of fit whose joints answer for their own misfit only.
-
-    Parameters
-    ----------
-    misfit : LackOfFit
-        of the fit
-    fit : Fit
-        the model at its optimum
-    fitter : Fitter
-        that has made it
-    pure_error : bool
-        whether the noise is known from repetitions
-    """
+    """A lack of fit whose joints answer for their own misfit only."""
     apart, suspects, wrong = misfit, _significant(misfit), set[int]()
     if len(suspects) < 2:
         return misfit

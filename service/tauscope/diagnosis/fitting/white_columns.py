@@ -30,13 +30,7 @@ OfJoints = dict[int, Array]
 
 
 class WhiteColumns:
-    """Linearises extended models on the same observations.
-
-    Parameters
-    ----------
-    observations : Observations
-        the data, noise known
-    """
+    """Linearises extended models on the same observations."""
 
     def __init__(self, observations: Observations) -> None:
         self._observations = observations
@@ -49,13 +43,7 @@ class WhiteColumns:
         self._friction_slopes: list[LastFew[object, Array]] = [LastFew(FRICTION_KEPT) for _ in self._joints]
 
     def residual(self, model: ExtendedModel) -> list[Array]:
-        """What a model leaves of the measured torque, (R_j,) a joint.
-
-        Parameters
-        ----------
-        model : ExtendedModel
-            the model
-        """
+        """What a model leaves of the measured torque, (R_j,) a joint."""
         found = []
         for joint in self._joints:
             rigid, friction = self._white_rigid(joint), self._white_friction(model, joint)
@@ -67,23 +55,11 @@ class WhiteColumns:
         return found
 
     def linear(self, model: ExtendedModel) -> list[JointColumns]:
-        """Columns of the parameters in which a model is linear, Θ and the terms' coefficients, a joint each.
-
-        Parameters
-        ----------
-        model : ExtendedModel
-            the model
-        """
+        """Columns of the parameters in which a model is linear, Θ and the terms' coefficients, a joint each."""
         return _joined(*self._linear(model))
 
     def all(self, model: ExtendedModel) -> list[JointColumns]:
-        """Columns of all parameters, a joint each: slopes of the model's torque.
-
-        Parameters
-        ----------
-        model : ExtendedModel
-            the model
-        """
+        """Columns of all parameters, a joint each: slopes of the model's torque."""
         index, rows = self._linear(model)
         for joint in self._joints:
             places, amplitudes = model.slope_amplitudes(joint)

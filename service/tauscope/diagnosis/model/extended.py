@@ -32,8 +32,6 @@ STATED_ERROR = 0.15
 class ExtendedModel:
     """τ = W(K_v, δ) Θ + Σ effects.
 
-    structure : ModelStructure
-        the nominal columns with their present shape constants
     parameters : (p,) float64
         Θ
     links : (10 n,) float64
@@ -42,10 +40,6 @@ class ExtendedModel:
         shape constants of the friction curve that are estimated along, as logarithms
     stated : tuple of float or None
         for each of these the value that the robot file states, None where it states none
-    terms : tuple of Term
-        effects beside the nominal model
-    held : tuple of int
-        places among Θ that no fit moves
     """
 
     structure: ModelStructure
@@ -72,13 +66,7 @@ class ExtendedModel:
         return tuple({*self.held, *(place for term in self.terms for place in term.displaced)})
 
     def constant(self, place: int) -> float:
-        """Present value of an estimated constant of the friction curve.
-
-        Parameters
-        ----------
-        place : int
-            among `constants`
-        """
+        """Present value of an estimated constant of the friction curve."""
         joint, name = self.constants[place]
         terms = self.structure.terms[joint]
         return terms.k_v if name == "k_v" else terms.delta or 0.0
@@ -137,8 +125,6 @@ class ExtendedModel:
 
         Parameters
         ----------
-        piece : Piece
-            from the observations
         joint : int
             joint index, from 0
         """
@@ -158,25 +144,13 @@ class ExtendedModel:
         return standard
 
     def signals(self, piece: Piece) -> Signals:
-        """One piece of motion with what the nominal part of the model says of it.
-
-        Parameters
-        ----------
-        piece : Piece
-            from the observations
-        """
+        """One piece of motion with what the nominal part of the model says of it."""
         key = self.structure, self.parameters, self.links
         made = _kept_signals(piece).get(tuple(map(id, key)), lambda: (key, self._made_signals(piece)))
         return made[1]
 
     def signals_of_terms(self, piece: Piece) -> Signals:
-        """The same as far as the columns of its terms need it: where none depends on Θ, what is known of any other Θ.
-
-        Parameters
-        ----------
-        piece : Piece
-            from the observations
-        """
+        """The same as far as the columns of its terms need it: where none depends on Θ, that of any other Θ."""
         latest = _kept_signals(piece).latest
         effects = [term.effect for term in self.terms]
         if latest is None or not all(each.of_motion_alone or each.of_motion_and_step for each in effects):
@@ -219,15 +193,7 @@ class ExtendedModel:
         )
 
     def term_torque(self, term: Term, signals: Signals) -> Array:
-        """Torque of one term at the recorded rate, (m, N) or (m, P, N) for the joints that it touches.
-
-        Parameters
-        ----------
-        term : Term
-            of this model
-        signals : Signals
-            one piece of motion
-        """
+        """Torque of one term at the recorded rate, (m, N) or (m, P, N) for the joints that it touches."""
         return np.asarray(np.tensordot(term.coefficients, term_columns(term, signals), axes=1), dtype=np.float64)
 
     def factor(self, joint: int) -> float:
@@ -243,15 +209,7 @@ class ExtendedModel:
         )
 
     def step_sensitivity(self, term: Term, signals: Signals) -> Array:
-        """∂τ/∂log K_v of a term whose torque has friction's step in it, K_v of its own joint, (1, N) or (1, P, N).
-
-        Parameters
-        ----------
-        term : Term
-            of this model, at a joint
-        signals : Signals
-            one piece of motion
-        """
+        """∂τ/∂log K_v of a term whose torque has friction's step in it, K_v of its own joint, (1, N) or (1, P, N)."""
         own = np.arange(len(signals.steepness)) == term.effect.joint
         ahead, behind = (
             self.term_torque(term, _with_steepness(signals, signals.steepness * np.exp(sign * own)))
@@ -260,44 +218,20 @@ class ExtendedModel:
         return (ahead - behind) / (2.0 * STEEPNESS_DIFFERENCE)
 
     def term_derivatives(self, term: Term, signals: Signals) -> Array:
-        """Torque per unit of each of a term's parameters, (c + f, m, N) or (c + f, m, P, N).
-
-        Parameters
-        ----------
-        term : Term
-            of this model
-        signals : Signals
-            one piece of motion
-        """
+        """Torque per unit of each of a term's parameters, (c + f, m, N) or (c + f, m, P, N)."""
         slopes = shape_slopes(term, signals) if term.free_shapes else ()
         by_shape = [np.tensordot(term.coefficients, each, axes=1).astype(np.float64) for each in slopes]
         return np.stack([*term_columns(term, signals), *by_shape])
 
 
 def term_columns(term: Term, signals: Signals) -> Array:
-    """Columns of a term, (c, m, N) or (c, m, P, N) for the joints that it touches.
-
-    Parameters
-    ----------
-    term : Term
-        the effect with its shape
-    signals : Signals
-        one piece of motion
-    """
+    """Columns of a term, (c, m, N) or (c, m, P, N) for the joints that it touches."""
     (columns,) = term.effect.columns(signals, term.shape[None])
     return columns
 
 
 def shape_slopes(term: Term, signals: Signals) -> Array:
-    """Slopes of a term's columns in each of its free shapes, at least one, (f, c, m, N) or (f, c, m, P, N).
-
-    Parameters
-    ----------
-    term : Term
-        the effect with its shape
-    signals : Signals
-        one piece of motion
-    """
+    """Slopes of a term's columns in each of its free shapes, at least one, (f, c, m, N) or (f, c, m, P, N)."""
     free = term.free_shapes
     steps = np.array([shape_step(term, place) for place in free])
     shapes = np.tile(term.shape, (2, len(free), 1))
@@ -323,13 +257,5 @@ def _with_steepness(signals: Signals, steepness: Array) -> Signals:
 
 
 def with_terms(model: ExtendedModel, terms: Sequence[Term]) -> ExtendedModel:
-    """The same nominal part with other effects.
-
-    Parameters
-    ----------
-    model : ExtendedModel
-        the model
-    terms : sequence of Term
-        all effects
-    """
+    """The same nominal part with other effects."""
     return replace(model, terms=tuple(terms))

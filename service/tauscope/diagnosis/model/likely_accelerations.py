@@ -55,10 +55,6 @@ def with_likely_accelerations(observations: Observations, model: ExtendedModel, 
 
     Parameters
     ----------
-    observations : Observations
-        as measured
-    model : ExtendedModel
-        the best that is known, fitted; its residual is what the noise is told from
     cutoff_hz : float
         of the band that torque and columns share [Hz]
     """

@@ -23,11 +23,6 @@ def nominal_model(identification: Identification) -> ExtendedModel:
     """The identified model with its friction curves' constants free, also those that the robot file states.
 
     Rotors, which an identification adds where the data ask for them, are left out: they are effects.
-
-    Parameters
-    ----------
-    identification : Identification
-        the best rigid-body and friction model that the data allow
     """
     constants: list[ShapeParameter] = []
     stated: list[float | None] = []
@@ -49,13 +44,7 @@ def nominal_model(identification: Identification) -> ExtendedModel:
 
 
 def delivered_model(identification: Identification) -> ExtendedModel:
-    """The model that the identification delivers, which is a body's where the free estimate is none's.
-
-    Parameters
-    ----------
-    identification : Identification
-        the result
-    """
+    """The model that the identification delivers, which is a body's where the free estimate is none's."""
     parameters = _without_rotors(identification, identification.parameters)
     return replace(nominal_model(identification), parameters=parameters)
 
@@ -67,13 +56,7 @@ def _without_rotors(identification: Identification, parameters: Array) -> Array:
 
 
 def identified_rotors(identification: Identification) -> dict[int, float]:
-    """Joints whose rotor the identification found, with its inertia [kg m² or kg].
-
-    Parameters
-    ----------
-    identification : Identification
-        the result
-    """
+    """Joints whose rotor the identification found, with its inertia [kg m² or kg]."""
     structure = identification.structure
     columns = {joint: structure.coefficient(joint, "rotor_inertia") for joint in range(structure.robot.joint_count)}
     return {
@@ -84,19 +67,7 @@ def identified_rotors(identification: Identification) -> dict[int, float]:
 def setting_of(
     model: ExtendedModel, observations: Observations, conditioners: Sequence[Conditioner], cutoff_hz: float | None
 ) -> Setting:
-    """The arm and the ranges of its recorded motion.
-
-    Parameters
-    ----------
-    model : ExtendedModel
-        the nominal model
-    observations : Observations
-        the training recordings
-    conditioners : sequence of Conditioner
-        the same, as surveyed
-    cutoff_hz : float or None
-        the band; half the sampling rate where None
-    """
+    """The arm and the ranges of its recorded motion."""
     robot = observations.robot
     motions = [piece.prepared.motion for piece in observations]
     position = np.concatenate([motion.position for motion in motions])

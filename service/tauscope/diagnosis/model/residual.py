@@ -13,15 +13,7 @@ from tauscope.recording.recording import Array
 
 
 def predicted_rows(model: ExtendedModel, piece: Piece) -> Array:
-    """The model's torque in the common band, all repetitions, (n, P M).
-
-    Parameters
-    ----------
-    model : ExtendedModel
-        the model
-    piece : Piece
-        from the observations
-    """
+    """The model's torque in the common band, all repetitions, (n, P M)."""
     total = np.array(piece.repeated(piece.prepared.predicted_rows(model.structure, model.parameters)))
     for term in model.terms:
         touched = list(term.effect.touched(len(total)))
@@ -30,15 +22,7 @@ def predicted_rows(model: ExtendedModel, piece: Piece) -> Array:
 
 
 def full_torque(model: ExtendedModel, piece: Piece) -> Array:
-    """The model's torque at the recorded rate, of the first repetition where they differ, (n, N).
-
-    Parameters
-    ----------
-    model : ExtendedModel
-        the model
-    piece : Piece
-        from the observations
-    """
+    """The model's torque at the recorded rate, of the first repetition where they differ, (n, N)."""
     signals = model.signals(piece)
     total = signals.torque.copy()
     for term in model.terms:
@@ -48,15 +32,7 @@ def full_torque(model: ExtendedModel, piece: Piece) -> Array:
 
 
 def residual_rows(model: ExtendedModel, observations: Observations) -> list[list[Array]]:
-    """Measured less modelled torque in the common band: per joint, per piece, (1, P M).
-
-    Parameters
-    ----------
-    model : ExtendedModel
-        the model
-    observations : Observations
-        the data
-    """
+    """Measured less modelled torque in the common band: per joint, per piece, (1, P M)."""
     predicted = [predicted_rows(model, piece) for piece in observations]
     joints = range(observations.robot.joint_count)
     return [
@@ -66,15 +42,7 @@ def residual_rows(model: ExtendedModel, observations: Observations) -> list[list
 
 
 def raw_squares(model: ExtendedModel, observations: Observations) -> tuple[Array, Array]:
-    """Σ e² and number of samples of every joint at the recorded rate, no filter, (n,) each; motion as it was measured.
-
-    Parameters
-    ----------
-    model : ExtendedModel
-        the model
-    observations : Observations
-        the data
-    """
+    """Σ e² and number of samples of every joint at the recorded rate, (n,) each; nothing is filtered."""
     count = observations.robot.joint_count
     squares, samples = np.zeros(count), np.zeros(count)
     for piece in observations.as_measured or observations:

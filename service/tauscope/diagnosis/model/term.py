@@ -13,14 +13,10 @@ DIFFERENCE = 1e-3
 class Term:
     """An effect in the model.
 
-    effect : Effect
-        its form and place
     shape : (k,) float64
         values of its shape parameters
     coefficients : (c,) float64
         values of its coefficients
-    displaced : tuple of int
-        places among Θ of plain friction that is none beside it, and that no fit moves as long as it is there
     """
 
     effect: Effect
@@ -40,15 +36,7 @@ class Term:
 
 
 def shape_step(term: Term, place: int) -> float:
-    """Step of a shape parameter for its derivative.
-
-    Parameters
-    ----------
-    term : Term
-        the effect in the model
-    place : int
-        which of its shape parameters
-    """
+    """Step of a shape parameter for its derivative."""
     effect = term.effect
     if effect.shapes[place].logarithmic:
         return DIFFERENCE * abs(float(term.shape[place]))

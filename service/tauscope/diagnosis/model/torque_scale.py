@@ -19,28 +19,12 @@ from tauscope.recording.recording import Array
 
 
 def on_the_arm(model: ExtendedModel, term: Term) -> Term:
-    """A term with the coefficients that it has in the arm's own torque; one that is none of the model's as it is.
-
-    Parameters
-    ----------
-    model : ExtendedModel
-        the fitted model
-    term : Term
-        the effect
-    """
+    """A term with the coefficients that it has in the arm's own torque; one that is none of the model's as it is."""
     return scaled_back(model, term) if any(term is each for each in model.terms) else term
 
 
 def scaled_back(model: ExtendedModel, term: Term) -> Term:
-    """A term with the coefficients that it has in the arm's own torque, at whichever shape.
-
-    Parameters
-    ----------
-    model : ExtendedModel
-        the fitted model, which has the term's effect
-    term : Term
-        the effect, in the recorded torque
-    """
+    """A term with the coefficients that it has in the arm's own torque, at whichever shape."""
     if not _is_scaled(model, term):
         return term
     return replace(term, coefficients=term.coefficients / model.factor(term.effect.joint or 0))
@@ -53,10 +37,6 @@ def covariance_on_the_arm(model: ExtendedModel, place: int, covariance: Array) -
 
     Parameters
     ----------
-    model : ExtendedModel
-        the fitted model
-    place : int
-        of the term among the model's
     covariance : (p, p) float64
         of all its parameters
     """

@@ -49,28 +49,14 @@ MOST_TAKEN_BACK = 8
 
 @dataclass(frozen=True, eq=False)
 class Primitive:
-    """One motion of the bank.
-
-    kind : str
-        what it is, in words
-    trajectory : Trajectory
-        from rest to rest, within the limits
-    """
+    """One motion of the bank."""
 
     kind: str
     trajectory: Trajectory
 
 
 class Bank:
-    """Makes motions for one arm.
-
-    Parameters
-    ----------
-    identification : Identification
-        the arm, and the model that predicts its torque
-    rng : numpy.random.Generator
-        source of the motions
-    """
+    """Makes motions for one arm."""
 
     def __init__(self, identification: Identification, rng: np.random.Generator) -> None:
         self._rng = rng
@@ -92,13 +78,7 @@ class Bank:
         self._postures = first.feasibility.standing_postures(self._rng)
 
     def first_look(self, of_each: int) -> Iterator[Primitive]:
-        """Some motions of every kind.
-
-        Parameters
-        ----------
-        of_each : int
-            Fourier series of each kind
-        """
+        """Some motions of every kind."""
         for kind in KINDS:
             yield from self.fourier(kind, of_each)
         for share in SWEEP_SHARES:
@@ -106,13 +86,7 @@ class Bank:
         yield from self._slow_reversals()
 
     def everywhere(self, count: int) -> Iterator[Primitive]:
-        """Motions through as much of the ranges of positions and speeds as one takes in, slow reversals included.
-
-        Parameters
-        ----------
-        count : int
-            how many are tried
-        """
+        """Motions through as much of the ranges of positions and speeds as one takes in, slow reversals included."""
         setting = self._settings[WIDE]
         for _ in range(count):
             drawn = (setting.feasibility.random_start(self._postures, self._rng) for _ in range(WIDEST_OF))
@@ -130,15 +104,7 @@ class Bank:
         return float((np.ptp(position, axis=0) / (2.0 * self._limits.half_range)).min())
 
     def fourier(self, kind: str, count: int) -> Iterator[Primitive]:
-        """Random Fourier series about random postures.
-
-        Parameters
-        ----------
-        kind : str
-            of `KINDS`
-        count : int
-            how many are tried
-        """
+        """Random Fourier series about random postures."""
         setting = self._settings[kind]
         for _ in range(count):
             x = setting.feasibility.random_start(self._postures, self._rng)

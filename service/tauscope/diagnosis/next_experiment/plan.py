@@ -36,15 +36,8 @@ MOST_OPTIONS = 4
 class PlannedExperiment:
     """The next motion.
 
-    trajectory : Trajectory
-        within the arm's limits, from rest to rest
-    kind : str
-        what it is, in words
     separates : tuple of (str, int or None)
         effects and places that it tells apart; empty where it is to show more of everything
-    before, after : float
-        standard errors by which the two hardest to tell apart differ without it and with it; of information, the mean
-        logarithm of the standard errors of the parameters that it is for
     """
 
     trajectory: Trajectory
@@ -62,13 +55,7 @@ class PlannedExperiment:
 
 
 def is_wanted(diagnosis: Diagnosis) -> bool:
-    """Whether anything is open that a motion decides.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        of the recordings that there are
-    """
+    """Whether anything is open that a motion decides."""
     open_verdicts = (Verdict.INCONCLUSIVE, Verdict.UNEXPLAINED)
     return diagnosis.verdict in open_verdicts or any(finding.alternatives for finding in diagnosis.findings)
 
@@ -77,15 +64,6 @@ def plan_experiment(
     diagnosis: Diagnosis, *, seed: int = 0, progress: Callable[[str], None] = lambda step: None
 ) -> PlannedExperiment:
     """Plan the recording to make next.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        of the recordings that there are
-    seed : int
-        of the bank of motions
-    progress : callable
-        told the name of each step as it begins
 
     Raises
     ------
@@ -124,15 +102,6 @@ def planned_experiment(
 ) -> PlannedExperiment | None:
     """The recording to make next where anything is open, None where nothing is or the limits allow no motion.
 
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        of the recordings that there are
-    progress : callable
-        told the name of each step as it begins
-    asked : bool
-        whether a motion is wanted in any case: then limits that allow none are an error
-
     Raises
     ------
     ExcitationError
@@ -169,8 +138,6 @@ class _Judge:
         the same of the recordings
     wanted : (k,) int
         parameters that are to be known better
-    inflation : float
-        factor by which the residual exceeds the modelled noise
     """
 
     separates: tuple[tuple[str, int | None], ...]

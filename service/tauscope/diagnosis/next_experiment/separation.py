@@ -28,11 +28,7 @@ UNKNOWN = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Played:
-    """A motion as the diagnosis would see it, without torque.
-
-    fitter : Fitter
-        of its rows, with the noise of the recordings that there are
-    """
+    """A motion as the diagnosis would see it, without torque."""
 
     fitter: Fitter
 
@@ -42,12 +38,6 @@ def played(trajectory: Trajectory, observations: Observations, model: ExtendedMo
 
     Parameters
     ----------
-    trajectory : Trajectory
-        the motion
-    observations : Observations
-        the recordings that there are, noise known
-    model : ExtendedModel
-        the nominal model
     cutoff_hz : float
         band of the comparison [Hz]
     """
@@ -75,17 +65,7 @@ def _measured(position: Array, noises: Sequence[PositionNoise], rate_hz: float) 
 
 
 def equations(model: ExtendedModel, fitter: Fitter, others: Sequence[ExtendedModel] = ()) -> Array:
-    """A model's whitened columns, and beside them the differences to other models' torque, as few rows, (r, p + o).
-
-    Parameters
-    ----------
-    model : ExtendedModel
-        whose parameters may imitate
-    fitter : Fitter
-        of the rows
-    others : sequence of ExtendedModel
-        what may be imitated
-    """
+    """A model's whitened columns, and beside them the differences to other models' torque, as few rows, (r, p + o)."""
     own = fitter.white_residual(model)
     differences = [
         [mine - theirs for mine, theirs in zip(own, fitter.white_residual(other), strict=True)] for other in others
@@ -106,8 +86,6 @@ def separations(model: ExtendedModel, stacked: Array) -> Array:
 
     Parameters
     ----------
-    model : ExtendedModel
-        whose parameters may imitate
     stacked : (r, p + o) float64
         its `equations` of all recordings
     """
@@ -126,8 +104,6 @@ def log_variances(model: ExtendedModel, stacked: Array) -> Array:
 
     Parameters
     ----------
-    model : ExtendedModel
-        the model
     stacked : (r, p) float64
         its `equations` of all recordings
     """

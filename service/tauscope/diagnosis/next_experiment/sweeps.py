@@ -29,10 +29,6 @@ def sweep(limits: MotionLimits, share: float, duration_s: float) -> SampledSegme
 
     Parameters
     ----------
-    limits : MotionLimits
-        limits of every joint
-    share : float
-        part of the speed limit
     duration_s : float
         how long [s]
     """

@@ -40,19 +40,7 @@ WORSE = 1.02
 def beside_events(
     observations: Observations, known: Observations, model: ExtendedModel, effects: Sequence[Effect]
 ) -> tuple[Observations, bool]:
-    """The observations with the noise that is left beside what happens once, and whether repetitions still tell it.
-
-    Parameters
-    ----------
-    observations : Observations
-        the data
-    known : Observations
-        the same with the noise that repetitions show
-    model : ExtendedModel
-        the nominal model
-    effects : sequence of Effect
-        the catalogue
-    """
+    """The observations with the noise that is left beside what happens once, and whether repetitions still tell it."""
     passing = [effect for effect in effects if not effect.repeats_with_motion]
     best, pure_error = known, True
     rows = observations.with_noise(_white(observations, model))

@@ -39,17 +39,7 @@ NO_BETTER = 0.8
 def with_noise(
     observations: Observations, model: ExtendedModel, effects: Sequence[Effect]
 ) -> tuple[Observations, bool]:
-    """The observations with their noise known, and whether it is pure error at every joint.
-
-    Parameters
-    ----------
-    observations : Observations
-        the data
-    model : ExtendedModel
-        the nominal model, fitted
-    effects : sequence of Effect
-        the catalogue, for the saturated fit
-    """
+    """The observations with their noise known, and whether it is pure error at every joint."""
     known = with_pure_error(observations, model)
     if known is None:
         told = _saturated_noise(observations, model, effects, _joints(observations))
@@ -58,15 +48,7 @@ def with_noise(
 
 
 def with_pure_error(observations: Observations, model: ExtendedModel) -> Observations | None:
-    """The observations with the noise that repetitions show; None where they are too few at some joint.
-
-    Parameters
-    ----------
-    observations : Observations
-        the data
-    model : ExtendedModel
-        any model; the motion of each repetition is its own
-    """
+    """The observations with the noise that repetitions show; None where they are too few at some joint."""
     differences = [] if rounding_repeats(observations) else list(repeated_differences(observations, model))
     pure = [[(rows[j], used[j], factor) for rows, used, factor in differences] for j in _joints(observations)]
     if any(sum(int(used.sum()) for _, used, _ in parts) < FEWEST_ROWS for parts in pure):
@@ -79,13 +61,6 @@ def repeated_differences(
     observations: Observations, model: ExtendedModel
 ) -> Iterator[tuple[Array, NDArray[np.bool_], float]]:
     """What the residual of a period differs by from that of the period before: noise, whatever the model lacks.
-
-    Parameters
-    ----------
-    observations : Observations
-        the data
-    model : ExtendedModel
-        any model; the motion of each repetition is its own
 
     Yields
     ------

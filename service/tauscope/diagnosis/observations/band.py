@@ -64,10 +64,6 @@ def diagnosis_cutoff(conditioners: Sequence[Conditioner], identification: Identi
 
     Parameters
     ----------
-    conditioners : sequence of Conditioner
-        the training recordings
-    identification : Identification
-        of the nominal model
     steepness : (n,) float64
         K_v of every joint's friction [s/rad or s/m]
     """
@@ -90,10 +86,6 @@ def wider_cutoff(
 
     Parameters
     ----------
-    conditioners : sequence of Conditioner
-        the training recordings
-    identification : Identification
-        of the nominal model
     steepness : (n,) float64
         K_v of every joint's friction [s/rad or s/m]
     cutoff_hz : float
@@ -121,8 +113,6 @@ def state_cutoffs(conditioner: Conditioner, cutoff_hz: float | None, steepness: 
 
     Parameters
     ----------
-    conditioner : Conditioner
-        a recording
     cutoff_hz : float or None
         of the common band [Hz]; None for no filter
     steepness : (n,) float64 or None
@@ -141,8 +131,6 @@ def quiet_cutoffs(conditioner: Conditioner, cutoff_hz: float | None, steepness: 
 
     Parameters
     ----------
-    conditioner : Conditioner
-        a recording
     cutoff_hz : float or None
         of the common band [Hz]; None for no filter
     steepness : (n,) float64 or None
@@ -166,12 +154,8 @@ def step_bands(conditioner: Conditioner, steepness: Array, blurred: float) -> Ar
 
     Parameters
     ----------
-    conditioner : Conditioner
-        a recording
     steepness : (n,) float64
         K_v of every joint's friction [s/rad or s/m]
-    blurred : float
-        noise of the velocity, relative to the width 1/K_v of friction's step
     """
     density = conditioner.noise.density
     widths = 3.0 * (blurred / np.maximum(steepness, 1e-9)) ** 2 / (4.0 * np.pi**2)
@@ -180,15 +164,7 @@ def step_bands(conditioner: Conditioner, steepness: Array, blurred: float) -> Ar
 
 
 def explained_share(conditioners: Sequence[Conditioner], identification: Identification) -> float:
-    """Part of the torque's variance, over all joints, that a model explains.
-
-    Parameters
-    ----------
-    conditioners : sequence of Conditioner
-        the training recordings
-    identification : Identification
-        of the model
-    """
+    """Part of the torque's variance, over all joints, that a model explains."""
     values = [c.recording.joint_torque(s.effort, c.robot) for c in conditioners for s in c.usable_samples()]
     torque = np.concatenate(values)
     variance = float(np.nansum(np.nanvar(torque, axis=0)))

@@ -38,8 +38,6 @@ class Repetition:
         since the beginning of the recording [s]
     length_s : float
         of one period [s]
-    count : int
-        whole periods
     """
 
     start_s: float
@@ -51,8 +49,6 @@ class Repetition:
 class Piece:
     """One piece of motion with the torque of every repetition in the common band.
 
-    prepared : PreparedMotion
-        motion and rigid-body columns
     torque : (n, P, M) float64
         measured torque in the common band
     used : (n, P, M) bool
@@ -61,16 +57,12 @@ class Piece:
         instants at the recorded rate, from the beginning of the recording [s]
     state_hz : (n,) float64
         band of each joint's own motion [Hz]
-    position_noise : PositionNoise
-        noise and rounding of the measured positions
     by_position : (n,) bool
         joints whose acceleration was made of their positions
     quiet_hz : (n,) float64 or None
         bands in which the velocities say most of single samples [Hz]; None for no filter
     rigid_hz : float or None
         band in which the accelerations do [Hz]; None for no filter
-    memory : dict
-        what others have made of this piece and may need again
     """
 
     prepared: PreparedMotion
@@ -159,18 +151,6 @@ class Piece:
 class Observations:
     """All pieces of some recordings.
 
-    robot : Robot
-        the arm
-    pieces : tuple of Piece
-        in the order of the recordings
-    names : tuple of str
-        the recordings
-    noise : tuple of JointNoise
-        one a joint; empty until it is known
-    repetitions : tuple of tuple of Repetition
-        where each recording's motion repeats
-    weightings : tuple of RowWeighting
-        how much the whitened rows of each joint count; empty where all count alike
     as_measured : Observations or None
         the same recordings with their motion as it was measured, by which residuals are stated; None where these are
     """
@@ -196,12 +176,6 @@ class Observations:
 
         Parameters
         ----------
-        conditioners : sequence of Conditioner
-            the surveyed recordings
-        robot : Robot
-            the arm
-        base : BaseParameters
-            its identifiable combinations
         cutoff_hz : float or None
             the common band [Hz]; None for no filter
         steepness : (n,) float64 or None
@@ -230,23 +204,11 @@ class Observations:
         )
 
     def with_noise(self, noise: Sequence[JointNoise]) -> "Observations":
-        """The same rows with their noise known.
-
-        Parameters
-        ----------
-        noise : sequence of JointNoise, length n
-            one a joint
-        """
+        """The same rows with their noise known."""
         return replace(self, noise=tuple(noise), weightings=(), _kept={})
 
     def with_weightings(self, weightings: Sequence[RowWeighting]) -> "Observations":
-        """The same rows, counting as much as they say.
-
-        Parameters
-        ----------
-        weightings : sequence of RowWeighting
-            one a joint, or none where all rows count alike
-        """
+        """The same rows, counting as much as they say."""
         return replace(self, weightings=tuple(weightings))
 
     def without_joints(self, joints: Collection[int]) -> "Observations":
@@ -286,7 +248,7 @@ class Observations:
         return self.weightings[joint].applied(counted) if self.weightings else counted
 
     def kept(self, joint: int) -> BoolArray:
-        """Whitened rows that count.
+        """Mask of the whitened rows that count, (rows,).
 
         Parameters
         ----------

@@ -21,13 +21,7 @@ FEWEST_SAMPLES = 64
 
 @dataclass(frozen=True)
 class PeriodPair:
-    """Samples of all periods but the last of a run, and those a period later, between two samples each.
-
-    earlier, near, far : slice
-        samples of the piece
-    part : float
-        how far the later instants lie from `near` to `far`, 0 to 1
-    """
+    """Samples of all periods but the last of a run, and those a period later, between two samples each."""
 
     earlier: slice
     near: slice
@@ -51,20 +45,7 @@ class PeriodPair:
 
 
 def period_pairs(observations: Observations, piece: Piece) -> Iterator[PeriodPair]:
-    """The repeated parts of a piece.
-
-    Parameters
-    ----------
-    observations : Observations
-        the data, which know what repeats
-    piece : Piece
-        one of theirs
-
-    Yields
-    ------
-    PeriodPair
-        one a run of periods
-    """
+    """The repeated parts of a piece."""
     number, motion = piece.prepared.recording, piece.prepared.motion
     runs = observations.repetitions[number] if 0 <= number < len(observations.repetitions) else ()
     for run in runs:
@@ -80,13 +61,7 @@ def period_pairs(observations: Observations, piece: Piece) -> Iterator[PeriodPai
 
 
 def rounding_repeats(observations: Observations) -> bool:
-    """Whether the positions' noise is the same in every period at some joint that moves.
-
-    Parameters
-    ----------
-    observations : Observations
-        the data
-    """
+    """Whether the positions' noise is the same in every period at some joint that moves."""
     for piece in observations:
         velocity = piece.prepared.motion.velocity.T
         moves = np.abs(velocity).max(axis=1) > STANDING * piece.velocity_std

@@ -52,13 +52,7 @@ class RowWeighting:
 
     @staticmethod
     def certain(count: int) -> "RowWeighting":
-        """For columns of whose errors nothing is said.
-
-        Parameters
-        ----------
-        count : int
-            rows R
-        """
+        """For columns of whose errors nothing is said."""
         return RowWeighting(np.ones(count), np.empty((0, count)), np.empty(0))
 
     def applied(self, rows: Array) -> Array:

@@ -25,16 +25,7 @@ band's own filter has cut."""
 
 @dataclass(frozen=True, eq=False)
 class JointNoise:
-    """Noise e_t = Σ a_k e_{t-k} + ε_t of one joint's rows in the common band.
-
-    model : Autoregression
-        its coefficients and variances
-    share : float
-        independent rows among a hundred, as a fraction: rows are closer than the band asks for, and above the band
-        there is no noise
-    over_repetitions : float
-        its power over that of what repetitions differ by, where it is far more: then most of it is no noise; else 1
-    """
+    """Noise e_t = Σ a_k e_{t-k} + ε_t of one joint's rows in the common band."""
 
     model: Autoregression
     share: float = 1.0
@@ -51,13 +42,7 @@ class JointNoise:
         return self.model.order
 
     def times(self, factor: float) -> "JointNoise":
-        """Noise of the same colour, so many times as large.
-
-        Parameters
-        ----------
-        factor : float
-            to its standard deviation
-        """
+        """Noise of the same colour, so many times as large."""
         power = factor**2
         model = Autoregression(
             self.model.coefficients, power * self.model.innovation_variance, power * self.model.variance
@@ -100,8 +85,6 @@ def fitted_noise(pieces: Iterable[tuple[Array, NDArray[np.bool_], float]], band_
     ----------
     pieces : iterable of ((T,) float64, (T,) bool, float)
         consecutive rows, which of them count, and the factor that turns their power into the noise's
-    band_share : float
-        the band's cut-off relative to the rows' own highest frequency
     """
     pieces = list(pieces)
     total = AutocovarianceSum()

@@ -23,12 +23,8 @@ def effective_number(found: Moments, columns: Sequence[Mapping[int, Array]], rng
 
     Parameters
     ----------
-    found : Moments
-        of all shapes of one form, g of them with c columns each
     columns : sequence of mappings of int to (g_i, c, R_j) float64
         the same shapes' whitened columns at every joint, in order
-    rng : numpy.random.Generator
-        of the draws
     """
     shapes, count = found.target.shape
     inner = found.inner.reshape(shapes * count, -1)

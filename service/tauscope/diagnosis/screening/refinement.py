@@ -16,19 +16,7 @@ ZOOMS = 3
 
 
 def refined(candidate: Candidate, fit: Fit, screen: Screen, signals: Sequence[Signals]) -> Candidate:
-    """The candidate at the best shape near its grid point, or near the same in another form.
-
-    Parameters
-    ----------
-    candidate : Candidate
-        at its best point of the grid
-    fit : Fit
-        the model so far
-    screen : Screen
-        of the observations
-    signals : sequence of Signals
-        of every piece under that model
-    """
+    """The candidate at the best shape near its grid point, or near the same in another form."""
     kinds = refined_kinds(candidate, fit, screen, signals)
     effect, shapes = candidate.effect, np.array([each.shape for each in kinds])
     worth = np.array([each.gain for each in kinds]) - effect.reluctance(shapes)
@@ -37,19 +25,7 @@ def refined(candidate: Candidate, fit: Fit, screen: Screen, signals: Sequence[Si
 
 
 def refined_kinds(candidate: Candidate, fit: Fit, screen: Screen, signals: Sequence[Signals]) -> list[Candidate]:
-    """The candidate at the best shape near its grid point, then at the best near the same of each other kind.
-
-    Parameters
-    ----------
-    candidate : Candidate
-        at a point of its grid
-    fit : Fit
-        the model so far
-    screen : Screen
-        of the observations
-    signals : sequence of Signals
-        of every piece under that model
-    """
+    """The candidate at the best shape near its grid point, then at the best near the same of each other kind."""
 
     def best_of(shapes: Array) -> tuple[int, Candidate]:
         return best_of_shapes(candidate, candidate.effect, shapes, fit, screen, signals)
@@ -65,18 +41,8 @@ def best_of_shapes(
 
     Parameters
     ----------
-    candidate : Candidate
-        of this form, or of another one of the same effect
-    effect : Effect
-        the form
     shapes : (g, k) float64
         values of its shape parameters
-    fit : Fit
-        the model so far
-    screen : Screen
-        of the observations
-    signals : sequence of Signals
-        of every piece under that model
     """
     found = screen.at_shapes(effect, shapes, fit, signals)
     gains, coefficients = statistics(found, [each.positive for each in effect.coefficients])

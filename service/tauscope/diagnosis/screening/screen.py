@@ -38,8 +38,6 @@ explain errs by as much, far less than between two shapes of a grid. Whoever ref
 class Candidate:
     """One form of an effect beside a fitted model, at its best shape.
 
-    effect : Effect
-        form and place
     shape : (k,) float64
         the best shape
     coefficients : (c,) float64
@@ -48,13 +46,6 @@ class Candidate:
         T, what it takes off the residual's energy [noise variances]
     gram : (c, c) float64
         of its projected columns at that shape
-    visible : bool
-        whether any data of this kind could show it
-    shapes_tried : float
-        effective number of independent shapes, at least 1
-    information : float
-        energy of the first coefficient's projected column per unit, the median over the visible shapes: the inverse of
-        its variance
     """
 
     effect: Effect
@@ -77,17 +68,7 @@ class Candidate:
         return self.gain - self.count - 2.0 * float(np.log(self.shapes_tried))
 
     def p_value(self, inflation: float = 1.0, *, refined: bool = False, freedom: float = np.inf) -> float:
-        """Chance that noise alone explains as much somewhere on this form's grid.
-
-        Parameters
-        ----------
-        inflation : float
-            factor by which the residual exceeds the modelled noise
-        refined : bool
-            whether the shape was moved between the grid's points: then noise had that freedom too
-        freedom : float
-            rows from which the noise's size is known, less parameters; infinite where it needs no estimate
-        """
+        """Chance that noise alone explains as much somewhere on this form's grid."""
         free = sum(self.effect.is_free(place) for place in range(len(self.shape))) if refined else 0
         count = self.count + free
         share = max(self.gain, 0.0) / inflation
@@ -124,19 +105,7 @@ class _Kept:
 
 
 class Screen:
-    """Screens effects on the same observations; effective numbers of shapes are worked out once.
-
-    Parameters
-    ----------
-    observations : Observations
-        the data, noise known
-    effects : sequence of Effect
-        all forms to look at
-    seed : int
-        of the draws for the effective numbers
-    count_all : bool
-        whether every window counts, as if none resembled another: quicker, and never too bold
-    """
+    """Screens effects on the same observations; effective numbers of shapes are worked out once."""
 
     def __init__(
         self, observations: Observations, effects: Sequence[Effect], seed: int = 0, *, count_all: bool = False
@@ -151,15 +120,7 @@ class Screen:
         self._found: dict[Fit, dict[int, Candidate]] = {}
 
     def candidates(self, fit: Fit, wanted: Callable[[Effect], bool] = lambda effect: True) -> list[Candidate]:
-        """Every form that is wanted at its best shape on the grid.
-
-        Parameters
-        ----------
-        fit : Fit
-            the model so far
-        wanted : callable
-            whether an effect is looked at
-        """
+        """Every form that is wanted at its best shape on the grid."""
         places = [at for at, effect in enumerate(self.effects) if wanted(effect)]
         if fit not in self._found:
             if len(self._found) > 1:
@@ -180,14 +141,8 @@ class Screen:
 
         Parameters
         ----------
-        effect : Effect
-            the form
         shapes : (g, k) float64
             shapes
-        fit : Fit
-            the model so far
-        signals : sequence of Signals
-            of every piece
         """
         return moments(fit.projection, self.white_columns(effect, shapes, signals))
 
@@ -196,12 +151,8 @@ class Screen:
 
         Parameters
         ----------
-        effect : Effect
-            the form
         shapes : (g, k) float64
             shapes
-        signals : sequence of Signals
-            of every piece
         """
         touched = effect.touched(self.observations.robot.joint_count)
         rows: dict[int, list[Array]] = {joint: [] for joint in touched}
@@ -289,13 +240,5 @@ class Screen:
 
 
 def model_signals(model: ExtendedModel, observations: Observations) -> list[Signals]:
-    """Signals of every piece under a model.
-
-    Parameters
-    ----------
-    model : ExtendedModel
-        the model
-    observations : Observations
-        the data
-    """
+    """Signals of every piece under a model."""
     return [model.signals(piece) for piece in observations]

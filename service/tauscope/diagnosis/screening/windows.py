@@ -26,15 +26,7 @@ Windows = Mapping[int, sparse.csr_array]
 
 
 def windows_on_rows(effect: TimeLocalEffect, observations: Observations) -> Windows:
-    """Every window of an effect's grid on the rows of the joints that it touches.
-
-    Parameters
-    ----------
-    effect : TimeLocalEffect
-        the form
-    observations : Observations
-        the data, noise known
-    """
+    """Every window of an effect's grid on the rows of the joints that it touches."""
     interval = 1.0 / observations.pieces[0].prepared.motion.band.rate_hz
     return {
         joint: _on_rows(effect.grid, *observations.row_labels(joint), interval)
@@ -61,17 +53,7 @@ def _on_rows(shapes: Array, recording: IndexArray, instants: Array, interval_s: 
 
 
 def white_torque(effect: TimeLocalEffect, observations: Observations, signals: Sequence[Signals]) -> dict[int, Array]:
-    """The effect's torque without any window, whitened, (c, R_j) a joint.
-
-    Parameters
-    ----------
-    effect : TimeLocalEffect
-        the form
-    observations : Observations
-        the data, noise known
-    signals : sequence of Signals
-        of every piece
-    """
+    """The effect's torque without any window, whitened, (c, R_j) a joint."""
     touched = effect.touched(observations.robot.joint_count)
     rows: dict[int, list[Array]] = {joint: [] for joint in touched}
     for piece, own in zip(observations, signals, strict=True):
@@ -90,8 +72,6 @@ def windowed_moments(white: Mapping[int, Array], windows: Windows, fit: Fit) -> 
         the whitened torque
     windows : mapping of int to (g, R_j) sparse array
         the windows
-    fit : Fit
-        the model so far
     """
     target, inner, gram = 0.0, 0.0, 0.0
     for joint, rows in white.items():
@@ -114,16 +94,10 @@ def windows_tried(
 
     Parameters
     ----------
-    found : Moments
-        of all windows
     white : mapping of int to (c, R_j) float64
         the whitened torque
     windows : mapping of int to (g, R_j) sparse array
         the windows
-    fit : Fit
-        the model that they stand beside
-    rng : numpy.random.Generator
-        of the draws
     """
     shapes, count = found.target.shape
     projected = np.zeros((fit.projection.spread.shape[1], DRAWS))

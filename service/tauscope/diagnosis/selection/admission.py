@@ -32,17 +32,7 @@ GUESSED = 0.01
 
 
 class Admission:
-    """What is asked of an effect on given observations.
-
-    Parameters
-    ----------
-    screen : Screen
-        of the training recordings
-    pure_error : bool
-        whether the noise is known from repetitions
-    looked_at_before : int
-        forms that were looked at with another screen, and count as well
-    """
+    """What is asked of an effect on given observations."""
 
     def __init__(self, screen: Screen, *, pure_error: bool, looked_at_before: int = 0) -> None:
         self.screen = screen
@@ -55,28 +45,13 @@ class Admission:
         return LEVEL / max(self._looked_at_before + len(self.screen.effects), 1)
 
     def inflation(self, fit: Fit) -> float:
-        """By how much the residual exceeds the modelled noise; where nothing repeats, the residual itself is right.
-
-        Parameters
-        ----------
-        fit : Fit
-            the model
-        """
+        """By how much the residual exceeds the modelled noise; where nothing repeats, the residual itself is right."""
         return fit.inflation(at_least=1.0 if self.pure_error else GUESSED)
 
     def p_value(self, option: Option, fit: Fit, *, blocks: bool) -> float:
         """Chance of the gain; without pure error its variance is taken from blocks of a second where that is larger.
 
         A further order of what was found before needs no such care: the orders still missing are what the blocks see.
-
-        Parameters
-        ----------
-        option : Option
-            the effect, fitted
-        fit : Fit
-            the model without it
-        blocks : bool
-            whether blocks are asked
         """
         candidate = replace(option.candidate, gain=max(option.gain, 0.0))
         inflation = self._inflation_there(option)
@@ -115,13 +90,6 @@ class Admission:
         """Whether the last term's coefficients differ from zero with everything else open, its own shapes included.
 
         cᵀ C⁻¹ c, C of the joint covariance: a shape that the data leave open makes a gain out of other columns' errors.
-
-        Parameters
-        ----------
-        fit : Fit
-            the model with it
-        fitter : Fitter
-            of the recordings
         """
         place, count = fit.model.term_places()[-1], len(fit.model.terms[-1].coefficients)
         own = slice(place.start, place.start + count)
@@ -130,19 +98,7 @@ class Admission:
         return float(coefficients @ np.linalg.pinv(covariance, hermitian=True) @ coefficients) > DETERMINED**2
 
     def large_enough(self, option: Option, fit: Fit, choices: Sequence[Choice], *, known: bool) -> bool:
-        """Whether it explains a worthwhile share of what is left at its joints, and of what the largest effect did.
-
-        Parameters
-        ----------
-        option : Option
-            the effect, fitted
-        fit : Fit
-            the model without it
-        choices : sequence of Choice
-            what that model has
-        known : bool
-            whether it is one more term of an effect that the model has
-        """
+        """Whether it explains a worthwhile share of what is left at its joints, and of what the largest effect did."""
         if self.pure_error:
             return True
         largest = max((choice.options[0].gain for choice in choices), default=0.0)
@@ -151,15 +107,7 @@ class Admission:
         return option.gain > self._smallest_gain(option.candidate, fit)
 
     def may_be_large_enough(self, candidate: Candidate, fit: Fit) -> bool:
-        """Whether it may explain a worthwhile share of what is left at its joints, once everything is fitted anew.
-
-        Parameters
-        ----------
-        candidate : Candidate
-            the effect, as screened
-        fit : Fit
-            the model without it
-        """
+        """Whether it may explain a worthwhile share of what is left at its joints, once everything is fitted anew."""
         return self.pure_error or MORE_THAN_SCREENED * candidate.gain > self._smallest_gain(candidate, fit)
 
     def _smallest_gain(self, candidate: Candidate, fit: Fit) -> float:

@@ -13,22 +13,7 @@ from tauscope.diagnosis.selection.blocks import add_block_sums
 
 
 def score_inflation(term: Term, before: Fit, after: Fit, screen: Screen) -> tuple[float, int]:
-    """Variance of a term's score over blocks, relative to that of white noise of the modelled size.
-
-    Parameters
-    ----------
-    term : Term
-        as fitted in `after`
-    before, after : Fit
-        models without and with it
-    screen : Screen
-        of the observations
-
-    Returns
-    -------
-    tuple of float and int
-        the ratio, and the number of blocks
-    """
+    """Variance of a term's score over blocks, relative to that of white noise of the modelled size."""
     observations = screen.observations
     white = screen.white_columns(term.effect, term.shape[None], model_signals(before.model, observations))
     rows = {joint: term.coefficients @ columns[0] for joint, columns in white.items()}

@@ -25,10 +25,6 @@ Place = tuple[str, int | None]
 class Option:
     """A form in the model, fitted with everything else free.
 
-    candidate : Candidate
-        as screened
-    fit : Fit
-        the model with it
     gain : float
         decrease of the residual's energy [noise variances]
     """
@@ -49,8 +45,6 @@ class Kind:
 
     behind : float
         by how much less it explains, parameters and what the usual kind is preferred by counted [noise variances]
-    term : Term
-        the effect, in the arm's own torque
     """
 
     behind: float
@@ -61,16 +55,8 @@ class Kind:
 class Choice:
     """One step of the selection.
 
-    options : tuple of Option
-        the chosen one first, then those that explain nearly as much, best first; each effect at each place once
     confirmation : Confirmation or None
         what held-out recordings say of the chosen one; None where there are none
-    p_value : float
-        of the chosen one, family-wise
-    was_given : bool
-        whether others had found it, so that nothing else was looked at in its place
-    kinds : tuple of Kind
-        other kinds of the chosen one; known only once all that is missing is in the model
     """
 
     options: tuple[Option, ...]
@@ -82,17 +68,7 @@ class Choice:
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """What was selected.
-
-    nominal : Fit
-        the model without effects
-    fit : Fit
-        the model with all that were selected
-    choices : tuple of Choice
-        one a term of the model, in the order of selection
-    rejected : tuple of Choice
-        significant in training, not confirmed by held-out recordings
-    """
+    """What was selected."""
 
     nominal: Fit
     fit: Fit
@@ -101,28 +77,12 @@ class Selection:
 
 
 def place_of(candidate: Candidate) -> Place:
-    """Which effect where.
-
-    Parameters
-    ----------
-    candidate : Candidate
-        any form of it
-    """
+    """Which effect where."""
     return candidate.effect.id, candidate.effect.joint
 
 
 def is_physical(option: Option, before: Fit, *, instead: bool = False) -> bool:
-    """Whether the term explains anything with coefficients that can be, and leaves friction that can be.
-
-    Parameters
-    ----------
-    option : Option
-        the last term of its model
-    before : Fit
-        the model without it
-    instead : bool
-        whether it is to explain more than others in whose place it stands: what those of the model leave is no doubt
-    """
+    """Whether the term explains anything with coefficients that can be, and leaves friction that can be."""
     term = option.fit.model.terms[-1]
     signs = zip(term.effect.coefficients, term.coefficients, strict=True)
     possible = all(
@@ -137,15 +97,7 @@ def is_physical(option: Option, before: Fit, *, instead: bool = False) -> bool:
 
 
 def driving(fit: Fit, *, certain: float = CERTAIN) -> set[tuple[int, str]]:
-    """Joints and coefficients at which the nominal friction would drive the motion.
-
-    Parameters
-    ----------
-    fit : Fit
-        the model
-    certain : float
-        by how many standard errors
-    """
+    """Joints and coefficients at which the nominal friction would drive the motion."""
     model, std = fit.model, np.sqrt(np.maximum(np.diag(fit.covariance), 0.0) * fit.inflation())
     found = set()
     for joint in range(model.structure.robot.joint_count):
@@ -157,13 +109,7 @@ def driving(fit: Fit, *, certain: float = CERTAIN) -> set[tuple[int, str]]:
 
 
 def distinct(options: Sequence[Option]) -> tuple[Option, ...]:
-    """Each effect at each place once, the first of several forms.
-
-    Parameters
-    ----------
-    options : sequence of Option
-        best first
-    """
+    """Each effect at each place once, the first of several forms."""
     kept: list[Option] = []
     for option in options:
         if place_of(option.candidate) not in [place_of(other.candidate) for other in kept]:
@@ -172,15 +118,7 @@ def distinct(options: Sequence[Option]) -> tuple[Option, ...]:
 
 
 def outsized(option: Option, observations: Observations) -> bool:
-    """Whether the last term's torque exceeds all that was measured at a joint: it then only cancels other columns.
-
-    Parameters
-    ----------
-    option : Option
-        the effect, fitted
-    observations : Observations
-        the recordings
-    """
+    """Whether the last term's torque exceeds all that was measured at a joint: it then only cancels other columns."""
     term = option.fit.model.terms[-1]
     if term.effect.may_exceed_measured:
         return False

@@ -63,16 +63,6 @@ class Confirmation:
 
     gain : float
         what the finding takes off the predicted residual's energy there [noise variances]
-    gain_z : float
-        the same in its own standard errors, from blocks of one second
-    expected_z : float
-        standard errors from zero at which the finding would be seen there if it is what training says
-    seen_z : float
-        the same as estimated there, beside nominal parameters of these recordings' own
-    favour : float
-        logarithm of how much likelier the held-out recordings are with the finding than without it: all parameters as
-        uncertain as training leaves them, where that can be all that is wrong; else by the point prediction, and by
-        the likeness of its size
     """
 
     gain: float
@@ -82,16 +72,7 @@ class Confirmation:
     favour: float
 
     def confirmed(self, *, cautious: bool, chance: float = 1.0) -> bool:
-        """Whether the finding is there on motion that it was not made from, and does not spoil the prediction.
-
-        Parameters
-        ----------
-        cautious : bool
-            whether the noise is not known from repetitions
-        chance : float
-            of the finding in training, relative to the chance that is allowed: the farther below, the more clearly
-            held-out recordings have to speak against it
-        """
+        """Whether the finding is there on motion that it was not made from, and does not spoil the prediction."""
         if self.gain_z <= CLEARLY_WORSE:
             return False
         if self.gain > 0.0 and self.gain_z > BEYOND_DOUBT:
@@ -108,24 +89,12 @@ class Confirmation:
 
 
 def likeness(expected_z: float, seen_z: float) -> float:
-    """Logarithm of how much likelier a size found anew is if it is what was expected than if it is zero: z E - E²/2.
-
-    Parameters
-    ----------
-    expected_z, seen_z : float
-        E and z, in standard errors of z
-    """
+    """Logarithm of how much likelier a size found anew is if it is what was expected than if it is zero: z E - E²/2."""
     return expected_z * seen_z - 0.5 * expected_z**2
 
 
 class HeldOut:
-    """Held-out recordings, with the noise of the training ones.
-
-    Parameters
-    ----------
-    observations : Observations
-        held-out rows, noise known
-    """
+    """Held-out recordings, with the noise of the training ones."""
 
     def __init__(self, observations: Observations) -> None:
         self.observations = observations
@@ -133,15 +102,7 @@ class HeldOut:
         self.screen = Screen(observations, ())
 
     def confirm(self, before: Fit, after: Fit, training: Fitter) -> Confirmation:
-        """Compare predictions without and with a term.
-
-        Parameters
-        ----------
-        before, after : Fit
-            to the training recordings; `after` has one term more, its last
-        training : Fitter
-            of these
-        """
+        """Compare predictions without and with a term."""
         gains = self.block_gains(before.model, after.model)
         spread = float(gains.std(ddof=1) * np.sqrt(len(gains))) if len(gains) > 1 else np.inf
         total = float(gains.sum())
@@ -156,36 +117,18 @@ class HeldOut:
         return log_likelihood(fit.model, training.covariance(fit), self.fitter)
 
     def predicted_by(self, model: ExtendedModel) -> bool:
-        """Whether a model leaves no joint much more than noise; else the training motion was too poor to say anything.
-
-        Parameters
-        ----------
-        model : ExtendedModel
-            fitted to the training recordings
-        """
+        """Whether a model leaves no joint much more than noise; otherwise the training motion was too poor."""
         return all(float(row @ row) <= PREDICTED * len(row) for row in self.fitter.white_residual(model))
 
     def block_gains(self, before: ExtendedModel, after: ExtendedModel) -> Array:
-        """Decrease of the whitened residual's energy in blocks of `BLOCK_S`, (b,).
-
-        Parameters
-        ----------
-        before, after : ExtendedModel
-            models to compare
-        """
+        """Decrease of the whitened residual's energy in blocks of `BLOCK_S`, (b,)."""
         gains: dict[tuple[int, int], float] = {}
         for joint, rows in enumerate(self._row_gains(before, after)):
             add_block_sums(gains, *self.observations.row_labels(joint), rows)
         return np.array(list(gains.values()))
 
     def joint_gains_z(self, before: ExtendedModel, after: ExtendedModel) -> Array:
-        """The same decrease joint by joint, each in its own standard errors, (n,).
-
-        Parameters
-        ----------
-        before, after : ExtendedModel
-            models to compare
-        """
+        """The same decrease joint by joint, each in its own standard errors, (n,)."""
         found = []
         for joint, rows in enumerate(self._row_gains(before, after)):
             gains: dict[tuple[int, int], float] = {}

@@ -35,21 +35,7 @@ probability of 0.9. On an arm with drag of another formula the wrong one led by 
 
 
 def equivalents(option: Option, others: Sequence[Option], fit: Fit, screen: Screen, inflation: float) -> list[Option]:
-    """The others that explain nearly as much as an option, or that these data could not tell from it.
-
-    Parameters
-    ----------
-    option : Option
-        the chosen one
-    others : sequence of Option
-        fitted beside the same model
-    fit : Fit
-        that model
-    screen : Screen
-        of the recordings
-    inflation : float
-        factor by which the residual exceeds the modelled noise
-    """
+    """The others that explain nearly as much as an option, or that these data could not tell from it."""
     found = []
     own: Mapping[int, Array] | None = None
     for each in others:
@@ -71,28 +57,12 @@ def equivalents(option: Option, others: Sequence[Option], fit: Fit, screen: Scre
 
 
 def doubt(option: Option, rival: Option, inflation: float, formula_error: float = FORMULA_DOUBT) -> float:
-    """What counts as one noise variance between the scores of two options.
-
-    Parameters
-    ----------
-    option, rival : Option
-        the one that explains more, and another
-    inflation : float
-        factor by which the residual exceeds the modelled noise
-    formula_error : float
-        share of what the one explains that counts as noise where the two are laws of the same quantities
-    """
+    """What counts as one noise variance between the scores of two options."""
     return inflation + (formula_error * option.gain if of_one_kind(option, rival) else 0.0)
 
 
 def of_one_kind(option: Option, rival: Option) -> bool:
-    """Whether two options are laws of the same quantities at one joint.
-
-    Parameters
-    ----------
-    option, rival : Option
-        any two
-    """
+    """Whether two options are laws of the same quantities at one joint."""
     one, other = option.candidate.effect, rival.candidate.effect
     return one.joint == other.joint and one.arguments is not None and one.arguments == other.arguments
 
@@ -104,10 +74,6 @@ def probability_among(score: float, rivals: Sequence[float], doubts: Sequence[fl
     ----------
     score : float
         of the one [noise variances]
-    rivals : sequence of float
-        scores of the rest
-    doubts : sequence of float
-        what counts as one noise variance between each of them and the one
     """
     ahead = np.array([score - rival for rival in rivals]) / np.array(doubts)
     return float(min(1.0 / (1.0 + np.exp(np.clip(-0.5 * ahead, -700.0, 700.0)).sum()), 0.999))
@@ -118,13 +84,6 @@ def with_rivals(choice: Choice, others: Sequence[Choice]) -> Choice:
 
     Where no formula of the catalogue is that of the arm, it is chance which of two holds on other motion, and which
     of two makes the other superfluous.
-
-    Parameters
-    ----------
-    choice : Choice
-        what is in the model
-    others : sequence of Choice
-        what was refused or dropped for it
     """
     chosen = choice.options[0]
     alike = [each.options[0] for each in others if of_one_kind(chosen, each.options[0])]

@@ -23,19 +23,7 @@ Stand = tuple[int, set[Place]]
 def looked_farther(
     selection: Selection, selector: Selector, setting: Setting, progress: Callable[[str], None]
 ) -> Selection:
-    """The selection with what such forms explain: in the place of what was found, and beside it where some is left.
-
-    Parameters
-    ----------
-    selection : Selection
-        what there is
-    selector : Selector
-        that has made it
-    setting : Setting
-        the arm and the ranges of its motion
-    progress : callable
-        told the name of the step, and what was found
-    """
+    """The selection with what such forms explain: in the place of what was found, and beside it where some is left."""
     chosen = stands(selection)
     screen = Screen(selector.screen.observations, farther_effects(setting))
     if chosen:
@@ -78,11 +66,6 @@ def stands(selection: Selection) -> list[Stand]:
     """All that was selected at each joint, and where it is several effects each of them by itself.
 
     Not where they are so many that together they are no physics: what they stand in for is all that is there.
-
-    Parameters
-    ----------
-    selection : Selection
-        what there is
     """
     at: dict[int, set[Place]] = {}
     for choice in selection.choices:
@@ -119,11 +102,6 @@ def explained(selection: Selection) -> float:
     """Score of all that was selected: what it explains, less what as many coefficients and shapes would of noise.
 
     Less also what some of these shapes have to explain before they are preferred to plainer ones.
-
-    Parameters
-    ----------
-    selection : Selection
-        what there is
     """
     chosen = [choice.options[0].candidate for choice in selection.choices]
     doubt = sum(float(each.effect.reluctance(each.shape[None])[0]) for each in chosen)

@@ -14,15 +14,7 @@ from tauscope.diagnosis.selection.selector import Selector
 
 
 def guided_by(model: ExtendedModel, selector: Selector) -> Selector | None:
-    """The selector with rows weighted by a model's friction; None where no joint waits for that.
-
-    Parameters
-    ----------
-    model : ExtendedModel
-        with the effects that were selected
-    selector : Selector
-        that has selected them
-    """
+    """The selector with rows weighted by a model's friction; None where no joint waits for that."""
     rows = _weighted(selector.screen.observations, model)
     if rows is None:
         return None

@@ -41,19 +41,7 @@ MOST_OF_IT = 0.5
 def interleaved_confirmation(
     term: Term, before: Fit, after: Fit, screen: Screen, held_out: HeldOut | None = None
 ) -> Confirmation:
-    """Confirm an effect of bounded duration within its own window.
-
-    Parameters
-    ----------
-    term : Term
-        as fitted in `after`
-    before, after : Fit
-        models without and with it
-    screen : Screen
-        of the recordings that it was found in
-    held_out : HeldOut or None
-        recordings that were not used
-    """
+    """Confirm an effect of bounded duration within its own window."""
     observations, signals = screen.observations, model_signals(before.model, screen.observations)
     white = screen.white_columns(term.effect, term.shape[None], signals)
     # errors that all rows share carry a little of the window to every row

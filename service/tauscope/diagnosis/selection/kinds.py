@@ -27,15 +27,7 @@ for another kind, which is another formula, more than noise does."""
 
 
 def with_best_kinds(selection: Selection, selector: Selector) -> Selection:
-    """The selection with every effect in its best kind, and with what its others explain; waves have but one.
-
-    Parameters
-    ----------
-    selection : Selection
-        all that was selected
-    selector : Selector
-        that has selected it
-    """
+    """The selection with every effect in its best kind, and with what its others explain; waves have but one."""
     improved = False
     for choice in selection.choices:
         if choice.options[0].candidate.effect.repeats:

@@ -14,19 +14,7 @@ from tauscope.effects import TimeLocalEffect
 
 
 def where_held_out_shows(option: Option, fit: Fit, fitter: Fitter, held_out: HeldOut | None) -> Option:
-    """The option within its window, or everywhere else: what predicts held-out recordings better.
-
-    Parameters
-    ----------
-    option : Option
-        an effect, fitted
-    fit : Fit
-        the model without it
-    fitter : Fitter
-        of the training recordings
-    held_out : HeldOut or None
-        the others
-    """
+    """The option within its window, or everywhere else: what predicts held-out recordings better."""
     term = option.fit.model.terms[-1]
     shape = term.effect.outside(term.shape) if isinstance(term.effect, TimeLocalEffect) else None
     if shape is None or held_out is None:

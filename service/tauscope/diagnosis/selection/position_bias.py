@@ -33,17 +33,7 @@ MOST = 1.0 / 3.0
 
 
 def is_position_noise(option: Option, fit: Fit, screen: Screen) -> bool:
-    """Whether noise of the positions accounts for more than `MOST` of what an effect that swings explains.
-
-    Parameters
-    ----------
-    option : Option
-        the effect, fitted
-    fit : Fit
-        the model without it
-    screen : Screen
-        of the training recordings
-    """
+    """Whether noise of the positions accounts for more than `MOST` of what an effect that swings explains."""
     term = option.fit.model.terms[-1]
     if not term.effect.swings:
         return False

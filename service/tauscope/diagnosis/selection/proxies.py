@@ -36,15 +36,6 @@ def weak_likenesses(nominal: Fit, fit: Fit, choices: Sequence[Choice], observati
     """Places of the choices at joints where all of them together leave most of what there is to explain.
 
     With fewer of them they leave more: no other choice has to be dropped before that is known.
-
-    Parameters
-    ----------
-    nominal, fit : Fit
-        models without and with all choices
-    choices : sequence of Choice
-        one a term of `fit`
-    observations : Observations
-        the rows that both were fitted to, their noise known from repetitions
     """
     before, after = (lack_of_fit(each, observations, pure_error=True) for each in (nominal, fit))
     return _weak(choices, before, after, nominal.joint_energies - fit.joint_energies)
@@ -53,19 +44,7 @@ def weak_likenesses(nominal: Fit, fit: Fit, choices: Sequence[Choice], observati
 def proxies(
     nominal: Fit, fit: Fit, choices: Sequence[Choice], observations: Observations, *, pure_error: bool
 ) -> list[int]:
-    """Places of the choices that only stand in for something else.
-
-    Parameters
-    ----------
-    nominal, fit : Fit
-        models without and with all choices
-    choices : sequence of Choice
-        one a term of `fit`
-    observations : Observations
-        the rows that both were fitted to
-    pure_error : bool
-        whether their noise is known from repetitions
-    """
+    """Places of the choices that only stand in for something else."""
     if not choices:
         return []
     after = lack_of_fit(fit, observations, pure_error=pure_error)
@@ -116,17 +95,6 @@ def hopeless(
     """Effects of several orders that would leave most of what there is to explain with all orders that they may have.
 
     None of those to come explains more than the last one did: the best comes first.
-
-    Parameters
-    ----------
-    nominal, fit : Fit
-        models without and with all choices so far
-    choices : sequence of Choice
-        one a term of `fit`
-    observations : Observations
-        the rows that both were fitted to, their noise known from repetitions
-    most_repeats : int
-        orders that an effect may have
     """
     gains: dict[Place, list[float]] = {}
     for choice in choices:
@@ -143,26 +111,14 @@ def hopeless(
 
 
 def endless(choices: Sequence[Choice]) -> set[Place]:
-    """Effects that several orders of make a series, at joints where it is one of many things that were found.
-
-    Parameters
-    ----------
-    choices : sequence of Choice
-        all so far
-    """
+    """Effects that several orders of make a series, at joints where it is one of many things that were found."""
     orders = Counter(place_of(choice.options[0].candidate) for choice in choices)
     crowded = _joints_of(orders, CROWDED)
     return {(effect, joint) for (effect, joint), count in orders.items() if count >= TELLING and joint in crowded}
 
 
 def full(choices: Sequence[Choice]) -> set[int]:
-    """Joints at which so many different effects were found that what is left there is of no catalogue.
-
-    Parameters
-    ----------
-    choices : sequence of Choice
-        all so far
-    """
+    """Joints at which so many different effects were found that what is left there is of no catalogue."""
     return _joints_of({place_of(choice.options[0].candidate) for choice in choices}, FULL)
 
 

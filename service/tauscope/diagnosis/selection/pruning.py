@@ -19,19 +19,7 @@ Pruned = tuple[Fit, list[Choice]]
 
 
 def without_superfluous(fit: Fit, choices: list[Choice], fitter: Fitter, admission: Admission) -> Pruned:
-    """Drop terms that the others have made superfluous, the weakest first.
-
-    Parameters
-    ----------
-    fit : Fit
-        the model with all choices
-    choices : list of Choice
-        one a term
-    fitter : Fitter
-        of the training recordings
-    admission : Admission
-        what was asked of each
-    """
+    """Drop terms that the others have made superfluous, the weakest first."""
     losses: dict[Choice, float] = {}
     while choices:
         weakest, without = _weakest(fit, choices, losses, fitter)
@@ -62,34 +50,12 @@ def _weakest(fit: Fit, choices: Sequence[Choice], losses: dict[Choice, float], f
 
 
 def without_weak_likenesses(nominal: Fit, fit: Fit, choices: list[Choice], fitter: Fitter) -> Pruned:
-    """Drop all choices at joints where even all of them together leave most of what there is to explain.
-
-    Parameters
-    ----------
-    nominal, fit : Fit
-        models without and with all choices
-    choices : list of Choice
-        one a term
-    fitter : Fitter
-        of the training recordings, their noise known from repetitions
-    """
+    """Drop all choices at joints where even all of them together leave most of what there is to explain."""
     return _without(weak_likenesses(nominal, fit, choices, fitter.observations), fit, choices, fitter)
 
 
 def without_proxies(nominal: Fit, fit: Fit, choices: list[Choice], fitter: Fitter, admission: Admission) -> Pruned:
-    """Drop what only stands in for an effect that the catalogue does not have, and what was needed for that alone.
-
-    Parameters
-    ----------
-    nominal, fit : Fit
-        models without and with all choices
-    choices : list of Choice
-        one a term
-    fitter : Fitter
-        of the training recordings
-    admission : Admission
-        what was asked of each
-    """
+    """Drop what only stands in for an effect that the catalogue does not have, and what was needed for that alone."""
     dropped = proxies(nominal, fit, choices, fitter.observations, pure_error=admission.pure_error)
     if dropped:
         fit, choices = without_superfluous(*_without(dropped, fit, choices, fitter), fitter, admission)
@@ -130,15 +96,6 @@ def without_errors_of_larger_ones(selection: Selection, fitter: Fitter, admissio
 
     Last of all: as long as others are looked for, what such an error explains must not be there for them to explain.
     One at a time: of two that share what the larger one leaves, neither has to be an error where the other is none.
-
-    Parameters
-    ----------
-    selection : Selection
-        all that was selected
-    fitter : Fitter
-        of the training recordings
-    admission : Admission
-        what was asked of each
     """
     while len(groups := list(groups_of(selection.fit.model).values())) > 1:
         fit = selection.fit

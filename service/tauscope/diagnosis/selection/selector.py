@@ -66,25 +66,7 @@ MOST_REJECTED = 12
 
 
 class Selector:
-    """Selects effects on given observations.
-
-    Parameters
-    ----------
-    screen : Screen
-        of the training recordings
-    fitter : Fitter
-        of the same
-    held_out : HeldOut or None
-        what findings are confirmed by
-    pure_error : bool
-        whether the noise is known from repetitions
-    looked_at_before : int
-        forms that were looked at with another screen, and count as well
-    wanted : callable
-        which of the screen's forms are looked for; all of them count
-    instead : bool
-        whether they are looked for in the place of others, and have to explain more than those did
-    """
+    """Selects effects on given observations."""
 
     def __init__(
         self,
@@ -107,17 +89,7 @@ class Selector:
         self.admission = Admission(screen, pure_error=pure_error, looked_at_before=looked_at_before)
 
     def select(self, model: ExtendedModel, beforehand: Sequence[Term], progress: Callable[[str], None]) -> Selection:
-        """Add effects as long as one is significant and confirmed.
-
-        Parameters
-        ----------
-        model : ExtendedModel
-            the nominal model
-        beforehand : sequence of Term
-            effects that others have found; those that count here too are there before any other is looked for
-        progress : callable
-            told what was found
-        """
+        """Add effects as long as one is significant and confirmed."""
         nominal = fit = self.fitter.fit(model)
         choices: list[Choice] = []
         for term in beforehand:
@@ -141,15 +113,7 @@ class Selector:
         return Selection(nominal, fit, tuple(choices), tuple(rejected))
 
     def continued(self, selection: Selection, progress: Callable[[str], None]) -> Selection:
-        """Add effects of this screen to what was selected with another.
-
-        Parameters
-        ----------
-        selection : Selection
-            what there is
-        progress : callable
-            told what was found
-        """
+        """Add effects of this screen to what was selected with another."""
         fit, choices, rejected = self._grown(selection.nominal, selection.fit, list(selection.choices), progress)
         if len(choices) == len(selection.choices):
             return selection
@@ -269,8 +233,6 @@ class Selector:
 
         Parameters
         ----------
-        effect : Effect
-            in any form
         chosen : sequence of (str, int or None)
             effects and places that the model has
         refused : set of (str, int or None)
@@ -358,15 +320,7 @@ class Selector:
         return choices[place].was_given or any(own & each for each in later)
 
     def confirmation(self, fit: Fit, option: Option) -> Confirmation | None:
-        """What motion that was not used says of an option; None where there is none.
-
-        Parameters
-        ----------
-        fit : Fit
-            the model without it
-        option : Option
-            the last term of its model
-        """
+        """What motion that was not used says of an option; None where there is none."""
         term = option.fit.model.terms[-1]
         if isinstance(term.effect, TimeLocalEffect):
             return interleaved_confirmation(term, fit, option.fit, self.screen, self.held_out)

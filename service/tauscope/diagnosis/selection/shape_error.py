@@ -51,8 +51,6 @@ WORTH_SHARING = 20.0
 class Standing:
     """A finding beside the others at its joints.
 
-    certainty : float
-        chance that it is more than an error of another one's curve
     behind : Effect or None
         the one that leads where its own share is largest; None where it leads itself, meets no other, or is plain
     """
@@ -69,13 +67,7 @@ Groups = Mapping[Place, Sequence[int]]
 
 
 def groups_of(model: ExtendedModel) -> Groups:
-    """The terms of each effect at each place: several orders of a periodic torque are one finding.
-
-    Parameters
-    ----------
-    model : ExtendedModel
-        with all of them
-    """
+    """The terms of each effect at each place: several orders of a periodic torque are one finding."""
     groups: dict[Place, list[int]] = {}
     for place, term in enumerate(model.terms):
         groups.setdefault((term.effect.id, term.effect.joint), []).append(place)
@@ -83,19 +75,7 @@ def groups_of(model: ExtendedModel) -> Groups:
 
 
 def standings(nominal: Fit, fit: Fit, without: Sequence[Fit], fitter: Fitter, inflation: float) -> list[Standing]:
-    """What each group of terms is beside the others.
-
-    Parameters
-    ----------
-    nominal, fit : Fit
-        models without and with all of them
-    without : sequence of Fit
-        models each without one of the groups
-    fitter : Fitter
-        of the training recordings
-    inflation : float
-        factor by which the residual exceeds the modelled noise
-    """
+    """What each group of terms is beside the others."""
     joints, groups = len(fit.projection.residual), groups_of(fit.model)
     effects = [fit.model.terms[places[0]].effect for places in groups.values()]
     touched = [effect.touched(joints) for effect in effects]

@@ -19,19 +19,7 @@ Done = TypeVar("Done")
 
 
 class Table:
-    """Candidates beside a model, each worked out once.
-
-    Parameters
-    ----------
-    fit : Fit
-        the model
-    screen : Screen
-        of the recordings
-    fitter : Fitter
-        of the same
-    allowed : callable
-        whether an effect may be added to the model at all
-    """
+    """Candidates beside a model, each worked out once."""
 
     def __init__(self, fit: Fit, screen: Screen, fitter: Fitter, allowed: Callable[[Effect], bool]) -> None:
         self.fit = fit
@@ -48,29 +36,15 @@ class Table:
         ----------
         place : (str, int or None)
             effect and joint
-        but : sequence of Candidate
-            forms of it that stay in
         """
         self.candidates = [each for each in self.candidates if place_of(each) != place or each in but]
 
     def refined(self, candidates: Sequence[Candidate]) -> list[Candidate]:
-        """Candidates at their best shapes.
-
-        Parameters
-        ----------
-        candidates : sequence of Candidate
-            of the table
-        """
+        """Candidates at their best shapes."""
         return _each_once(candidates, self._refined, lambda each: refined(each, self.fit, self._screen, self._signals))
 
     def fitted(self, candidates: Sequence[Candidate]) -> list[Option]:
-        """Refined candidates, each fitted with everything else.
-
-        Parameters
-        ----------
-        candidates : sequence of Candidate
-            as `refined` gives them
-        """
+        """Refined candidates, each fitted with everything else."""
         return _each_once(candidates, self._fitted, lambda each: fitted_option(each, self.fit, self._fitter))
 
 
@@ -88,15 +62,6 @@ def fitted_option(candidate: Candidate, fit: Fit, fitter: Fitter) -> Option:
 
     Where the model's own friction would then drive the motion, or the form be no more than what cancels it, friction is
     zero instead of negative: the best of what can be.
-
-    Parameters
-    ----------
-    candidate : Candidate
-        the form with its shape
-    fit : Fit
-        the model without it
-    fitter : Fitter
-        of the recordings
     """
     term = Term(candidate.effect, candidate.shape, candidate.coefficients)
     start = with_terms(fit.model, [*fit.model.terms, term])
@@ -114,11 +79,6 @@ def turned_negative(found: Fit, before: Fit) -> set[tuple[int, str]]:
     """Joints and coefficients of plain friction that are negative, and were not certainly so before.
 
     One that was as good as zero may have been either: what drives now drives because of what was added.
-
-    Parameters
-    ----------
-    found, before : Fit
-        the model with and without one effect more
     """
     return driving(found, certain=0.0) - driving(before)
 

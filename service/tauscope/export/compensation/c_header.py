@@ -16,16 +16,6 @@ def to_c_header(model: CompensationModel) -> str:
     joint's unit is known, so that a missing unit is a compiler's error and not a wrong torque. Joints count from 1; for
     any other number the functions return 0. ``NAME_joint_name(int joint)`` gives the joint's name in UTF-8. NAME is the
     robot's name as an identifier.
-
-    Parameters
-    ----------
-    model : CompensationModel
-        what to write
-
-    Returns
-    -------
-    str
-        C99 and C++ source, plain ASCII
     """
     name = identifier(model.robot)
     guard = f"TAUSCOPE_{name.upper()}_FRICTION_H"

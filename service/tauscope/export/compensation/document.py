@@ -20,16 +20,6 @@ def to_document(model: CompensationModel) -> dict[str, Any]:
 
     Coefficients stand three times: as joint torque, in mA and in ‰ of rated torque; the last two are None where the
     unit is not known, and the joint's remarks say why.
-
-    Parameters
-    ----------
-    model : CompensationModel
-        what to write
-
-    Returns
-    -------
-    dict
-        schema ``tauscope.compensation/1``
     """
     return {
         "schema": SCHEMA,
@@ -43,34 +33,12 @@ def to_document(model: CompensationModel) -> dict[str, Any]:
 
 
 def to_json(model: CompensationModel) -> str:
-    """The model as JSON text; every number reads back as the same float64.
-
-    Parameters
-    ----------
-    model : CompensationModel
-        what to write
-
-    Returns
-    -------
-    str
-        JSON, plain ASCII
-    """
+    """The model as JSON text; every number reads back as the same float64."""
     return json.dumps(to_document(model), indent=2, allow_nan=False) + "\n"
 
 
 def to_yaml(model: CompensationModel) -> str:
-    """The model as YAML text; YAML 1.1 and 1.2 readers see the same strings and float64 numbers.
-
-    Parameters
-    ----------
-    model : CompensationModel
-        what to write
-
-    Returns
-    -------
-    str
-        YAML, in UTF-8 when encoded
-    """
+    """The model as YAML text; YAML 1.1 and 1.2 readers see the same strings and float64 numbers."""
     yaml = YAML(typ="safe", pure=True)
     yaml.Representer = _PlainRepresenter
     yaml.default_flow_style = False

@@ -19,8 +19,6 @@ class DriveUnits:
         joint torque per mA of recorded current, sign of the wiring included [Nm or N per mA]
     torque_per_permille : float or None
         joint torque per 1/1000 of the motor's rated torque, sign included [Nm per ‰]
-    remarks : tuple of str
-        what was taken, or why a unit is not known
     """
 
     torque_per_milliampere: float | None = None
@@ -38,18 +36,6 @@ def drive_units(joint: Joint, effort_kind: EffortKind) -> DriveUnits:
     Current is known where the recording holds current (ampere): `torque_constant` is then Nm per A. Per mille of rated
     torque is known where the joint's drive block states ``rated_torque_nm``, the rated torque at the motor shaft as in
     CiA 402 object 0x6076: joint torque = ‰ / 1000 · rated torque · |gear ratio|. Directions are the joint's `sign`.
-
-    Parameters
-    ----------
-    joint : Joint
-        its torque constant, sign, gear ratio and drive block
-    effort_kind : EffortKind
-        whether the recording holds torque or current
-
-    Returns
-    -------
-    DriveUnits
-        what is known, and remarks on what is not
 
     Raises
     ------

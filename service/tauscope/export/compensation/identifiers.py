@@ -8,18 +8,7 @@ _PLAIN = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz01234567
 
 
 def identifier(name: str) -> str:
-    """A name as a lower-case identifier that C, C++ and Python accept as the beginning of a longer one.
-
-    Parameters
-    ----------
-    name : str
-        any text; accents are dropped, what is no letter or digit becomes one underscore
-
-    Returns
-    -------
-    str
-        letters, digits and single underscores, beginning with a letter; "robot" where nothing is left
-    """
+    """A name as a lower-case identifier that C, C++ and Python accept as the beginning of a longer one."""
     ascii_name = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode("ascii").lower()
     words = re.sub(r"[^a-z0-9]+", "_", ascii_name).strip("_")[:60].strip("_")
     if not words:
@@ -28,28 +17,11 @@ def identifier(name: str) -> str:
 
 
 def comment_text(text: str) -> str:
-    """Text as it may stand in a comment of any of the languages: one line of plain ASCII.
-
-    Parameters
-    ----------
-    text : str
-        any text
-
-    Returns
-    -------
-    str
-        with every other character written as its code point, such as ``<U+002A>``
-    """
+    """Text as it may stand in a comment of any of the languages: one line of plain ASCII."""
     return "".join(c if c in _PLAIN else f"<U+{ord(c):04X}>" for c in text)
 
 
 def c_string(text: str) -> str:
-    """Text as a C string literal in UTF-8, all but letters, digits and a few signs as three-digit octal escapes.
-
-    Parameters
-    ----------
-    text : str
-        any text; a NUL would end the string early and is written as U+FFFD
-    """
+    """Text as a C string literal in UTF-8, all but letters, digits and a few signs as three-digit octal escapes."""
     data = text.replace("\0", "\ufffd").encode("utf-8", "replace")
     return '"' + "".join(chr(b) if chr(b) in _PLAIN else f"\\{b:03o}" for b in data) + '"'

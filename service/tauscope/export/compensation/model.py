@@ -44,14 +44,8 @@ class JointFriction:
 class JointCompensation:
     """One joint of a compensation model.
 
-    name : str
-        as in the robot file
     type : JointType
         revolute (rad, Nm) or prismatic (m, N)
-    friction : JointFriction
-        coefficients
-    units : DriveUnits
-        how a joint torque is written in the drive's units, where that is known
     """
 
     name: str
@@ -70,19 +64,7 @@ class RecordingSource:
 
 @dataclass(frozen=True)
 class CompensationModel:
-    """Friction compensation of a robot, with its provenance.
-
-    robot : str
-        the robot's name
-    joints : tuple of JointCompensation, length n
-        in chain order
-    created : date
-        day or moment of the identification
-    recordings : tuple of RecordingSource
-        what the coefficients were estimated from
-    version : str
-        of Tauscope
-    """
+    """Friction compensation of a robot, with its provenance."""
 
     robot: str
     joints: tuple[JointCompensation, ...]
@@ -100,13 +82,6 @@ class CompensationModel:
 
 def check_friction(joint: str, friction: JointFriction) -> None:
     """Refuse coefficients that are not finite and shapes without meaning.
-
-    Parameters
-    ----------
-    joint : str
-        the joint's name, for the message
-    friction : JointFriction
-        its coefficients
 
     Raises
     ------
@@ -129,14 +104,12 @@ def check_friction(joint: str, friction: JointFriction) -> None:
 
 
 def friction_torque(friction: JointFriction, velocity: NDArray[np.float64] | float) -> NDArray[np.float64]:
-    """Torque that compensates a joint's friction: τ_s S(K_v v) + τ_sc S(δ v) + τ_v v + offset, S(x) = (2/π) atan x.
+    """Friction torque τ_s S(K_v v) + τ_sc S(δ v) + τ_v v + offset, S(x) = (2/π) atan x, (N,).
 
     Seed paper, equations (7) and (8).
 
     Parameters
     ----------
-    friction : JointFriction
-        coefficients of the joint
     velocity : array_like of float64
         v [rad/s or m/s]
 

@@ -12,16 +12,6 @@ def to_python(model: CompensationModel) -> str:
     ``NAME_friction_current_ma`` and ``NAME_friction_permille`` return it in drive units and exist only where every
     joint's unit is known. Joints count from 1; another number raises IndexError. NAME is the robot's name as an
     identifier.
-
-    Parameters
-    ----------
-    model : CompensationModel
-        what to write
-
-    Returns
-    -------
-    str
-        Python 3 source, plain ASCII
     """
     name = identifier(model.robot)
     functions, _ = unit_functions(model)

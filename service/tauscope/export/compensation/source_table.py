@@ -14,10 +14,6 @@ COEFFICIENTS = ("stiction", "stribeck", "viscous", "offset", "k_v", "delta")
 class UnitFunction:
     """A function that gives the friction in one unit.
 
-    suffix : str
-        end of its name
-    meaning : str
-        what it returns
     torque_per_unit : tuple of float, length n
         what one unit means at each joint [Nm or N]
     """
@@ -28,20 +24,7 @@ class UnitFunction:
 
 
 def unit_functions(model: CompensationModel) -> tuple[tuple[UnitFunction, ...], tuple[str, ...]]:
-    """The functions of a model in drive units, and the units that are left out because a joint does not know them.
-
-    Parameters
-    ----------
-    model : CompensationModel
-        what to write
-
-    Returns
-    -------
-    functions : tuple of UnitFunction
-        for units that every joint knows
-    missing : tuple of str
-        one sentence for each unit that is left out
-    """
+    """The functions of a model in drive units, and the units that are left out because a joint does not know them."""
     candidates = (
         ("friction_current_ma", "motor current in mA", [j.units.torque_per_milliampere for j in model.joints]),
         ("friction_permille", "torque in 1/1000 of rated torque", [j.units.torque_per_permille for j in model.joints]),
@@ -58,13 +41,7 @@ def unit_functions(model: CompensationModel) -> tuple[tuple[UnitFunction, ...], 
 
 
 def heading(model: CompensationModel) -> tuple[str, ...]:
-    """Lines of the comment at the top: what this is, in which units, and where it came from; safe in any language.
-
-    Parameters
-    ----------
-    model : CompensationModel
-        what to write
-    """
+    """Lines of the comment at the top: what this is, in which units, and where it came from; safe in any language."""
     lines = [
         f"Friction compensation of {model.robot}, written by Tauscope {model.version} on {model.created.isoformat()}.",
         "",
@@ -80,13 +57,7 @@ def heading(model: CompensationModel) -> tuple[str, ...]:
 
 
 def row(joint: JointCompensation) -> tuple[float, ...]:
-    """A joint's numbers in the order of `COEFFICIENTS`; δ is 0 where the joint has no Stribeck term.
-
-    Parameters
-    ----------
-    joint : JointCompensation
-        the joint
-    """
+    """A joint's numbers in the order of `COEFFICIENTS`; δ is 0 where the joint has no Stribeck term."""
     values = {name: getattr(joint.friction, name) for name in COEFFICIENTS}
     return tuple(0.0 if values[name] is None else float(values[name]) for name in COEFFICIENTS)
 

@@ -22,8 +22,6 @@ class LinearInequalities:
         G
     bound : (k,) float64
         h
-    names : tuple of str, length k
-        what a row demands, for messages: "viscous friction of joint2 ≥ 0"
     """
 
     matrix: Array
@@ -40,25 +38,13 @@ class LinearInequalities:
 
     @staticmethod
     def none(size: int) -> "LinearInequalities":
-        """No row at all.
-
-        Parameters
-        ----------
-        size : int
-            number p of parameters
-        """
+        """No row at all."""
         return LinearInequalities(np.empty((0, size)), np.empty(0), ())
 
 
 @dataclass(frozen=True)
 class FrictionColumns:
-    """Where each joint's friction coefficients stand in the parameter vector; None for a coefficient that is not there.
-
-    stiction, stribeck, viscous : tuple of int or None, length n
-        index into x of τ_s, τ_sc, τ_v of the seed paper's equation (7)
-    rotor_inertia : tuple of int or None, length n or 0
-        index into x of the rotor's reflected inertia I_a, which is no friction but stands among the joint's own terms
-    """
+    """Index of each joint's friction coefficients in the parameter vector; None for an absent coefficient."""
 
     stiction: tuple[int | None, ...]
     stribeck: tuple[int | None, ...]
@@ -70,20 +56,6 @@ def friction_inequalities(columns: FrictionColumns, size: int, joints: Sequence[
     """Friction that only dissipates: τ_s ≥ 0, τ_s + τ_sc ≥ 0, τ_v ≥ 0 for every joint, and I_a ≥ 0 for every rotor.
 
     τ_sc, the difference of Coulomb friction and stiction, may be negative by itself, and an offset is free.
-
-    Parameters
-    ----------
-    columns : FrictionColumns
-        where the coefficients stand in x
-    size : int
-        number p of parameters
-    joints : sequence of str, length n
-        names, for messages
-
-    Returns
-    -------
-    LinearInequalities
-        at most 4 rows a joint
     """
     demands: list[tuple[str, list[int]]] = []
     rotors = columns.rotor_inertia or (None,) * len(joints)
@@ -116,15 +88,6 @@ def centre_of_mass_inequalities(
         index of the link, from 0
     lower, upper : (3,) float64
         corners of the box in the link frame [m]; ±inf leaves an axis free
-    size : int
-        number p of parameters
-    name : str, optional
-        the link's name in messages; "link 1" and so on where absent
-
-    Returns
-    -------
-    LinearInequalities
-        one row for each finite bound
     """
     label = name or f"link {link + 1}"
     rows, names = [], []
@@ -150,15 +113,6 @@ def mass_inequalities(
         index of the link, from 0
     lower, upper : float or None
         bounds [kg]; None leaves that side free
-    size : int
-        number p of parameters
-    name : str, optional
-        the link's name in messages; "link 1" and so on where absent
-
-    Returns
-    -------
-    LinearInequalities
-        one row for each bound given
     """
     row = np.zeros(size)
     row[10 * link + _MASS] = 1.0
@@ -170,17 +124,8 @@ def total_mass_inequalities(link_count: int, lower: float | None, upper: float |
 
     Parameters
     ----------
-    link_count : int
-        number n of links
     lower, upper : float or None
         bounds [kg]; None leaves that side free
-    size : int
-        number p of parameters
-
-    Returns
-    -------
-    LinearInequalities
-        one row for each bound given
     """
     row = np.zeros(size)
     row[_MASS : 10 * link_count : 10] = 1.0

@@ -37,26 +37,12 @@ _ACTIVE = 10.0
 class ConsistentParameters:
     """A full parameter set of a robot that can exist.
 
-    links : tuple of LinkInertia, length n
-        each with a positive definite pseudo-inertia, in its link frame
     parameters : (p,) float64
         x: standard parameters of all links, then friction coefficients
-    objective : float
-        value of the whole criterion at x
     squared_residual : float
         ‖R x - z‖² [noise variances]
     free_squared_residual : float
         the least that any x, consistent or not, reaches [noise variances]
-    prior_squared_distance : float
-        the criterion's second sum at x
-    status : str
-        "interior" where no constraint is felt, else the solver's word: "Solved" or "AlmostSolved"
-    duality_gap : float
-        proof of optimality: how far the criterion may be above its minimum, relative to it or to 1
-    active_links : tuple of bool, length n
-        whether a link lies on the boundary of what can exist
-    active_inequalities : tuple of str
-        names of the inequalities that hold with equality
     """
 
     links: tuple[LinkInertia, ...]
@@ -102,19 +88,6 @@ def nearest_consistent_parameters(
         Columns: ten standard parameters for each link, then friction coefficients. Rank may be deficient.
     target : (r,) float64
         z
-    prior : Prior
-        plausible point μ and magnitudes s of the parameters
-    inequalities : LinearInequalities, optional
-        G and h; none where absent
-    margin : float
-        ε, relative to each link's mass and size
-    prior_width : float
-        w
-
-    Returns
-    -------
-    ConsistentParameters
-        the optimum, what it costs, and which constraints it touches
 
     Raises
     ------

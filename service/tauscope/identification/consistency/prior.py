@@ -47,19 +47,10 @@ def plausible_prior(robot: Robot, factor: Array, target: Array, friction: Fricti
 
     Parameters
     ----------
-    robot : Robot
-        the chain's geometry, and its model where given
     factor : (r, p) float64
         R of the whitened least-squares problem ‖R x - z‖²
     target : (r,) float64
         z
-    friction : FrictionColumns, optional
-        where the friction coefficients stand in x
-
-    Returns
-    -------
-    Prior
-        mean and magnitude of every parameter
     """
     lengths = link_lengths(robot)
     friction_scale = _friction_scale(factor[:, 10 * robot.joint_count :], target)
@@ -86,11 +77,6 @@ def plausible_prior(robot: Robot, factor: Array, target: Array, friction: Fricti
 
 def link_lengths(robot: Robot) -> Array:
     """Size of each link: the distance of its two joints, at least a quarter of the chain's mean such distance.
-
-    Parameters
-    ----------
-    robot : Robot
-        the chain
 
     Returns
     -------

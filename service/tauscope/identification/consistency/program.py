@@ -55,12 +55,6 @@ class ConicProgram:
         A, the k inequalities first, each of unit length
     bound : (k + 10 n,) float64
         b
-    names : tuple of str, length k
-        what each inequality demands
-    margin : float
-        ε
-    link_count : int
-        n
     """
 
     triangle: Array
@@ -132,19 +126,6 @@ def assemble(
         R, whitened
     target : (r,) float64
         z
-    prior : Prior
-        μ and s
-    inequalities : LinearInequalities
-        G and h
-    margin : float
-        ε
-    prior_width : float
-        w
-
-    Returns
-    -------
-    ConicProgram
-        ready to be solved
     """
     size, link_count = prior.mean.size, len(prior.link_scale)
     information = np.column_stack([factor * prior.scale, target])
@@ -168,11 +149,6 @@ def assemble(
 
 def solve(program: ConicProgram) -> tuple[Array, str, float]:
     """The optimum of a program.
-
-    Parameters
-    ----------
-    program : ConicProgram
-        as assembled
 
     Returns
     -------

@@ -58,13 +58,7 @@ class BandFilter(Protocol):
         ...
 
     def filtered_white(self, lags: int) -> Array | None:
-        """Autocovariance of white noise that passed, up to a factor, (lags + 1,); None where it is white still.
-
-        Parameters
-        ----------
-        lags : int
-            largest lag
-        """
+        """Autocovariance of white noise that passed, up to a factor, (lags + 1,); None where it is white still."""
         ...
 
 
@@ -99,13 +93,7 @@ class AllPass:
         return measured
 
     def filtered_white(self, lags: int) -> None:
-        """None: white noise stays white.
-
-        Parameters
-        ----------
-        lags : int
-            largest lag
-        """
+        """None: white noise stays white."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,8 +102,6 @@ class Decimator:
 
     kernel : (K,) float64
         symmetric impulse response of unit sum; K is a multiple of `factor`
-    factor : int
-        decimation D
     rate_hz : float
         sampling rate after decimation [Hz]
 
@@ -192,13 +178,7 @@ class Decimator:
         return (in_long_gaps <= MASKED_FRACTION) & (missed <= BRIDGED_FRACTION)
 
     def filtered_white(self, lags: int) -> Array:
-        """Autocovariance of white noise that passed: Σ_i h_i h_{i + kD}, (lags + 1,).
-
-        Parameters
-        ----------
-        lags : int
-            largest lag
-        """
+        """Autocovariance of white noise that passed: Σ_i h_i h_{i + kD}, (lags + 1,)."""
         every = np.correlate(self.kernel, self.kernel, "full")[len(self.kernel) - 1 :: self.factor]
         return np.pad(every[: lags + 1], (0, max(0, lags + 1 - len(every))))
 
@@ -222,10 +202,6 @@ def _in_long_gaps(measured: NDArray[np.bool_], bridged: int) -> NDArray[np.bool_
 class HarmonicBand:
     """The band of one averaged period: its harmonics up to the cut-off, sampled just often enough to hold them.
 
-    period_samples : int
-        samples in the period, N
-    harmonics : int
-        highest harmonic kept, h; the output has M = 2h + 1 samples, on which white noise stays white
     rate_hz : float
         sampling rate of the output [Hz]
     """
@@ -242,8 +218,6 @@ class HarmonicBand:
         ----------
         rate_hz : float
             sampling rate [Hz]
-        period_samples : int
-            samples in the period
         cutoff_hz : float
             highest frequency kept [Hz]
         """
@@ -274,10 +248,4 @@ class HarmonicBand:
         return np.broadcast_to(whole, (*measured.shape[:-1], 2 * self.harmonics + 1))
 
     def filtered_white(self, lags: int) -> None:
-        """None: white noise stays white.
-
-        Parameters
-        ----------
-        lags : int
-            largest lag
-        """
+        """None: white noise stays white."""

@@ -48,16 +48,6 @@ PERIOD_SPARE = 4
 class Conditioner:
     """One recording, surveyed once, from which conditioned motion can be drawn at any band.
 
-    recording : Recording
-        the recording
-    robot : Robot
-        sign and torque constant of every joint
-    timing : Timing
-        stretches, sampling rate, repeated periods
-    noise : PositionNoise
-        noise of the positions, and the band that the motion's sources allow
-    source : MotionSource
-        what every joint's velocity and acceleration are made from
     state_hz : (n,) float64 or None
         cut-off of the smoothing of motion that is not averaged, joint by joint [Hz]; by the common band's where None
     """
@@ -72,13 +62,6 @@ class Conditioner:
     @staticmethod
     def survey(recording: Recording, robot: Robot) -> "Conditioner":
         """Find the usable stretches of a recording, the noise of its positions and the best source of its motion.
-
-        Parameters
-        ----------
-        recording : Recording
-            the recording
-        robot : Robot
-            the robot that it belongs to
 
         Raises
         ------
@@ -133,11 +116,6 @@ class Conditioner:
         ----------
         cutoff_hz : float or None
             cut-off of the band that torque and regressor share [Hz]; None for no filter
-
-        Yields
-        ------
-        Motion
-            pieces of bounded size, whatever the recording's length
 
         Raises
         ------

@@ -32,13 +32,9 @@ class Motion:
         where that torque was measured and not filled in
     rate_hz : float
         sampling rate of all of these [Hz]
-    band : BandFilter
-        filter and decimation that torque and regressor share
     period : (N,) float64 or None
         progress through the repeated excitation, where it is known and not averaged: index of the period plus the part
         of it that is over
-    own : slice
-        samples that belong to no other piece: those before and after serve the band's filter only
     scatter : (n,) float64 or None
         standard deviation of the positions from period to period [rad or m]; None where nothing was averaged
     """
@@ -74,15 +70,11 @@ class Motion:
 class Trim:
     """The band of one recording's transient motion, and the samples that it costs.
 
-    band : AllPass or Decimator
-        the same for every piece, so that pieces join
     cutoff_hz : float or None
         of the band [Hz]; None where it is open
     state_hz : float or (n,) float64
         cut-off of the motion's own smoothing, of each joint if they differ [Hz]; the sampling rate where nothing is
         smoothed
-    margin : int
-        samples that smoothing and differentiation take from each end of a piece
     """
 
     band: AllPass | Decimator
@@ -121,13 +113,7 @@ class Trim:
         return self.band.factor if isinstance(self.band, Decimator) else 1
 
     def outputs(self, samples: int) -> int:
-        """Outputs of a piece of so many samples.
-
-        Parameters
-        ----------
-        samples : int
-            before anything is trimmed
-        """
+        """Outputs of a piece of so many samples."""
         return max(0, (samples - 2 * self.margin - self.kernel) // self.factor + 1)
 
 
@@ -146,15 +132,6 @@ def state_cutoff(rate_hz: float, cutoff_hz: float | None) -> float:
 
 def transient_motion(stretch: Stretch, trim: Trim, source: MotionSource) -> Motion | None:
     """Smoothed and differentiated motion of a stretch, edges trimmed.
-
-    Parameters
-    ----------
-    stretch : Stretch
-        uniform motion
-    trim : Trim
-        the band
-    source : MotionSource
-        what q̇ and q̈ are made from
 
     Returns
     -------
@@ -195,12 +172,8 @@ def averaged_motion(periods: Periods, cutoff_hz: float | None, source: MotionSou
 
     Parameters
     ----------
-    periods : Periods
-        periods that repeat
     cutoff_hz : float or None
         of the common band [Hz]; None for no filter
-    source : MotionSource
-        what q̇ and q̈ are made from
     """
     rate, count = periods.rate_hz, periods.position.shape[1]
     cutoff = state_cutoff(rate, cutoff_hz)

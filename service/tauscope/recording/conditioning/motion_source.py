@@ -92,20 +92,7 @@ class MotionSource:
 
 
 def choose_sources(stretches: Sequence[Stretch], noise: PositionNoise) -> MotionSource:
-    """The quieter of consistent sources, joint by joint.
-
-    Parameters
-    ----------
-    stretches : sequence of Stretch
-        stretches of motion at one rate
-    noise : PositionNoise
-        noise of their positions, and the band that it allows
-
-    Returns
-    -------
-    MotionSource
-        the positions, wherever nothing better is certain
-    """
+    """The quieter of consistent sources, joint by joint."""
     joint_count = stretches[0].position.shape[1]
     limits = noise.joint_limits_hz.copy()
     best = limits.copy()
@@ -159,17 +146,7 @@ def _is_flat(spectrum: AccelerationSpectrum, rate_hz: float) -> bool:
 
 @dataclass(frozen=True)
 class _Comparison:
-    """A recorded signal beside the derivative of the positions, in their band.
-
-    gain, delay : float
-        of the recorded one; delay in seconds
-    gain_std, delay_std : float
-        standard errors
-    offset : float
-        constant part of the recorded signal that is not in the motion, relative to its rms
-    motion, misfit : float
-        rms of q̈, and of what gain and delay leave of the difference
-    """
+    """A recorded signal beside the derivative of the positions, in their band."""
 
     gain: float
     delay: float

@@ -35,12 +35,6 @@ class PeriodRun:
 
     rows : (int, int)
         rows of the stretch in which it lies
-    start_s, stop_s : float
-        instants between which the excitation is known to repeat
-    length_s : float
-        duration of a period
-    first : float
-        progress at `start_s`: the index of the period plus the part of it that is over
     """
 
     rows: tuple[int, int]
@@ -72,13 +66,7 @@ class PeriodRun:
         return PeriodRun(rows, start, max(start, stop), self.length_s, self._at(start))
 
     def part(self, first: int, last: int) -> "PeriodRun":
-        """Some of its periods, counted from its start.
-
-        Parameters
-        ----------
-        first, last : int
-            the first of them, and the one after the last
-        """
+        """Some of its periods, counted from its start."""
         start = self.start_s + first * self.length_s
         return PeriodRun(self.rows, start, self.start_s + last * self.length_s, self.length_s, self._at(start))
 
@@ -128,11 +116,6 @@ class PeriodLabels:
             instants of its first sample and of the end of its last one [s]
         interval_s : float
             time from sample to sample [s]
-
-        Yields
-        ------
-        PeriodRun
-            in order of time
         """
         first = max(int(np.searchsorted(self.row, rows[0], side="right")) - 1, 0)
         last = int(np.searchsorted(self.row, rows[1]))

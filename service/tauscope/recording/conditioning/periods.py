@@ -50,16 +50,12 @@ LEAST_WIDTH = 1e-15
 class Periods:
     """P complete periods of N samples, aligned.
 
-    rate_hz : float
-        sampling rate; a whole number of samples makes a period
     position, torque : (P, N, n) float64
         q and τ of every period
     measured : (P, N, n) bool
         where the torque was measured
     rows : (int, int)
         the samples of the stretch that the periods cover
-    start_s : float
-        time of the first sample of the first period
     velocity, acceleration : (P, N, n) float64 or None
         recorded q̇ and q̈, where the stretch has them
     advance : (n,) float64 or None
@@ -84,13 +80,6 @@ class Periods:
 
 def split_periods(stretch: Stretch, refine: bool = False) -> Periods | None:
     """The complete repeated periods of a stretch.
-
-    Parameters
-    ----------
-    stretch : Stretch
-        uniform motion with its progress through the repeated excitation
-    refine : bool
-        whether a length that is no whole number of samples is improved until the positions repeat best
 
     Returns
     -------
@@ -132,13 +121,6 @@ def _aligned(stretch: Stretch, first: int, length: float, count: int) -> Periods
 def with_turns_removed(periods: Periods, joint_types: Sequence[JointType]) -> Periods | None:
     """The periods with their joints' advance from one to the next known, and whole turns taken out of the positions.
 
-    Parameters
-    ----------
-    periods : Periods
-        the periods
-    joint_types : sequence of JointType, length n
-        a joint that turns may turn on and on; one that slides may not
-
     Returns
     -------
     Periods or None
@@ -161,8 +143,6 @@ def repeats(periods: Periods, cutoff_hz: float, noise_density: Array) -> bool:
 
     Parameters
     ----------
-    periods : Periods
-        the periods
     cutoff_hz : float
         only what lies below matters [Hz]
     noise_density : (n,) float64
@@ -202,8 +182,6 @@ def fourier_derivatives(
         highest harmonic kept [Hz]
     advance : (n,) float64 or None
         what a joint that turns on and on gains in one period: the series is that of q less this ramp
-    orders : sequence of int
-        which derivatives are wanted
 
     Returns
     -------

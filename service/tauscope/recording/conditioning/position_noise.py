@@ -113,15 +113,8 @@ def position_noise(stretches: Stretch | Sequence[Stretch], step: Array | None = 
 
     Parameters
     ----------
-    stretches : Stretch or sequence of Stretch
-        stretches of motion at one rate, the longer the better
     step : (n,) float64 or None
         the encoders' steps, as `encoder_step` finds them [rad or m]
-
-    Returns
-    -------
-    PositionNoise
-        density and limit; the quantisation step's own density, step²/(6 fs), is the least that is assumed
     """
     stretches = [stretches] if isinstance(stretches, Stretch) else list(stretches)
     rate = stretches[0].rate_hz
@@ -157,15 +150,8 @@ def acceleration_spectrum(
         pieces of q (order 2), q̇ (order 1) or q̈ (order 0)
     rate_hz : float
         sampling rate [Hz]
-    order : int
-        how many differences lead to q̈
     floor : (n,) float64 or float
         least density of the signal's noise
-
-    Returns
-    -------
-    AccelerationSpectrum
-        the noise density is the median over `PLATEAU` while nothing shakes, corrected for the skewness of few averages
     """
     accelerations = [np.diff(values, n=order, axis=0) * rate_hz**order for values in signals]
     length = min(SEGMENT, max(len(values) for values in accelerations))
@@ -211,8 +197,6 @@ def segment_spectra(values: Array, rate_hz: float, length: int) -> Array:
         signals, a column each
     rate_hz : float
         sampling rate [Hz]
-    length : int
-        samples in a segment, at most N
 
     Returns
     -------

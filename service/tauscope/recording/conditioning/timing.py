@@ -44,16 +44,8 @@ SHORTEST_STRETCH = 32
 class Timing:
     """How a recording was sampled.
 
-    rate_hz : float
-        the inverse of the mean interval between samples that follow one another
     rows : tuple of (int, int)
         row ranges without a long gap, each at least `SHORTEST_STRETCH` complete rows
-    samples, missed, dropped : int
-        rows in the file; rows without a complete position; rows in stretches too short to use
-    gaps : int
-        number of long gaps, at which the recording was split
-    runs : tuple of PeriodRun
-        where the excitation repeats
     """
 
     rate_hz: float
@@ -85,16 +77,6 @@ class Timing:
 
 def find_stretches(recording: Recording) -> Timing:
     """Row ranges of `recording` that can be filtered in one go.
-
-    Parameters
-    ----------
-    recording : Recording
-        the recording; read once, in pieces
-
-    Returns
-    -------
-    Timing
-        the sampling rate, the ranges, and what is missing
 
     Raises
     ------
@@ -130,8 +112,6 @@ def row_at(recording: Recording, time_s: float, rows: tuple[int, int]) -> int:
 
     Parameters
     ----------
-    recording : Recording
-        the recording
     time_s : float
         the instant [s]
     rows : (int, int)

@@ -34,16 +34,12 @@ NEARBY = 0.75
 class Stretch:
     """Uniformly sampled motion without a long gap.
 
-    start_s, rate_hz : float
-        time of the first sample, sampling rate
     position, torque : (N, n) float64
         q [rad or m] and joint torque τ [Nm or N]; finite everywhere
     measured : (N, n) bool
         False where a joint's torque was filled in and must not be counted
     period : (N,) float64 or None
         progress through the repeated excitation: index of the period plus the part of it that is over; NaN outside
-    resampled : bool
-        the stamps were not uniform enough and all signals were interpolated
     velocity, acceleration : (N, n) float64 or None
         recorded qd, qdd where there are such columns; a joint of which more than single samples were missed is NaN
         throughout
@@ -68,8 +64,6 @@ class Grid:
         grid point of every sample
     start_s : float
         instant of grid point 0, relative to the first sample [s]
-    rate_hz : float
-        the grid's rate
     """
 
     index: NDArray[np.int_]
@@ -78,25 +72,7 @@ class Grid:
 
 
 def read_stretch(recording: Recording, robot: Robot, start: int, stop: int, timing: Timing) -> Stretch:
-    """Rows start:stop on a uniform grid.
-
-    Parameters
-    ----------
-    recording : Recording
-        the recording
-    robot : Robot
-        gives sign and torque constant of every joint
-    start, stop : int
-        a row range of `find_stretches`, or a part of one
-    timing : Timing
-        rate of the grid and place of the repeated periods
-
-    Returns
-    -------
-    Stretch
-        the motion; where stamps jitter, all signals follow the same cubic spline between samples, so that torque and
-        motion keep the same band
-    """
+    """Rows start:stop on a uniform grid."""
     samples = recording.samples(start, stop)
     torque = recording.joint_torque(samples.effort, robot)
     complete = samples.complete

@@ -23,17 +23,7 @@ FAILURES_PER_S, FAILURE_BURST = 0.5, 20.0
 
 @dataclass(frozen=True, eq=False)
 class Access:
-    """Who may call, and how often.
-
-    ring : KeyRing
-        the keys
-    rate : RateLimit
-        for each key
-    limits_local : bool
-        whether it holds for callers of a service without keys too
-    failures : RateLimit
-        for each address, of requests with a wrong key or none
-    """
+    """Who may call, and how often."""
 
     ring: KeyRing
     rate: RateLimit
@@ -54,13 +44,7 @@ class Gate:
     """Lets a request pass that comes with a key of the scope that it needs."""
 
     def __init__(self, app: ASGIApp) -> None:
-        """Wrap an application.
-
-        Parameters
-        ----------
-        app : ASGI application
-            what is wrapped; its state holds the services
-        """
+        """Wrap an application."""
         self.app = app
 
     async def __call__(self, scope: AsgiScope, receive: Receive, send: Send) -> None:
@@ -77,13 +61,7 @@ class Gate:
 
 
 def caller_of(scope: AsgiScope) -> Caller:
-    """Who makes a request.
-
-    Parameters
-    ----------
-    scope : ASGI scope
-        of a request that has passed the gate
-    """
+    """Who makes a request."""
     return cast(Caller, scope.get(CALLER, LOCAL))
 
 

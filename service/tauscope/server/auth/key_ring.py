@@ -19,15 +19,7 @@ LOOK_S = 1.0
 
 @dataclass(frozen=True)
 class Caller:
-    """Who makes a request.
-
-    name : str
-        of the key; ``local`` where no keys are asked for
-    key : str or None
-        identifier of the key
-    scope : Scope
-        what they may do
-    """
+    """Who makes a request."""
 
     name: str
     key: str | None
@@ -47,15 +39,6 @@ class KeyRing:
 
     def __init__(self, file: KeyFile, *, is_required: bool, clock: Callable[[], datetime] = utc_now) -> None:
         """Read the keys.
-
-        Parameters
-        ----------
-        file : KeyFile
-            where they are kept
-        is_required : bool
-            whether a key is asked for even if none was ever made
-        clock : callable
-            tells the present moment
 
         Raises
         ------
@@ -77,15 +60,7 @@ class KeyRing:
         return any(key.state(self._clock()) == "valid" for key in self._keys)
 
     def caller(self, text: str | None, *, may_be_expired: bool = False) -> Caller | str:
-        """Who calls, or why that is nobody.
-
-        Parameters
-        ----------
-        text : str or None
-            key that came with the request
-        may_be_expired : bool
-            whether an expired key will do: it does for a stop
-        """
+        """Who calls, or why that is nobody."""
         if not self.is_required:
             return LOCAL
         if text is None:

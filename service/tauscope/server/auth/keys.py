@@ -43,13 +43,7 @@ class ApiKey(StrictModel):
     revoked: AwareDatetime | None = Field(default=None, description="when it was taken back")
 
     def state(self, now: datetime) -> Literal["valid", "expired", "revoked"]:
-        """What the key is worth.
-
-        Parameters
-        ----------
-        now : datetime
-            the present moment
-        """
+        """What the key is worth."""
         if self.revoked is not None:
             return "revoked"
         return "expired" if self.expires is not None and now >= self.expires else "valid"
@@ -66,13 +60,7 @@ class KeyFile:
     """The keys of a service, in one file that only its owner can read. Another store needs these four methods."""
 
     def __init__(self, folder: Path) -> None:
-        """Look at the keys of a data folder; nothing is opened yet.
-
-        Parameters
-        ----------
-        folder : Path
-            the data folder
-        """
+        """Look at the keys of a data folder; nothing is opened yet."""
         self.path = folder / KEY_FILE
 
     def read(self) -> tuple[ApiKey, ...]:
@@ -102,24 +90,6 @@ class KeyFile:
     def add(self, name: str, scope: Scope, now: datetime, life: timedelta | None) -> tuple[ApiKey, str]:
         """Make a key.
 
-        Parameters
-        ----------
-        name : str
-            who gets it; unique among the keys that are not revoked
-        scope : Scope
-            what it may do
-        now : datetime
-            the present moment
-        life : timedelta or None
-            how long it holds; for good where None
-
-        Returns
-        -------
-        ApiKey
-            as it is kept
-        str
-            the key itself, which is not kept anywhere
-
         Raises
         ------
         TauscopeError
@@ -146,13 +116,6 @@ class KeyFile:
 
     def revoke(self, name: str, now: datetime) -> ApiKey:
         """Take a key back; a service that runs knows within seconds.
-
-        Parameters
-        ----------
-        name : str
-            name or identifier of the key
-        now : datetime
-            the present moment
 
         Raises
         ------
@@ -181,15 +144,7 @@ class KeyFile:
 
 
 def matching_key(keys: tuple[ApiKey, ...], text: str) -> ApiKey | None:
-    """The key that a text is; takes the same time whatever is wrong with the text.
-
-    Parameters
-    ----------
-    keys : tuple of ApiKey
-        that are known
-    text : str
-        what a client sent
-    """
+    """The key that a text is; takes the same time whatever is wrong with the text."""
     prefix, _, rest = text.partition("_")
     identifier, _, secret = rest.partition("_")
     found = next((key for key in keys if key.id == identifier), None)

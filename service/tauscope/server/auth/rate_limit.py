@@ -18,21 +18,12 @@ class RateLimit:
         ----------
         per_second : float
             how often a caller may call in the long run [1/s]
-        burst : float
-            how often at once
-        clock : callable
-            seconds that never run backwards
         """
         self._rate, self._burst, self._clock = per_second, burst, clock
         self._buckets: OrderedDict[str, tuple[float, float]] = OrderedDict()
 
     def take(self, caller: str) -> float:
         """Count a call.
-
-        Parameters
-        ----------
-        caller : str
-            who calls
 
         Returns
         -------

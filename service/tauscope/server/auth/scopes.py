@@ -19,24 +19,13 @@ class Scope(StrEnum):
     """remove what was measured, take an arm from somebody else"""
 
     def includes(self, other: "Scope") -> bool:
-        """Whether this scope is the other one, or a higher one.
-
-        Parameters
-        ----------
-        other : Scope
-            that is needed
-        """
+        """Whether this scope is the other one, or a higher one."""
         order = list(Scope)
         return order.index(self) >= order.index(other)
 
 
 def parse_scope(text: str) -> Scope:
     """The scope of a name.
-
-    Parameters
-    ----------
-    text : str
-        its name
 
     Raises
     ------
@@ -77,15 +66,7 @@ _RULES: tuple[tuple[str, re.Pattern[str], Scope], ...] = tuple(
 
 
 def needed_scope(method: str, path: str) -> Scope | None:
-    """The scope that a request needs; None for what anybody may read: pages, the interface's description, health.
-
-    Parameters
-    ----------
-    method : str
-        of HTTP, in capitals
-    path : str
-        of the request
-    """
+    """The scope that a request needs; None for what anybody may read: pages, the interface's description, health."""
     is_reading = method in ("GET", "HEAD", "OPTIONS")
     if not path.startswith("/api/") and path != "/metrics":
         return None if is_reading else Scope.ADMIN
@@ -95,13 +76,5 @@ def needed_scope(method: str, path: str) -> Scope | None:
 
 
 def is_stop(method: str, path: str) -> bool:
-    """Whether a request stops an arm: nothing that can fail or wait may stand in its way.
-
-    Parameters
-    ----------
-    method : str
-        of HTTP, in capitals
-    path : str
-        of the request
-    """
+    """Whether a request stops an arm: nothing that can fail or wait may stand in its way."""
     return method == "POST" and re.fullmatch(rf"/api/v1/(stop|(runs|campaigns)/{_ITEM}/stop)", path) is not None

@@ -26,13 +26,6 @@ class CampaignManager:
 
         Of the campaigns that an earlier service left unfinished, those whose motions had all been recorded go on with
         the identification; the others become `interrupted`: nothing moves by itself.
-
-        Parameters
-        ----------
-        items : ItemStore
-            folders of the campaigns
-        shop : CampaignDependencies
-            what campaigns work with
         """
         self.items = items
         self._shop = shop
@@ -45,18 +38,6 @@ class CampaignManager:
 
     def submit(self, staged: Path, permit: Permit = FREE) -> str:
         """Take a campaign; it begins at once, and has the arm until its motions are done.
-
-        Parameters
-        ----------
-        staged : Path
-            staged folder that holds the campaign's input
-        permit : Permit
-            leave to move the arm; the motions stop when it ends
-
-        Returns
-        -------
-        str
-            the campaign's identifier
 
         Raises
         ------
@@ -91,11 +72,6 @@ class CampaignManager:
     def stop(self, identifier: str) -> JobState | None:
         """Stop a campaign: takes no lock, waits for nothing, may be called any number of times.
 
-        Parameters
-        ----------
-        identifier : str
-            of the campaign
-
         Returns
         -------
         JobState or None
@@ -110,11 +86,6 @@ class CampaignManager:
 
     def remove(self, identifier: str) -> bool:
         """Remove a campaign that has ended; what it made stays.
-
-        Parameters
-        ----------
-        identifier : str
-            of the campaign
 
         Returns
         -------

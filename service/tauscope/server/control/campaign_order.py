@@ -41,13 +41,7 @@ class CampaignOrder(StoredModel):
     diagnosis: DiagnosisOptions | None = Field(default=None, description="how it is diagnosed; null: it is not")
 
     def backend_of(self, *, held_out: bool) -> BackendChoice:
-        """Which arm is moved by a run; the noise that a scenario's seed fixes is another one in each.
-
-        Parameters
-        ----------
-        held_out : bool
-            whether it is the run of the held-out motion
-        """
+        """Which arm is moved by a run; the noise that a scenario's seed fixes is another one in each."""
         scenario = self.backend.scenario
         if not held_out or scenario is None or not isinstance(scenario.get("seed"), int):
             return self.backend

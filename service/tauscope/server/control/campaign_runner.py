@@ -43,17 +43,7 @@ ROOM_POLL_S = 0.5
 
 @dataclass(frozen=True, eq=False)
 class CampaignDependencies:
-    """What a campaign works with.
-
-    jobs : JobQueue
-        designs and identifies
-    excitations, identifications, diagnoses : JobKind
-        kinds of its jobs
-    runs : RunManager
-        moves arms
-    recordings : RecordingStore
-        what was measured
-    """
+    """What a campaign works with."""
 
     jobs: JobQueue
     excitations: JobKind
@@ -74,21 +64,7 @@ class CampaignRunner:
         release_arm: Callable[[], None],
         permit: Permit = FREE,
     ) -> None:
-        """Prepare; nothing happens before `lead`.
-
-        Parameters
-        ----------
-        workspace : CampaignWorkspace
-            of the campaign
-        order : CampaignOrder
-            what is wanted
-        shop : CampaignDependencies
-            what it works with
-        release_arm : callable
-            lets go of the arm; called when nothing more will move
-        permit : Permit
-            leave to move the arm
-        """
+        """Prepare; nothing happens before `lead`."""
         self.state = JobState.QUEUED
         self._workspace = workspace
         self._order = order

@@ -11,13 +11,7 @@ class CampaignWorkspace(Workspace):
     """Files of a campaign: ``order.json`` and ``robot/``; ``made.json`` names what it has made so far."""
 
     def __init__(self, folder: Path) -> None:
-        """Look at a campaign's folder; nothing is opened yet.
-
-        Parameters
-        ----------
-        folder : Path
-            of the campaign
-        """
+        """Look at a campaign's folder; nothing is opened yet."""
         super().__init__(folder)
         self.robot = folder / "robot"
         self._order = folder / "order.json"
@@ -32,13 +26,7 @@ class CampaignWorkspace(Workspace):
         return read_stored(self._order, CampaignOrder)
 
     def write_order(self, order: CampaignOrder) -> None:
-        """Keep the campaign's input.
-
-        Parameters
-        ----------
-        order : CampaignOrder
-            what is wanted
-        """
+        """Keep the campaign's input."""
         write_stored(self._order, order)
 
     def read_made(self) -> CampaignLinks:
@@ -46,11 +34,5 @@ class CampaignWorkspace(Workspace):
         return read_stored(self._made, CampaignLinks) or CampaignLinks()
 
     def write_made(self, made: CampaignLinks) -> None:
-        """Keep what the campaign has made so far.
-
-        Parameters
-        ----------
-        made : CampaignLinks
-            all of it
-        """
+        """Keep what the campaign has made so far."""
         write_stored(self._made, made)

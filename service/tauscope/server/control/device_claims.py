@@ -14,26 +14,13 @@ class DeviceClaims:
     """Arms and their holders; every method may be called from any thread and returns at once."""
 
     def __init__(self, most: int) -> None:
-        """Begin with no arm held.
-
-        Parameters
-        ----------
-        most : int
-            arms that may be held at a time
-        """
+        """Begin with no arm held."""
         self._most = most
         self._lock = threading.Lock()
         self._holders: dict[str, str] = {}
 
     def take(self, device: str, holder: str) -> None:
         """Take an arm.
-
-        Parameters
-        ----------
-        device : str
-            names the arm
-        holder : str
-            names who takes it, as in ``run 20261103T101502Z-1f2e3d4c``; who holds it already may take it again
 
         Raises
         ------
@@ -51,11 +38,6 @@ class DeviceClaims:
     def require_free(self, device: str) -> None:
         """Say at once that somebody has an arm, before work is begun for whoever wants it.
 
-        Parameters
-        ----------
-        device : str
-            names the arm
-
         Raises
         ------
         BusyError
@@ -66,15 +48,7 @@ class DeviceClaims:
             raise self._busy(device, holder)
 
     def release(self, device: str, holder: str) -> None:
-        """Let go of an arm; nothing happens where somebody else has it.
-
-        Parameters
-        ----------
-        device : str
-            names the arm
-        holder : str
-            names who had it
-        """
+        """Let go of an arm; nothing happens where somebody else has it."""
         with self._lock:
             if self._holders.get(device) == holder:
                 del self._holders[device]

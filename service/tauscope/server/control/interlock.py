@@ -16,17 +16,6 @@ def objection(data_folder: Path, name: str, robot: str, device: str) -> str | No
 
     Only programs in the folder are called, never a command that came over the network.
 
-    Parameters
-    ----------
-    data_folder : Path
-        holds the folder of programs
-    name : str
-        of the program; called with the two names as arguments, exit status 0 means that the arm is free
-    robot : str
-        name of the robot
-    device : str
-        what names the arm
-
     Returns
     -------
     str or None

@@ -12,26 +12,10 @@ class Lease:
 
     Attributes are replaced one at a time and never need a lock to be read.
 
-    id : str
-        public name
-    number : int
-        for fencing: a later lease has a higher one
-    device : str
-        the arm
-    holder : str
-        who has it, in words
-    owner : str
-        whose it is: no other caller can use its token
     ttl_s : float
         how long it lasts without a sign of life [s]
-    secret : str
-        second part of the token
     ends : float
         when it ends, on the clock of `Leases` [s]
-    is_armed : bool
-        whether the arm may move
-    lost : str or None
-        why it does not hold any more; None while it does
     """
 
     id: str

@@ -7,13 +7,7 @@ from tauscope.files import write_atomically
 
 
 def next_number(counter: Path) -> int:
-    """A number above all before, kept before it is used.
-
-    Parameters
-    ----------
-    counter : Path
-        file of the last number given
-    """
+    """A number above all before, kept before it is used."""
     try:
         last = int(counter.read_text(encoding="ascii"))
     except FileNotFoundError:

@@ -12,15 +12,7 @@ class LeasePermit:
     """Leave by a lease that was shown."""
 
     def __init__(self, lease: Lease, end_of: Callable[[Lease], str | None]) -> None:
-        """Nothing is asked yet.
-
-        Parameters
-        ----------
-        lease : Lease
-            that was shown
-        end_of : callable
-            says why a lease does not hold; None while it does
-        """
+        """Nothing is asked yet."""
         self._lease, self._end_of = lease, end_of
 
     def require(self) -> None:
@@ -48,15 +40,7 @@ class UnleasedPermit:
     """Leave for one motion, by the arm's claim alone; nobody can lease the arm while it lasts."""
 
     def __init__(self, device: str, require_unleased: Callable[[str], None]) -> None:
-        """Nothing is asked yet.
-
-        Parameters
-        ----------
-        device : str
-            the arm
-        require_unleased : callable
-            refuses an arm that somebody has a lease of
-        """
+        """Nothing is asked yet."""
         self._device, self._require_unleased = device, require_unleased
 
     def require(self) -> None:

@@ -35,19 +35,7 @@ class Leases:
         clock: Callable[[], float] = time.monotonic,
         on_end: LeaseEnd | None = None,
     ) -> None:
-        """Begin with no lease.
-
-        Parameters
-        ----------
-        claims : DeviceClaims
-            which arms move now
-        counter : Path
-            file of the last number given
-        clock : callable
-            seconds that never run backwards
-        on_end : callable or None
-            told of each lease that ended
-        """
+        """Begin with no lease."""
         self._claims, self._counter, self._clock = claims, counter, clock
         self._on_end = on_end or (lambda _lease, _why: None)
         self._lock = threading.Lock()
@@ -59,13 +47,7 @@ class Leases:
         return sorted(leases, key=lambda lease: -lease.number)
 
     def seconds_left(self, lease: Lease) -> float:
-        """How long a lease lasts without a further sign of life [s].
-
-        Parameters
-        ----------
-        lease : Lease
-            the lease
-        """
+        """How long a lease lasts without a further sign of life [s]."""
         return max(0.0, lease.ends - self._clock())
 
     def acquire(self, device: str, holder: str, owner: str, ttl_s: float, *, take: bool = False) -> Lease:
@@ -73,16 +55,8 @@ class Leases:
 
         Parameters
         ----------
-        device : str
-            the arm
-        holder : str
-            who wants it, in words
-        owner : str
-            who alone can use the lease
         ttl_s : float
             how long it lasts without a sign of life [s]
-        take : bool
-            take the arm from whoever has the lease; what moves by it stops
 
         Raises
         ------
@@ -122,15 +96,6 @@ class Leases:
     def renew(self, device: str, token: str, owner: str) -> Lease:
         """Take a sign of life.
 
-        Parameters
-        ----------
-        device : str
-            the arm
-        token : str
-            of its lease
-        owner : str
-            who shows it
-
         Raises
         ------
         LeaseLostError
@@ -144,17 +109,6 @@ class Leases:
     def arm(self, device: str, token: str, owner: str, *, armed: bool) -> Lease:
         """Let the arm move, or not any more.
 
-        Parameters
-        ----------
-        device : str
-            the arm
-        token : str
-            of its lease
-        owner : str
-            who shows it
-        armed : bool
-            whether it may move
-
         Raises
         ------
         LeaseLostError
@@ -167,15 +121,6 @@ class Leases:
 
     def release(self, device: str, token: str, owner: str) -> None:
         """Give an arm back; what moves by the lease stops.
-
-        Parameters
-        ----------
-        device : str
-            the arm
-        token : str
-            of its lease
-        owner : str
-            who shows it
 
         Raises
         ------
@@ -191,26 +136,11 @@ class Leases:
             lease.is_armed = False
 
     def find(self, identifier: str) -> Lease | None:
-        """The lease of an identifier, while it holds.
-
-        Parameters
-        ----------
-        identifier : str
-            of the lease
-        """
+        """The lease of an identifier, while it holds."""
         return next((lease for lease in self.active() if lease.id == identifier), None)
 
     def require(self, device: str, token: str, owner: str) -> Lease:
         """The present lease of an arm, if it is the one that is shown.
-
-        Parameters
-        ----------
-        device : str
-            the arm
-        token : str
-            that is shown
-        owner : str
-            who shows it
 
         Raises
         ------
@@ -226,22 +156,6 @@ class Leases:
 
     def permit(self, device: str, token: str | None, owner: str, *, is_needed: bool) -> Permit:
         """Leave to move an arm.
-
-        Parameters
-        ----------
-        device : str
-            the arm
-        token : str or None
-            of its lease, if one is shown
-        owner : str
-            who shows it
-        is_needed : bool
-            whether the arm moves with a lease only; else whoever asks first has it for one motion
-
-        Returns
-        -------
-        Permit
-            to be asked before the motion begins, and while it lasts
 
         Raises
         ------
@@ -259,24 +173,13 @@ class Leases:
         return permit
 
     def end_of(self, lease: Lease) -> str | None:
-        """Why a lease does not hold; None while it does. Takes no lock.
-
-        Parameters
-        ----------
-        lease : Lease
-            the lease
-        """
+        """Why a lease does not hold; None while it does. Takes no lock."""
         if lease.lost is None and self._clock() >= lease.ends:
             self._finish(lease, f"no sign of life for {lease.ttl_s:g} s")
         return lease.lost
 
     def require_unleased(self, device: str) -> None:
         """Refuse an arm that somebody has a lease of.
-
-        Parameters
-        ----------
-        device : str
-            the arm
 
         Raises
         ------

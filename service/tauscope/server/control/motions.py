@@ -25,29 +25,13 @@ POLL_S = 0.05
 
 
 def ready_motion(run: RunWorkspace, stop: threading.Event) -> bool:
-    """The motion of a run whose trajectory is in its folder.
-
-    Parameters
-    ----------
-    run : RunWorkspace
-        of the run
-    stop : threading.Event
-        set when the run shall stop
-    """
+    """The motion of a run whose trajectory is in its folder."""
     return run.trajectory is not None and not stop.is_set()
 
 
 @dataclass(frozen=True, eq=False)
 class DesignedMotion:
-    """A motion that a job designs meanwhile.
-
-    jobs : JobQueue
-        where the job is
-    excitations : JobKind
-        its kind
-    excitation : str
-        its identifier
-    """
+    """A motion that a job designs meanwhile."""
 
     jobs: JobQueue
     excitations: JobKind
@@ -55,13 +39,6 @@ class DesignedMotion:
 
     def __call__(self, run: RunWorkspace, stop: threading.Event) -> bool:
         """Wait for the job and fetch its trajectory.
-
-        Parameters
-        ----------
-        run : RunWorkspace
-            of the run
-        stop : threading.Event
-            set when the run shall stop
 
         Raises
         ------
@@ -81,13 +58,6 @@ class DesignedMotion:
 
 def wait_for_end(workspace: Workspace, stop: threading.Event) -> JobRecord | None:
     """Wait until a job has ended.
-
-    Parameters
-    ----------
-    workspace : Workspace
-        of the job
-    stop : threading.Event
-        ends the waiting
 
     Returns
     -------
@@ -110,13 +80,7 @@ def wait_for_end(workspace: Workspace, stop: threading.Event) -> JobRecord | Non
 
 
 class StepFailedError(AcquisitionError):
-    """Something that others wait for has ended without result.
-
-    Parameters
-    ----------
-    problem : JobProblem
-        that it ended in
-    """
+    """Something that others wait for has ended without result."""
 
     def __init__(self, problem: JobProblem) -> None:
         super().__init__(problem.detail)
@@ -125,13 +89,6 @@ class StepFailedError(AcquisitionError):
 
 def require_succeeded(record: JobRecord, name: str) -> None:
     """Refuse to go on without a result.
-
-    Parameters
-    ----------
-    record : JobRecord
-        in an end state
-    name : str
-        what messages call the job
 
     Raises
     ------
@@ -145,13 +102,6 @@ def require_succeeded(record: JobRecord, name: str) -> None:
 
 def take_trajectory(excitation: ExcitationWorkspace, run: RunWorkspace) -> None:
     """Give a run the trajectory of an excitation that succeeded.
-
-    Parameters
-    ----------
-    excitation : ExcitationWorkspace
-        of the excitation
-    run : RunWorkspace
-        of the run
 
     Raises
     ------

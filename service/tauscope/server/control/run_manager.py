@@ -35,23 +35,7 @@ class RunManager:
         is_alive: Callable[[], bool],
         on_end: Callable[[RunRecord], None] = lambda _record: None,
     ) -> None:
-        """Open the desk; runs that an earlier service left unfinished become `interrupted`.
-
-        Parameters
-        ----------
-        items : ItemStore
-            folders of the runs
-        recordings : RecordingStore
-            where the recordings of runs are kept for identifications
-        start : callable
-            starts the control process of a run
-        claims : DeviceClaims
-            who has which arm
-        is_alive : callable
-            whether the service can still be reached; while it cannot, no control process hears of its owner
-        on_end : callable
-            told the record of every run that has ended under this desk
-        """
+        """Open the desk; runs that an earlier service left unfinished become `interrupted`."""
         self.items = items
         self.claims = claims
         self._recordings = recordings
@@ -71,19 +55,8 @@ class RunManager:
 
         Parameters
         ----------
-        staged : Path
-            staged folder that holds the run's input
-        motion : callable
-            sees to it that the run has its trajectory
         holder : str or None
             who has the arm already, to whom the run belongs; None where the run takes the arm itself
-        permit : Permit
-            leave to move the arm; the run stops when it ends
-
-        Returns
-        -------
-        str
-            the run's identifier
 
         Raises
         ------
@@ -118,11 +91,6 @@ class RunManager:
     def stop(self, identifier: str) -> Live | None:
         """Stop a run, in whatever state it is: takes no lock, waits for nothing, may be called any number of times.
 
-        Parameters
-        ----------
-        identifier : str
-            of the run
-
         Returns
         -------
         Live or None
@@ -135,23 +103,12 @@ class RunManager:
         return leader.live
 
     def live(self, identifier: str) -> Live | None:
-        """What is known of a run that goes on; None of any other.
-
-        Parameters
-        ----------
-        identifier : str
-            of the run
-        """
+        """What is known of a run that goes on; None of any other."""
         leader = self._led.find(identifier)
         return None if leader is None else leader.live
 
     def remove(self, identifier: str) -> bool:
         """Remove a run that has ended, with all its files; what is kept among the recordings stays.
-
-        Parameters
-        ----------
-        identifier : str
-            of the run
 
         Returns
         -------
@@ -244,11 +201,5 @@ class RunManager:
 
 
 def run_recording_name(identifier: str) -> str:
-    """What the recording of a run is called among the recordings.
-
-    Parameters
-    ----------
-    identifier : str
-        of the run
-    """
+    """What the recording of a run is called among the recordings."""
     return f"run-{identifier}.csv"

@@ -25,13 +25,7 @@ class BackendChoice(StoredModel):
     )
 
     def device(self, robot_name: str) -> str:
-        """What names the arm: one run at a time has it.
-
-        Parameters
-        ----------
-        robot_name : str
-            what the robot file calls the robot
-        """
+        """What names the arm: one run at a time has it."""
         return f"{robot_name} on {self.name}"
 
 

@@ -17,20 +17,6 @@ from tauscope.server.control.run_workspace import RunWorkspace
 def start_control(workspace: RunWorkspace, report: Report, *, sim_socket: Path | None = None) -> RunProcess:
     """Start the control process.
 
-    Parameters
-    ----------
-    workspace : RunWorkspace
-        of the run
-    report : callable
-        takes the events
-    sim_socket : Path or None
-        where a simulated arm that runs by the clock listens; one is started for each run where None
-
-    Returns
-    -------
-    RunProcess
-        started; hears of its owner by `RunProcess.beat`
-
     Raises
     ------
     RobotFileError

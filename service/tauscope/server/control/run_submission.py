@@ -23,23 +23,8 @@ def hand_in_run(
 
     Parameters
     ----------
-    desk : RunManager
-        takes it
-    robot_folder : Path
-        holds the robot file and its URDF
-    request : RunRequestRecord
-        which run
-    excitation : ExcitationWorkspace
-        its motion
     holder : str or None
         who has the arm already; None where the run takes it itself
-    permit : Permit
-        leave to move the arm
-
-    Returns
-    -------
-    str
-        the run's identifier
 
     Raises
     ------

@@ -58,15 +58,7 @@ StartControl = Callable[[RunWorkspace, Report], ControlProcess]
 
 @dataclass(frozen=True)
 class Live:
-    """What is known of a run that goes on.
-
-    state : RunState
-        where it stands
-    percent : float or None
-        how much of ramp and motion was played
-    figures : mapping
-        what the control process measured last
-    """
+    """What is known of a run that goes on."""
 
     state: RunState
     percent: float | None
@@ -87,22 +79,7 @@ class RunSupervisor:
         is_alive: Callable[[], bool],
         permit: Permit = FREE,
     ) -> None:
-        """Prepare; nothing happens before `lead`.
-
-        Parameters
-        ----------
-        workspace : RunWorkspace
-            of the run
-        start : callable
-            starts the control process
-        motion : callable
-            sees to it that the run has its trajectory
-        is_alive : callable
-            whether the service can still be reached; while it cannot, the control process hears nothing of its owner,
-            and stops the arm
-        permit : Permit
-            leave to move the arm; the run stops when it ends
-        """
+        """Prepare; nothing happens before `lead`."""
         self.live = Live(RunState.CREATED, None, {})
         self._workspace = workspace
         self._start = start

@@ -32,13 +32,7 @@ class RunWorkspace(JobFolder):
     """
 
     def __init__(self, folder: Path) -> None:
-        """Look at a run's folder; nothing is opened yet.
-
-        Parameters
-        ----------
-        folder : Path
-            of the run
-        """
+        """Look at a run's folder; nothing is opened yet."""
         super().__init__(folder)
         self.robot = folder / "robot"
         self.trajectories = folder / "trajectory"
@@ -57,13 +51,7 @@ class RunWorkspace(JobFolder):
         return next(iter(sorted(self.trajectories.glob("*"))), None)
 
     def recording(self, format_: str) -> Path:
-        """Where the recording of a format lies; the journal is the MCAP, ramp included.
-
-        Parameters
-        ----------
-        format_ : str
-            ``mcap``, ``csv`` or ``parquet``
-        """
+        """Where the recording of a format lies; the journal is the MCAP, ramp included."""
         return self.control / (JOURNAL_FILE if format_ == "mcap" else f"{RECORDING_STEM}.{format_}")
 
     def read_request(self) -> RunRequestRecord | None:
@@ -71,23 +59,11 @@ class RunWorkspace(JobFolder):
         return read_stored(self._request, RunRequestRecord)
 
     def write_request(self, request: RunRequestRecord) -> None:
-        """Keep what was asked for.
-
-        Parameters
-        ----------
-        request : RunRequestRecord
-            which run
-        """
+        """Keep what was asked for."""
         write_stored(self._request, request)
 
     def create(self, request: RunRequestRecord) -> None:
-        """Write the record of a run that has not begun.
-
-        Parameters
-        ----------
-        request : RunRequestRecord
-            which run
-        """
+        """Write the record of a run that has not begun."""
         backend, mode = request.backend.name, request.options.mode.value
         write_record(self.folder, new_record(request.robot_name, backend, mode))
 
@@ -105,13 +81,6 @@ class RunWorkspace(JobFolder):
 
     def end_before_start(self, state: RunState, problem: RunProblem | None) -> None:
         """Write the end of a run that no control process was started for.
-
-        Parameters
-        ----------
-        state : RunState
-            an end state
-        problem : RunProblem or None
-            why it did not finish
 
         Raises
         ------
@@ -145,13 +114,7 @@ class RunWorkspace(JobFolder):
         return JobProblem(code=record.problem.code, detail=self.in_user_terms(record.problem.detail))
 
     def in_user_terms(self, text: str) -> str:
-        """A message without the server's folders.
-
-        Parameters
-        ----------
-        text : str
-            a message that may hold paths
-        """
+        """A message without the server's folders."""
         return without_folders(text, self.control, self.trajectories, self.robot, self.folder)
 
     def tell_end(self) -> None:

@@ -39,17 +39,7 @@ class SupervisedThreads(Generic[L]):
         self._active: Mapping[str, _Supervised[L]] = {}
 
     def begin(self, identifier: str, leader: L, then: Callable[[], None]) -> None:
-        """Lead some work in a thread of its own.
-
-        Parameters
-        ----------
-        identifier : str
-            of the work
-        leader : Supervisor
-            leads it
-        then : callable
-            called in the same thread afterwards, before the work counts as over
-        """
+        """Lead some work in a thread of its own."""
 
         def run() -> None:
             try:
@@ -65,13 +55,7 @@ class SupervisedThreads(Generic[L]):
         thread.start()
 
     def find(self, identifier: str) -> L | None:
-        """Who leads some work; None where it does not go on.
-
-        Parameters
-        ----------
-        identifier : str
-            of the work
-        """
+        """Who leads some work; None where it does not go on."""
         led = self._active.get(identifier)
         return None if led is None else led.leader
 

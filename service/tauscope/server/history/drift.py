@@ -12,16 +12,10 @@ from tauscope.server.history.policy import ModelPolicy
 class Drift:
     """The change of one parameter.
 
-    name, joint : str
-        as in `NamedParameter`
     before, after : float
         values [SI]
     std : float
         standard error of the difference [SI]; of two identifications that share no recording
-    in_std : float
-        the difference in its standard errors
-    share : float
-        the difference in parts of the earlier value, or of what it is measured by where that is next to nothing
     """
 
     name: str
@@ -34,25 +28,13 @@ class Drift:
 
 
 def drift_between(before: Sequence[NamedParameter], after: Sequence[NamedParameter]) -> tuple[Drift, ...]:
-    """The change of every parameter that both identifications tell.
-
-    Parameters
-    ----------
-    before, after : sequence of NamedParameter
-        of the earlier and of the later one
-    """
+    """The change of every parameter that both identifications tell."""
     later = {parameter.name: parameter for parameter in after}
     return tuple(_drift(parameter, later[parameter.name]) for parameter in before if parameter.name in later)
 
 
 def largest_by_joint(drifts: Sequence[Drift]) -> Mapping[str, Drift]:
-    """For each joint its most significant change.
-
-    Parameters
-    ----------
-    drifts : sequence of Drift
-        of all parameters
-    """
+    """For each joint its most significant change."""
     largest: dict[str, Drift] = {}
     for drift in drifts:
         if drift.joint not in largest or abs(drift.in_std) > abs(largest[drift.joint].in_std):
@@ -61,15 +43,7 @@ def largest_by_joint(drifts: Sequence[Drift]) -> Mapping[str, Drift]:
 
 
 def is_beyond(drift: Drift, policy: ModelPolicy) -> bool:
-    """Whether a change is both significant and large.
-
-    Parameters
-    ----------
-    drift : Drift
-        of a parameter
-    policy : ModelPolicy
-        the bounds
-    """
+    """Whether a change is both significant and large."""
     return abs(drift.in_std) > policy.drift_std and abs(drift.share) > policy.drift_share
 
 

@@ -14,15 +14,7 @@ _MOST_EVENTS = 10_000
 
 @dataclass(frozen=True)
 class RobotDrift:
-    """The active model of a robot against the one that drift is counted from.
-
-    active, reference : str
-        identifiers of both
-    drifts : tuple of Drift
-        the change of every parameter that both tell
-    open_events : int
-        drifts beyond their bounds that nobody has taken note of
-    """
+    """The active model of a robot against the one that drift is counted from."""
 
     active: str
     reference: str
@@ -34,15 +26,7 @@ class DriftMonitor:
     """Looks at the history now and then; models are read again only where others became active or the reference."""
 
     def __init__(self, history: ModelHistory, site: str) -> None:
-        """Prepare; nothing is known before `look`.
-
-        Parameters
-        ----------
-        history : ModelHistory
-            the models
-        site : str
-            of the data folder that holds the active ones; those of others are told by the services of theirs
-        """
+        """Prepare; nothing is known before `look`."""
         self._history, self._site = history, site
         self.robots: Mapping[str, RobotDrift] = {}
 

@@ -11,15 +11,7 @@ from tauscope.server.history.policy import ModelPolicy
 
 @dataclass(frozen=True)
 class Gate:
-    """One condition.
-
-    name : str
-        ``held_out``, ``consistency``, ``excitation`` or ``structure``
-    passed : bool
-        whether it is met
-    reason : str
-        one line: what was found, what is allowed, and what to do where it is not met
-    """
+    """One condition."""
 
     name: str
     passed: bool
@@ -29,29 +21,13 @@ class Gate:
 def check_gates(
     document: IdentificationDocument, policy: ModelPolicy, active: IdentificationDocument | None = None
 ) -> tuple[Gate, ...]:
-    """Judge a model.
-
-    Parameters
-    ----------
-    document : IdentificationDocument
-        the new model
-    policy : ModelPolicy
-        the bounds
-    active : IdentificationDocument or None
-        the model whose place it would take
-    """
+    """Judge a model."""
     gates = [_held_out(document, policy), _consistency(document, policy), _excitation(document, policy)]
     return tuple(gates if active is None else [*gates, _structure(document, active)])
 
 
 def passes(gates: Sequence[Gate]) -> bool:
-    """Whether all gates are met.
-
-    Parameters
-    ----------
-    gates : sequence of Gate
-        of a model
-    """
+    """Whether all gates are met."""
     return all(gate.passed for gate in gates)
 
 
@@ -111,13 +87,7 @@ def _structure(document: IdentificationDocument, active: IdentificationDocument)
 
 
 def is_physical(link: LinkEntry) -> bool:
-    """Whether a link's pseudo-inertia [[½ tr(I) 1 − I, m s], [(m s)ᵀ, m]] has no negative eigenvalue.
-
-    Parameters
-    ----------
-    link : LinkEntry
-        mass, first moment, and inertia about the link frame's origin
-    """
+    """Whether a link's pseudo-inertia [[½ tr(I) 1 − I, m s], [(m s)ᵀ, m]] has no negative eigenvalue."""
     i = link.inertia
     inertia = np.array([[i.xx, i.xy, i.xz], [i.xy, i.yy, i.yz], [i.xz, i.yz, i.zz]])
     pseudo = np.empty((4, 4))

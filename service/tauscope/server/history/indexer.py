@@ -18,13 +18,7 @@ _log = logging.getLogger("tauscope.jobs")
 
 @dataclass(frozen=True)
 class ChangedItem:
-    """An item of which a file is not what it was when the item ended; or a recording that is not what was kept.
-
-    kind, identifier : str
-        of the item; ``recording`` and its name
-    path : str
-        of the file, below the item's folder; empty for a recording
-    """
+    """An item of which a file is not what it was when the item ended; or a recording that is not what was kept."""
 
     kind: str
     identifier: str
@@ -39,17 +33,7 @@ class Indexer:
     """
 
     def __init__(self, index: Index, items: Mapping[str, ItemStore], recordings: RecordingStore) -> None:
-        """Prepare; nothing is read yet.
-
-        Parameters
-        ----------
-        index : Index
-            of this data folder
-        items : mapping of str to ItemStore
-            folders of each kind of item
-        recordings : RecordingStore
-            recordings on the server
-        """
+        """Prepare; nothing is read yet."""
         self.index = index
         self._items = items
         self._recordings = recordings
@@ -59,11 +43,6 @@ class Indexer:
 
     def sync(self, *, thorough: bool = False) -> None:
         """Bring the index up to date.
-
-        Parameters
-        ----------
-        thorough : bool
-            whether items that have ended are looked at too: somebody may have changed them by hand
 
         Raises
         ------
@@ -78,18 +57,7 @@ class Indexer:
             self._sync_recordings()
 
     def check(self, *, deep: bool = True) -> list[ChangedItem]:
-        """Compare the files of every item that has ended with what they were then, and recordings with what was kept.
-
-        Parameters
-        ----------
-        deep : bool
-            whether every byte is looked at, or the sizes alone
-
-        Returns
-        -------
-        list of ChangedItem
-            shown as damaged in the index from now on
-        """
+        """Compare the files of every ended item, and every recording, with the hashes kept of them."""
         self.sync(thorough=True)
         found = [ChangedItem("recording", name, "") for name in self._recordings.damaged(deep=deep)]
         for kind, store in self._items.items():
@@ -158,17 +126,6 @@ class Indexer:
 
 def open_index(index: Index, items: Mapping[str, ItemStore], recordings: RecordingStore, label: str) -> Indexer:
     """Open the index of a data folder, and fill it from the folders; an old folder is upgraded so.
-
-    Parameters
-    ----------
-    index : Index
-        of this data folder
-    items : mapping of str to ItemStore
-        folders of each kind of item
-    recordings : RecordingStore
-        recordings on the server
-    label : str
-        what people call the data folder
 
     Raises
     ------

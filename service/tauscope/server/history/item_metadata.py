@@ -25,20 +25,7 @@ _LIVING = {"state.json", "events.jsonl", "progress", "cancel", "run.json", "stop
 
 
 def read_facts(kind: str, folder: Path) -> ItemMetadata:
-    """What an item's folder shows.
-
-    Parameters
-    ----------
-    kind : str
-        a key of `ITEM_CLASSES`
-    folder : Path
-        of the item
-
-    Returns
-    -------
-    ItemMetadata
-        with its files, where the item has ended
-    """
+    """What an item's folder shows."""
     facts = _READERS[kind](folder)
     if not facts.is_final:
         return facts
@@ -49,15 +36,7 @@ def read_facts(kind: str, folder: Path) -> ItemMetadata:
 
 
 def stamp(kind: str, folder: Path) -> str:
-    """What changes when the state of an item does.
-
-    Parameters
-    ----------
-    kind : str
-        of the item
-    folder : Path
-        of the item
-    """
+    """What changes when the state of an item does."""
     names = ("control/run.json", "run.json") if kind == "run" else ("state.json",)
     for name in names:
         try:
@@ -70,15 +49,6 @@ def stamp(kind: str, folder: Path) -> str:
 
 def changed_file(folder: Path, artefacts: tuple[FileMetadata, ...], *, deep: bool) -> str | None:
     """The first file of an item that is not what it was when the item ended.
-
-    Parameters
-    ----------
-    folder : Path
-        of the item
-    artefacts : tuple of FileMetadata
-        its files as they were
-    deep : bool
-        whether every byte is looked at, or the sizes alone
 
     Returns
     -------

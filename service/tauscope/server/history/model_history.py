@@ -20,23 +20,11 @@ class ModelHistory:
     """Models of every robot. Every method is one short transaction, and may be called from any thread."""
 
     def __init__(self, database: Database) -> None:
-        """Look at the history.
-
-        Parameters
-        ----------
-        database : Database
-            holds it
-        """
+        """Look at the history."""
         self._database = database
 
     def unjudged(self, site: str) -> list[str]:
-        """Identifications that succeeded and were not judged yet, the oldest first.
-
-        Parameters
-        ----------
-        site : str
-            of the data folder that holds them
-        """
+        """Identifications that succeeded and were not judged yet, the oldest first."""
         judged = select(Model.identifier).where(Model.site == site)
         query = (
             select(Item.identifier)
@@ -49,18 +37,6 @@ class ModelHistory:
 
     def consider(self, candidate: Candidate, now: datetime) -> ModelEntry:
         """Judge an identification: compare it, make it active where it passes, and raise what people should know.
-
-        Parameters
-        ----------
-        candidate : Candidate
-            the identification
-        now : datetime
-            the present moment
-
-        Returns
-        -------
-        ModelEntry
-            as it was judged
 
         Raises
         ------
@@ -75,17 +51,6 @@ class ModelHistory:
 
     def activate(self, identifier: str, role: str, reason: str, now: datetime) -> ModelEntry:
         """Make a model the active one, or the one that drift is counted from, on somebody's word.
-
-        Parameters
-        ----------
-        identifier : str
-            of the model
-        role : str
-            ``active`` or ``reference``
-        reason : str
-            why; kept with the choice
-        now : datetime
-            the present moment
 
         Raises
         ------
@@ -108,11 +73,6 @@ class ModelHistory:
     def find(self, identifier: str) -> ModelEntry:
         """A model.
 
-        Parameters
-        ----------
-        identifier : str
-            of the identification
-
         Raises
         ------
         NotFoundError
@@ -123,11 +83,6 @@ class ModelHistory:
 
     def document(self, identifier: str) -> IdentificationDocument:
         """What a model says; also where its identification was removed.
-
-        Parameters
-        ----------
-        identifier : str
-            of the identification
 
         Raises
         ------
@@ -141,26 +96,14 @@ class ModelHistory:
         return IdentificationDocument.model_validate(content)
 
     def active(self, robot: str) -> ModelEntry | None:
-        """The active model of a robot; None where none has passed yet.
-
-        Parameters
-        ----------
-        robot : str
-            its name
-        """
+        """The active model of a robot; None where none has passed yet."""
         query = select(Model).join(Robot).where(Robot.name == robot, Model.is_active)
         with self._database.reading() as session:
             model = session.scalar(query)
             return None if model is None else _entry(model)
 
     def active_and_reference(self, site: str) -> dict[str, tuple[str, str]]:
-        """Identifiers of the active model and of the one that drift is counted from, by name of the robot.
-
-        Parameters
-        ----------
-        site : str
-            of the data folder that holds the active one
-        """
+        """Identifiers of the active model and of the one that drift is counted from, by name of the robot."""
         active, reference = aliased(Model), aliased(Model)
         query = (
             select(Robot.name, active.identifier, reference.identifier)
@@ -171,15 +114,7 @@ class ModelHistory:
             return {name: (now, then) for name, now, then in session.execute(query)}
 
     def models(self, robot: str | None, limit: int) -> list[ModelEntry]:
-        """Models, the newest first.
-
-        Parameters
-        ----------
-        robot : str or None
-            of this robot only
-        limit : int
-            most models
-        """
+        """Models, the newest first."""
         query = select(Model).join(Robot).order_by(Model.created.desc(), Model.id.desc()).limit(limit)
         if robot is not None:
             query = query.where(Robot.name == robot)
@@ -188,13 +123,6 @@ class ModelHistory:
 
     def documents(self, robot: str, since: datetime | None = None) -> list[tuple[ModelEntry, IdentificationDocument]]:
         """Every model of a robot that was ever active, with what it says; the oldest first.
-
-        Parameters
-        ----------
-        robot : str
-            its name
-        since : datetime or None
-            models of identifications that were handed in no earlier
 
         Raises
         ------
@@ -211,11 +139,6 @@ class ModelHistory:
     def policy(self, robot: str) -> ModelPolicy:
         """The bounds for a robot.
 
-        Parameters
-        ----------
-        robot : str
-            its name
-
         Raises
         ------
         NotFoundError
@@ -227,13 +150,6 @@ class ModelHistory:
     def set_policy(self, robot: str, policy: ModelPolicy) -> None:
         """Set the bounds for a robot; models that were judged stay as they were judged.
 
-        Parameters
-        ----------
-        robot : str
-            its name
-        policy : ModelPolicy
-            the bounds
-
         Raises
         ------
         NotFoundError
@@ -243,17 +159,7 @@ class ModelHistory:
             session.merge(RobotPolicy(robot_id=_robot(session, robot).id, document=policy.model_dump()))
 
     def events(self, robot: str | None, *, only_open: bool, limit: int) -> list[ModelEventEntry]:
-        """What people should know, the newest first.
-
-        Parameters
-        ----------
-        robot : str or None
-            of this robot only
-        only_open : bool
-            only what nobody has taken note of
-        limit : int
-            most events
-        """
+        """What people should know, the newest first."""
         query = select(ModelEvent).join(Robot).order_by(ModelEvent.last_seen.desc(), ModelEvent.id.desc()).limit(limit)
         if robot is not None:
             query = query.where(Robot.name == robot)
@@ -264,15 +170,6 @@ class ModelHistory:
 
     def acknowledge(self, number: int, note: str, now: datetime) -> ModelEventEntry:
         """Take note of an event; nothing happens to one that was closed before.
-
-        Parameters
-        ----------
-        number : int
-            of the event
-        note : str
-            kept with it
-        now : datetime
-            the present moment
 
         Raises
         ------

@@ -29,16 +29,6 @@ from tauscope.server.store.database.tables import Robot
 class Candidate:
     """An identification that is to be judged.
 
-    identifier : str
-        of it
-    site : str
-        of the data folder that holds it
-    robot : str
-        name of the robot
-    created : datetime
-        when it was handed in
-    source : str
-        what was measured: ``arm``, ``simulated`` or ``uploaded``
     result : bytes or None
         its document; None where it cannot be read
     """
@@ -52,26 +42,7 @@ class Candidate:
 
 
 def judge(session: Session, robot: Robot, candidate: Candidate, policy: ModelPolicy, now: datetime) -> Model:
-    """Judge an identification, and write down what came of it.
-
-    Parameters
-    ----------
-    session : Session
-        that writes
-    robot : Robot
-        whose model it is
-    candidate : Candidate
-        the identification
-    policy : ModelPolicy
-        the bounds
-    now : datetime
-        the present moment
-
-    Returns
-    -------
-    Model
-        its row
-    """
+    """Judge an identification, and write down what came of it."""
     document = _parsed(candidate.result)
     active, reference = _current(session, robot, is_active=True), _current(session, robot, is_active=False)
     model = Model(
@@ -101,21 +72,7 @@ def judge(session: Session, robot: Robot, candidate: Candidate, policy: ModelPol
 
 
 def choose(session: Session, model: Model, role: str, reason: str, now: datetime) -> None:
-    """Make a model the active one, or the reference; the one before is kept.
-
-    Parameters
-    ----------
-    session : Session
-        that writes
-    model : Model
-        the model
-    role : str
-        ``active`` or ``reference``
-    reason : str
-        why
-    now : datetime
-        the present moment
-    """
+    """Make a model the active one, or the reference; the one before is kept."""
     session.flush()
     column = Model.is_active if role == "active" else Model.is_reference
     for other in session.scalars(select(Model).where(Model.robot_id == model.robot_id, column, Model.id != model.id)):
@@ -134,13 +91,7 @@ def choose(session: Session, model: Model, role: str, reason: str, now: datetime
 
 
 def compared(before: IdentificationDocument, after: IdentificationDocument) -> tuple[Drift, ...]:
-    """The change of every parameter that two models tell.
-
-    Parameters
-    ----------
-    before, after : IdentificationDocument
-        the earlier and the later one
-    """
+    """The change of every parameter that two models tell."""
     return drift_between(named_parameters(before), named_parameters(after))
 
 

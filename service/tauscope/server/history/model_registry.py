@@ -22,17 +22,7 @@ class ModelRegistry:
     """Brings identifications before the history of models, in the order in which they were handed in."""
 
     def __init__(self, history: ModelHistory, site: str, items: Mapping[str, ItemStore]) -> None:
-        """Prepare; nothing is judged yet.
-
-        Parameters
-        ----------
-        history : ModelHistory
-            judges
-        site : str
-            identifier of this data folder
-        items : mapping of str to ItemStore
-            folders of each kind of item
-        """
+        """Prepare; nothing is judged yet."""
         self.history = history
         self._site = site
         self._identifications = items["identification"]
@@ -41,11 +31,6 @@ class ModelRegistry:
 
     def consider_new(self) -> list[ModelEntry]:
         """Judge every identification in the index that was not judged yet.
-
-        Returns
-        -------
-        list of ModelEntry
-            as they were judged
 
         Raises
         ------

@@ -12,12 +12,8 @@ from tauscope.server.history.model_entries import ModelEntry
 class ParameterTrend:
     """One parameter over time.
 
-    name, joint : str
-        of the parameter, and of the joint that it belongs to
     points : tuple of (str, TrendPoint)
         identifier of each model, and what it says; the oldest first
-    line : Trend or None
-        the straight line through them; None before there are three
     """
 
     name: str

@@ -14,10 +14,6 @@ _LINK = re.compile(r"\d+$")
 class NamedParameter:
     """An identified parameter.
 
-    name : str
-        as in a diagnosis: ``viscous joint2``, or the expression of a base parameter
-    joint : str
-        name of the joint that it belongs to; of a base parameter, the joint that moves its first link
     value : float
         estimate [SI]
     std : float
@@ -38,11 +34,6 @@ def named_parameters(document: IdentificationDocument) -> tuple[NamedParameter, 
 
     Base parameters are those of the free estimate: their standard errors belong to it. The shape constants K_v and δ
     are left out: they describe the same curve as stiction and Stribeck friction, and wander with them.
-
-    Parameters
-    ----------
-    document : IdentificationDocument
-        of the identification
     """
     return (*_base(document), *_friction(document), *_rotors(document))
 

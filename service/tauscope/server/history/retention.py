@@ -17,15 +17,7 @@ _ALL = 10**9
 
 @dataclass(frozen=True)
 class RetentionRule:
-    """What may go.
-
-    older_than : timedelta
-        items that ended, and recordings that were written, longer ago than this
-    kinds : frozenset of str
-        kinds of items that may go
-    recordings : bool
-        whether recordings may go too that no item which stays was made from
-    """
+    """What may go."""
 
     older_than: timedelta
     kinds: frozenset[str]
@@ -34,13 +26,7 @@ class RetentionRule:
 
 @dataclass(frozen=True)
 class Removal:
-    """What goes.
-
-    items : tuple of ItemEntry
-        with all their files
-    recordings : tuple of str
-        names of recordings
-    """
+    """What goes."""
 
     items: tuple[ItemEntry, ...]
     recordings: tuple[str, ...]
@@ -53,19 +39,6 @@ def plan_removal(
 
     The identification of an active model, or of one that drift is counted from, stays; so does what goes on, and what
     is damaged: somebody should look at it.
-
-    Parameters
-    ----------
-    keeper : Indexer
-        knows the items
-    history : ModelHistory
-        knows the models
-    recordings : RecordingStore
-        recordings on the server
-    rule : RetentionRule
-        what may go
-    now : datetime
-        the present moment
 
     Raises
     ------
@@ -99,22 +72,6 @@ def remove(
 ) -> Removal:
     """Remove what was planned; what somebody else removed meanwhile is left out.
 
-    Parameters
-    ----------
-    removal : Removal
-        of `plan_removal`
-    removers : mapping of str to callable
-        for each kind of item what removes one, given its identifier
-    recordings : RecordingStore
-        recordings on the server
-    keeper : Indexer
-        brought up to date afterwards
-
-    Returns
-    -------
-    Removal
-        what went
-
     Raises
     ------
     OSError
@@ -147,23 +104,7 @@ class RetentionSweeper:
         removers: Mapping[str, Callable[[str], object]],
         on_removed: Callable[[str, str], None],
     ) -> None:
-        """Prepare; nothing goes before `tidy`.
-
-        Parameters
-        ----------
-        rule : RetentionRule
-            what may go
-        keeper : Indexer
-            knows the items
-        history : ModelHistory
-            knows the models
-        recordings : RecordingStore
-            recordings on the server
-        removers : mapping of str to callable
-            for each kind of item what removes one, given its identifier
-        on_removed : callable
-            told the kind and the name of what went
-        """
+        """Prepare; nothing goes before `tidy`."""
         self._rule, self._keeper, self._history = rule, keeper, history
         self._recordings, self._removers, self._on_removed = recordings, removers, on_removed
 

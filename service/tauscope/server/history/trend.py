@@ -14,8 +14,6 @@ WEEK_S = 7 * 86400.0
 class TrendPoint:
     """A parameter in one identification.
 
-    time : datetime
-        of the identification
     value, std : float
         estimate and its standard error [SI]
     """
@@ -29,14 +27,8 @@ class TrendPoint:
 class Trend:
     """The line through all points.
 
-    count : int
-        number of points
     slope : float
         change a week [SI/week]
-    slope_std : float
-        its standard error; larger where the points scatter more than their own errors say
-    scatter : float
-        √(χ²/(N − 2)): 1 where the points scatter as their errors say, more where something else changes too
     change : float
         of the line from the first point to the last [SI]
     """
@@ -55,11 +47,6 @@ class Trend:
 
 def trend_of(points: Sequence[TrendPoint]) -> Trend | None:
     """The line through all points, by weighted least squares.
-
-    Parameters
-    ----------
-    points : sequence of TrendPoint
-        in any order, standard errors positive
 
     Returns
     -------

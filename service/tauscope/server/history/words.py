@@ -14,15 +14,7 @@ _NOUNS = {
 
 
 def drift_words(drift: Drift, elapsed: timedelta) -> str:
-    """A change in one sentence.
-
-    Parameters
-    ----------
-    drift : Drift
-        of a parameter
-    elapsed : timedelta
-        between the two identifications
-    """
+    """A change in one sentence."""
     term = drift.name.partition(" ")[0]
     noun = _NOUNS.get(term, drift.name) if drift.name == f"{term} {drift.joint}" else drift.name
     difference = drift.after - drift.before
@@ -33,13 +25,7 @@ def drift_words(drift: Drift, elapsed: timedelta) -> str:
 
 
 def duration_words(elapsed: timedelta) -> str:
-    """A length of time, as people say it.
-
-    Parameters
-    ----------
-    elapsed : timedelta
-        not negative
-    """
+    """A length of time, as people say it."""
     for unit, length, most in (("hour", 3600, 48), ("day", 86400, 14), ("week", 7 * 86400, 9)):
         count = round(elapsed.total_seconds() / length)
         if count < most:

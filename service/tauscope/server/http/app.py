@@ -46,8 +46,8 @@ from tauscope.server.http.settings import Settings
 from tauscope.server.page.router import router as page
 from tauscope.server.problems import Problem
 
-API_VERSION = "1.9.1"
-"""Of the interface, not of the package; a change of tests/api/openapi.json goes with a change here."""
+API_VERSION = "1.9.2"
+"""Of the interface, not of the package; a change of tests/server/http/openapi.json goes with a change here."""
 
 PREFIX = "/api/v1"
 
@@ -84,17 +84,7 @@ REQUESTS = (
 
 
 def create_app(settings: Settings, executor: Executor | None = None, start: StartControl | None = None) -> FastAPI:
-    """The application; it takes the data folder when it starts and lets go of it when it stops.
-
-    Parameters
-    ----------
-    settings : Settings
-        of the operator
-    executor : Executor or None
-        where the work is done; processes of our own where None
-    start : callable or None
-        starts the control process of a run; one of our own where None
-    """
+    """The application; it takes the data folder when it starts and lets go of it when it stops."""
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:

@@ -66,15 +66,6 @@ def open_services(
 ) -> Iterator[Services]:
     """Take the data folder, and end all work on leaving: first what moves, then the rest.
 
-    Parameters
-    ----------
-    settings : Settings
-        of the operator
-    executor : Executor or None
-        where the work is done; processes of our own where None
-    start : callable or None
-        starts the control process of a run; one of our own where None
-
     Raises
     ------
     TauscopeError
@@ -239,11 +230,6 @@ def _open_access(settings: Settings) -> Access:
 
 def require_data_folder(settings: Settings) -> None:
     """Make the data folder, and refuse one that cannot be worked with.
-
-    Parameters
-    ----------
-    settings : Settings
-        of the operator
 
     Raises
     ------

@@ -36,15 +36,6 @@ class BackendRequest(StrictModel):
 def chosen_backend(settings: Settings, request: BackendRequest, robot: Robot) -> BackendChoice:
     """The backend of a request.
 
-    Parameters
-    ----------
-    settings : Settings
-        of the operator
-    request : BackendRequest
-        what was asked for
-    robot : Robot
-        the arm
-
     Raises
     ------
     ScenarioError

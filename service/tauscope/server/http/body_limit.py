@@ -23,8 +23,6 @@ class BodyLimit:
 
         Parameters
         ----------
-        app : ASGI application
-            what is wrapped
         limit : int
             largest body [bytes]
         """

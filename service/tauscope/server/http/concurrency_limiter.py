@@ -26,10 +26,6 @@ class TakingTurns:
 
         Parameters
         ----------
-        app : ASGI application
-            what is wrapped
-        at_a_time : int
-            how many reading requests are worked on at once
         longest_turn_s : float
             after which the next one is let in although the answer has not begun [s]
         """

@@ -15,26 +15,12 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 def media_type(request: Request) -> str:
-    """The media type of a request's body, without parameters.
-
-    Parameters
-    ----------
-    request : Request
-        with or without a body
-    """
+    """The media type of a request's body, without parameters."""
     return request.headers.get("content-type", "").partition(";")[0].strip().lower()
 
 
 def refuse_media_type(request: Request, *accepted: str) -> ProblemError:
-    """The problem of a body of another media type.
-
-    Parameters
-    ----------
-    request : Request
-        the request
-    accepted : str
-        media types that would do
-    """
+    """The problem of a body of another media type."""
     found = media_type(request) or "of no stated media type"
     headers = {"Accept-Post": ", ".join(accepted)}
     return ProblemError("media-type", f"the body is {found}; send {' or '.join(accepted)}", headers=headers)
@@ -45,10 +31,6 @@ async def read_document(request: Request, kind: type[Model], limit: int) -> Mode
 
     Parameters
     ----------
-    request : Request
-        the request
-    kind : type
-        model of the body
     limit : int
         largest body [bytes]
 
@@ -70,15 +52,6 @@ async def read_document(request: Request, kind: type[Model], limit: int) -> Mode
 def parse_document(content: bytes, kind: type[Model], *, within: str) -> Model:
     """A model from JSON text.
 
-    Parameters
-    ----------
-    content : bytes
-        JSON
-    kind : type
-        the model
-    within : str
-        where the text stands in the request, for messages
-
     Raises
     ------
     ProblemError
@@ -91,13 +64,7 @@ def parse_document(content: bytes, kind: type[Model], *, within: str) -> Model:
 
 
 def to_json_text(value: Any) -> str | None:
-    """Plain data as JSON; None where it holds NaN or infinity, or text that is not Unicode.
-
-    Parameters
-    ----------
-    value : dict, list, str, int, float, bool or None
-        plain data
-    """
+    """Plain data as JSON; None where it holds NaN or infinity, or text that is not Unicode."""
     try:
         text = json.dumps(value, ensure_ascii=False, allow_nan=False)
         text.encode()

@@ -9,14 +9,6 @@ _MEDIA_TYPES: Mapping[str, str] = {".csv": "text/csv", ".json": "application/jso
 
 
 def file_answer(path: Path, name: str) -> FileResponse:
-    """The answer that sends a file, to be saved under a name and never shown as a page.
-
-    Parameters
-    ----------
-    path : Path
-        an existing file
-    name : str
-        what the client saves it as
-    """
+    """The answer that sends a file, to be saved under a name and never shown as a page."""
     media_type = _MEDIA_TYPES.get(Path(name).suffix.lower(), "application/octet-stream")
     return FileResponse(path, media_type=media_type, filename=name)

@@ -31,8 +31,6 @@ class PartRule:
         largest size [bytes]
     folder : Path or None
         where its files are written; None for text that is kept in memory
-    most : int
-        how many parts of that name there may be
     default_name : str or None
         name of a file that was sent without one; None where it has to have one
     """
@@ -45,43 +43,19 @@ class PartRule:
 
 @dataclass
 class ReceivedForm:
-    """A form that arrived as a whole.
-
-    texts : dict of str to bytes
-        content of the text parts, by part name
-    files : dict of str to list of KeptFile
-        files by part name, each in its folder under its own name
-    """
+    """A form that arrived as a whole."""
 
     texts: dict[str, bytes] = field(default_factory=dict)
     files: dict[str, list[KeptFile]] = field(default_factory=dict)
 
     def file(self, name: str) -> KeptFile | None:
-        """The only file of a part, or None.
-
-        Parameters
-        ----------
-        name : str
-            of the part
-        """
+        """The only file of a part, or None."""
         files = self.files.get(name, [])
         return files[0] if files else None
 
 
 async def receive_form(request: Request, rules: Mapping[str, PartRule]) -> ReceivedForm:
     """Read the form of a request; two files of one part never share a name.
-
-    Parameters
-    ----------
-    request : Request
-        with a multipart body
-    rules : mapping of str to PartRule
-        the parts that the form may have
-
-    Returns
-    -------
-    ReceivedForm
-        all parts; the caller owns the files
 
     Raises
     ------

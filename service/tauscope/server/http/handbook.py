@@ -20,13 +20,7 @@ _markdown = MarkdownIt("commonmark", {"html": False}).enable("table")
 
 @dataclass(frozen=True)
 class Chapter:
-    """A page as it is shown.
-
-    title : str
-        its first heading, without markup
-    html : str
-        its content
-    """
+    """A page as it is shown."""
 
     title: str
     html: str
@@ -44,17 +38,7 @@ def chapters() -> Mapping[str, Chapter]:
 
 
 def rendered(text: str, path: str, known: Mapping[str, object]) -> Chapter:
-    """A page from its Markdown. Markup of HTML stays text, and a link that leads to no page becomes its words.
-
-    Parameters
-    ----------
-    text : str
-        Markdown
-    path : str
-        of the page, below /docs
-    known : mapping
-        whose keys are the paths of all pages
-    """
+    """A page from its Markdown. Markup of HTML stays text, and a link that leads to no page becomes its words."""
     tokens = _markdown.parse(text)
     for token in tokens:
         if token.children is not None:

@@ -16,13 +16,7 @@ class Heartbeat:
     """The last sign of life of the event loop."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        """Begin alive.
-
-        Parameters
-        ----------
-        clock : callable
-            seconds that never run backwards
-        """
+        """Begin alive."""
         self._clock = clock
         self._last = clock()
 

@@ -25,8 +25,6 @@ def json_body(model: type[BaseModel], examples: Examples) -> dict[str, Any]:
 
     Parameters
     ----------
-    model : type
-        of the body; to be given to `install_openapi` too
     examples : mapping of str to (str, plain data)
         summary and value by name
     """
@@ -37,17 +35,7 @@ def json_body(model: type[BaseModel], examples: Examples) -> dict[str, Any]:
 def form_body(
     parts: Mapping[str, Any], required: Sequence[str], encoding: Mapping[str, Any] | None = None
 ) -> dict[str, Any]:
-    """A multipart body of an operation.
-
-    Parameters
-    ----------
-    parts : mapping of str to dict
-        schema of each part
-    required : sequence of str
-        parts that must be there
-    encoding : mapping of str to dict, or None
-        media types of parts
-    """
+    """A multipart body of an operation."""
     schema = {"type": "object", "properties": dict(parts), "additionalProperties": False}
     if required:
         schema["required"] = list(required)
@@ -55,37 +43,17 @@ def form_body(
 
 
 def binary_part(description: str) -> dict[str, Any]:
-    """The schema of a file in a form.
-
-    Parameters
-    ----------
-    description : str
-        what the file is
-    """
+    """The schema of a file in a form."""
     return {"type": "string", "contentMediaType": "application/octet-stream", "description": description}
 
 
 def model_reference(model: type[BaseModel]) -> dict[str, str]:
-    """A reference to a model of the document.
-
-    Parameters
-    ----------
-    model : type
-        the model
-    """
+    """A reference to a model of the document."""
     return {"$ref": _REFERENCE.format(model=model.__name__)}
 
 
 def install_openapi(app: FastAPI, models: Sequence[type[BaseModel]]) -> None:
-    """Have the application's OpenAPI document hold further models.
-
-    Parameters
-    ----------
-    app : FastAPI
-        the application
-    models : sequence of type
-        models that bodies and problems refer to
-    """
+    """Have the application's OpenAPI document hold further models."""
 
     def document() -> dict[str, Any]:
         if app.openapi_schema is None:

@@ -44,13 +44,7 @@ def get_style() -> Response:
 
 @router.get("/errors/{code}")
 def show_problem_kind(code: str) -> Response:
-    """What a code means.
-
-    Parameters
-    ----------
-    code : str
-        of a problem
-    """
+    """What a code means."""
     kind = KINDS.get(code)
     if kind is None:
         raise NotFoundError(one_line(f"there is no error code {shown(code)}; /docs lists them"))
@@ -60,13 +54,7 @@ def show_problem_kind(code: str) -> Response:
 
 @router.get("/how-to/{name}")
 def show_guide(name: str) -> Response:
-    """How something is done.
-
-    Parameters
-    ----------
-    name : str
-        of the page
-    """
+    """How something is done."""
     chapter = chapters().get(f"how-to/{name}")
     if chapter is None:
         raise NotFoundError(one_line(f"there is no page {shown(name)}; /docs lists them"))

@@ -28,13 +28,7 @@ _OF_STATUS: Mapping[int, str] = {404: "not-found", 405: "method-not-allowed", 41
 
 
 def install_problem_handlers(app: FastAPI) -> None:
-    """Have every exception of a route answered with a problem.
-
-    Parameters
-    ----------
-    app : FastAPI
-        the application
-    """
+    """Have every exception of a route answered with a problem."""
     app.add_exception_handler(TauscopeError, _tauscope_error)
     app.add_exception_handler(RequestValidationError, _validation_error)
     app.add_exception_handler(HTTPException, _http_exception)

@@ -29,13 +29,7 @@ class SafeAnswers:
     """Adds the headers of every answer, and turns an unforeseen exception into a problem without internals."""
 
     def __init__(self, app: ASGIApp) -> None:
-        """Wrap an application.
-
-        Parameters
-        ----------
-        app : ASGI application
-            what is wrapped
-        """
+        """Wrap an application."""
         self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -68,15 +62,7 @@ class KnownCallers:
     """Turns away requests for other host names (DNS rebinding) and those that a page of another origin makes."""
 
     def __init__(self, app: ASGIApp, answers_for: Callable[[str | None], bool]) -> None:
-        """Wrap an application.
-
-        Parameters
-        ----------
-        app : ASGI application
-            what is wrapped
-        answers_for : callable
-            whether a host, in lower case and without port, is this service
-        """
+        """Wrap an application."""
         self.app = app
         self.answers_for = answers_for
 

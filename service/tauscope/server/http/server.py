@@ -23,13 +23,6 @@ GRACE_S = 5
 def serve(settings: Settings, announce: Callable[[str], None]) -> None:
     """Answer requests until SIGINT or SIGTERM.
 
-    Parameters
-    ----------
-    settings : Settings
-        of the operator
-    announce : callable
-        told the service's address once it listens
-
     Raises
     ------
     TauscopeError

@@ -27,47 +27,7 @@ from tauscope.server.store.recordings import RecordingStore
 
 @dataclass(frozen=True)
 class Services:
-    """What the routes work with.
-
-    settings : Settings
-        of the operator
-    recordings : RecordingStore
-        recordings on the server
-    identifications, diagnoses, excitations : JobKind
-        identifications, diagnoses and designed motions, each a folder
-    jobs : JobQueue
-        waiting and running jobs of every kind
-    runs : RunManager
-        runs, each a folder
-    campaigns : CampaignManager
-        campaigns, each a folder
-    checks : Executor
-        where uploaded recordings are looked into
-    followers : CapacityLimiter
-        threads that read events for those who follow them: however many follow, the other routes' threads stay free
-    access : Access
-        who may call, and how often
-    leases : Leases
-        who controls which arm
-    audit : AuditTrail
-        who did what
-    answers : Answers
-        answers to requests that may be repeated
-    lease_answers : Answers
-        answers to those who take leases, which hold a secret
-    metrics : Metrics
-        what is counted
-    index : Indexer
-        what is kept, for searches
-    models : ModelRegistry
-        models of each robot over time
-    schedules : Scheduler
-        what is repeated at set times
-    pulse : Heartbeat
-        whether requests are answered: while they are not, nobody could stop a run, and no run goes on
-    closing : threading.Event
-        set when the service is asked to end: whoever follows events lets go
-    """
+    """What the routes work with."""
 
     settings: Settings
     recordings: RecordingStore

@@ -112,26 +112,14 @@ class Settings(BaseModel):
         return is_loopback(self.host)
 
     def answers_for(self, name: str | None) -> bool:
-        """Whether a request for a host is meant for this service; a name that merely leads here (DNS rebinding) is not.
-
-        Parameters
-        ----------
-        name : str or None
-            of the header ``Host``, in lower case and without port
-        """
+        """Whether a host names this service; a name that only resolves here (DNS rebinding) does not."""
         own = {"localhost", "127.0.0.1", "::1", self.host.lower(), *(other.lower() for other in self.names)}
         # No page of somebody else's can have an address of ours for its name: addresses are not rebound.
         return name in own or (not self.is_local and name is not None and _is_address(name))
 
 
 def is_loopback(host: str) -> bool:
-    """Whether only this machine can reach an address.
-
-    Parameters
-    ----------
-    host : str
-        name or address
-    """
+    """Whether only this machine can reach an address."""
     if host.lower() == "localhost":
         return True
     try:

@@ -35,15 +35,7 @@ HEADERS: Mapping[str, str] = {
 
 @dataclass(frozen=True)
 class Asset:
-    """A file of the page.
-
-    content : bytes
-        as it is sent
-    media_type : str
-        of it
-    tag : str
-        changes with the content
-    """
+    """A file of the page."""
 
     content: bytes
     media_type: str
@@ -58,13 +50,7 @@ def show_page(request: Request) -> Response:
 
 @router.get("/page/{name}")
 def show_asset(request: Request, name: str) -> Response:
-    """A file of the page.
-
-    Parameters
-    ----------
-    name : str
-        of the file
-    """
+    """A file of the page."""
     return _answer(request, name)
 
 

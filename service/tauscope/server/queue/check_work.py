@@ -13,8 +13,6 @@ def check_kept_recording(path: Path, joint_count: int | None) -> RecordingReport
 
     Parameters
     ----------
-    path : Path
-        of the recording
     joint_count : int or None
         joints that it must have; None where any number is welcome
 

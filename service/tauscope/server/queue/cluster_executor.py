@@ -43,8 +43,6 @@ class ClusterExecutor(Executor):
 
         Parameters
         ----------
-        address : str
-            as in ``tcp://scheduler:8786``
         wait_s : float
             how long `submit` waits for a scheduler that is away [s]
 
@@ -82,20 +80,6 @@ class ClusterExecutor(Executor):
     ) -> "Future[Result]":
         """Have a function called by a worker.
 
-        Parameters
-        ----------
-        fn : callable
-            a function of a module, not a closure
-        args : tuple
-            its arguments; anything that pickle takes
-        kwargs : dict
-            its arguments by name
-
-        Returns
-        -------
-        Future
-            of its result; it ends with `ClusterAwayError` where the scheduler is lost meanwhile
-
         Raises
         ------
         ClusterAwayError
@@ -119,15 +103,7 @@ class ClusterExecutor(Executor):
         return outer
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Leave the cluster.
-
-        Parameters
-        ----------
-        wait : bool
-            whether to return only when all tasks have ended
-        cancel_futures : bool
-            take back what was not begun; a worker that is in the middle of a task finishes it for nobody
-        """
+        """Leave the cluster."""
         self._closing.set()
         self._watcher.join(2 * PATIENCE_S)
         try:

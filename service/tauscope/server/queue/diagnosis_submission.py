@@ -25,28 +25,6 @@ def hand_in_diagnosis(
 ) -> str:
     """Hand a diagnosis in.
 
-    Parameters
-    ----------
-    jobs : JobQueue
-        takes it
-    kind : JobKind
-        diagnoses
-    recordings : RecordingStore
-        where the recordings lie
-    robot_folder : Path
-        holds the robot file and its URDF
-    robot : tuple of str
-        name of the robot file, and what it calls the robot
-    train, held_out : sequence of str
-        names of the recordings that are to be explained, and those that findings are confirmed by
-    options : DiagnosisOptions
-        how it is diagnosed
-
-    Returns
-    -------
-    str
-        the diagnosis's identifier
-
     Raises
     ------
     NotFoundError

@@ -26,13 +26,6 @@ from tauscope.trajectory import trajectory_json
 def run_diagnosis(folder: Path, server_recordings: Path) -> JobProblem | None:
     """Do a diagnosis job.
 
-    Parameters
-    ----------
-    folder : Path
-        of the job; the results are written into it
-    server_recordings : Path
-        folder of the recordings that lie on the server
-
     Returns
     -------
     JobProblem or None

@@ -19,13 +19,7 @@ class DiagnosisWorkspace(Workspace):
     """
 
     def __init__(self, folder: Path) -> None:
-        """Look at a job's folder; nothing is opened yet.
-
-        Parameters
-        ----------
-        folder : Path
-            of the job
-        """
+        """Look at a job's folder; nothing is opened yet."""
         super().__init__(folder)
         self.robot = folder / "robot"
         self.result = folder / "result.json"
@@ -41,27 +35,11 @@ class DiagnosisWorkspace(Workspace):
             folder.mkdir()
 
     def uploads(self, role: str) -> Path:
-        """The folder of recordings that came with the request.
-
-        Parameters
-        ----------
-        role : str
-            one of `ROLES`
-        """
+        """The folder of recordings that came with the request."""
         return self.folder / role
 
     def recording_path(self, recording: OrderedRecording, server: Path, role: str) -> Path:
-        """Where a recording of the order lies.
-
-        Parameters
-        ----------
-        recording : OrderedRecording
-            of the order
-        server : Path
-            folder of the recordings that lie on the server
-        role : str
-            one of `ROLES`
-        """
+        """Where a recording of the order lies."""
         return (server if recording.origin == "server" else self.uploads(role)) / recording.name
 
     def read_order(self) -> DiagnosisOrder | None:
@@ -69,13 +47,7 @@ class DiagnosisWorkspace(Workspace):
         return read_stored(self._order, DiagnosisOrder)
 
     def write_order(self, order: DiagnosisOrder) -> None:
-        """Keep the job's input.
-
-        Parameters
-        ----------
-        order : DiagnosisOrder
-            what is to be diagnosed
-        """
+        """Keep the job's input."""
         write_stored(self._order, order)
 
     def read_result(self) -> bytes | None:

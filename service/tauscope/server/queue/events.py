@@ -50,13 +50,7 @@ _EVENTS: TypeAdapter[JobEvent] = TypeAdapter(JobEvent)
 
 
 def parse_event(content: Mapping[str, Any]) -> JobEvent | None:
-    """The event of a line; None where it is none that we know.
-
-    Parameters
-    ----------
-    content : mapping
-        object of the line
-    """
+    """The event of a line; None where it is none that we know."""
     try:
         return _EVENTS.validate_python(content, strict=False)
     except ValidationError:

@@ -14,24 +14,6 @@ def hand_in_excitation(
 ) -> str:
     """Hand an excitation in.
 
-    Parameters
-    ----------
-    jobs : JobQueue
-        takes it
-    kind : JobKind
-        excitations
-    robot_folder : Path
-        holds the robot file and its URDF
-    robot : tuple of str
-        name of the robot file, and what it calls the robot
-    options : ExcitationDesignOptions
-        how the motion is designed
-
-    Returns
-    -------
-    str
-        the excitation's identifier
-
     Raises
     ------
     QueueFullError

@@ -22,11 +22,6 @@ MOST_ROWS = 2_000_000
 def run_excitation(folder: Path) -> JobProblem | None:
     """Do an excitation job.
 
-    Parameters
-    ----------
-    folder : Path
-        of the job; the design and the trajectory are written into it
-
     Returns
     -------
     JobProblem or None
@@ -41,8 +36,6 @@ def read_designed_trajectory(workspace: ExcitationWorkspace, rate_hz: float | No
 
     Parameters
     ----------
-    workspace : ExcitationWorkspace
-        of the excitation
     rate_hz : float or None
         samples a second of a CSV [Hz]; None for the exact document
 
@@ -75,13 +68,6 @@ def read_designed_trajectory(workspace: ExcitationWorkspace, rate_hz: float | No
 
 def check_trajectory(folder: Path, robot_file: Path) -> None:
     """Read a trajectory that a client sent, as a worker process does it.
-
-    Parameters
-    ----------
-    folder : Path
-        holds the trajectory
-    robot_file : Path
-        of the robot that shall play it
 
     Raises
     ------

@@ -11,13 +11,7 @@ class ExcitationWorkspace(Workspace):
     """Files of an excitation job: ``order.json`` and ``robot/``; ``result.json`` and ``trajectory.json``."""
 
     def __init__(self, folder: Path) -> None:
-        """Look at a job's folder; nothing is opened yet.
-
-        Parameters
-        ----------
-        folder : Path
-            of the job
-        """
+        """Look at a job's folder; nothing is opened yet."""
         super().__init__(folder)
         self.robot = folder / "robot"
         self.result = folder / "result.json"
@@ -33,13 +27,7 @@ class ExcitationWorkspace(Workspace):
         return read_stored(self._order, ExcitationOrder)
 
     def write_order(self, order: ExcitationOrder) -> None:
-        """Keep the job's input.
-
-        Parameters
-        ----------
-        order : ExcitationOrder
-            which motion is wanted
-        """
+        """Keep the job's input."""
         write_stored(self._order, order)
 
     def read_result(self) -> bytes | None:

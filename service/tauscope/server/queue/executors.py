@@ -14,8 +14,6 @@ def open_executor(workers: int, wait_s: float = 0.0) -> Executor:
 
     Parameters
     ----------
-    workers : int
-        largest number of processes of our own
     wait_s : float
         how long a task waits for a cluster that is away before it ends [s]
 

@@ -20,17 +20,7 @@ AWAY = "the Dask cluster was away for too long; see to its scheduler, and give t
 
 @dataclass(frozen=True)
 class FleetEntry:
-    """A robot of a manifest.
-
-    row : int
-        line of the manifest
-    name : str
-        of the result
-    robot : Path
-        robot file
-    recordings, held_out : tuple of Path
-        what it is analysed from, and judged by
-    """
+    """A robot of a manifest."""
 
     row: int
     name: str
@@ -41,17 +31,7 @@ class FleetEntry:
 
 @dataclass(frozen=True)
 class FleetResult:
-    """What came of a robot.
-
-    entry : FleetEntry
-        the robot
-    figures : dict
-        columns of the table; empty where it failed
-    error : str or None
-        why it failed
-    seconds : float
-        how long it took
-    """
+    """What came of a robot."""
 
     entry: FleetEntry
     figures: dict[str, str]
@@ -67,11 +47,6 @@ def read_manifest(path: Path) -> Iterator[FleetEntry]:
     """The robots of a manifest, line by line; paths are relative to it.
 
     A CSV file with the columns `COLUMNS`; several recordings are separated by ``;``, `held_out` may be empty.
-
-    Parameters
-    ----------
-    path : Path
-        of the manifest
 
     Raises
     ------
@@ -99,24 +74,6 @@ def analyse_fleet(
     No more robots than `width` and as many again wait in the executor, so that the memory that is needed here does not
     grow with the fleet. Where a worker dies, or a cluster goes away, those that were in the executor are done again one
     by one: what kills its worker then is to blame itself.
-
-    Parameters
-    ----------
-    entries : iterator of FleetEntry
-        the fleet
-    work : callable
-        of one robot
-    folder : Path
-        where results go; the workers see it under the same path
-    executor : Executor
-        does the work
-    width : int
-        robots at a time
-
-    Yields
-    ------
-    FleetResult
-        of each robot, once
     """
     pending: dict[Future[FleetResult], FleetEntry] = {}
     suspects: list[FleetEntry] = []
@@ -162,13 +119,7 @@ def _result(future: "Future[FleetResult]", entry: FleetEntry) -> FleetResult:
 
 
 def timed(work: Callable[[], FleetResult]) -> FleetResult:
-    """A result with how long it took.
-
-    Parameters
-    ----------
-    work : callable
-        makes it
-    """
+    """A result with how long it took."""
     begin = time.monotonic()
     result = work()
     return replace(result, seconds=time.monotonic() - begin)

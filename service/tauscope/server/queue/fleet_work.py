@@ -19,38 +19,12 @@ DIAGNOSIS_COLUMNS = ("verdict", "findings")
 
 
 def identify_robot(entry: FleetEntry, folder: Path) -> FleetResult:
-    """Identify a robot.
-
-    Parameters
-    ----------
-    entry : FleetEntry
-        of the manifest
-    folder : Path
-        its result goes into ``NAME.json`` there
-
-    Returns
-    -------
-    FleetResult
-        columns of the table, or why there are none
-    """
+    """Identify a robot."""
     return timed(lambda: _guarded(entry, lambda: _identified(entry, folder)))
 
 
 def diagnose_robot(entry: FleetEntry, folder: Path) -> FleetResult:
-    """Diagnose a robot, against the best model that its recordings allow.
-
-    Parameters
-    ----------
-    entry : FleetEntry
-        of the manifest
-    folder : Path
-        its result goes into ``NAME.json`` there
-
-    Returns
-    -------
-    FleetResult
-        columns of the table, or why there are none
-    """
+    """Diagnose a robot, against the best model that its recordings allow."""
     return timed(lambda: _guarded(entry, lambda: _diagnosed(entry, folder)))
 
 

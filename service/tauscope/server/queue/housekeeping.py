@@ -20,8 +20,6 @@ class Housekeeping:
 
         Parameters
         ----------
-        tasks : sequence of callable
-            each quick
         period_s : float
             pause between two rounds [s]
         """

@@ -24,28 +24,6 @@ def hand_in_identification(
 ) -> str:
     """Hand an identification in.
 
-    Parameters
-    ----------
-    jobs : JobQueue
-        takes it
-    kind : JobKind
-        identifications
-    recordings : RecordingStore
-        where the recordings lie
-    robot_folder : Path
-        holds the robot file and its URDF
-    robot : tuple of str
-        name of the robot file, and what it calls the robot
-    train, held_out : sequence of str
-        names of the recordings that the model is made from, and judged by
-    options : IdentificationOptions
-        how it is identified
-
-    Returns
-    -------
-    str
-        the identification's identifier
-
     Raises
     ------
     NotFoundError
@@ -75,13 +53,6 @@ def hand_in_identification(
 
 def ordered_on_server(recordings: RecordingStore, names: Sequence[str]) -> tuple[OrderedRecording, ...]:
     """Recordings that lie on the server, as an order holds them.
-
-    Parameters
-    ----------
-    recordings : RecordingStore
-        where they lie
-    names : sequence of str
-        their names
 
     Raises
     ------

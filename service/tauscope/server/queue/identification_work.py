@@ -27,13 +27,6 @@ from tauscope.server.store.incoming import hash_file
 def run_identification(folder: Path, server_recordings: Path) -> JobProblem | None:
     """Do an identification job.
 
-    Parameters
-    ----------
-    folder : Path
-        of the job; the result and the exports are written into it
-    server_recordings : Path
-        folder of the recordings that lie on the server
-
     Returns
     -------
     JobProblem or None

@@ -17,13 +17,7 @@ class IdentificationWorkspace(Workspace):
     """
 
     def __init__(self, folder: Path) -> None:
-        """Look at a job's folder; nothing is opened yet.
-
-        Parameters
-        ----------
-        folder : Path
-            of the job
-        """
+        """Look at a job's folder; nothing is opened yet."""
         super().__init__(folder)
         self.robot = folder / "robot"
         self.exports = folder / "exports"
@@ -39,27 +33,11 @@ class IdentificationWorkspace(Workspace):
             folder.mkdir()
 
     def uploads(self, *, held_out: bool) -> Path:
-        """The folder of recordings that came with the request.
-
-        Parameters
-        ----------
-        held_out : bool
-            of the held-out ones
-        """
+        """The folder of recordings that came with the request."""
         return self.folder / ("held_out" if held_out else "recordings")
 
     def recording_path(self, recording: OrderedRecording, server: Path, *, held_out: bool) -> Path:
-        """Where a recording of the order lies.
-
-        Parameters
-        ----------
-        recording : OrderedRecording
-            of the order
-        server : Path
-            folder of the recordings that lie on the server
-        held_out : bool
-            whether it is a held-out one
-        """
+        """Where a recording of the order lies."""
         folder = server if recording.origin == "server" else self.uploads(held_out=held_out)
         return folder / recording.name
 
@@ -68,13 +46,7 @@ class IdentificationWorkspace(Workspace):
         return read_stored(self._order, IdentificationOrder)
 
     def write_order(self, order: IdentificationOrder) -> None:
-        """Keep the job's input.
-
-        Parameters
-        ----------
-        order : IdentificationOrder
-            what is to be identified
-        """
+        """Keep the job's input."""
         write_stored(self._order, order)
 
     def read_result(self) -> bytes | None:
@@ -99,11 +71,6 @@ class IdentificationWorkspace(Workspace):
 
     def read_export(self, file_name: str) -> bytes:
         """An export.
-
-        Parameters
-        ----------
-        file_name : str
-            in the folder of exports
 
         Raises
         ------

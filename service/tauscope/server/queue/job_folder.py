@@ -17,13 +17,7 @@ class JobFolder:
     """Step, events and the wish to stop."""
 
     def __init__(self, folder: Path) -> None:
-        """Look at a folder; nothing is opened yet.
-
-        Parameters
-        ----------
-        folder : Path
-            of the job
-        """
+        """Look at a folder; nothing is opened yet."""
         self.folder = folder
         self.events = EventLog(folder / "events.jsonl")
         self._progress = folder / "progress"
@@ -37,38 +31,18 @@ class JobFolder:
             return None
 
     def write_step(self, step: str) -> None:
-        """Tell the step that the work is in; worth nothing after a crash, so not brought to the disk.
-
-        Parameters
-        ----------
-        step : str
-            its name
-        """
+        """Tell the step that the work is in; worth nothing after a crash, so not brought to the disk."""
         temporary = self._progress.with_suffix(".part")
         temporary.write_text(step, encoding="utf-8")
         temporary.replace(self._progress)
         self.tell(StepEvent(time=datetime.now(UTC), step=step))
 
     def write_progress(self, percent: float | None, figures: Mapping[str, JsonValue]) -> None:
-        """Tell how far the work is.
-
-        Parameters
-        ----------
-        percent : float or None
-            how much is done, where that is known
-        figures : mapping of str to plain data
-            what is measured meanwhile
-        """
+        """Tell how far the work is."""
         self.tell(ProgressEvent(time=datetime.now(UTC), percent=percent, figures=dict(figures)))
 
     def tell(self, event: JobEvent) -> None:
-        """Append an event; a disk that takes none does not stop the job.
-
-        Parameters
-        ----------
-        event : JobEvent
-            what happened
-        """
+        """Append an event; a disk that takes none does not stop the job."""
         try:
             self.events.append(event.model_dump(mode="json"))
         except (OSError, ValueError):

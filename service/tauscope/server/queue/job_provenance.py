@@ -17,17 +17,8 @@ def job_provenance(
 
     Parameters
     ----------
-    command : sequence of str
-        words of the command line that does the same
-    robot_folder : Path
-        holds the robot file and its URDF
     recordings : iterable of (str, OrderedRecording, Path)
         what each was read as, its entry in the order, and where it lies
-
-    Returns
-    -------
-    Provenance
-        all of it
 
     Raises
     ------

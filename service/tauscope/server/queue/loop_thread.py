@@ -14,11 +14,6 @@ class LoopThread:
 
     Dask gives each client a loop of its own otherwise, and one that does not reach its scheduler leaves it running:
     a thread more with every attempt.
-
-    Parameters
-    ----------
-    name : str
-        of the thread, as debuggers show it
     """
 
     def __init__(self, name: str) -> None:
@@ -28,11 +23,6 @@ class LoopThread:
 
     def open(self) -> "IOLoop":
         """The running loop, started where it is not.
-
-        Returns
-        -------
-        IOLoop
-            as ``distributed.Client`` takes it
 
         Raises
         ------

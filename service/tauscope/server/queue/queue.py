@@ -53,21 +53,7 @@ class JobQueue:
         most_waiting: int,
         is_there: Callable[[], bool] = lambda: True,
     ) -> None:
-        """Make the queue; jobs that an earlier service left unfinished are done again, in their order.
-
-        Parameters
-        ----------
-        kinds : sequence of JobKind
-            every kind of job that will be handed in
-        executor : Executor
-            where the work is done; shut down by `close`
-        slots : int or callable
-            jobs that are in the executor at a time; a callable tells how many at present, and waits for nothing
-        most_waiting : int
-            jobs that may wait
-        is_there : callable
-            whether the executor can work at present, and waits for nothing; jobs wait until it can
-        """
+        """Make the queue; jobs that an earlier service left unfinished are done again, in their order."""
         self._executor = executor
         self._slots = slots if callable(slots) else lambda: slots
         self._is_there = is_there
@@ -89,18 +75,6 @@ class JobQueue:
     def submit(self, kind: JobKind, staged: Path) -> str:
         """Take a job.
 
-        Parameters
-        ----------
-        kind : JobKind
-            of the job
-        staged : Path
-            staged folder that holds the job's input
-
-        Returns
-        -------
-        str
-            the job's identifier
-
         Raises
         ------
         QueueFullError
@@ -119,13 +93,6 @@ class JobQueue:
         """Cancel a job that has not ended; remove one that has, or whose record is damaged.
 
         Cancelled work stops at its next step; what it still does until then is dropped.
-
-        Parameters
-        ----------
-        kind : JobKind
-            of the job
-        identifier : str
-            of the job
 
         Returns
         -------
@@ -146,13 +113,6 @@ class JobQueue:
 
     def cancel(self, kind: JobKind, identifier: str) -> bool:
         """Cancel a job that has not ended.
-
-        Parameters
-        ----------
-        kind : JobKind
-            of the job
-        identifier : str
-            of the job
 
         Returns
         -------

@@ -27,13 +27,7 @@ TOO_OFTEN = JobProblem(
 
 @dataclass(frozen=True, eq=False)
 class JobKind:
-    """A kind of job: where its folders lie and what is done with them.
-
-    items : ItemStore
-        folders of the jobs
-    work : callable
-        does the job of a folder
-    """
+    """A kind of job: where its folders lie and what is done with them."""
 
     items: ItemStore
     work: Work
@@ -41,13 +35,7 @@ class JobKind:
 
 @dataclass(frozen=True)
 class QueuedJob:
-    """A job that has not ended.
-
-    kind : JobKind
-        of the job
-    identifier : str
-        of the job
-    """
+    """A job that has not ended."""
 
     kind: JobKind
     identifier: str
@@ -69,13 +57,6 @@ class QueuedJob:
         """Write a new state, if it may follow the present one.
 
         An earlier attempt may have written it and failed after that, as on a disk that became full in between.
-
-        Parameters
-        ----------
-        state : JobState
-            the new state
-        problem : JobProblem or None
-            why the job did not succeed
 
         Returns
         -------

@@ -28,26 +28,11 @@ class JobRecord(StoredModel):
     attempts: int = Field(default=0, ge=0, description="how often its work was begun and not given up in good order")
 
     def may_become(self, state: JobState) -> bool:
-        """Whether a state may follow.
-
-        Parameters
-        ----------
-        state : JobState
-            the new state
-        """
+        """Whether a state may follow."""
         return may_follow(self.state, state)
 
     def moved(self, state: JobState, now: datetime, problem: JobProblem | None = None) -> "JobRecord":
         """The record after a transition.
-
-        Parameters
-        ----------
-        state : JobState
-            the new state
-        now : datetime
-            the present moment
-        problem : JobProblem or None
-            why the job did not succeed
 
         Raises
         ------
@@ -64,11 +49,5 @@ class JobRecord(StoredModel):
         return self.model_copy(update={"state": state, "problem": problem, **changes})
 
     def given_up(self, now: datetime) -> "JobRecord":
-        """The record of a job that waits again because the service ends in good order: that counts as no attempt.
-
-        Parameters
-        ----------
-        now : datetime
-            the present moment
-        """
+        """The record of a job that waits again because the service ends in good order: that counts as no attempt."""
         return self.moved(JobState.QUEUED, now).model_copy(update={"attempts": max(0, self.attempts - 1)})

@@ -19,13 +19,6 @@ def read_kept_samples(path: Path, most: int) -> bytes:
     A recording of more samples than asked for is thinned: of each stretch those are kept at which any joint's position
     or effort is least or greatest.
 
-    Parameters
-    ----------
-    path : Path
-        of the recording
-    most : int
-        samples to return, about; all of them where there are no more
-
     Returns
     -------
     bytes

@@ -35,13 +35,5 @@ TRANSITIONS: Mapping[JobState, frozenset[JobState]] = {
 
 
 def may_follow(before: JobState, after: JobState) -> bool:
-    """Whether a job may go from one state to another.
-
-    Parameters
-    ----------
-    before : JobState
-        where the job stands
-    after : JobState
-        where it would go
-    """
+    """Whether a job may go from one state to another."""
     return after in TRANSITIONS[before]

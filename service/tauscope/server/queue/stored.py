@@ -19,15 +19,7 @@ Stored = TypeVar("Stored", bound=StoredModel)
 
 
 def read_stored(path: Path, kind: type[Stored]) -> Stored | None:
-    """A stored model, or None where the file is missing or damaged.
-
-    Parameters
-    ----------
-    path : Path
-        of the file
-    kind : type
-        the model
-    """
+    """A stored model, or None where the file is missing or damaged."""
     try:
         return kind.model_validate_json(path.read_bytes())
     except (OSError, ValidationError):
@@ -35,28 +27,12 @@ def read_stored(path: Path, kind: type[Stored]) -> Stored | None:
 
 
 def write_stored(path: Path, model: StoredModel) -> None:
-    """Keep a model.
-
-    Parameters
-    ----------
-    path : Path
-        of the file
-    model : StoredModel
-        what it shall hold
-    """
+    """Keep a model."""
     write_atomically(path, model.model_dump_json(indent=1).encode())
 
 
 def read_document(path: Path, schema: str) -> bytes | None:
-    """A JSON document as it was written, or None where the file is missing, damaged or of another schema.
-
-    Parameters
-    ----------
-    path : Path
-        of the file
-    schema : str
-        name and version that the document has to state, as in ``tauscope.identification/1``
-    """
+    """A JSON document as it was written, or None where the file is missing, damaged or of another schema."""
     try:
         content = path.read_bytes()
         document = json.loads(content)
@@ -66,13 +42,7 @@ def read_document(path: Path, schema: str) -> bytes | None:
 
 
 def read_bytes(path: Path) -> bytes | None:
-    """A file as it was written, or None where it is missing.
-
-    Parameters
-    ----------
-    path : Path
-        of the file
-    """
+    """A file as it was written, or None where it is missing."""
     try:
         return path.read_bytes()
     except OSError:

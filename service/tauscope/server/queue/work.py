@@ -21,15 +21,6 @@ class StoppedError(Exception):
 def do_work(workspace: Workspace, work: Callable[[], None], *folders: Path) -> JobProblem | None:
     """Do the work of a job, and say why it has no result.
 
-    Parameters
-    ----------
-    workspace : Workspace
-        of the job
-    work : callable
-        writes the result; calls `begin_step` on its way
-    folders : Path
-        of the server, which messages shall not show
-
     Returns
     -------
     JobProblem or None
@@ -51,13 +42,6 @@ def do_work(workspace: Workspace, work: Callable[[], None], *folders: Path) -> J
 def begin_step(workspace: Workspace, step: str) -> None:
     """Tell a step, unless nobody wants to know any more.
 
-    Parameters
-    ----------
-    workspace : Workspace
-        of the job
-    step : str
-        what is done next
-
     Raises
     ------
     StoppedError
@@ -69,11 +53,6 @@ def begin_step(workspace: Workspace, step: str) -> None:
 
 def require_wanted(workspace: Workspace) -> None:
     """Stop a job that was cancelled.
-
-    Parameters
-    ----------
-    workspace : Workspace
-        of the job
 
     Raises
     ------

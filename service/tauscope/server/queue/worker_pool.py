@@ -26,13 +26,7 @@ class WorkerPool(Executor):
     """
 
     def __init__(self, workers: int) -> None:
-        """Make the pool; no process is started before it is needed.
-
-        Parameters
-        ----------
-        workers : int
-            largest number of processes
-        """
+        """Make the pool; no process is started before it is needed."""
         self._workers = workers
         self._lock = threading.Lock()
         self._pool: ProcessPoolExecutor | None
@@ -42,20 +36,6 @@ class WorkerPool(Executor):
         self, fn: Callable[Arguments, Result], /, *args: Arguments.args, **kwargs: Arguments.kwargs
     ) -> "Future[Result]":
         """Have a function called in a process.
-
-        Parameters
-        ----------
-        fn : callable
-            a function of a module, not a closure
-        args : tuple
-            its arguments; anything that pickle takes
-        kwargs : dict
-            its arguments by name
-
-        Returns
-        -------
-        Future
-            of its result
 
         Raises
         ------
@@ -73,15 +53,7 @@ class WorkerPool(Executor):
                 return self._pool.submit(fn, *args, **kwargs)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the processes.
-
-        Parameters
-        ----------
-        wait : bool
-            whether to return only when all processes have ended
-        cancel_futures : bool
-            end the processes at once, in the middle of their work
-        """
+        """End the processes."""
         with self._lock:
             pool, self._pool = self._pool, None
             if cancel_futures:

@@ -16,13 +16,7 @@ class Workspace(JobFolder):
     """
 
     def __init__(self, folder: Path) -> None:
-        """Look at a job's folder; nothing is opened yet.
-
-        Parameters
-        ----------
-        folder : Path
-            of the job
-        """
+        """Look at a job's folder; nothing is opened yet."""
         super().__init__(folder)
         self._record = folder / "state.json"
 
@@ -36,13 +30,7 @@ class Workspace(JobFolder):
         return record is None or record.state.is_end
 
     def write_record(self, record: JobRecord) -> None:
-        """Keep the job's state, and tell it.
-
-        Parameters
-        ----------
-        record : JobRecord
-            the new state
-        """
+        """Keep the job's state, and tell it."""
         write_stored(self._record, record)
         self._tell_state(record)
 

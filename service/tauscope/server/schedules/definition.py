@@ -35,13 +35,7 @@ class Window(StoredModel):
     end: ClockTime = Field(description="first moment after it; the same as `start` for the whole day")
 
     def holds(self, moment: datetime) -> bool:
-        """Whether work may be started.
-
-        Parameters
-        ----------
-        moment : datetime
-            in the time zone of the wall's clock
-        """
+        """Whether work may be started."""
         start, end = time.fromisoformat(self.start), time.fromisoformat(self.end)
         now, today = moment.time(), DAYS[moment.weekday()]
         yesterday = DAYS[(moment - timedelta(days=1)).weekday()]
@@ -100,28 +94,14 @@ class ScheduleDefinition(StoredModel):
         return self
 
     def next_after(self, now: datetime, created: datetime) -> datetime | None:
-        """When it is due next, strictly after a moment; None where it never is.
-
-        Parameters
-        ----------
-        now : datetime
-            the moment
-        created : datetime
-            when the schedule was set up
-        """
+        """When it is due next, strictly after a moment; None where it never is."""
         if not self.enabled:
             return None
         found = self._trigger(created).get_next_fire_time(None, now + timedelta(microseconds=1))
         return None if found is None else found.astimezone(UTC)
 
     def is_open(self, now: datetime) -> bool:
-        """Whether the window holds a moment.
-
-        Parameters
-        ----------
-        now : datetime
-            the moment
-        """
+        """Whether the window holds a moment."""
         return self.window is None or self.window.holds(now.astimezone(ZoneInfo(self.timezone)))
 
     def _trigger(self, created: datetime) -> BaseTrigger:

@@ -19,16 +19,8 @@ UNDECIDED = ("asked", "claimed")
 class ScheduleEntry:
     """A schedule.
 
-    name : str
-        of it
     site : str or None
         of the data folder whose service does it; None for whichever comes first
-    definition, order, files : mapping
-        when it is due, what is done then, and the robot's files as text
-    created : datetime
-        when it was set up first
-    next_due : datetime or None
-        when it is due next; None while it is not enabled
     """
 
     name: str
@@ -44,26 +36,8 @@ class ScheduleEntry:
 class FiringEntry:
     """One time that a schedule was due.
 
-    number : int
-        of the firing
-    schedule : str
-        name of the schedule
-    due : datetime
-        when it was
-    is_asked : bool
-        whether somebody asked for it
-    state : str
-        as in the table
-    reason : str or None
-        why nothing was started
-    site : str or None
-        of the data folder whose service took it on
     item : (str, str) or None
         kind and identifier of what was started
-    item_state : str or None
-        where that stands, as far as the index knows
-    is_final : bool
-        whether nothing will change any more
     """
 
     number: int
@@ -79,26 +53,12 @@ class FiringEntry:
 
 
 def schedule_entry(row: Schedule) -> ScheduleEntry:
-    """What is given out of a schedule.
-
-    Parameters
-    ----------
-    row : Schedule
-        of it
-    """
+    """What is given out of a schedule."""
     return ScheduleEntry(row.name, row.site, row.definition, row.order, row.files, row.created, row.next_due)
 
 
 def firing_entry(session: Session, row: Firing) -> FiringEntry:
-    """What is given out of a firing, and where that stands which it started.
-
-    Parameters
-    ----------
-    session : Session
-        that the row is of
-    row : Firing
-        of it
-    """
+    """What is given out of a firing, and where that stands which it started."""
     item = None
     if row.item_kind is not None and row.item_identifier is not None:
         item = row.item_kind, row.item_identifier

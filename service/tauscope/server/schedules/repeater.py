@@ -34,15 +34,7 @@ class NothingToDoError(TauscopeError):
 
 @dataclass(frozen=True, eq=False)
 class Repeater:
-    """Starts what schedules repeat.
-
-    shop : CampaignDependencies
-        what is worked with
-    campaigns : CampaignManager
-        takes campaigns
-    permit_for : callable
-        leave to move an arm that nobody has a lease of
-    """
+    """Starts what schedules repeat."""
 
     shop: CampaignDependencies
     campaigns: CampaignManager
@@ -50,13 +42,6 @@ class Repeater:
 
     def start(self, entry: ScheduleEntry, since: datetime | None) -> tuple[str, str]:
         """Start it; returns at once.
-
-        Parameters
-        ----------
-        entry : ScheduleEntry
-            the schedule
-        since : datetime or None
-            when it was done last: an analysis needs a recording that is newer
 
         Returns
         -------
@@ -80,26 +65,14 @@ class Repeater:
         return "diagnosis", self._diagnosis(entry, train, held_out)
 
     def goes_on(self, kind: str, identifier: str) -> bool:
-        """Whether something that was started has not ended; what was removed has.
-
-        Parameters
-        ----------
-        kind, identifier : str
-            of the item
-        """
+        """Whether something that was started has not ended; what was removed has."""
         try:
             return not Workspace(self.items(kind).folder(identifier)).has_ended()
         except NotFoundError:
             return False
 
     def items(self, kind: str) -> ItemStore:
-        """The folders of what is repeated.
-
-        Parameters
-        ----------
-        kind : str
-            ``campaign``, ``identification`` or ``diagnosis``
-        """
+        """The folders of what is repeated."""
         if kind == "campaign":
             return self.campaigns.items
         return (self.shop.identifications if kind == "identification" else self.shop.diagnoses).items
@@ -156,22 +129,6 @@ def newest_recordings(
 ) -> tuple[tuple[OrderedRecording, ...], tuple[OrderedRecording, ...]]:
     """The recordings that an analysis takes: those to judge by are the newest, the others come before them.
 
-    Parameters
-    ----------
-    store : RecordingStore
-        recordings on the server
-    choice : RecordingChoice
-        which ones
-    since : datetime or None
-        one has to be newer
-
-    Returns
-    -------
-    tuple of OrderedRecording
-        what the model is made from
-    tuple of OrderedRecording
-        what it is judged by
-
     Raises
     ------
     NothingToDoError
@@ -189,15 +146,7 @@ def newest_recordings(
 
 
 def write_robot(folder: Path, entry: ScheduleEntry) -> None:
-    """Write a robot's files.
-
-    Parameters
-    ----------
-    folder : Path
-        where they are written
-    entry : ScheduleEntry
-        the schedule that holds them
-    """
+    """Write a robot's files."""
     for name, text in entry.files.items():
         (folder / name).write_text(text, encoding="utf-8")
 

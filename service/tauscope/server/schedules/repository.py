@@ -17,29 +17,13 @@ class ScheduleRepository:
     """Schedules and their firings, as one site sees them. Every method is one short transaction."""
 
     def __init__(self, database: Database, site: str, boot: str) -> None:
-        """Look at the book.
-
-        Parameters
-        ----------
-        database : Database
-            holds it
-        site : str
-            identifier of this data folder
-        boot : str
-            of this start of the service: tells its claims from those of earlier starts
-        """
+        """Look at the book."""
         self._database = database
         self.site = site
         self._boot = boot
 
     def put(self, entry: ScheduleEntry) -> None:
-        """Set a schedule up, or replace one of the same name; its firings stay.
-
-        Parameters
-        ----------
-        entry : ScheduleEntry
-            the schedule; of one that is replaced, `created` stays as it was
-        """
+        """Set a schedule up, or replace one of the same name; its firings stay."""
         with self._database.writing() as session:
             row = session.scalar(select(Schedule).where(Schedule.name == entry.name))
             if row is None:
@@ -51,11 +35,6 @@ class ScheduleRepository:
     def remove(self, name: str) -> None:
         """Remove a schedule and its firings; what they started stays.
 
-        Parameters
-        ----------
-        name : str
-            of the schedule
-
         Raises
         ------
         NotFoundError
@@ -66,11 +45,6 @@ class ScheduleRepository:
 
     def find(self, name: str) -> ScheduleEntry:
         """A schedule.
-
-        Parameters
-        ----------
-        name : str
-            of it
 
         Raises
         ------
@@ -86,28 +60,13 @@ class ScheduleRepository:
             return [schedule_entry(row) for row in session.scalars(select(Schedule).order_by(Schedule.name))]
 
     def due(self, now: datetime) -> list[ScheduleEntry]:
-        """Schedules that this site may do and that are due, the longest first.
-
-        Parameters
-        ----------
-        now : datetime
-            the present moment
-        """
+        """Schedules that this site may do and that are due, the longest first."""
         query = select(Schedule).where(Schedule.next_due <= now, self._is_mine()).order_by(Schedule.next_due)
         with self._database.reading() as session:
             return [schedule_entry(row) for row in session.scalars(query)]
 
     def claim(self, entry: ScheduleEntry, next_due: datetime | None, now: datetime) -> int | None:
         """Take the firing of a schedule on that is due; once only, whoever else tries.
-
-        Parameters
-        ----------
-        entry : ScheduleEntry
-            of `due`
-        next_due : datetime or None
-            when it is due afterwards
-        now : datetime
-            the present moment
 
         Returns
         -------
@@ -132,18 +91,6 @@ class ScheduleRepository:
     def ask(self, name: str, now: datetime) -> int:
         """Ask the service of a schedule's site to do it now.
 
-        Parameters
-        ----------
-        name : str
-            of the schedule
-        now : datetime
-            the present moment
-
-        Returns
-        -------
-        int
-            number of the firing
-
         Raises
         ------
         NotFoundError
@@ -157,13 +104,6 @@ class ScheduleRepository:
 
     def claim_asked(self, now: datetime, number: int | None = None) -> tuple[int, ScheduleEntry] | None:
         """Take a firing on that was asked for; once only, whoever else tries.
-
-        Parameters
-        ----------
-        now : datetime
-            the present moment
-        number : int or None
-            of the firing; any that this site may do where None
 
         Returns
         -------
@@ -181,13 +121,7 @@ class ScheduleRepository:
             return firing.id, schedule_entry(firing.schedule)
 
     def withdraw(self, number: int) -> bool:
-        """Take back what was asked for; False where somebody has taken it on.
-
-        Parameters
-        ----------
-        number : int
-            of the firing
-        """
+        """Take back what was asked for; False where somebody has taken it on."""
         return self._move(Firing.id == number, "asked", state="withdrawn", reason="nobody took it on in time") > 0
 
     def finish(self, number: int, state: str, reason: str | None = None, item: tuple[str, str] | None = None) -> None:
@@ -195,12 +129,6 @@ class ScheduleRepository:
 
         Parameters
         ----------
-        number : int
-            of the firing
-        state : str
-            ``started``, ``skipped``, ``missed`` or ``failed``
-        reason : str or None
-            why nothing was started
         item : (str, str) or None
             kind and identifier of what was started
         """
@@ -209,24 +137,13 @@ class ScheduleRepository:
         self._move(Firing.id == number, "claimed", state=state, **values)
 
     def interrupt_claims(self) -> int:
-        """Give firings an end that an earlier start of this site's service left undecided; none of them is repeated.
-
-        Returns
-        -------
-        int
-            how many there were
-        """
+        """Give firings an end that an earlier start of this site's service left undecided; none of them is repeated."""
         reason = "the service ended while it was being started; look whether it was, nothing is repeated by itself"
         mine = (Firing.site == self.site) & (Firing.boot != self._boot)
         return self._move(mine, "claimed", state="interrupted", reason=reason)
 
     def firing(self, number: int) -> FiringEntry:
         """A firing.
-
-        Parameters
-        ----------
-        number : int
-            of it
 
         Raises
         ------
@@ -241,13 +158,6 @@ class ScheduleRepository:
 
     def firings(self, name: str, limit: int) -> list[FiringEntry]:
         """The firings of a schedule, the newest first.
-
-        Parameters
-        ----------
-        name : str
-            of the schedule
-        limit : int
-            most firings
 
         Raises
         ------

@@ -30,19 +30,7 @@ class Scheduler:
     def __init__(
         self, book: ScheduleRepository, repeater: Repeater, data_folder: Path, clock: Callable[[], datetime] = utc_now
     ) -> None:
-        """Prepare. Firings that an earlier start left undecided become `interrupted`: nothing is repeated.
-
-        Parameters
-        ----------
-        book : ScheduleRepository
-            of schedules
-        repeater : Repeater
-            starts what they repeat
-        data_folder : Path
-            holds the folder of interlocks
-        clock : callable
-            tells the present moment
-        """
+        """Prepare. Firings that an earlier start left undecided become `interrupted`: nothing is repeated."""
         self.book = book
         self.repeater = repeater
         self._data_folder = data_folder
@@ -70,11 +58,6 @@ class Scheduler:
 
     def fire_now(self, name: str) -> FiringEntry:
         """Do a schedule now, in this process.
-
-        Parameters
-        ----------
-        name : str
-            of the schedule
 
         Raises
         ------
@@ -155,13 +138,7 @@ class Scheduler:
 
 
 def parse_schedule(entry: ScheduleEntry) -> ScheduleDefinition:
-    """When a schedule is due.
-
-    Parameters
-    ----------
-    entry : ScheduleEntry
-        of the book
-    """
+    """When a schedule is due."""
     return ScheduleDefinition.model_validate(dict(entry.definition), strict=False)
 
 

@@ -25,18 +25,8 @@ def make_schedule(
 
     Parameters
     ----------
-    name : str
-        of the schedule
-    like : str
-        identifier of the item, which is of the kind that the definition names
-    definition : ScheduleDefinition
-        when it is due
-    repeater : Repeater
-        knows the items
     site : str or None
         of the data folder whose service does it; None for whichever comes first
-    now : datetime
-        the present moment
 
     Raises
     ------

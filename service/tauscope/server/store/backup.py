@@ -34,22 +34,6 @@ def write_backup(data_folder: Path, database: Database, target: Path, version: s
     The database comes first, and in every folder the state before what it speaks of: what is copied later can only be
     newer, and the start of a service puts that right as it does after a crash.
 
-    Parameters
-    ----------
-    data_folder : Path
-        holds everything that is kept
-    database : Database
-        its database
-    target : Path
-        the file to make
-    version : str
-        of this program
-
-    Returns
-    -------
-    int
-        number of files in it
-
     Raises
     ------
     OSError
@@ -78,20 +62,6 @@ def write_backup(data_folder: Path, database: Database, target: Path, version: s
 
 def restore_backup(source: Path, data_folder: Path, address: str | None) -> int:
     """Make a data folder and its database from a backup; nothing appears before everything was found sound.
-
-    Parameters
-    ----------
-    source : Path
-        of `write_backup`
-    data_folder : Path
-        is made; may be an empty folder
-    address : str or None
-        URL of an empty PostgreSQL database; SQLite in the data folder where None
-
-    Returns
-    -------
-    int
-        number of files
 
     Raises
     ------

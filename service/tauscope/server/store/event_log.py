@@ -18,8 +18,6 @@ class LoggedEvent:
 
     number : int
         of the line, from 1: who has read it goes on with the next
-    content : dict
-        what was appended
     """
 
     number: int
@@ -34,22 +32,11 @@ class EventLog:
     """
 
     def __init__(self, path: Path) -> None:
-        """Look at a log; nothing is opened yet, and a file that is not there is an empty log.
-
-        Parameters
-        ----------
-        path : Path
-            of the file
-        """
+        """Look at a log; nothing is opened yet, and a file that is not there is an empty log."""
         self.path = path
 
     def append(self, content: Mapping[str, Any]) -> None:
         """Add a line; a crash of the machine may lose the last ones.
-
-        Parameters
-        ----------
-        content : mapping
-            plain data without NaN
 
         Raises
         ------
@@ -81,13 +68,7 @@ class EventLog:
         return _parsed(lines[-2]) if len(lines) > 1 else None
 
     def follow(self, after: int = 0) -> "LogFollower":
-        """A reader of what comes after a line.
-
-        Parameters
-        ----------
-        after : int
-            number of the last line that is known already; 0 for all lines
-        """
+        """A reader of what comes after a line."""
         return LogFollower(self.path, after)
 
 
@@ -95,15 +76,7 @@ class LogFollower:
     """Reads a log from where it last ended; holds no file open between two readings."""
 
     def __init__(self, path: Path, after: int) -> None:
-        """Begin behind a line.
-
-        Parameters
-        ----------
-        path : Path
-            of the log
-        after : int
-            lines that are passed over
-        """
+        """Begin behind a line."""
         self._path = path
         self._after = after
         self._number = 0

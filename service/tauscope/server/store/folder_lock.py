@@ -15,11 +15,6 @@ class FolderLock:
     def __init__(self, folder: Path) -> None:
         """Take the folder.
 
-        Parameters
-        ----------
-        folder : Path
-            an existing folder
-
         Raises
         ------
         TauscopeError

@@ -15,12 +15,6 @@ _PIECE = 2**20
 class KeptFile:
     """A file that arrived as a whole.
 
-    path : Path
-        where it lies
-    name : str
-        what the sender called it
-    size : int
-        number of bytes
     sha256 : str
         of its bytes, in hexadecimal
     """
@@ -39,10 +33,6 @@ class IncomingFile:
 
         Parameters
         ----------
-        folder : Path
-            where it is written
-        name : str
-            what the sender calls it, for messages and for `finish`
         limit : int
             largest size that is accepted [bytes]
         """
@@ -56,11 +46,6 @@ class IncomingFile:
 
     def write(self, piece: bytes) -> None:
         """Append some bytes.
-
-        Parameters
-        ----------
-        piece : bytes
-            the next bytes
 
         Raises
         ------
@@ -87,13 +72,7 @@ class IncomingFile:
 
 
 def hash_file(path: Path) -> str:
-    """The sha256 of a file's bytes, in hexadecimal.
-
-    Parameters
-    ----------
-    path : Path
-        a regular file
-    """
+    """The sha256 of a file's bytes, in hexadecimal."""
     digest = hashlib.sha256()
     with path.open("rb") as file:
         while piece := file.read(_PIECE):

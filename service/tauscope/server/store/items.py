@@ -23,17 +23,7 @@ class ItemStore:
     """Folders named by identifiers, below one folder."""
 
     def __init__(self, root: Path, noun: str, clock: Callable[[], datetime] = utc_now) -> None:
-        """Open the store; its folder is made where it is missing.
-
-        Parameters
-        ----------
-        root : Path
-            holds the items' folders
-        noun : str
-            what messages call an item, for example "identification"
-        clock : callable
-            tells the present moment
-        """
+        """Open the store; its folder is made where it is missing."""
         self.root = root
         self.noun = noun
         self.clock = clock
@@ -47,16 +37,6 @@ class ItemStore:
 
     def publish(self, staged: Path) -> str:
         """Make a staged folder an item.
-
-        Parameters
-        ----------
-        staged : Path
-            of `stage`
-
-        Returns
-        -------
-        str
-            the item's identifier
 
         Raises
         ------
@@ -75,13 +55,7 @@ class ItemStore:
         return identifier
 
     def discard(self, staged: Path) -> None:
-        """Remove a staged folder; nothing happens where it was published.
-
-        Parameters
-        ----------
-        staged : Path
-            of `stage`
-        """
+        """Remove a staged folder; nothing happens where it was published."""
         shutil.rmtree(staged, ignore_errors=True)
 
     def identifiers(self) -> list[str]:
@@ -90,11 +64,6 @@ class ItemStore:
 
     def folder(self, identifier: str) -> Path:
         """The folder of an item.
-
-        Parameters
-        ----------
-        identifier : str
-            of the item; any text that a client sent
 
         Raises
         ------
@@ -109,11 +78,6 @@ class ItemStore:
 
     def remove(self, identifier: str) -> None:
         """Remove an item and all its files.
-
-        Parameters
-        ----------
-        identifier : str
-            of the item
 
         Raises
         ------
@@ -135,11 +99,5 @@ class ItemStore:
 
 
 def staged_identifier(staged: Path) -> str:
-    """The identifier that a staged folder will have as an item.
-
-    Parameters
-    ----------
-    staged : Path
-        of `ItemStore.stage`
-    """
+    """The identifier that a staged folder will have as an item."""
     return staged.name.removeprefix(_STAGED)

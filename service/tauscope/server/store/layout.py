@@ -17,11 +17,5 @@ RECORDINGS = "recordings"
 
 
 def item_stores(data_folder: Path) -> dict[str, ItemStore]:
-    """The folders of every kind of item, made where they are missing.
-
-    Parameters
-    ----------
-    data_folder : Path
-        holds everything that is kept
-    """
+    """The folders of every kind of item, made where they are missing."""
     return {kind: ItemStore(data_folder / name, kind) for kind, name in FOLDERS.items()}

@@ -14,45 +14,22 @@ _IDENTIFIER = re.compile(r"[0-9]{8}T[0-9]{6}Z-[0-9a-f]{8}")
 
 
 def is_file_name(text: str) -> bool:
-    """Whether a text may name a file that is kept: never hidden, never a path, never ending in a blank or a dot.
-
-    Parameters
-    ----------
-    text : str
-        any text
-    """
+    """Whether a text may name a file that is kept: never hidden, never a path, never ending in a blank or a dot."""
     return _FILE_NAME.fullmatch(text) is not None and not text.endswith((" ", "."))
 
 
 def new_identifier(now: datetime) -> str:
-    """A new identifier; sorted as text, identifiers are sorted by the second of their creation.
-
-    Parameters
-    ----------
-    now : datetime
-        the present moment, with its time zone
-    """
+    """A new identifier; sorted as text, identifiers are sorted by the second of their creation."""
     return f"{now.astimezone(UTC):%Y%m%dT%H%M%SZ}-{secrets.token_hex(4)}"
 
 
 def is_identifier(text: str) -> bool:
-    """Whether a text has the form of an identifier.
-
-    Parameters
-    ----------
-    text : str
-        any text
-    """
+    """Whether a text has the form of an identifier."""
     return _IDENTIFIER.fullmatch(text) is not None
 
 
 def identifier_time(identifier: str) -> datetime:
     """The second in which an identifier was made.
-
-    Parameters
-    ----------
-    identifier : str
-        of `new_identifier`
 
     Raises
     ------

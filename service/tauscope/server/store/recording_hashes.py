@@ -40,53 +40,24 @@ class RecordingHashes:
     """
 
     def __init__(self, root: Path) -> None:
-        """Open the memory; its folder is made where it is missing.
-
-        Parameters
-        ----------
-        root : Path
-            holds it
-        """
+        """Open the memory; its folder is made where it is missing."""
         self._root = root
         root.mkdir(parents=True, exist_ok=True)
 
     def of(self, name: str, status: os.stat_result) -> KnownHash | None:
-        """What is known of a recording, unless its file was written since.
-
-        Parameters
-        ----------
-        name : str
-            of the recording
-        status : os.stat_result
-            of its file
-        """
+        """What is known of a recording, unless its file was written since."""
         content = self._read(name)
         if content is None or (content["size"], content["modified_ns"]) != (status.st_size, status.st_mtime_ns):
             return None
         return KnownHash(content["sha256"], content.get("kept"))
 
     def is_kept(self, name: str) -> bool:
-        """Whether it is known what a recording was in the beginning.
-
-        Parameters
-        ----------
-        name : str
-            of the recording
-        """
+        """Whether it is known what a recording was in the beginning."""
         content = self._read(name)
         return content is not None and content.get("kept") is not None
 
     def keep(self, name: str, status: os.stat_result, sha256: str) -> None:
         """Write down what is about to be kept.
-
-        Parameters
-        ----------
-        name : str
-            of the recording
-        status : os.stat_result
-            of its file
-        sha256 : str
-            of its bytes
 
         Raises
         ------
@@ -96,17 +67,7 @@ class RecordingHashes:
         self._write(name, status, KnownHash(sha256, kept=sha256))
 
     def remember(self, name: str, status: os.stat_result, sha256: str) -> KnownHash:
-        """Remember the present hash of a recording; a disk that takes nothing costs the memory alone.
-
-        Parameters
-        ----------
-        name : str
-            of the recording
-        status : os.stat_result
-            of its file
-        sha256 : str
-            of its bytes
-        """
+        """Remember the present hash of a recording; a disk that takes nothing costs the memory alone."""
         before = self._read(name)
         known = KnownHash(sha256, None if before is None else before.get("kept"))
         try:
@@ -116,23 +77,11 @@ class RecordingHashes:
         return known
 
     def forget(self, name: str) -> None:
-        """Forget a recording.
-
-        Parameters
-        ----------
-        name : str
-            of the recording
-        """
+        """Forget a recording."""
         self._path(name).unlink(missing_ok=True)
 
     def tidy(self, is_there: Callable[[str], bool]) -> None:
-        """Forget recordings that are gone, or never came; to be called before anything arrives.
-
-        Parameters
-        ----------
-        is_there : callable
-            whether there is a recording of a name
-        """
+        """Forget recordings that are gone, or never came; to be called before anything arrives."""
         for path in self._root.iterdir():
             if not is_there(path.name.removesuffix(".json")):
                 path.unlink(missing_ok=True)

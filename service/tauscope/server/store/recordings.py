@@ -29,16 +29,8 @@ class NameTakenError(RecordingError):
 class StoredRecording:
     """A recording that lies on the server.
 
-    name : str
-        by which requests refer to it
-    size : int
-        number of bytes
-    modified : datetime
-        when it was last written, in UTC
     sha256 : str or None
         of its bytes, in hexadecimal; None where it was not computed yet
-    is_damaged : bool
-        whether it was sent or recorded, and its bytes are not those any more
     """
 
     name: str
@@ -55,13 +47,7 @@ class RecordingStore:
     """
 
     def __init__(self, root: Path) -> None:
-        """Open the store; its folder is made where it is missing.
-
-        Parameters
-        ----------
-        root : Path
-            holds the recordings
-        """
+        """Open the store; its folder is made where it is missing."""
         self.root = root
         self._hashes = RecordingHashes(root / _HASHES)
         self._naming = threading.Lock()
@@ -71,22 +57,11 @@ class RecordingStore:
         return Path(tempfile.mkdtemp(prefix=_INCOMING, dir=self.root))
 
     def discard(self, staged: Path) -> None:
-        """Remove a staged folder and what is in it.
-
-        Parameters
-        ----------
-        staged : Path
-            of `stage`
-        """
+        """Remove a staged folder and what is in it."""
         shutil.rmtree(staged, ignore_errors=True)
 
     def keep(self, file: KeptFile) -> tuple[StoredRecording, bool]:
         """Give a file in a staged folder its place among the recordings.
-
-        Parameters
-        ----------
-        file : KeptFile
-            in a folder of `stage`
 
         Returns
         -------
@@ -110,11 +85,6 @@ class RecordingStore:
     def path(self, name: str) -> Path:
         """Where a recording lies.
 
-        Parameters
-        ----------
-        name : str
-            of the recording; any text that a client sent
-
         Raises
         ------
         NotFoundError
@@ -124,13 +94,7 @@ class RecordingStore:
         return self.root / name
 
     def holds(self, name: str) -> bool:
-        """Whether there is a recording of a name.
-
-        Parameters
-        ----------
-        name : str
-            any text
-        """
+        """Whether there is a recording of a name."""
         try:
             self._status(name)
         except NotFoundError:
@@ -139,11 +103,6 @@ class RecordingStore:
 
     def find(self, name: str) -> StoredRecording:
         """A recording with its sha256, which is computed where it is not known.
-
-        Parameters
-        ----------
-        name : str
-            of the recording
 
         Raises
         ------
@@ -158,11 +117,6 @@ class RecordingStore:
 
     def digest(self, name: str) -> str:
         """The sha256 of a recording's bytes, in hexadecimal, for who will work with them.
-
-        Parameters
-        ----------
-        name : str
-            of the recording
 
         Raises
         ------
@@ -194,13 +148,7 @@ class RecordingStore:
         return found
 
     def damaged(self, *, deep: bool) -> list[str]:
-        """Names of the recordings that were sent or recorded and whose bytes are not those any more.
-
-        Parameters
-        ----------
-        deep : bool
-            whether every byte is looked at, or only at what has another size or another time
-        """
+        """Names of the recordings that were sent or recorded and whose bytes are not those any more."""
         if deep:
             for entry in self.entries():
                 with suppress(NotFoundError, FileNotFoundError):  # removed meanwhile
@@ -209,11 +157,6 @@ class RecordingStore:
 
     def remove(self, name: str) -> None:
         """Remove a recording.
-
-        Parameters
-        ----------
-        name : str
-            of the recording
 
         Raises
         ------

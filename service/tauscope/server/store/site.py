@@ -13,11 +13,6 @@ FILE_NAME = "site.json"
 def site_identifier(data_folder: Path) -> str:
     """The identifier of a data folder; given to it when it is opened for the first time, and kept with it.
 
-    Parameters
-    ----------
-    data_folder : Path
-        an existing folder
-
     Raises
     ------
     StoreError

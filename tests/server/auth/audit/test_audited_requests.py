@@ -10,7 +10,7 @@ from fastapi import FastAPI
 from starlette.testclient import TestClient
 
 from server.auth.keyed import client_with, make_keys
-from server.http.conftest import HOST, IDENTIFICATIONS, RECORDINGS, connected
+from server.conftest import HOST, IDENTIFICATIONS, RECORDINGS, connected
 from server.http.contract.test_route_scopes import CHANGING
 from server.http.motions import ROBOT, move_document
 from server.queue.controls import HandControls, finish_at_once

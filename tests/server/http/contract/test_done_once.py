@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from server.http.conftest import RECORDINGS, connected
+from server.conftest import RECORDINGS, connected
 from server.http.motions import ROBOT, move_document
 from server.http.problem_check import assert_problem
 from server.http.write_openapi import COMMITTED

@@ -11,7 +11,7 @@ from fastapi.routing import iter_route_contexts
 from starlette.testclient import TestClient
 
 from server.auth.keyed import client_with, make_keys
-from server.http.conftest import HOST
+from server.conftest import HOST
 from server.http.problem_check import assert_problem
 from server.http.write_openapi import COMMITTED
 from server.queue.controls import finish_at_once

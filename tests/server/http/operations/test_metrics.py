@@ -10,7 +10,7 @@ from starlette.testclient import TestClient
 
 from identified import candidate, identified
 from server.auth.keyed import client_with
-from server.http.conftest import HOST
+from server.conftest import HOST
 from server.http.motions import ROBOT, move_document
 from server.queue.controls import HandControls
 from server.queue.executors import InlineExecutor, ManualExecutor

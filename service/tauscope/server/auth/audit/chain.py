@@ -21,13 +21,6 @@ def chained_line(previous: Mapping[str, Any] | None, content: Mapping[str, Any])
     ----------
     previous : mapping or None
         the entry before; None for the first
-    content : mapping
-        plain data of the new one
-
-    Returns
-    -------
-    bytes
-        JSON, without the line's end
     """
     entry = {
         "number": 1 if previous is None else previous["number"] + 1,
@@ -41,8 +34,6 @@ def chained_line(previous: Mapping[str, Any] | None, content: Mapping[str, Any])
 class Verification:
     """What a log is worth.
 
-    entries : int
-        whole entries
     head : str or None
         hash of the last one; None where there is none
     fault : str or None
@@ -55,15 +46,7 @@ class Verification:
 
 
 def verify_lines(lines: Iterable[bytes], noted: str | None = None) -> Verification:
-    """Check every line against the one before.
-
-    Parameters
-    ----------
-    lines : iterable of bytes
-        with their ends; a last one without end is one that a crash cut off
-    noted : str or None
-        hash of an entry that has to be among them
-    """
+    """Check every line against the one before."""
     count, head, is_noted_there = 0, GENESIS, noted is None
     torn: bytes | None = None
     for place, line in enumerate(lines, start=1):
@@ -84,13 +67,7 @@ def verify_lines(lines: Iterable[bytes], noted: str | None = None) -> Verificati
 
 
 def parse_entry(line: bytes) -> dict[str, Any] | None:
-    """The entry of a whole line; None where it is none.
-
-    Parameters
-    ----------
-    line : bytes
-        with or without its end
-    """
+    """The entry of a whole line; None where it is none."""
     try:
         entry = json.loads(line)
     except (ValueError, RecursionError):
@@ -100,13 +77,7 @@ def parse_entry(line: bytes) -> dict[str, Any] | None:
 
 
 def is_line_of_ours(line: bytes) -> bool:
-    """Whether a line is whole JSON, so that no crash can have cut it off.
-
-    Parameters
-    ----------
-    line : bytes
-        any line
-    """
+    """Whether a line is whole JSON, so that no crash can have cut it off."""
     try:
         json.loads(line)
     except (ValueError, RecursionError):

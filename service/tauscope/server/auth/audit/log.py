@@ -32,29 +32,12 @@ class AuditLog:
     """Entries chained by their hashes. Several processes may append at the same time."""
 
     def __init__(self, folder: Path, clock: Callable[[], datetime] = utc_now) -> None:
-        """Look at the log of a data folder; nothing is opened yet.
-
-        Parameters
-        ----------
-        folder : Path
-            the data folder
-        clock : callable
-            tells the present moment
-        """
+        """Look at the log of a data folder; nothing is opened yet."""
         self.path = folder / AUDIT_FILE
         self._clock = clock
 
     def append(self, actor: str, action: str, **details: Any) -> None:
         """Add an entry; it is on the disk when this returns.
-
-        Parameters
-        ----------
-        actor : str
-            who did it
-        action : str
-            what was done
-        **details : object
-            plain data, None left out; never a secret
 
         Raises
         ------
@@ -65,11 +48,6 @@ class AuditLog:
 
     def verify(self, noted: str | None = None) -> Verification:
         """Check the whole log.
-
-        Parameters
-        ----------
-        noted : str or None
-            hash of an entry that has to be in it
 
         Raises
         ------
@@ -112,29 +90,13 @@ class AuditTrail:
     """The log as the service writes it: what must not wait for the disk is handed to a thread."""
 
     def __init__(self, log: AuditLog) -> None:
-        """Begin with nothing to write.
-
-        Parameters
-        ----------
-        log : AuditLog
-            takes the entries
-        """
+        """Begin with nothing to write."""
         self.log = log
         self._waiting: queue.Queue[tuple[str, str, dict[str, Any]] | None] = queue.Queue(MOST_WAITING)
         self.lost = 0
 
     def note(self, actor: str, action: str, **details: Any) -> None:
-        """Hand an entry in; returns at once, whatever the disk does.
-
-        Parameters
-        ----------
-        actor : str
-            who did it
-        action : str
-            what was done
-        **details : object
-            plain data; never a secret
-        """
+        """Hand an entry in; returns at once, whatever the disk does."""
         try:
             self._waiting.put_nowait((actor, action, details))
         except queue.Full:

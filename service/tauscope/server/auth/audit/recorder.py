@@ -20,13 +20,7 @@ class Audited:
     """Notes who asked for what, and what was answered."""
 
     def __init__(self, app: ASGIApp) -> None:
-        """Wrap an application.
-
-        Parameters
-        ----------
-        app : ASGI application
-            what is wrapped; its state holds the services
-        """
+        """Wrap an application."""
         self.app = app
 
     async def __call__(self, scope: AsgiScope, receive: Receive, send: Send) -> None:
@@ -60,15 +54,7 @@ class Audited:
 
 
 def is_noted(method: str, path: str) -> bool:
-    """Whether a request leaves an entry: not where it only reads, and not for signs of life.
-
-    Parameters
-    ----------
-    method : str
-        of HTTP, in capitals
-    path : str
-        of the request
-    """
+    """Whether a request leaves an entry: not where it only reads, and not for signs of life."""
     return method not in ("GET", "HEAD", "OPTIONS") and not path.endswith("/heartbeat")
 
 

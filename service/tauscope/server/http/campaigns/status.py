@@ -30,13 +30,6 @@ WAITING, GONE = "waiting", "gone"
 def find_campaign(services: Services, identifier: str) -> CampaignWorkspace:
     """The folder of a campaign.
 
-    Parameters
-    ----------
-    services : Services
-        where it is kept
-    identifier : str
-        of the campaign
-
     Raises
     ------
     NotFoundError
@@ -47,15 +40,6 @@ def find_campaign(services: Services, identifier: str) -> CampaignWorkspace:
 
 def describe(services: Services, identifier: str, root: str) -> CampaignAnswer:
     """The state of a campaign; one whose files are damaged is said to be so.
-
-    Parameters
-    ----------
-    services : Services
-        where it is kept
-    identifier : str
-        of the campaign
-    root : str
-        path under which all collections stand, for the links
 
     Raises
     ------
@@ -75,15 +59,6 @@ def describe(services: Services, identifier: str, root: str) -> CampaignAnswer:
 
 def result_of(services: Services, identifier: str, root: str) -> CampaignResult:
     """What came of a campaign that succeeded.
-
-    Parameters
-    ----------
-    services : Services
-        where it is kept
-    identifier : str
-        of the campaign
-    root : str
-        path under which all collections stand, for the links
 
     Raises
     ------

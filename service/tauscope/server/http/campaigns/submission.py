@@ -16,18 +16,6 @@ from tauscope.server.http.services import Services
 async def submit_campaign(request: Request, services: Services) -> str:
     """Take a request for a campaign.
 
-    Parameters
-    ----------
-    request : Request
-        JSON, or a form with the parts request, robot and urdf
-    services : Services
-        where it goes
-
-    Returns
-    -------
-    str
-        the campaign's identifier
-
     Raises
     ------
     ProblemError

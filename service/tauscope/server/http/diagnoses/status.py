@@ -10,13 +10,6 @@ from tauscope.server.queue.states import JobState
 def find_diagnosis(services: Services, identifier: str) -> DiagnosisWorkspace:
     """The folder of a diagnosis.
 
-    Parameters
-    ----------
-    services : Services
-        where it is kept
-    identifier : str
-        of the diagnosis
-
     Raises
     ------
     NotFoundError
@@ -27,15 +20,6 @@ def find_diagnosis(services: Services, identifier: str) -> DiagnosisWorkspace:
 
 def describe(services: Services, identifier: str, collection: str) -> DiagnosisAnswer:
     """The state of a diagnosis; one whose files are damaged is said to be so.
-
-    Parameters
-    ----------
-    services : Services
-        where it is kept
-    identifier : str
-        of the diagnosis
-    collection : str
-        path of the collection, for the links
 
     Raises
     ------
@@ -61,13 +45,6 @@ def describe(services: Services, identifier: str, collection: str) -> DiagnosisA
 
 def finished_diagnosis(services: Services, identifier: str) -> DiagnosisWorkspace:
     """The folder of a diagnosis that succeeded.
-
-    Parameters
-    ----------
-    services : Services
-        where it is kept
-    identifier : str
-        of the diagnosis
 
     Raises
     ------

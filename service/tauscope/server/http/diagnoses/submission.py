@@ -18,18 +18,6 @@ from tauscope.server.queue.diagnosis_workspace import DiagnosisWorkspace
 async def submit_diagnosis(request: Request, services: Services) -> str:
     """Take a request for a diagnosis.
 
-    Parameters
-    ----------
-    request : Request
-        JSON, or a form with the parts request, robot, urdf, recordings, held_out and simulated
-    services : Services
-        where it goes
-
-    Returns
-    -------
-    str
-        the job's identifier
-
     Raises
     ------
     ProblemError

@@ -10,13 +10,6 @@ from tauscope.server.queue.states import JobState
 def find_excitation(services: Services, identifier: str) -> ExcitationWorkspace:
     """The folder of an excitation.
 
-    Parameters
-    ----------
-    services : Services
-        where it is kept
-    identifier : str
-        of the excitation
-
     Raises
     ------
     NotFoundError
@@ -27,13 +20,6 @@ def find_excitation(services: Services, identifier: str) -> ExcitationWorkspace:
 
 def finished_excitation(services: Services, identifier: str) -> ExcitationWorkspace:
     """The folder of an excitation that succeeded.
-
-    Parameters
-    ----------
-    services : Services
-        where it is kept
-    identifier : str
-        of the excitation
 
     Raises
     ------
@@ -49,15 +35,6 @@ def finished_excitation(services: Services, identifier: str) -> ExcitationWorksp
 
 def describe(services: Services, identifier: str, collection: str) -> ExcitationAnswer:
     """The state of an excitation; one whose files are damaged is said to be so.
-
-    Parameters
-    ----------
-    services : Services
-        where it is kept
-    identifier : str
-        of the excitation
-    collection : str
-        path of the collection, for the links
 
     Raises
     ------

@@ -14,18 +14,6 @@ from tauscope.server.queue.excitation_workspace import ExcitationWorkspace
 async def submit_excitation(request: Request, services: Services) -> str:
     """Take a request for an excitation.
 
-    Parameters
-    ----------
-    request : Request
-        JSON, or a form with the parts request, robot and urdf
-    services : Services
-        where it goes
-
-    Returns
-    -------
-    str
-        the job's identifier
-
     Raises
     ------
     ProblemError

@@ -22,15 +22,7 @@ from tauscope.server.http.history.models import (
 
 
 def model_answer(entry: ModelEntry, collection: str) -> ModelAnswer:
-    """The answer that holds a model.
-
-    Parameters
-    ----------
-    entry : ModelEntry
-        of the history
-    collection : str
-        path of the collection, for the links
-    """
+    """The answer that holds a model."""
     here = f"{collection}/{entry.identifier}"
     return ModelAnswer(
         id=entry.identifier,
@@ -49,15 +41,7 @@ def model_answer(entry: ModelEntry, collection: str) -> ModelAnswer:
 def comparison_answer(
     before: str, earlier: IdentificationDocument, after: str, later: IdentificationDocument
 ) -> ComparisonAnswer:
-    """The answer that compares two models.
-
-    Parameters
-    ----------
-    before, after : str
-        identifiers of the two
-    earlier, later : IdentificationDocument
-        what they say
-    """
+    """The answer that compares two models."""
     drifts = compared(earlier, later)
     return ComparisonAnswer(
         before=before,
@@ -72,8 +56,6 @@ def trend_answer(robot: str, models: Sequence[tuple[ModelEntry, IdentificationDo
 
     Parameters
     ----------
-    robot : str
-        its name
     models : sequence of (ModelEntry, IdentificationDocument)
         every model that was ever active, the oldest first
     """

@@ -31,11 +31,6 @@ class Answers(Protocol):
     def begin(self, name: str) -> bool:
         """Claim a request before anything is done.
 
-        Parameters
-        ----------
-        name : str
-            of the request, see `request_name`
-
         Returns
         -------
         bool
@@ -49,38 +44,14 @@ class Answers(Protocol):
         ...
 
     def finish(self, name: str, answer: KeptAnswer | None) -> None:
-        """Keep the answer, or forget a request that did nothing.
-
-        Parameters
-        ----------
-        name : str
-            of the request
-        answer : KeptAnswer or None
-            what was answered; None to forget
-        """
+        """Keep the answer, or forget a request that did nothing."""
         ...
 
     def find(self, name: str) -> KeptAnswer | None:
-        """The answer to a request; None where there is none (yet).
-
-        Parameters
-        ----------
-        name : str
-            of the request
-        """
+        """The answer to a request; None where there is none (yet)."""
         ...
 
 
 def request_name(caller: str, path: str, key: str) -> str:
-    """What a request is called: nobody meets another caller's answers.
-
-    Parameters
-    ----------
-    caller : str
-        whose request
-    path : str
-        where it goes
-    key : str
-        its Idempotency-Key
-    """
+    """What a request is called: nobody meets another caller's answers."""
     return hashlib.sha256("\n".join((caller, path, key)).encode()).hexdigest()

@@ -9,26 +9,14 @@ class Fingerprint:
     """A hash of a body as it arrives. Clients draw a new boundary for every form: it is left out."""
 
     def __init__(self, content_type: str) -> None:
-        """Begin with an empty body.
-
-        Parameters
-        ----------
-        content_type : str
-            header of the request
-        """
+        """Begin with an empty body."""
         media_type, options = parse_options_header(content_type)
         self._boundary = options.get(b"boundary") or b""
         self._hash = hashlib.sha256(media_type + b"\n")
         self._held = b""
 
     def add(self, piece: bytes) -> None:
-        """Take the next bytes.
-
-        Parameters
-        ----------
-        piece : bytes
-            of the body
-        """
+        """Take the next bytes."""
         if not self._boundary:
             self._hash.update(piece)
             return

@@ -19,15 +19,7 @@ class AnswersOnDisk(Answers):
     """Answers that outlast the service, each request durably claimed."""
 
     def __init__(self, folder: Path, clock: Callable[[], float] = time.time) -> None:
-        """Open the store; its folder is made where it is missing, and answers that are too old go.
-
-        Parameters
-        ----------
-        folder : Path
-            holds the answers
-        clock : callable
-            seconds of the same era as the files' times
-        """
+        """Open the store; its folder is made where it is missing, and answers that are too old go."""
         self._folder, self._clock = folder, clock
         self._lock = threading.Lock()
         self._begun = 0

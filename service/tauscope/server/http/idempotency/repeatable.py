@@ -32,13 +32,7 @@ class Repeatable:
     """Answers a request that came before with the answer of then."""
 
     def __init__(self, app: ASGIApp) -> None:
-        """Wrap an application.
-
-        Parameters
-        ----------
-        app : ASGI application
-            what is wrapped; its state holds the services
-        """
+        """Wrap an application."""
         self.app = app
         self._underway: set[str] = set()
 
@@ -85,13 +79,7 @@ class Repeatable:
 
 
 def is_repeatable(path: str) -> bool:
-    """Whether a POST to a path creates or moves something, and is done once for an Idempotency-Key.
-
-    Parameters
-    ----------
-    path : str
-        of the request
-    """
+    """Whether a POST to a path creates or moves something, and is done once for an Idempotency-Key."""
     return _REPEATABLE.fullmatch(path) is not None
 
 

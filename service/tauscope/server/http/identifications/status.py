@@ -13,13 +13,6 @@ from tauscope.server.queue.states import JobState
 def find_identification(services: Services, identifier: str) -> IdentificationWorkspace:
     """The folder of an identification.
 
-    Parameters
-    ----------
-    services : Services
-        where it is kept
-    identifier : str
-        of the identification
-
     Raises
     ------
     NotFoundError
@@ -30,15 +23,6 @@ def find_identification(services: Services, identifier: str) -> IdentificationWo
 
 def describe(services: Services, identifier: str, collection: str) -> IdentificationAnswer:
     """The state of an identification; one whose files are damaged is said to be so.
-
-    Parameters
-    ----------
-    services : Services
-        where it is kept
-    identifier : str
-        of the identification
-    collection : str
-        path of the collection, for the links
 
     Raises
     ------
@@ -64,13 +48,6 @@ def describe(services: Services, identifier: str, collection: str) -> Identifica
 
 def finished_identification(services: Services, identifier: str) -> IdentificationWorkspace:
     """The folder of an identification that succeeded.
-
-    Parameters
-    ----------
-    services : Services
-        where it is kept
-    identifier : str
-        of the identification
 
     Raises
     ------

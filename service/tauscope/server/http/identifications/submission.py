@@ -24,18 +24,6 @@ _Received = Received[IdentificationRequest]
 async def submit_identification(request: Request, services: Services) -> str:
     """Take a request for an identification.
 
-    Parameters
-    ----------
-    request : Request
-        JSON, or a form with the parts request, robot, urdf, recordings and held_out
-    services : Services
-        where it goes
-
-    Returns
-    -------
-    str
-        the job's identifier
-
     Raises
     ------
     ProblemError
@@ -80,15 +68,6 @@ def _hand_in(received: _Received, services: Services, workspace: IdentificationW
 def ordered_recordings(role: str, received: Received[Any], store: RecordingStore) -> tuple[OrderedRecording, ...]:
     """The recordings of a role: each a file of the form, or else a recording on the server.
 
-    Parameters
-    ----------
-    role : str
-        name of the form's part and of the request's field
-    received : Received
-        the request
-    store : RecordingStore
-        recordings on the server
-
     Raises
     ------
     ProblemError
@@ -117,13 +96,6 @@ def check_roles(
     recordings: Sequence[OrderedRecording], held_out: Sequence[OrderedRecording], max_recordings: int
 ) -> None:
     """There is something to work on, not too much, and no recording is its own judge.
-
-    Parameters
-    ----------
-    recordings, held_out : sequence of OrderedRecording
-        what is worked on, and everything else
-    max_recordings : int
-        most of all together
 
     Raises
     ------

@@ -27,15 +27,7 @@ class JobAnswer(AnswerModel):
 
 
 def job_fields(workspace: Workspace, here: str) -> dict[str, Any]:
-    """The fields of `JobAnswer`; a job whose state cannot be read is said to be damaged.
-
-    Parameters
-    ----------
-    workspace : Workspace
-        of the job
-    here : str
-        path of the job's resource
-    """
+    """The fields of `JobAnswer`; a job whose state cannot be read is said to be damaged."""
     identifier, record = workspace.folder.name, workspace.read_record()
     if record is None:
         return damaged_fields(identifier, here)
@@ -51,39 +43,18 @@ def job_fields(workspace: Workspace, here: str) -> dict[str, Any]:
 
 
 def damaged_fields(identifier: str, here: str) -> dict[str, Any]:
-    """The fields of `JobAnswer` of a job whose files are missing or damaged.
-
-    Parameters
-    ----------
-    identifier : str
-        of the job
-    here : str
-        path of the job's resource
-    """
+    """The fields of `JobAnswer` of a job whose files are missing or damaged."""
     detail = f"files of {identifier} are missing or damaged; remove it and hand it in again"
     return {"id": identifier, "state": "damaged", "problem": make_problem("damaged", detail, here)}
 
 
 def shown_problem(problem: JobProblem | None, here: str) -> Problem | None:
-    """The problem that a job ended in, as answers hold it.
-
-    Parameters
-    ----------
-    problem : JobProblem or None
-        as it is kept
-    here : str
-        path of the job's resource
-    """
+    """The problem that a job ended in, as answers hold it."""
     return None if problem is None else make_problem(problem.code, problem.detail, here)
 
 
 def require_success(workspace: Workspace) -> None:
     """Refuse to go on with a job that has no result.
-
-    Parameters
-    ----------
-    workspace : Workspace
-        of the job
 
     Raises
     ------
@@ -107,8 +78,6 @@ def require_document(content: bytes | None, identifier: str) -> bytes:
     ----------
     content : bytes or None
         as its folder holds it; None where it is damaged
-    identifier : str
-        of the job
 
     Raises
     ------

@@ -24,16 +24,8 @@ def add_collection_routes(
 
     Parameters
     ----------
-    router : APIRouter
-        of the collection; its prefix names the jobs in the plural
-    noun : str
-        what one of them is called, with its article
-    kind : callable
-        finds the jobs of that kind among the services
     answers : (type, type)
         what `describe` returns, and the list of it, whose one field is named in the plural
-    describe : callable
-        describes a job: of the services, its identifier and the path of the collection
     """
     plural, singular = router.prefix.removeprefix("/"), noun.rpartition(" ")[2]
     answer, list_answer = answers

@@ -25,16 +25,8 @@ Folder = TypeVar("Folder", bound=Workspace)
 class JobDocument(Generic[Folder]):
     """A document that a job leaves in its folder.
 
-    name : str
-        last part of the path
     read : callable
         its content, from the job's folder; None where it is damaged
-    summary, description : str
-        of the route
-    answer : dict
-        of OpenAPI: what an answer with the document is
-    media_type : str
-        of its content
     """
 
     name: str
@@ -51,19 +43,7 @@ def add_document_routes(
     documents: Sequence[JobDocument[Folder]],
     *problems: str,
 ) -> None:
-    """Give a collection of jobs the routes ``/{identifier}/…``, one a document.
-
-    Parameters
-    ----------
-    router : APIRouter
-        of the collection
-    finished : callable
-        the folder of a job that succeeded; raises NotFoundError or ProblemError for any other
-    documents : sequence of JobDocument
-        what is fetched
-    problems : str
-        codes of the problems that the work of such a job may end in
-    """
+    """Give a collection of jobs the routes ``/{identifier}/…``, one a document."""
     for document in documents:
         _add_document_route(router, finished, document, problems)
 

@@ -56,17 +56,7 @@ LastEvent = Annotated[
 
 
 def add_events_route(router: APIRouter, noun: str, find: Callable[[Services, str], Told]) -> None:
-    """Give a collection of jobs the route ``/{identifier}/events``.
-
-    Parameters
-    ----------
-    router : APIRouter
-        of the collection
-    noun : str
-        what the summary calls a job, with its article
-    find : callable
-        the job of an identifier; raises NotFoundError where there is none
-    """
+    """Give a collection of jobs the route ``/{identifier}/events``."""
 
     def found(identifier: Identifier, services: ServicesDep) -> Told:
         return find(services, identifier)

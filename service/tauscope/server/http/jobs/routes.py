@@ -28,13 +28,5 @@ MOTION = ("busy", "leased", "lease-needed", "lease-lost", "not-armed")
 
 
 def collection(request: Request, steps_below: int) -> str:
-    """Path of the collection, seen from a request below it.
-
-    Parameters
-    ----------
-    request : Request
-        what is answered
-    steps_below : int
-        path components below the collection
-    """
+    """Path of the collection, seen from a request below it."""
     return request.url.path.rsplit("/", steps_below)[0]

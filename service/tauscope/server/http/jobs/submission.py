@@ -30,13 +30,7 @@ Document = TypeVar("Document", bound=RobotRequest)
 
 @dataclass(frozen=True)
 class Received(Generic[Document]):
-    """A request as it arrived.
-
-    document : RobotRequest
-        what it says
-    form : ReceivedForm
-        the files that came with it
-    """
+    """A request as it arrived."""
 
     document: Document
     form: ReceivedForm
@@ -50,19 +44,6 @@ async def receive_request(
     further_parts: Mapping[str, PartRule] | None = None,
 ) -> Received[Document]:
     """Read the body, whichever of the two media types it is.
-
-    Parameters
-    ----------
-    request : Request
-        JSON, or a form with the parts request, robot, urdf and further ones
-    kind : type
-        model of the JSON
-    settings : Settings
-        of the operator
-    robot_folder : Path
-        where the robot file and its URDF are written
-    further_parts : mapping of str to PartRule, or None
-        further parts that the form may have
 
     Raises
     ------
@@ -86,13 +67,6 @@ async def receive_request(
 
 def keep_robot(received: Received[Any], folder: Path) -> str:
     """Name of the robot file in the job's folder, written there if it came as JSON.
-
-    Parameters
-    ----------
-    received : Received
-        a request
-    folder : Path
-        where its robot file was written, if it came as a file
 
     Raises
     ------
@@ -118,12 +92,8 @@ def request_body(
 
     Parameters
     ----------
-    kind : type
-        model of the JSON
     examples : mapping of str to (str, plain data)
         summary and value by name
-    further_parts : mapping of str to dict, or None
-        schemas of further parts of the form
     """
     parts = {
         "request": model_reference(kind),

@@ -21,27 +21,12 @@ LeaseToken = Annotated[
 
 
 def owner_of(request: Request) -> str:
-    """Whose a lease is that this request takes or uses.
-
-    Parameters
-    ----------
-    request : Request
-        that has passed the gate
-    """
+    """Whose a lease is that this request takes or uses."""
     return caller_of(request.scope).key or "local"
 
 
 def permit_of(request: Request, services: Services, device: str) -> Permit:
     """Leave to move an arm, by the lease that comes with a request.
-
-    Parameters
-    ----------
-    request : Request
-        that wants to move it
-    services : Services
-        where leases are kept
-    device : str
-        the arm
 
     Raises
     ------

@@ -13,15 +13,7 @@ _HIDDEN = "[hidden]"
 
 
 def log_as_json(level: int = logging.INFO, stream: TextIO | None = None) -> None:
-    """Have everything that this process logs written as JSON.
-
-    Parameters
-    ----------
-    level : int
-        lowest level that is written
-    stream : text file or None
-        where it goes; standard error where None
-    """
+    """Have everything that this process logs written as JSON."""
     shared = [
         structlog.stdlib.add_log_level,
         structlog.stdlib.add_logger_name,
@@ -47,13 +39,7 @@ def log_as_json(level: int = logging.INFO, stream: TextIO | None = None) -> None
 
 
 def without_secrets(_logger: Any, _method: str, event: MutableMapping[str, Any]) -> MutableMapping[str, Any]:
-    """An event without anything that looks like a key or a token.
-
-    Parameters
-    ----------
-    event : mapping
-        what is logged; changed in place
-    """
+    """An event without anything that looks like a key or a token."""
     event.pop("color_message", None)  # uvicorn's, for terminals
     for name, value in event.items():
         if isinstance(value, str):

@@ -46,38 +46,16 @@ class Metrics:
         )
 
     def run_ended(self, record: RunRecord) -> None:
-        """Count a run.
-
-        Parameters
-        ----------
-        record : RunRecord
-            in its end state
-        """
+        """Count a run."""
         self.runs.labels(record.backend, record.state.value).inc()
         self.loops.add(record)
 
     def watch_drift(self, drift: DriftMonitor) -> None:
-        """Have it told how models drift.
-
-        Parameters
-        ----------
-        drift : DriftMonitor
-            knows it
-        """
+        """Have it told how models drift."""
         self.registry.register(ModelDrift(drift))
 
     def watch(self, name: str, text: str, value: Callable[[], float]) -> None:
-        """Have a number asked for whenever somebody looks.
-
-        Parameters
-        ----------
-        name : str
-            of the gauge
-        text : str
-            what it is
-        value : callable
-            its present value
-        """
+        """Have a number asked for whenever somebody looks."""
         self.registry.register(_Watched(name, text, value))
 
     def text(self) -> bytes:
@@ -97,13 +75,7 @@ class LoopTimes(Collector):
         self._stale: Tally[str] = Tally()
 
     def add(self, record: RunRecord) -> None:
-        """Count the cycles of a run that has ended.
-
-        Parameters
-        ----------
-        record : RunRecord
-            of the run
-        """
+        """Count the cycles of a run that has ended."""
         if record.timing is None:
             return
         with self._lock:
@@ -144,13 +116,7 @@ class ModelDrift(Collector):
     """How far each robot's active model is from the one that drift is counted from; a series a parameter."""
 
     def __init__(self, watch: DriftMonitor) -> None:
-        """Prepare.
-
-        Parameters
-        ----------
-        watch : DriftMonitor
-            knows it
-        """
+        """Prepare."""
         self._watch = watch
 
     def collect(self) -> Iterator[Metric]:
@@ -177,34 +143,11 @@ class TimedExecutor(Executor):
     """An executor whose work is timed; what it does is another executor's."""
 
     def __init__(self, executor: Executor, seconds: Histogram) -> None:
-        """Wrap an executor.
-
-        Parameters
-        ----------
-        executor : Executor
-            does the work
-        seconds : Histogram
-            takes the times, by kind and outcome
-        """
+        """Wrap an executor."""
         self._executor, self._seconds = executor, seconds
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> "Future[Any]":
-        """Have a function called.
-
-        Parameters
-        ----------
-        fn : callable
-            the work
-        args : tuple
-            its arguments
-        kwargs : dict
-            its arguments by name
-
-        Returns
-        -------
-        Future
-            of its result; a result that is not None is a problem
-        """
+        """Have a function called."""
         began = time.monotonic()
         kind = getattr(getattr(fn, "func", fn), "__name__", "work").removeprefix("run_")
         future = self._executor.submit(fn, *args, **kwargs)
@@ -217,15 +160,7 @@ class TimedExecutor(Executor):
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the work.
-
-        Parameters
-        ----------
-        wait : bool
-            whether to return only when it has ended
-        cancel_futures : bool
-            whether what has not begun is dropped
-        """
+        """End the work."""
         self._executor.shutdown(wait=wait, cancel_futures=cancel_futures)
 
 

@@ -20,13 +20,7 @@ class Observed:
     """Counts, times and logs requests."""
 
     def __init__(self, app: ASGIApp) -> None:
-        """Wrap an application.
-
-        Parameters
-        ----------
-        app : ASGI application
-            what is wrapped; its state holds the services
-        """
+        """Wrap an application."""
         self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:

@@ -14,13 +14,7 @@ PATIENCE_S = 2.0
 
 
 def obstacles(services: Services) -> list[str]:
-    """Everything that stands in the way of work, each in a few words; asks the disk, so that it may hang.
-
-    Parameters
-    ----------
-    services : Services
-        of the application
-    """
+    """Everything that stands in the way of work, each in a few words; asks the disk, so that it may hang."""
     found = ["the service is ending"] if services.closing.is_set() else []
     if not services.jobs.can_work():
         found.append("the Dask cluster does not answer, and jobs wait for it")

@@ -8,20 +8,7 @@ from contextlib import asynccontextmanager, suppress
 
 
 def notify(state: str, environment: Mapping[str, str] = os.environ) -> bool:
-    """Tell systemd a state.
-
-    Parameters
-    ----------
-    state : str
-        ``READY=1``, ``WATCHDOG=1`` or ``STOPPING=1``
-    environment : mapping
-        names the socket, where systemd listens
-
-    Returns
-    -------
-    bool
-        whether it was told
-    """
+    """Tell systemd a state."""
     address = environment.get("NOTIFY_SOCKET", "")
     if not address.startswith(("/", "@")):
         return False
@@ -34,13 +21,7 @@ def notify(state: str, environment: Mapping[str, str] = os.environ) -> bool:
 
 
 def watchdog_interval_s(environment: Mapping[str, str] = os.environ) -> float | None:
-    """How often systemd wants a sign of life, halved; None where it wants none [s].
-
-    Parameters
-    ----------
-    environment : mapping
-        of this process
-    """
+    """How often systemd wants a sign of life, halved; None where it wants none [s]."""
     text = environment.get("WATCHDOG_USEC", "")
     is_ours = environment.get("WATCHDOG_PID", str(os.getpid())) == str(os.getpid())
     return int(text) * 0.5e-6 if text.isdecimal() and int(text) > 0 and is_ours else None

@@ -21,13 +21,7 @@ INLINE_NAME = "robot.json"
 
 
 def robot_part_rules(folder: Path) -> dict[str, PartRule]:
-    """Parts of a form that bring a robot.
-
-    Parameters
-    ----------
-    folder : Path
-        where the robot file and its URDF are written, beside each other
-    """
+    """Parts of a form that bring a robot."""
     return {
         "robot": PartRule(LARGEST_ROBOT_FILE, folder, default_name="robot.yaml"),
         "urdf": PartRule(LARGEST_URDF, folder),
@@ -36,18 +30,6 @@ def robot_part_rules(folder: Path) -> dict[str, PartRule]:
 
 def keep_inline_robot(folder: Path, robot: Mapping[str, Any]) -> str:
     """Write a robot that came as JSON to a robot file.
-
-    Parameters
-    ----------
-    folder : Path
-        where it is written
-    robot : mapping
-        content of the robot file
-
-    Returns
-    -------
-    str
-        name of the file
 
     Raises
     ------
@@ -64,13 +46,6 @@ def keep_inline_robot(folder: Path, robot: Mapping[str, Any]) -> str:
 def read_received_robot(folder: Path, file_name: str) -> Robot:
     """The robot of a received file.
 
-    Parameters
-    ----------
-    folder : Path
-        of the robot file and its URDF
-    file_name : str
-        of the robot file
-
     Raises
     ------
     RobotFileError
@@ -85,13 +60,6 @@ def read_received_robot(folder: Path, file_name: str) -> Robot:
 
 def check_received_robot(folder: Path, file_name: str) -> RobotReport:
     """The report on a received file.
-
-    Parameters
-    ----------
-    folder : Path
-        of the robot file and its URDF
-    file_name : str
-        of the robot file
 
     Raises
     ------

@@ -76,11 +76,5 @@ class RobotReportAnswer(AnswerModel):
 
     @classmethod
     def of(cls, report: RobotReport) -> "RobotReportAnswer":
-        """The answer that holds a report.
-
-        Parameters
-        ----------
-        report : RobotReport
-            of `check_robot`
-        """
+        """The answer that holds a report."""
         return cls.model_validate(report)

@@ -35,17 +35,7 @@ class JobRobotAnswer(AnswerModel):
 
 
 def add_robot_route(router: APIRouter, noun: str, find: FindRobot) -> None:
-    """Give a collection of jobs the route ``/{identifier}/robot``.
-
-    Parameters
-    ----------
-    router : APIRouter
-        of the collection
-    noun : str
-        what the summary calls a job, with its article
-    find : callable
-        folder and file of a job's robot; raises NotFoundError where there is no such job
-    """
+    """Give a collection of jobs the route ``/{identifier}/robot``."""
 
     @router.get(
         "/{identifier}/robot",

@@ -19,13 +19,6 @@ FORMATS: tuple[RecordingFormat, ...] = ("mcap", "csv", "parquet")
 def find_run(services: Services, identifier: str) -> RunWorkspace:
     """The folder of a run.
 
-    Parameters
-    ----------
-    services : Services
-        where it is kept
-    identifier : str
-        of the run
-
     Raises
     ------
     NotFoundError
@@ -36,13 +29,7 @@ def find_run(services: Services, identifier: str) -> RunWorkspace:
 
 @dataclass(frozen=True)
 class FollowedRun:
-    """A run as those see it who follow its events: it ends when the desk has put everything in its place.
-
-    events : EventLog
-        what happened
-    has_ended : callable
-        whether nothing more will happen
-    """
+    """A run as those see it who follow its events: it ends when the desk has put everything in its place."""
 
     events: EventLog
     has_ended: Callable[[], bool]
@@ -50,13 +37,6 @@ class FollowedRun:
 
 def followed_run(services: Services, identifier: str) -> FollowedRun:
     """A run whose events are followed.
-
-    Parameters
-    ----------
-    services : Services
-        where it is kept
-    identifier : str
-        of the run
 
     Raises
     ------
@@ -73,15 +53,6 @@ def followed_run(services: Services, identifier: str) -> FollowedRun:
 
 def describe(services: Services, identifier: str, root: str) -> RunAnswer:
     """The state of a run; one whose files are damaged is said to be so.
-
-    Parameters
-    ----------
-    services : Services
-        where it is kept
-    identifier : str
-        of the run
-    root : str
-        path under which all collections stand, for the links
 
     Raises
     ------
@@ -123,15 +94,6 @@ def describe(services: Services, identifier: str, root: str) -> RunAnswer:
 
 def require_recording(services: Services, identifier: str, format_: RecordingFormat) -> RunWorkspace:
     """The folder of a run that left a recording of a format.
-
-    Parameters
-    ----------
-    services : Services
-        where it is kept
-    identifier : str
-        of the run
-    format_ : str
-        ``mcap``, ``csv`` or ``parquet``
 
     Raises
     ------

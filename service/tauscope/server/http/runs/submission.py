@@ -35,18 +35,6 @@ LARGEST_TRAJECTORY = 64 * 2**20
 async def submit_run(request: Request, services: Services) -> str:
     """Take a request for a run.
 
-    Parameters
-    ----------
-    request : Request
-        JSON, or a form with the parts request, robot, urdf and trajectory
-    services : Services
-        where it goes
-
-    Returns
-    -------
-    str
-        the run's identifier
-
     Raises
     ------
     ProblemError

@@ -24,11 +24,6 @@ class Database:
     def __init__(self, address: Path | str) -> None:
         """Open a database, and bring its tables to this program's form.
 
-        Parameters
-        ----------
-        address : Path or str
-            file of a SQLite database, made where it is missing; or URL of a PostgreSQL database
-
         Raises
         ------
         StoreError
@@ -51,11 +46,6 @@ class Database:
     def reading(self) -> Iterator[Session]:
         """A transaction that reads.
 
-        Yields
-        ------
-        Session
-            sees one state of the database in SQLite, committed ones in PostgreSQL
-
         Raises
         ------
         StoreError
@@ -67,11 +57,6 @@ class Database:
     @contextmanager
     def writing(self) -> Iterator[Session]:
         """A transaction that writes: all of it is kept, or nothing. Keep it short, others wait meanwhile.
-
-        Yields
-        ------
-        Session
-            commits when left without exception
 
         Raises
         ------

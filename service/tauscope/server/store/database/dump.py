@@ -15,13 +15,7 @@ _FORM = "alembic_version"
 
 
 def dump_lines(engine: Engine) -> Iterator[bytes]:
-    """Every row, as one moment shows them; the first line holds the form of the tables.
-
-    Parameters
-    ----------
-    engine : Engine
-        of the database
-    """
+    """Every row, as one moment shows them; the first line holds the form of the tables."""
     # SQLite shows one moment by itself, PostgreSQL when it is told to.
     options = {"isolation_level": "REPEATABLE READ"} if engine.dialect.name == "postgresql" else {}
     with engine.connect().execution_options(**options) as connection:
@@ -34,13 +28,6 @@ def dump_lines(engine: Engine) -> Iterator[bytes]:
 
 def load_lines(engine: Engine, lines: Iterable[bytes]) -> None:
     """Fill an empty database, and bring it to this program's form; all of it, or nothing.
-
-    Parameters
-    ----------
-    engine : Engine
-        of a database in which there is nothing
-    lines : iterable of bytes
-        of `dump_lines`
 
     Raises
     ------

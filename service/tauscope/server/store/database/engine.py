@@ -22,11 +22,6 @@ A transaction that only later turns out to write could not wait for the lock, be
 def open_engine(address: Path | str) -> Engine:
     """An engine; nothing is connected yet.
 
-    Parameters
-    ----------
-    address : Path or str
-        file of a SQLite database, or URL of a PostgreSQL database (``postgresql://user@host/name``)
-
     Raises
     ------
     StoreError
@@ -47,13 +42,7 @@ def open_engine(address: Path | str) -> Engine:
 
 
 def shown_address(engine: Engine) -> str:
-    """What messages call a database: its file, or its URL without the password.
-
-    Parameters
-    ----------
-    engine : Engine
-        of the database
-    """
+    """What messages call a database: its file, or its URL without the password."""
     url = engine.url
     return str(url.database) if url.get_backend_name() == "sqlite" else url.render_as_string(hide_password=True)
 

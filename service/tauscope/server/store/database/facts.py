@@ -9,10 +9,6 @@ from datetime import datetime
 class FileMetadata:
     """A file of an item.
 
-    path : str
-        below the item's folder, with ``/``
-    size : int
-        number of bytes
     sha256 : str
         of its bytes, in hexadecimal
     """
@@ -24,17 +20,7 @@ class FileMetadata:
 
 @dataclass(frozen=True)
 class RecordingRole:
-    """A recording that an item works with.
-
-    role : str
-        what for: ``recordings``, ``held_out`` or ``simulated``
-    name : str
-        its file name
-    origin : str
-        ``uploaded`` with the request, or lying on the ``server``
-    sha256 : str
-        of its bytes when the item was handed in
-    """
+    """A recording that an item works with."""
 
     role: str
     name: str
@@ -46,30 +32,8 @@ class RecordingRole:
 class ItemMetadata:
     """An item as its folder shows it.
 
-    kind : str
-        a key of `ITEM_CLASSES`
-    identifier : str
-        name of its folder
-    state : str
-        where it stands, or ``damaged``
-    is_final : bool
-        whether it will stay so by itself
-    stamp : str
-        changes when its state file does
-    created : datetime
-        when it was handed in
-    ended : datetime or None
-        when it reached its end
-    robot : str or None
-        what its robot file calls the robot
     problem : (str, str) or None
         code and detail: why it has no result
-    figures : mapping
-        what is searched for besides: columns of its kind's table class
-    recordings : tuple of RecordingRole
-        what it works with
-    artefacts : tuple of FileMetadata
-        its files, once it has ended
     """
 
     kind: str
@@ -88,23 +52,7 @@ class ItemMetadata:
 
 @dataclass(frozen=True)
 class ItemEntry:
-    """An item as a search finds it.
-
-    kind, identifier, state : str
-        as in `ItemMetadata`
-    site : str
-        identifier of the data folder that holds it
-    created : datetime
-        when it was handed in
-    ended : datetime or None
-        when it reached its end
-    robot : str or None
-        what its robot file calls the robot
-    problem_code, problem_detail : str or None
-        why it has no result
-    figures : mapping
-        columns of its kind
-    """
+    """An item as a search finds it."""
 
     kind: str
     identifier: str
@@ -120,17 +68,7 @@ class ItemEntry:
 
 @dataclass(frozen=True)
 class ItemQuery:
-    """What is searched for; None where anything will do.
-
-    kind, state, robot, site : str or None
-        of the items
-    recording_sha256 : str or None
-        of a recording that the items were made from or judged by
-    before : datetime or None
-        items that were handed in earlier than this
-    limit : int
-        most items that are found, the newest first
-    """
+    """What is searched for; None where anything will do."""
 
     kind: str | None = None
     state: str | None = None
@@ -143,13 +81,7 @@ class ItemQuery:
 
 @dataclass(frozen=True)
 class RobotEntry:
-    """A robot that items are about.
-
-    name : str
-        as in its file
-    first_seen, last_seen : datetime
-        when the first and the last item about it was handed in
-    """
+    """A robot that items are about."""
 
     name: str
     first_seen: datetime

@@ -23,38 +23,17 @@ class Index:
     """The part of the index that one data folder fills, and the search over all of it."""
 
     def __init__(self, database: Database, site: str) -> None:
-        """Look at the index.
-
-        Parameters
-        ----------
-        database : Database
-            holds it
-        site : str
-            identifier of the data folder
-        """
+        """Look at the index."""
         self._database = database
         self.site = site
 
     def register(self, label: str, now: datetime) -> None:
-        """Make the site known, before anything of it is put into the index.
-
-        Parameters
-        ----------
-        label : str
-            what people call it
-        now : datetime
-            the present moment
-        """
+        """Make the site known, before anything of it is put into the index."""
         with self._database.writing() as session:
             session.merge(Site(identifier=self.site, label=label, last_seen=now))
 
     def stamps(self, kind: str) -> dict[str, tuple[str, bool]]:
         """What is indexed of this site.
-
-        Parameters
-        ----------
-        kind : str
-            of the items
 
         Returns
         -------
@@ -66,13 +45,7 @@ class Index:
             return {identifier: (stamp, is_final) for identifier, stamp, is_final in session.execute(query)}
 
     def put(self, facts: ItemMetadata) -> None:
-        """Index an item, in place of what was known of it.
-
-        Parameters
-        ----------
-        facts : ItemMetadata
-            what its folder shows
-        """
+        """Index an item, in place of what was known of it."""
         with self._database.writing() as session:
             row = session.scalar(self._row(facts.kind, facts.identifier))
             if row is None:
@@ -93,15 +66,7 @@ class Index:
             )
 
     def forget(self, kind: str, identifiers: Collection[str]) -> None:
-        """Take items out of the index whose folders are gone.
-
-        Parameters
-        ----------
-        kind : str
-            of the items
-        identifiers : collection of str
-            of the items
-        """
+        """Take items out of the index whose folders are gone."""
         with self._database.writing() as session:
             for identifier in identifiers:
                 session.execute(
@@ -109,40 +74,20 @@ class Index:
                 )
 
     def damaged(self, kind: str) -> frozenset[str]:
-        """Identifiers of the damaged items of this site.
-
-        Parameters
-        ----------
-        kind : str
-            of the items
-        """
+        """Identifiers of the damaged items of this site."""
         query = select(Item.identifier).where(Item.site == self.site, Item.kind == kind, Item.state == "damaged")
         with self._database.reading() as session:
             return frozenset(session.scalars(query))
 
     def mark_damaged(self, kind: str, identifier: str, detail: str) -> None:
-        """Say of an item that a file of it is not what it was.
-
-        Parameters
-        ----------
-        kind, identifier : str
-            of the item
-        detail : str
-            one line: which file, and what to do
-        """
+        """Say of an item that a file of it is not what it was."""
         where = (Item.site == self.site, Item.kind == kind, Item.identifier == identifier)
         values = {"state": "damaged", "problem_code": "damaged", "problem_detail": detail}
         with self._database.writing() as session:
             session.execute(update(Item).where(*where).values(**values))
 
     def artefacts(self, kind: str, identifier: str) -> tuple[FileMetadata, ...]:
-        """The files of an item as they were when it ended.
-
-        Parameters
-        ----------
-        kind, identifier : str
-            of the item
-        """
+        """The files of an item as they were when it ended."""
         query = (
             select(Artefact).join(Item).where(Item.site == self.site, Item.kind == kind, Item.identifier == identifier)
         )
@@ -151,13 +96,7 @@ class Index:
             return tuple(FileMetadata(row.path, row.size, row.sha256) for row in rows)
 
     def put_recordings(self, entries: Iterable[StoredRecording]) -> None:
-        """Index the recordings of this site; those that are not among them any more are forgotten.
-
-        Parameters
-        ----------
-        entries : iterable of StoredRecording
-            all that lie in the folder
-        """
+        """Index the recordings of this site; those that are not among them any more are forgotten."""
         present = {entry.name: entry for entry in entries}
         with self._database.writing() as session:
             known = {row.name: row for row in session.scalars(select(Recording).where(Recording.site == self.site))}
@@ -185,13 +124,7 @@ class Index:
             return frozenset(name for kind, identifier, name in uses if (kind, identifier) not in except_by)
 
     def search(self, query: ItemQuery) -> list[ItemEntry]:
-        """Items of all sites, the newest first.
-
-        Parameters
-        ----------
-        query : ItemQuery
-            which ones
-        """
+        """Items of all sites, the newest first."""
         statement = select(Item).outerjoin(Robot)
         for column, value in (
             (Item.kind, query.kind),

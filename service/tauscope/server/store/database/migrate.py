@@ -16,13 +16,6 @@ _ADVISORY_LOCK = 7_283_462_001
 def upgrade(engine: Engine, target: str = "head") -> None:
     """Bring the tables to this program's form; nothing happens where they have it.
 
-    Parameters
-    ----------
-    engine : Engine
-        of the database
-    target : str
-        revision to stop at; the newest one where not given
-
     Raises
     ------
     StoreError
@@ -39,13 +32,7 @@ def upgrade(engine: Engine, target: str = "head") -> None:
 
 
 def present_revision(connection: Connection) -> str | None:
-    """The form that the tables of a database have; None where there are none.
-
-    Parameters
-    ----------
-    connection : Connection
-        to the database
-    """
+    """The form that the tables of a database have; None where there are none."""
     return MigrationContext.configure(connection).get_current_revision()
 
 

@@ -20,13 +20,6 @@ class Moment(TypeDecorator[datetime]):
     def process_bind_param(self, value: datetime | None, dialect: Dialect) -> Any:
         """The moment as it is kept.
 
-        Parameters
-        ----------
-        value : datetime or None
-            with its time zone
-        dialect : Dialect
-            of the database
-
         Raises
         ------
         ValueError
@@ -40,15 +33,7 @@ class Moment(TypeDecorator[datetime]):
         return moment.replace(tzinfo=None) if dialect.name == "sqlite" else moment
 
     def process_result_value(self, value: Any, dialect: Dialect) -> datetime | None:
-        """The moment as it is given out, in UTC.
-
-        Parameters
-        ----------
-        value : datetime or None
-            as it is kept
-        dialect : Dialect
-            of the database
-        """
+        """The moment as it is given out, in UTC."""
         if value is None:
             return None
         return value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)
