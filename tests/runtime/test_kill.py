@@ -33,7 +33,7 @@ from tauscope_sim.driver import DeviceProcess, start_device
 
 WATCHDOG_S, HEARTBEAT_S = 0.2, 0.5
 STANDSTILL_S = 0.3
-OWNER = REPOSITORY / "tests" / "acquisition" / "run_owner.py"
+OWNER = REPOSITORY / "tests" / "runtime" / "run_owner.py"
 ROBOT = """\
 name: points
 kinematics:
