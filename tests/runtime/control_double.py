@@ -4,6 +4,7 @@ import os
 import sys
 import time
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -38,12 +39,14 @@ class RealClock(VirtualClock):
 
 
 def double(robot: Robot, settings: Mapping[str, Any], folder: Path | None) -> Connection:
-    """Keys: `block` and `crash` name calls; `virtual` keeps virtual time."""
+    """Keys: `block` and `crash` name calls; `slow` maps calls to seconds; `virtual` keeps virtual time."""
     del robot, folder
     virtual = bool(settings.get("virtual"))
     arm = PointArm(position=np.array([0.2, 0.1]), clock=VirtualClock() if virtual else RealClock())
     if "block" in settings:
         arm.fail[settings["block"]] = block_for_good
+    for call, seconds in settings.get("slow", {}).items():
+        arm.fail[call] = partial(time.sleep, seconds)
     if "crash" in settings:
         arm.fail[settings["crash"]] = lambda: os._exit(9)
     return Connection(arm, is_real_time=not virtual)

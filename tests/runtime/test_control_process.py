@@ -14,6 +14,7 @@ from tauscope.recording.journal_reading import read_journal
 from tauscope.runtime.record import ProcessName, read_record
 from tauscope.runtime.run_process import RunProcess
 from tauscope.runtime.states import RunState
+from tauscope.runtime.stop_listener import STOPPING_S
 
 
 def packages_of(module: str) -> set[str]:
@@ -153,6 +154,34 @@ def test_an_owner_that_stops_talking_interrupts_its_run(tmp_path: Path) -> None:
     assert "silent for 0.3 s" in record.stop
     assert record.recording is not None
     assert record.recording.partial
+
+
+def test_an_owner_may_be_silent_in_virtual_time(tmp_path: Path) -> None:
+    settings = {"virtual": True, "slow": {"connect": 0.5, "enable": 0.5, "exchange": 0.001}}
+    run, _ = start(tmp_path / "run", settings=settings, heartbeat_s=0.05)
+    run._beats_by_itself = False
+    record = run.wait(60)
+    assert (record.state, record.stop, record.problem) == (RunState.FINISHED, None, None)
+
+
+def test_a_run_in_virtual_time_ends_with_its_owner(tmp_path: Path) -> None:
+    settings = {"virtual": True, "slow": {"exchange": 0.01}}
+    run, events = start(tmp_path / "run", duration_s=60.0, settings=settings)
+    wait_for(lambda: "ramping" in events.states(), "the ramp")
+    run._commands.close()
+    record = run.wait(20)
+    assert states(record)[-2:] == ["stopping", "interrupted"]
+    assert record.stop == "the process that started it is gone"
+
+
+@pytest.mark.slow
+def test_a_simulated_arm_may_take_long_to_stop(tmp_path: Path) -> None:
+    settings = {"virtual": True, "slow": {"exchange": 0.01, "stop": 1.5 * STOPPING_S}}
+    run, events = start(tmp_path / "run", duration_s=60.0, settings=settings)
+    wait_for(lambda: "ramping" in events.states(), "the ramp")
+    run.stop()
+    record = run.wait(20)
+    assert (record.state, record.problem) == (RunState.STOPPED, None)
 
 
 def test_a_backend_that_takes_the_process_down(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from tauscope.runtime.in_process import open_recorder
 from tauscope.runtime.order import RunOrder, read_order
 from tauscope.runtime.progress import end_event
 from tauscope.runtime.record import STOP_FILE, ProcessName, RunProblem, RunRecord, read_record
-from tauscope.runtime.record_keeper import RecordKeeper
+from tauscope.runtime.record_keeper import FLUSH_S, RecordKeeper
 from tauscope.runtime.run import Run
 from tauscope.runtime.run_lock import RunLock
 from tauscope.runtime.states import RunState
@@ -59,7 +59,7 @@ def control(
         report(end_event(record))
     else:
         run.execute()
-    unkept = keeper.close()
+    unkept = keeper.close(FLUSH_S if stops.is_real_time else None)
     if unkept is not None:
         sys.stderr.write(f"{unkept}\n")
     lock.release()

@@ -30,7 +30,7 @@ class RunOptions(StoredModel, strict=False):
         default=0.1, le=10, description="time without a cycle after which the device stops itself"
     )
     heartbeat_s: Positive = Field(
-        default=1.0, le=60, description="silence of its owner after which a run is interrupted"
+        default=1.0, le=60, description="silence of its owner after which a run in real time is interrupted"
     )
     following_error: Positive | None = Field(
         default=None, description="allowed distance of arm and target, rad or m; null for 0.2 rad or 0.05 m"

@@ -63,6 +63,8 @@ class Run:
         raise_if_requested(self._around.stops)
         self._enter(RunState.CONNECTING)
         connection = self._task.connect()
+        if connection.is_real_time:
+            self._around.stops.enter_real_time()
         self._backend = backend = connection.backend
         state = backend.connect()
         raise_if_requested(self._around.stops)

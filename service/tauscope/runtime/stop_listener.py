@@ -1,10 +1,13 @@
-"""How a control process hears that it shall stop: a byte on its pipe, a file in its folder, a signal, or silence.
+"""How a control process hears a request to stop: a byte on its pipe, a file in its folder, a signal, or silence.
 
 Each way has a thread of its own or none, so that any of them works while the others are stuck. The loop looks at one
-attribute. Where the main thread does not take notice in time, because a call into a driver or the disk does not return,
-it is broken out of that call by a signal.
+attribute. If a call into a driver or the disk does not return, a signal breaks the main thread out of it.
+
+The arm's clock decides how long a run may wait. In real time the owner's silence ends the run, and the drives have a
+limited time to confirm a stop. In virtual time the arm waits too, so a request or the end of the owner ends the run.
 """
 
+import math
 import os
 import select
 import signal
@@ -16,13 +19,13 @@ from types import FrameType
 from tauscope.runtime.stop_request import StopAskedError, StopRequest, StopSource
 
 BEAT, STOP = b".", b"s"
-"""What an owner writes to its run's pipe: that it is alive, and that the run shall stop."""
+"""What an owner writes to its run's pipe: it is alive; the run has to stop."""
 
 NOTICE_S = 0.25
-"""Time in which a run has to take notice of a request before it is broken out of what it does."""
+"""Time for a run to notice a request before a signal breaks it out of its call."""
 
 STOPPING_S = 2.0
-"""Time that the drives may take to confirm the stop before the run gives up waiting for them."""
+"""Time for the drives to confirm the stop, in real time."""
 
 _POLL_S = 0.02
 _SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
@@ -38,9 +41,10 @@ class StopListener:
         Parameters
         ----------
         heartbeat_s : float
-            silence on the pipe after which the owner counts as gone [s]
+            silence on the pipe after which the owner counts as gone, in real time [s]
         """
         self.requested: StopRequest | None = None
+        self.is_real_time = False
         self._pipe, self._stop_file, self._heartbeat_s = command_pipe, stop_file, heartbeat_s
         self._asked_at: float | None = None
         self._acknowledged_at: float | None = None
@@ -51,6 +55,10 @@ class StopListener:
         signal.signal(_BREAK, self._on_break)
         threading.Thread(target=self._listen, name="stop-pipe", daemon=True).start()
         threading.Thread(target=self._watch_file, name="stop-file", daemon=True).start()
+
+    def enter_real_time(self) -> None:
+        """The arm moves by the wall clock: apply the limits of real time from here on."""
+        self.is_real_time = True
 
     def acknowledge(self) -> None:
         """The run has begun to stop: it is broken out only if the stop itself takes too long."""
@@ -82,16 +90,16 @@ class StopListener:
                     self.request(StopSource.OPERATOR, "its owner asked it to stop")
                 elif not is_open:
                     self.request(StopSource.OWNER_GONE, "the process that started it is gone")
-            elif time.monotonic() - heard > self._heartbeat_s:
+            elif self.is_real_time and time.monotonic() - heard > self._heartbeat_s:
                 silence = f"the process that started it has been silent for {self._heartbeat_s:g} s"
                 self.request(StopSource.OWNER_GONE, silence)
             self._break_out_if_overdue()
 
     def _break_out_if_overdue(self) -> None:
-        since, patience = self._asked_at, NOTICE_S
+        since, limit_s = self._asked_at, NOTICE_S
         if self._acknowledged_at is not None:
-            since, patience = self._acknowledged_at, STOPPING_S
-        if since is None or self._main is None or self._is_done or time.monotonic() - since < patience:
+            since, limit_s = self._acknowledged_at, STOPPING_S if self.is_real_time else math.inf
+        if since is None or self._main is None or self._is_done or time.monotonic() - since < limit_s:
             return
         if self._acknowledged_at is not None:
             self._acknowledged_at = time.monotonic()

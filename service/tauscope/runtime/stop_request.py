@@ -13,7 +13,7 @@ class StopSource(StrEnum):
     OPERATOR = "operator"
     """a byte on the pipe, the stop file, or a signal"""
     OWNER_GONE = "owner-gone"
-    """the process that started the run has died, or is silent"""
+    """the process that started the run has died, or is silent while the arm runs in real time"""
 
 
 @dataclass(frozen=True)
@@ -45,6 +45,10 @@ class Stops(Protocol):
         """The first request, None where there is none."""
         ...
 
+    def enter_real_time(self) -> None:
+        """The arm moves by the wall clock: apply the limits of real time from here on."""
+        ...
+
     def acknowledge(self) -> None:
         """The run has begun to stop."""
         ...
@@ -65,6 +69,9 @@ class ManualStop:
         """Ask; the first request counts."""
         if self.requested is None:
             self.requested = StopRequest(source, detail)
+
+    def enter_real_time(self) -> None:
+        """A caller in this process has no limits."""
 
     def acknowledge(self) -> None:
         """The run has begun to stop."""

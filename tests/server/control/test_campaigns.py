@@ -1,5 +1,6 @@
 """Campaigns: every step in its turn, stopped at once, and after a restart only analysis goes on."""
 
+import shutil
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -314,12 +315,13 @@ def test_what_was_measured_before_a_restart_is_analysed_after_it(is_closed: bool
 @pytest.mark.parametrize("is_closed", [True, False])
 def test_what_was_not_measured_before_a_restart_never_moves_by_itself(is_closed: bool, tmp_path: Path) -> None:
     executor, controls = ManualExecutor(), HandControls()
-    earlier = Bench(tmp_path, controls, executor)
+    earlier = Bench(tmp_path / "earlier", controls, executor)
     campaign = earlier.submit()
     wait_until(lambda: earlier.workspace(campaign).read_made().held_out_excitation is not None)
     if is_closed:
         earlier.desk.close()
-    later = Bench(tmp_path, controls)
+    shutil.copytree(tmp_path / "earlier", tmp_path / "later")  # a service that is dead does not go on with its own
+    later = Bench(tmp_path / "later", controls)
     assert later.ended(campaign).state is JobState.INTERRUPTED
     assert controls.started == []
     events = later.workspace(campaign).events.last()
