@@ -78,8 +78,8 @@ class FaultTable:
         text = (
             f"Made by `tests/hardware_emulated/test_{self.bus}_fault_table.py` on three emulated {self.devices}; "
             f"{self.device} {DEVICE} has the fault just as the phase begins. `TAUSCOPE_WRITE_DOCS=1` renews it. What "
-            f"real {self.devices.split()[-1]} do may differ where the emulator had to assume something: see the README "
-            "on what only hardware can show."
+            f"real {self.devices.split()[-1]} do may differ where the emulator had to assume something: see "
+            "[what only real hardware can show](../hardware-limits.md)."
         )
         return textwrap.wrap(text, _WIDTH, break_on_hyphens=False)
 
