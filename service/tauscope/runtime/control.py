@@ -7,6 +7,7 @@ lines on standard output, and keeps ``run.json``. Anything that a library prints
 import json
 import os
 import sys
+import threading
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -59,7 +60,7 @@ def control(
         report(end_event(record))
     else:
         run.execute()
-    unkept = keeper.close(FLUSH_S if stops.is_real_time else None)
+    unkept = keeper.close(FLUSH_S if stops.is_real_time else threading.TIMEOUT_MAX)
     if unkept is not None:
         sys.stderr.write(f"{unkept}\n")
     lock.release()

@@ -6,7 +6,7 @@ from pathlib import Path
 from tauscope.runtime.record import RunRecord, write_record
 
 FLUSH_S = 5.0
-"""Time that the disk may take for the last record of a run in real time [s]."""
+"""Time that the disk may take for the last record."""
 
 
 class RecordKeeper:
@@ -29,13 +29,13 @@ class RecordKeeper:
             self._newest = record
             self._changed.notify_all()
 
-    def close(self, patience_s: float | None) -> str | None:
+    def close(self, patience_s: float = FLUSH_S) -> str | None:
         """Wait for the last record to reach the disk.
 
         Parameters
         ----------
-        patience_s : float or None
-            how long; None for as long as the disk takes [s]
+        patience_s : float
+            how long [s]
 
         Returns
         -------

@@ -1,4 +1,4 @@
-"""Whether requests are answered: an arm moves in real time only while the service can take a stop."""
+"""Whether requests are answered: arms only move while somebody could stop them through this service."""
 
 import asyncio
 import time
