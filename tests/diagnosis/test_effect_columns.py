@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from arms import random_parameters, ur5_like
 from pinocchio_arm import pinocchio_model
-from tauscope.effects import Effect, Setting, Signals, catalogue, possible_effects
+from tauscope.effects import ArmContext, Effect, Signals, catalogue, possible_effects
 from tauscope.effects.deflection import FIRST_ORDER, inertia_of_link, torque_of_deflection
 from tauscope.effects.joint_elasticity import DAMPING, transmitted
 from tauscope.effects.late_torque import Lag, Shift
@@ -71,10 +71,10 @@ def torque(robot: Robot, links: Array, q: Array, qd: Array, qdd: Array) -> Array
 SIGNALS = signals()
 
 
-def setting(gear_ratio: float | None = None) -> Setting:
+def setting(gear_ratio: float | None = None) -> ArmContext:
     s = SIGNALS
     robot = replace(s.robot, joints=tuple(replace(joint, gear_ratio=gear_ratio) for joint in s.robot.joints))
-    return Setting(
+    return ArmContext(
         robot=robot,
         slowest=s.velocity.min(axis=1),
         fastest=s.velocity.max(axis=1),

@@ -6,16 +6,14 @@ Stiff teeth stop the link; on springy ones it swings, at frequencies that a diag
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import ClassVar
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicSpline
 
+from tauscope.effects.context import ArmContext
 from tauscope.effects.deflection import BAND, Deflection
-from tauscope.effects.effect import Effect, mesh
-from tauscope.effects.parameters import Coefficient, Quantity, Shape
-from tauscope.effects.setting import Setting
+from tauscope.effects.effect import Coefficient, Effect, Quantity, Shape, mesh
 from tauscope.recording.recording import Array
 
 GAPS = np.array([1e-4, 3e-4, 1e-3, 3e-3, 1e-2])
@@ -162,32 +160,32 @@ def _first(is_so: np.ndarray) -> int:
 class Backlash(Deflection):
     """q_link = q - b u, u the place of the link between the teeth."""
 
-    id: ClassVar[str] = "backlash"
-    equation: ClassVar[str] = "q_link = q - delta, delta = +-b/2 under load, I d2(delta)/dt2 = tau_rb in between"
-    meaning: ClassVar[str] = "the transmission has play when the load changes sign"
-    remedy: ClassVar[str] = "take up the play, or model a dead zone"
-    revealing_motion: ClassVar[str] = "poses in which the joint's load passes slowly through zero"
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("b", "{q}", positive=True),)
+    id = "backlash"
+    equation = "q_link = q - delta, delta = +-b/2 under load, I d2(delta)/dt2 = tau_rb in between"
+    meaning = "the transmission has play when the load changes sign"
+    remedy = "take up the play, or model a dead zone"
+    revealing_motion = "poses in which the joint's load passes slowly through zero"
+    coefficients = (Coefficient("b", "{q}", positive=True),)
     # What is flown over is b, and less where the load is smoothed: without it the motor, too, moves on during a flight.
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("flown", "{q}", logarithmic=True, reported=False), BAND)
+    shapes = (Shape("flown", "{q}", logarithmic=True, reported=False), BAND)
 
     @classmethod
-    def forms(cls, setting: Setting) -> Sequence[Effect]:
+    def forms(cls, context: ArmContext) -> Sequence[Effect]:
         """One a joint that moves under load."""
         made = []
-        for joint in cls.deflected_joints(setting):
-            gaps, bands = GAPS * (setting.highest[joint] - setting.lowest[joint]), BANDS * setting.cutoff_hz
+        for joint in cls.deflected_joints(context):
+            gaps, bands = GAPS * (context.highest[joint] - context.lowest[joint]), BANDS * context.cutoff_hz
             bounds = np.array([0.5 * gaps[0], bands[-1]]), np.array([2.0 * gaps[-1], bands[0]])
             made.append(cls(joint, mesh(gaps, bands), *bounds))
         return made
 
     @classmethod
-    def farther_forms(cls, setting: Setting) -> Sequence[Effect]:
+    def farther_forms(cls, context: ArmContext) -> Sequence[Effect]:
         """The same with teeth that give way, one a joint whose link has an inertia."""
-        return SpringyTeeth.forms(setting)
+        return SpringyTeeth.forms(context)
 
     def quantities(
-        self, setting: Setting, coefficients: Array, shape: Array, covariance: Array
+        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
         """b; where the link crosses more than it is found to move by, what it crosses.
 
@@ -203,7 +201,7 @@ class Backlash(Deflection):
         covariance : (1 + k, 1 + k) float64
             of both
         """
-        (found,) = super().quantities(setting, coefficients, shape, covariance)
+        (found,) = super().quantities(context, coefficients, shape, covariance)
         apart = max(float(shape[0]) - found.value, 0.0)
         return (replace(found, value=found.value + apart, std=float(np.hypot(found.std, 0.5 * apart))),)
 
@@ -237,30 +235,30 @@ class Backlash(Deflection):
 class SpringyTeeth(Backlash):
     """The same where the teeth give way, so that a link that has crossed the gap swings on them."""
 
-    shapes: ClassVar[tuple[Shape, ...]] = (
+    shapes = (
         *Backlash.shapes,
         Shape("swinging", "{q}/{tau}", logarithmic=True, reported=False),
         Shape("loss", "s/{q}", logarithmic=True, reported=False),
     )
-    swings: ClassVar[bool] = True
+    swings = True
 
     @classmethod
-    def forms(cls, setting: Setting) -> Sequence[Effect]:
+    def forms(cls, context: ArmContext) -> Sequence[Effect]:
         """One a joint that moves under load, and whose link has an inertia."""
         made = []
-        for joint in cls.deflected_joints(setting):
-            if setting.inertia[joint] <= 0.0:
+        for joint in cls.deflected_joints(context):
+            if context.inertia[joint] <= 0.0:
                 continue
-            gaps = SPRINGY_GAPS * (setting.highest[joint] - setting.lowest[joint])
-            swinging = 1.0 / ((2.0 * np.pi * RESONANCES * setting.cutoff_hz) ** 2 * setting.inertia[joint])
-            grid = mesh(gaps, np.array([SPRINGY_BAND * setting.cutoff_hz]), swinging, LOSSES[1:2])
+            gaps = SPRINGY_GAPS * (context.highest[joint] - context.lowest[joint])
+            swinging = 1.0 / ((2.0 * np.pi * RESONANCES * context.cutoff_hz) ** 2 * context.inertia[joint])
+            grid = mesh(gaps, np.array([SPRINGY_BAND * context.cutoff_hz]), swinging, LOSSES[1:2])
             lower, upper = grid.min(axis=0) * [0.5, 1.0, 0.7, 1.0], grid.max(axis=0) * [2.0, 1.0, 1.4, 1.0]
             lower[-1], upper[-1] = LOSSES[0], LOSSES[-1]
             made.append(cls(joint, grid, lower, upper))
         return made
 
     @classmethod
-    def farther_forms(cls, setting: Setting) -> Sequence[Effect]:
+    def farther_forms(cls, context: ArmContext) -> Sequence[Effect]:
         """None: these are."""
         return ()
 

@@ -13,9 +13,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from tauscope.effects.parameters import Coefficient, Quantity, Shape
-from tauscope.effects.setting import Setting
-from tauscope.effects.signals import Signals
+from tauscope.effects.context import ArmContext, Signals
 from tauscope.recording.recording import Array
 from tauscope.robot import JointType
 
@@ -25,6 +23,39 @@ _TORQUE = {JointType.REVOLUTE: "Nm", JointType.PRISMATIC: "N"}
 
 NO_SHAPE = np.zeros((1, 0))
 """The grid of an effect without shape parameters."""
+
+
+@dataclass(frozen=True)
+class Coefficient:
+    """A linear coefficient of an effect."""
+
+    name: str
+    unit: str
+    positive: bool = False
+    largest: float = np.inf
+    smallest: float = 0.0
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A quantity that shapes an effect's columns and is searched over a grid, then refined between bounds."""
+
+    name: str
+    unit: str
+    logarithmic: bool = False
+    fixed: bool = False
+    reported: bool = True
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A parameter as a finding reports it."""
+
+    name: str
+    value: float
+    std: float
+    unit: str
+    period: float = np.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,11 +110,11 @@ class Effect(ABC):
 
     @classmethod
     @abstractmethod
-    def forms(cls, setting: Setting) -> "Sequence[Effect]":
+    def forms(cls, context: ArmContext) -> "Sequence[Effect]":
         """All forms and places worth looking at on this arm and motion."""
 
     @classmethod
-    def farther_forms(cls, setting: Setting) -> "Sequence[Effect]":
+    def farther_forms(cls, context: ArmContext) -> "Sequence[Effect]":
         """Forms that show in a small part of the motion: looked at where all others leave more than noise."""
         return ()
 
@@ -205,12 +236,12 @@ class Effect(ABC):
         """The place in words."""
         return "the whole arm" if self.joint is None else joint_names[self.joint]
 
-    def unit(self, template: str, setting: Setting) -> str:
+    def unit(self, template: str, context: ArmContext) -> str:
         """A unit with the joint's own units of torque and position."""
-        return self.unit_at(template, setting, self.joint)
+        return self.unit_at(template, context, self.joint)
 
     @staticmethod
-    def unit_at(template: str, setting: Setting, joint: int | None) -> str:
+    def unit_at(template: str, context: ArmContext, joint: int | None) -> str:
         """The same for any joint.
 
         Parameters
@@ -218,11 +249,11 @@ class Effect(ABC):
         joint : int or None
             joint index, from 0; None for the whole arm
         """
-        kind = setting.robot.joints[joint or 0].type
+        kind = context.robot.joints[joint or 0].type
         return template.format(tau=_TORQUE[kind], q=_POSITION[kind])
 
     def quantities(
-        self, setting: Setting, coefficients: Array, shape: Array, covariance: Array
+        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
         """The parameters of a finding: coefficients, then shapes.
 
@@ -239,7 +270,7 @@ class Effect(ABC):
         names = (*self.coefficients, *self.shapes)
         values = (*coefficients, *shape)
         return tuple(
-            Quantity(each.name, float(value), float(error), self.unit(each.unit, setting))
+            Quantity(each.name, float(value), float(error), self.unit(each.unit, context))
             for each, value, error in zip(names, values, std, strict=True)
             if isinstance(each, Coefficient) or each.reported
         )

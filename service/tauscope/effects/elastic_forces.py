@@ -2,14 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
-from tauscope.effects.effect import Effect, mesh, per_joint_columns
-from tauscope.effects.parameters import Coefficient, Shape
-from tauscope.effects.setting import Setting
-from tauscope.effects.signals import Signals
+from tauscope.effects.context import ArmContext, Signals
+from tauscope.effects.effect import Coefficient, Effect, Shape, mesh, per_joint_columns
 from tauscope.recording.recording import Array
 
 ONSETS = np.linspace(0.2, 0.9, 8)
@@ -30,29 +27,23 @@ class JointSpring(Effect):
     What a counterbalance carries the motor need not: its torque may well be more than was measured.
     """
 
-    of_motion_alone: ClassVar[bool] = True
-    may_exceed_measured: ClassVar[bool] = True
-    id: ClassVar[str] = "joint_spring"
-    arguments: ClassVar[frozenset[str] | None] = frozenset({"position"})
-    equation: ClassVar[str] = "tau = k (q - q_0)"
-    meaning: ClassVar[str] = "an elastic torque grows linearly with the angle"
-    remedy: ClassVar[str] = "add a spring to the joint"
-    revealing_motion: ClassVar[str] = "the joint's whole range, in several poses of the other joints"
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("k", "{tau}/{q}"),)
+    of_motion_alone = True
+    may_exceed_measured = True
+    id = "joint_spring"
+    arguments = frozenset({"position"})
+    equation = "tau = k (q - q_0)"
+    meaning = "an elastic torque grows linearly with the angle"
+    remedy = "add a spring to the joint"
+    revealing_motion = "the joint's whole range, in several poses of the other joints"
+    coefficients = (Coefficient("k", "{tau}/{q}"),)
 
     @classmethod
-    def forms(cls, setting: Setting) -> Sequence[Effect]:
+    def forms(cls, context: ArmContext) -> Sequence[Effect]:
         """One a joint that moves."""
-        return [cls(joint) for joint in setting.joints if setting.moves(joint)]
+        return [cls(joint) for joint in context.joints if context.moves(joint)]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """The angle.
-
-        Parameters
-        ----------
-        shapes : (1, 0) float64
-            none
-        """
+        """The angle."""
         return per_joint_columns(signals.position[self.joint][None, None])
 
 
@@ -60,26 +51,26 @@ class JointSpring(Effect):
 class CableForce(Effect):
     """τ = ±k max(±(q - q_t), 0)^p."""
 
-    of_motion_alone: ClassVar[bool] = True
-    may_exceed_measured: ClassVar[bool] = True
-    id: ClassVar[str] = "cable_force"
-    arguments: ClassVar[frozenset[str] | None] = frozenset({"position"})
-    equation: ClassVar[str] = "tau = +-k max(+-(q - q_t), 0)^p"
-    meaning: ClassVar[str] = "a one-sided elastic torque sets in past an angle"
-    remedy: ClassVar[str] = "re-route the hose or cable, or model its pull past the angle"
-    revealing_motion: ClassVar[str] = "motion well past the angle on both sides"
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("k", "{tau}/{q}^p", positive=True),)
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("q_t", "{q}"), Shape("p", "1", fixed=True))
+    of_motion_alone = True
+    may_exceed_measured = True
+    id = "cable_force"
+    arguments = frozenset({"position"})
+    equation = "tau = +-k max(+-(q - q_t), 0)^p"
+    meaning = "a one-sided elastic torque sets in past an angle"
+    remedy = "re-route the hose or cable, or model its pull past the angle"
+    revealing_motion = "motion well past the angle on both sides"
+    coefficients = (Coefficient("k", "{tau}/{q}^p", positive=True),)
+    shapes = (Shape("q_t", "{q}"), Shape("p", "1", fixed=True))
 
     side: int = 1
 
     @classmethod
-    def forms(cls, setting: Setting) -> Sequence[Effect]:
+    def forms(cls, context: ArmContext) -> Sequence[Effect]:
         """Both sides of every joint that moves."""
         made = []
-        for joint in setting.joints:
-            if setting.moves(joint):
-                low, high = float(setting.lowest[joint]), float(setting.highest[joint])
+        for joint in context.joints:
+            if context.moves(joint):
+                low, high = float(context.lowest[joint]), float(context.highest[joint])
                 for side in (1, -1):
                     onsets = np.sort((low if side > 0 else high) + side * ONSETS * (high - low))
                     bounds = np.array([onsets[0], 1.0]), np.array([onsets[-1], 2.0])

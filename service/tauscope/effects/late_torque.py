@@ -2,15 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from scipy import signal
 
-from tauscope.effects.effect import Effect
-from tauscope.effects.parameters import Coefficient, Quantity, Shape
-from tauscope.effects.setting import Setting
-from tauscope.effects.signals import Signals
+from tauscope.effects.context import ArmContext, Signals
+from tauscope.effects.effect import Coefficient, Effect, Quantity, Shape
 from tauscope.recording.recording import Array
 
 LARGEST_SHARE = 2.0
@@ -28,16 +25,16 @@ ORDERS = (1, 2)
 class LateTorque(Effect):
     """A torque channel that is late against the positions."""
 
-    id: ClassVar[str] = "time_delay"
-    equation: ClassVar[str] = "tau_recorded(t) = tau(t - d)"
-    meaning: ClassVar[str] = "the torque channel is late against the positions (early where d is negative)"
-    remedy: ClassVar[str] = "shift the torque channel by d"
-    revealing_motion: ClassVar[str] = "fast motion with quick changes of torque"
+    id = "time_delay"
+    equation = "tau_recorded(t) = tau(t - d)"
+    meaning = "the torque channel is late against the positions (early where d is negative)"
+    remedy = "shift the torque channel by d"
+    revealing_motion = "fast motion with quick changes of torque"
 
     @staticmethod
-    def places(setting: Setting) -> Sequence[int | None]:
+    def places(context: ArmContext) -> Sequence[int | None]:
         """The whole arm, and every joint of an arm with several."""
-        return (None, *(setting.joints if setting.robot.joint_count > 1 else ()))
+        return (None, *(context.joints if context.robot.joint_count > 1 else ()))
 
     def measured(self, signals: Signals) -> Array:
         """Torque of the model at the joints that are late, (m, N)."""
@@ -50,15 +47,13 @@ class Shift(LateTorque):
     All of the torque is late with a = 1; reported is d = a T, by which slow changes are late.
     """
 
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (
-        Coefficient("a", "1", positive=True, largest=LARGEST_SHARE, smallest=SMALLEST_SHARE),
-    )
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("T", "s", logarithmic=True),)
+    coefficients = (Coefficient("a", "1", positive=True, largest=LARGEST_SHARE, smallest=SMALLEST_SHARE),)
+    shapes = (Shape("T", "s", logarithmic=True),)
 
     @classmethod
-    def forms(cls, setting: Setting) -> Sequence[Effect]:
+    def forms(cls, context: ArmContext) -> Sequence[Effect]:
         """One a place."""
-        return [cls(place, *_constants(setting)) for place in cls.places(setting)]
+        return [cls(place, *_constants(context)) for place in cls.places(context)]
 
     def late(self, torque: Array, constant: float, signals: Signals) -> Array:
         """Torque (m, N) as it is recorded with a = 1.
@@ -89,7 +84,7 @@ class Shift(LateTorque):
         return self.grid[:0]
 
     def quantities(
-        self, setting: Setting, coefficients: Array, shape: Array, covariance: Array
+        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
         """The mean delay d = a T: it is known well also where a and T are not.
 
@@ -114,17 +109,17 @@ class Lag(Shift):
     Reported are d = a n T, T and n.
     """
 
-    equation: ClassVar[str] = "tau_recorded = tau + d/(n T) (tau_T - tau), (1 + T d/dt)^n tau_T = tau"
-    meaning: ClassVar[str] = "the torque channel is low-pass filtered, and so late against the positions"
-    remedy: ClassVar[str] = "filter the positions alike, or undo the filter of time constant T"
+    equation = "tau_recorded = tau + d/(n T) (tau_T - tau), (1 + T d/dt)^n tau_T = tau"
+    meaning = "the torque channel is low-pass filtered, and so late against the positions"
+    remedy = "filter the positions alike, or undo the filter of time constant T"
 
     order: int = 1
 
     @classmethod
-    def forms(cls, setting: Setting) -> Sequence[Effect]:
+    def forms(cls, context: ArmContext) -> Sequence[Effect]:
         """One a place and order."""
-        places = cls.places(setting)
-        return [cls(place, *_constants(setting), order=order) for place in places for order in ORDERS]
+        places = cls.places(context)
+        return [cls(place, *_constants(context), order=order) for place in places for order in ORDERS]
 
     def late(self, torque: Array, constant: float, signals: Signals) -> Array:
         """Torque (m, N) behind the filter.
@@ -139,7 +134,7 @@ class Lag(Shift):
         return low_passed(torque, constant, self.order, signals)
 
     def quantities(
-        self, setting: Setting, coefficients: Array, shape: Array, covariance: Array
+        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
         """The mean delay, T and n.
 
@@ -152,7 +147,7 @@ class Lag(Shift):
         covariance : (2, 2) float64
             of both
         """
-        (each,) = super().quantities(setting, coefficients, shape, covariance)
+        (each,) = super().quantities(context, coefficients, shape, covariance)
         own = float(np.sqrt(max(covariance[1, 1], 0.0)))
         return (
             Quantity("d", self.order * each.value, self.order * each.std, "s"),
@@ -161,9 +156,9 @@ class Lag(Shift):
         )
 
 
-def _constants(setting: Setting) -> tuple[Array, Array, Array]:
+def _constants(context: ArmContext) -> tuple[Array, Array, Array]:
     """Grid (g, 1), lower and upper bound (1,) of T [s]."""
-    constants = LAGS / (2.0 * np.pi * setting.cutoff_hz)
+    constants = LAGS / (2.0 * np.pi * context.cutoff_hz)
     return constants[:, None], 0.3 * constants[:1], 2.0 * constants[-1:]
 
 

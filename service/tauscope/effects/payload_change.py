@@ -1,15 +1,12 @@
 """Mass picked up or dropped while it was recorded, or between two recordings."""
 
 from collections.abc import Sequence
-from typing import ClassVar
 
 import numpy as np
 
 from tauscope.effects.carried_body import FARTHEST_M, MASS, PLACE, body_columns, body_quantities, unit_body
-from tauscope.effects.effect import Effect
-from tauscope.effects.parameters import Coefficient, Quantity, Shape
-from tauscope.effects.setting import Setting
-from tauscope.effects.signals import Signals
+from tauscope.effects.context import ArmContext, Signals
+from tauscope.effects.effect import Effect, Quantity, Shape
 from tauscope.effects.time_local import EVERY, OUTSIDE, TimeLocalEffect, since
 from tauscope.recording.recording import Array
 
@@ -23,15 +20,15 @@ INSTANTS = 12
 class PayloadChange(TimeLocalEffect):
     """τ = m Φ_body(r) w(t), Φ_body the torque of a point mass at r of the last link."""
 
-    of_motion_alone: ClassVar[bool] = True
-    id: ClassVar[str] = "payload_change"
-    arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "velocity", "acceleration", "others", "time"})
-    equation: ClassVar[str] = "tau = m Phi_body(q, qd, qdd; r) w(t), w = 1 from t_on to t_off"
-    meaning: ClassVar[str] = "a mass at the tool is picked up or dropped"
-    remedy: ClassVar[str] = "record with one payload at a time, or add the body to the last link while it is carried"
-    revealing_motion: ClassVar[str] = "the same motion without payload, and once more with it all the time"
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (MASS,)
-    shapes: ClassVar[tuple[Shape, ...]] = (
+    of_motion_alone = True
+    id = "payload_change"
+    arguments = frozenset({"position", "velocity", "acceleration", "others", "time"})
+    equation = "tau = m Phi_body(q, qd, qdd; r) w(t), w = 1 from t_on to t_off"
+    meaning = "a mass at the tool is picked up or dropped"
+    remedy = "record with one payload at a time, or add the body to the last link while it is carried"
+    revealing_motion = "the same motion without payload, and once more with it all the time"
+    coefficients = (MASS,)
+    shapes = (
         Shape("scope", "1", fixed=True, reported=False),
         Shape("t_on", "s"),
         Shape("t_off", "s"),
@@ -40,12 +37,12 @@ class PayloadChange(TimeLocalEffect):
     )
 
     @classmethod
-    def forms(cls, setting: Setting) -> Sequence[Effect]:
+    def forms(cls, context: ArmContext) -> Sequence[Effect]:
         """One for the arm."""
-        grid = payload_windows(setting.durations)
-        longest = max(setting.durations)
-        lower = np.array([since(len(setting.durations) - 1), 0.0, 0.0, OUTSIDE, *(-FARTHEST_M,) * 3])
-        upper = np.array([len(setting.durations) - 1.0, longest, 1.1 * longest, 0.0, *(FARTHEST_M,) * 3])
+        grid = payload_windows(context.durations)
+        longest = max(context.durations)
+        lower = np.array([since(len(context.durations) - 1), 0.0, 0.0, OUTSIDE, *(-FARTHEST_M,) * 3])
+        upper = np.array([len(context.durations) - 1.0, longest, 1.1 * longest, 0.0, *(FARTHEST_M,) * 3])
         return [cls(None, grid, lower, upper)] if len(grid) else []
 
     def outside(self, shape: Array) -> Array | None:
@@ -73,7 +70,7 @@ class PayloadChange(TimeLocalEffect):
         return np.tensordot(unit_body(shape[4:]), body_columns(signals), axes=1)[None]
 
     def quantities(
-        self, setting: Setting, coefficients: Array, shape: Array, covariance: Array
+        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
         """Mass, first moment, and when.
 
@@ -87,7 +84,7 @@ class PayloadChange(TimeLocalEffect):
             of both
         """
         body = (0, 5, 6, 7)
-        sign, instants = carried(float(coefficients[0]), shape, setting.durations)
+        sign, instants = carried(float(coefficients[0]), shape, context.durations)
         found = list(body_quantities(sign * float(coefficients[0]), shape[4:], covariance[np.ix_(body, body)]))
         std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         found += [Quantity(name, float(shape[place]), float(std[1 + place]), "s") for name, place in instants.items()]

@@ -10,6 +10,7 @@ from importlib.metadata import entry_points
 from tauscope.effects.asymmetric_friction import AsymmetricCoulomb, AsymmetricViscous
 from tauscope.effects.backlash import Backlash
 from tauscope.effects.base_tilt import BaseTilt
+from tauscope.effects.context import ArmContext
 from tauscope.effects.effect import Effect
 from tauscope.effects.elastic_forces import CableForce, JointSpring
 from tauscope.effects.external_contact import ExternalContact
@@ -26,7 +27,6 @@ from tauscope.effects.plain_terms import CoulombFriction, TorqueOffset, ViscousF
 from tauscope.effects.position_dependent_friction import PositionDependentFriction
 from tauscope.effects.presliding_hysteresis import PreslidingHysteresis
 from tauscope.effects.rotor_inertia import RotorInertia
-from tauscope.effects.setting import Setting
 from tauscope.effects.stribeck_friction import StribeckFriction
 from tauscope.effects.time_delay import TimeDelay
 from tauscope.effects.torque_sensing import TorqueGainError, TorqueSaturation
@@ -88,11 +88,11 @@ def catalogue() -> tuple[type[Effect], ...]:
     return (*BUILT_IN, *added)
 
 
-def possible_effects(setting: Setting) -> Sequence[Effect]:
+def possible_effects(context: ArmContext) -> Sequence[Effect]:
     """Every form of every effect worth looking at beside the nominal model."""
-    return [form for effect in catalogue() if effect.screened for form in effect.forms(setting)]
+    return [form for effect in catalogue() if effect.screened for form in effect.forms(context)]
 
 
-def farther_effects(setting: Setting) -> Sequence[Effect]:
+def farther_effects(context: ArmContext) -> Sequence[Effect]:
     """Every form that is worth a look only where something is left."""
-    return [form for effect in catalogue() if effect.screened for form in effect.farther_forms(setting)]
+    return [form for effect in catalogue() if effect.screened for form in effect.farther_forms(context)]

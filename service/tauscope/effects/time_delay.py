@@ -1,36 +1,27 @@
 """A torque channel that is late against the positions: by a delay, or behind a low-pass filter."""
 
 from collections.abc import Sequence
-from typing import ClassVar
 
 import numpy as np
 
-from tauscope.effects.effect import Effect
+from tauscope.effects.context import ArmContext, Signals
+from tauscope.effects.effect import Coefficient, Effect
 from tauscope.effects.late_torque import Lag, LateTorque, Shift, shifted
-from tauscope.effects.parameters import Coefficient
-from tauscope.effects.setting import Setting
-from tauscope.effects.signals import Signals
 from tauscope.recording.recording import Array
 
 
 class TimeDelay(LateTorque):
     """τ_recorded(t) = τ(t - d), to first order -d dτ/dt."""
 
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("d", "s"),)
+    coefficients = (Coefficient("d", "s"),)
 
     @classmethod
-    def forms(cls, setting: Setting) -> Sequence[Effect]:
+    def forms(cls, context: ArmContext) -> Sequence[Effect]:
         """All forms, the small delay first."""
-        return [*(cls(place) for place in cls.places(setting)), *Shift.forms(setting), *Lag.forms(setting)]
+        return [*(cls(place) for place in cls.places(context)), *Shift.forms(context), *Lag.forms(context)]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """-dτ/dt of the model's torque.
-
-        Parameters
-        ----------
-        shapes : (1, 0) float64
-            none
-        """
+        """-dτ/dt of the model's torque."""
         torque = self.measured(signals)
         # Over two samples: where friction steps from one sample to the next, a finer slope is no torque that anybody
         # records.

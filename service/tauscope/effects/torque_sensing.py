@@ -2,14 +2,11 @@
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import ClassVar
 
 import numpy as np
 
-from tauscope.effects.effect import Effect, per_joint_columns
-from tauscope.effects.parameters import Coefficient, Quantity, Shape
-from tauscope.effects.setting import Setting
-from tauscope.effects.signals import Signals
+from tauscope.effects.context import ArmContext, Signals
+from tauscope.effects.effect import Coefficient, Effect, Quantity, Shape, per_joint_columns
 from tauscope.recording.recording import Array
 
 COMPRESSIONS = np.array([0.3, 0.5, 0.8, 1.3, 2.2, 4.0])
@@ -25,27 +22,21 @@ CLIPPED_AT_LEAST = 0.5
 class TorqueGainError(Effect):
     """τ_recorded = (1 + g) τ."""
 
-    id: ClassVar[str] = "torque_gain_error"
-    equation: ClassVar[str] = "tau_recorded = (1 + g) tau"
-    meaning: ClassVar[str] = "the recorded torque is scaled: the torque constant is wrong"
-    remedy: ClassVar[str] = "correct the joint's torque_constant by 1 + g"
-    revealing_motion: ClassVar[str] = "fast motion of neighbouring joints that share inertia, or a known added mass"
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("g", "1"),)
-    may_exceed_measured: ClassVar[bool] = True
+    id = "torque_gain_error"
+    equation = "tau_recorded = (1 + g) tau"
+    meaning = "the recorded torque is scaled: the torque constant is wrong"
+    remedy = "correct the joint's torque_constant by 1 + g"
+    revealing_motion = "fast motion of neighbouring joints that share inertia, or a known added mass"
+    coefficients = (Coefficient("g", "1"),)
+    may_exceed_measured = True
 
     @classmethod
-    def forms(cls, setting: Setting) -> Sequence[Effect]:
+    def forms(cls, context: ArmContext) -> Sequence[Effect]:
         """One a joint."""
-        return [cls(joint) for joint in setting.joints]
+        return [cls(joint) for joint in context.joints]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """The model's torque.
-
-        Parameters
-        ----------
-        shapes : (1, 0) float64
-            none
-        """
+        """The model's torque."""
         return per_joint_columns(signals.torque[self.joint][None, None])
 
     def factor(self, coefficients: Array) -> float:
@@ -62,16 +53,16 @@ class TorqueGainError(Effect):
 class Saturation(Effect):
     """τ_recorded = τ - a (τ - r(τ)): what all curves r have in common; a is 1 where nothing else bends them."""
 
-    id: ClassVar[str] = "torque_saturation"
-    equation: ClassVar[str] = "tau_recorded = tau - a (tau - c tanh(tau/c)); clipped: tau - a (tau - clip(tau, +-c))"
-    meaning: ClassVar[str] = "the recorded torque is compressed or clipped at high load"
-    remedy: ClassVar[str] = "record within the sensor's or the drive's linear range"
-    revealing_motion: ClassVar[str] = "the same motion slower and without payload, well below the level"
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("c", "{tau}", logarithmic=True),)
-    may_exceed_measured: ClassVar[bool] = True
+    id = "torque_saturation"
+    equation = "tau_recorded = tau - a (tau - c tanh(tau/c)); clipped: tau - a (tau - clip(tau, +-c))"
+    meaning = "the recorded torque is compressed or clipped at high load"
+    remedy = "record within the sensor's or the drive's linear range"
+    revealing_motion = "the same motion slower and without payload, well below the level"
+    shapes = (Shape("c", "{tau}", logarithmic=True),)
+    may_exceed_measured = True
 
     @classmethod
-    def of_levels(cls, setting: Setting, parts: Array) -> list[Effect]:
+    def of_levels(cls, context: ArmContext, parts: Array) -> list[Effect]:
         """One a joint.
 
         Parameters
@@ -80,8 +71,8 @@ class Saturation(Effect):
             levels looked at, relative to the joint's largest torque
         """
         made: list[Effect] = []
-        for joint in setting.joints:
-            levels = parts * float(setting.top_torque[joint])
+        for joint in context.joints:
+            levels = parts * float(context.top_torque[joint])
             made.append(cls(joint, levels[:, None], 0.7 * levels[:1], 1.5 * levels[-1:]))
         return made
 
@@ -112,12 +103,12 @@ class Saturation(Effect):
 class TorqueSaturation(Saturation):
     """r(τ) = c tanh(τ/c), a soft curve; where it is only bent a little no data tell a and c apart, but c/√a."""
 
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("a", "1", positive=True),)
+    coefficients = (Coefficient("a", "1", positive=True),)
 
     @classmethod
-    def forms(cls, setting: Setting) -> Sequence[Effect]:
+    def forms(cls, context: ArmContext) -> Sequence[Effect]:
         """Both curves at every joint."""
-        return [*cls.of_levels(setting, COMPRESSIONS), *Clipping.forms(setting)]
+        return [*cls.of_levels(context, COMPRESSIONS), *Clipping.forms(context)]
 
     def recorded(self, torque: Array, levels: Array) -> Array:
         """A soft curve, c tanh(τ/c), (g, N).
@@ -144,7 +135,7 @@ class TorqueSaturation(Saturation):
         return bool(shape[0] >= self.lower[0] * np.sqrt(coefficients[0]))
 
     def quantities(
-        self, setting: Setting, coefficients: Array, shape: Array, covariance: Array
+        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
         """The level c/√a.
 
@@ -160,20 +151,18 @@ class TorqueSaturation(Saturation):
         share, level = max(float(coefficients[0]), 1e-12), float(shape[0])
         slope = np.array([-0.5 * level / share**1.5, 1.0 / np.sqrt(share)])
         std = float(np.sqrt(max(slope @ covariance @ slope, 0.0)))
-        return (Quantity("c", level / np.sqrt(share), std, self.unit("{tau}", setting)),)
+        return (Quantity("c", level / np.sqrt(share), std, self.unit("{tau}", context)),)
 
 
 class Clipping(Saturation):
     """r(τ) = clip(τ, ±c): what lies beyond the level is cut off."""
 
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (
-        Coefficient("a", "1", positive=True, largest=2.0, smallest=CLIPPED_AT_LEAST),
-    )
+    coefficients = (Coefficient("a", "1", positive=True, largest=2.0, smallest=CLIPPED_AT_LEAST),)
 
     @classmethod
-    def forms(cls, setting: Setting) -> Sequence[Effect]:
+    def forms(cls, context: ArmContext) -> Sequence[Effect]:
         """One a joint."""
-        return cls.of_levels(setting, CLIPS)
+        return cls.of_levels(context, CLIPS)
 
     def recorded(self, torque: Array, levels: Array) -> Array:
         """A hard curve, clip(τ, ±c), (g, N).

@@ -16,8 +16,8 @@ from tauscope.diagnosis.selection.equivalence import EQUIVALENT
 from tauscope.diagnosis.selection.selector import MOST_FITTED, Selector
 from tauscope.diagnosis.selection.table import fitted_option
 from tauscope.effects import TimeLocalEffect
+from tauscope.effects.computation import side_by_side
 from tauscope.effects.plain_terms import TorqueOffset
-from tauscope.effects.side_by_side import side_by_side
 
 WITH_A_CONSTANT = ("joint_spring",)
 """Effects whose own constant is the nominal model's offset: beside one, the offset is no finding of its own."""

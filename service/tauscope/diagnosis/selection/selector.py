@@ -29,7 +29,7 @@ from tauscope.diagnosis.selection.proxies import TELLING, endless, full, hopeles
 from tauscope.diagnosis.selection.pruning import without_proxies, without_superfluous, without_weak_likenesses
 from tauscope.diagnosis.selection.table import Table, fitted_option
 from tauscope.effects import Effect, TimeLocalEffect
-from tauscope.effects.side_by_side import side_by_side
+from tauscope.effects.computation import side_by_side
 
 MOST_EFFECTS = 4
 """Different effects in one model; what one joint does, the others may do as well."""
