@@ -161,6 +161,8 @@ class Backlash(Deflection):
     """q_link = q - b u, u the place of the link between the teeth."""
 
     id = "backlash"
+    rank = 120
+    german = "Spiel"
     equation = "q_link = q - delta, delta = +-b/2 under load, I d2(delta)/dt2 = tau_rb in between"
     meaning = "the transmission has play when the load changes sign"
     remedy = "take up the play, or model a dead zone"
@@ -235,6 +237,7 @@ class Backlash(Deflection):
 class SpringyTeeth(Backlash):
     """The same where the teeth give way, so that a link that has crossed the gap swings on them."""
 
+    is_variant = True
     shapes = (
         *Backlash.shapes,
         Shape("swinging", "{q}/{tau}", logarithmic=True, reported=False),

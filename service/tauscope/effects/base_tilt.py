@@ -7,8 +7,9 @@ import numpy as np
 
 from tauscope.dynamics import gravity_torque
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect
+from tauscope.effects.effect import Coefficient, Effect, Entry
 from tauscope.recording.recording import Array
+from tauscope.robot import Robot
 
 
 def tilt_directions(gravity: Array) -> tuple[Array, Array]:
@@ -31,10 +32,14 @@ class BaseTilt(Effect):
 
     of_motion_alone = True  # the consistent links, as for `KinematicError`
     id = "base_tilt"
+    rank = 200
+    german = "geneigte Basis"
     arguments = frozenset({"position", "others"})
     equation = "tau = dtau/dg (|g| (alpha_1 e_1 + alpha_2 e_2)), e_1 and e_2 across gravity"
     meaning = "gravity points elsewhere in the base frame than the robot file says"
     remedy = "level the base, or correct gravity in the robot file"
+    no_code = "it needs the positions of all joints"
+    no_scenario = "a scenario tilts gravity along -z only"
     revealing_motion = "wide poses all round the first joint"
     coefficients = (Coefficient("alpha_1", "rad"), Coefficient("alpha_2", "rad"))
 
@@ -52,3 +57,9 @@ class BaseTilt(Effect):
             for direction in tilt_directions(signals.robot.gravity)
         ]
         return np.stack(torques)[None]
+
+    def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
+        """For gravity along -z: R_x(α) R_y(β) (0, 0, -g) is g (-β, α, -1) to first order."""
+        if robot.gravity[2] >= 0.0 or np.abs(robot.gravity[:2]).max() > 0.0:
+            return []
+        return [{"about_x": coefficients[1], "about_y": -coefficients[0]}]

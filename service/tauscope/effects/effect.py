@@ -8,14 +8,20 @@ equation, its columns and the forms that it can take on a given arm.
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tauscope.effects.context import ArmContext, Signals
 from tauscope.recording.recording import Array
-from tauscope.robot import JointType
+from tauscope.robot import JointType, Robot
+
+Entry = dict[str, Any]
+"""An entry of a scenario file without its joint; without its effect too where that is the effect's own id."""
+
+_STEP = "atan({k_v} * v) * 0.6366197723675814"
+"""A(K_v v), the smooth sign, in C and Python."""
 
 _POSITION = {JointType.REVOLUTE: "rad", JointType.PRISMATIC: "m"}
 _TORQUE = {JointType.REVOLUTE: "Nm", JointType.PRISMATIC: "N"}
@@ -82,6 +88,13 @@ class Effect(ABC):
     One that does not do the same whenever the motion does, that does not `repeats_with_motion`, passes for noise there.
     What its law depends on are its `arguments`: ``position``, ``velocity``, ``acceleration`` of its joint, the ``load``
     on its transmission, ``time``, the ``others``' motion; None where it acts on whatever torque there is.
+    `code` is the torque as an expression that C and Python share: q, v and load are position, velocity and rigid-body
+    torque of the joint, {c[0]} and {s[0]} the first coefficient and shape, {step} the smooth sign of v, {effect} the
+    object. Without it, `no_code` is the reason. `no_scenario` is the reason where a scenario cannot hold the effect.
+    `rank` is its place in the catalogue and in documents, `german` its name on the German page.
+    One that `is_variant` is a form of the effect of the same id and stands in no catalogue itself.
+    Every geared joint may have one that `is_expected`: it counts towards no limit, and nothing is doubted beside it.
+    One that `has_constant` of its own shows it as the nominal model's offset.
     """
 
     id: ClassVar[str]
@@ -89,6 +102,14 @@ class Effect(ABC):
     meaning: ClassVar[str]
     remedy: ClassVar[str]
     revealing_motion: ClassVar[str]
+    german: ClassVar[str] = ""
+    code: ClassVar[str] = ""
+    no_code: ClassVar[str] = ""
+    no_scenario: ClassVar[str] = ""
+    rank: ClassVar[int] = 0
+    is_variant: ClassVar[bool] = False
+    is_expected: ClassVar[bool] = False
+    has_constant: ClassVar[bool] = False
     coefficients: ClassVar[tuple[Coefficient, ...]]
     shapes: ClassVar[tuple[Shape, ...]] = ()
     repeats: ClassVar[bool] = False
@@ -109,9 +130,14 @@ class Effect(ABC):
     upper: Array = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
-    @abstractmethod
     def forms(cls, context: ArmContext) -> "Sequence[Effect]":
-        """All forms and places worth looking at on this arm and motion."""
+        """All forms and places worth looking at on this arm and motion: one a joint where it can act."""
+        return [cls(joint) for joint in context.joints if cls.can_act(context, joint)]
+
+    @classmethod
+    def can_act(cls, context: ArmContext, joint: int) -> bool:
+        """Whether the motion of a joint, from 0, may show the effect: whether it moves."""
+        return context.moves(joint)
 
     @classmethod
     def farther_forms(cls, context: ArmContext) -> "Sequence[Effect]":
@@ -145,6 +171,21 @@ class Effect(ABC):
         """
         (columns,) = self.columns(signals, shape[None])
         return np.asarray(np.tensordot(coefficients, columns, axes=1), dtype=np.float64)
+
+    def torque_code(self, coefficients: Sequence[float], shape: Sequence[float], k_v: float) -> str:
+        """`code` with its numbers.
+
+        Parameters
+        ----------
+        k_v : float
+            K_v of the joint [s/rad or s/m]
+        """
+        step = _STEP.format(k_v=repr(k_v))
+        return self.code.format(c=[*map(repr, coefficients)], s=[*map(repr, shape)], step=step, effect=self)
+
+    def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
+        """Entries of a scenario file that stand for the effect; none where `no_scenario` tells why."""
+        return ()
 
     def factor(self, coefficients: Array) -> float:
         """By how much it multiplies what the parameters of the plain model make at its joint: 1 where it only adds.

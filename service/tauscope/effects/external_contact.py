@@ -7,9 +7,10 @@ import numpy as np
 
 from tauscope.dynamics import gravity_torque
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Shape
+from tauscope.effects.effect import Coefficient, Effect, Entry, Shape
 from tauscope.effects.time_local import EVERY, HALF_SINE, TimeLocalEffect
 from tauscope.recording.recording import Array
+from tauscope.robot import Robot
 from tauscope.robot.robot import STANDARD_PARAMETERS
 
 LENGTHS_S = (0.5, 1.5, 4.5)
@@ -37,10 +38,13 @@ class ExternalContact(TimeLocalEffect):
 
     of_motion_alone = True
     id = "external_contact"
+    rank = 220
+    german = "Kontakt von außen"
     arguments = frozenset({"time"})
     equation = "tau = J(q)^T F w(t), or tau_j = c w(t); w = 1 or a half sine from t_0 to t_1"
     meaning = "the arm touches something for a while"
     remedy = "clear what it touches, or leave that stretch of the recording out"
+    no_scenario = "a scenario starts anew each time, so only contact at the same time in every recording fits"
     revealing_motion = "the same motion once more without contact"
     coefficients = (
         Coefficient("F_x", "N"),
@@ -82,10 +86,20 @@ class ExternalContact(TimeLocalEffect):
         """
         return signals.remembered_of_motion("transposed Jacobian", lambda: transposed_jacobian(signals))
 
+    def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
+        """A window that lies in every recording: a scenario starts anew each time."""
+        if shape[0] != EVERY:
+            return []
+        profile = "half_sine" if shape[3] == HALF_SINE else "rectangular"
+        window = {"start": max(shape[1], 0.0), "duration": shape[2] - shape[1], "profile": profile}
+        own = {"force": list(coefficients)} if self.joint is None else {"torque": coefficients[0]}
+        return [{**own, **window}]
+
 
 class JointContact(ExternalContact):
     """τ_j = c w(t): the same at one joint alone."""
 
+    is_variant = True
     coefficients = (Coefficient("c", "{tau}"),)
 
     def torque(self, signals: Signals, shape: Array) -> Array:

@@ -7,8 +7,9 @@ import numpy as np
 
 from tauscope.dynamics import smooth_sign
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Shape
+from tauscope.effects.effect import Coefficient, Effect, Entry, Shape
 from tauscope.recording.recording import Array
+from tauscope.robot import Robot
 
 STEEPNESSES = np.array([30.0, 120.0, 500.0, 2000.0])
 """Steepness of the coupled motor's Coulomb step, times the rms of the joint's own speed."""
@@ -20,10 +21,13 @@ class FrictionCoupling(Effect):
 
     of_motion_alone = True
     id = "friction_coupling"
+    rank = 90
+    german = "gekoppelte Reibung"
     arguments = frozenset({"velocity", "others"})
     equation = "tau_j = f sgn(v) + w v, tau_k = +-tau_j, v = qd_j +- qd_k"
     meaning = "two joints share friction on the sum or difference of their motion"
     remedy = "add Coulomb and viscous friction of the coupled motor's own speed"
+    no_code = "it needs the velocities of two joints"
     revealing_motion = "both joints at once, in the same and in opposite directions, slowly and fast"
     coefficients = (
         Coefficient("f", "{tau}", positive=True),
@@ -66,3 +70,9 @@ class FrictionCoupling(Effect):
         step = smooth_sign(velocity, shapes)
         own = np.stack([step, np.broadcast_to(velocity, step.shape)], axis=1)
         return np.stack([self.sign * own, own], axis=2)
+
+    def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
+        """One coupling."""
+        f, w = coefficients
+        of = "sum" if self.sign > 0 else "difference"
+        return [{"other_joint": self.partner + 1, "of": of, "coulomb": f, "viscous": w, "k_v": shape[0]}]

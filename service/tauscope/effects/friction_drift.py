@@ -29,10 +29,14 @@ class FrictionDrift(Effect):
     repeats_with_motion = False
     has_step = True
     id = "friction_drift"
+    rank = 80
+    german = "Drift der Reibung"
     arguments = frozenset({"velocity", "time"})
     equation = "tau = (f sgn(qd) + w qd) h, T dh/dt = p / (1 - exp(-D/T)) - h, p = 1 or friction's own power / 1 W"
     meaning = "friction changes over time, as in a warm-up"
     remedy = "warm the joint up before recording, or let friction depend on temperature"
+    no_code = "it needs the clock or the temperature of the joint"
+    no_scenario = "the simulated drift needs a thermal resistance, which was not measured"
     revealing_motion = "the first motion once more at the end"
     coefficients = (Coefficient("f", "{tau}"), Coefficient("w", "{tau} s/{q}"))
     shapes = (Shape("T", "s", logarithmic=True),)

@@ -72,6 +72,8 @@ class JointElasticity(Deflection):
     """q_link = q - c τ, τ the load as the spring passes it on."""
 
     id = "joint_elasticity"
+    rank = 130
+    german = "Gelenkelastizität"
     equation = "q_link = q - c tau_rb, c = 1/stiffness"
     meaning = "the transmission gives way under load"
     remedy = "model the joint as two masses with a stiffness between them"

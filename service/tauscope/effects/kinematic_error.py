@@ -10,7 +10,7 @@ import numpy as np
 
 from tauscope.dynamics import inverse_dynamics
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Shape
+from tauscope.effects.effect import Coefficient, Effect, Entry, Shape
 from tauscope.recording.recording import Array
 from tauscope.robot import Placement, Robot
 
@@ -25,10 +25,13 @@ class KinematicError(Effect):
     """τ = ∂τ/∂d d: the frame of one link lies d farther along one axis, of those before its last turn."""
 
     id = "kinematic_error"
+    rank = 230
+    german = "Kinematikfehler"
     arguments = frozenset({"position", "velocity", "acceleration", "others"})
     equation = "tau = dtau/dd d, d the displacement of one link's frame along one of its axes"
     meaning = "a link length or frame is wrong"
     remedy = "measure the arm's geometry, and correct the robot file by d"
+    no_code = "it needs the positions of all joints"
     revealing_motion = "none: measure the tool's place in several postures instead"
     coefficients = (Coefficient("d", "m", largest=LARGEST_M),)
     shapes = (Shape("link", "1", fixed=True), Shape("axis", "1", fixed=True))
@@ -69,6 +72,11 @@ class KinematicError(Effect):
         """
         longer, exact = _torques(signals, [(shape, float(coefficients[0])), (shape, 0.0)])
         return longer - exact
+
+    def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
+        """One displacement."""
+        link, axis = (int(each) for each in shape)
+        return [{"link": link, "translation": [coefficients[0] if each == axis else 0.0 for each in (1, 2, 3)]}]
 
 
 def _torques(signals: Signals, displacements: Sequence[tuple[Array, float]]) -> list[Array]:

@@ -5,8 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Shape, per_joint_columns
+from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, per_joint_columns
 from tauscope.recording.recording import Array
+from tauscope.robot import Robot
 
 POWERS = (np.array([0.35, 0.5, 0.65, 0.8]), np.array([1.25, 1.6, 2.0, 2.4, 3.0]))
 """Powers looked at, below one and above."""
@@ -21,10 +22,13 @@ class NonlinearViscous(Effect):
 
     of_motion_alone = True
     id = "nonlinear_viscous"
+    rank = 30
+    german = "nichtlineare viskose Reibung"
     arguments = frozenset({"velocity"})
     equation = "tau = c sgn(qd) |qd|^p"
     meaning = "friction grows with a power of speed other than one"
     remedy = "replace the viscous line by a power of speed"
+    code = "{c[0]} * copysign(pow(fabs(v), {s[0]}), v)"
     revealing_motion = "motion at top speed beside slow motion: half as fast again as so far"
     coefficients = (Coefficient("c", "{tau} (s/{q})^p"),)
     shapes = (Shape("p", "1"),)
@@ -48,3 +52,7 @@ class NonlinearViscous(Effect):
         """
         velocity = signals.velocity[self.joint]
         return per_joint_columns((np.sign(velocity) * np.abs(velocity) ** shapes)[:, None])
+
+    def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
+        """One power of speed."""
+        return [{"amplitude": coefficients[0], "exponent": shape[0]}]

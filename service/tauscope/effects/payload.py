@@ -18,10 +18,14 @@ class Payload(Effect):
 
     of_motion_alone = True
     id = "payload"
+    rank = 240
+    german = "Nutzlast"
     arguments = frozenset({"position", "velocity", "acceleration", "others"})
     equation = "tau = m Phi_body(q, qd, qdd; r)"
     meaning = "a mass is fixed to the tool that the model does not have"
     remedy = "add the body to the last link (or correct the last link's own mass: torque cannot tell)"
+    no_code = "it needs the positions of all joints"
+    no_scenario = "the improved robot file has it in the last link"
     revealing_motion = "the same motion with the tool taken off"
     coefficients = (MASS,)
     shapes = PLACE

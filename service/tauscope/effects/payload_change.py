@@ -6,9 +6,10 @@ import numpy as np
 
 from tauscope.effects.carried_body import FARTHEST_M, MASS, PLACE, body_columns, body_quantities, unit_body
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Effect, Quantity, Shape
+from tauscope.effects.effect import Effect, Entry, Quantity, Shape
 from tauscope.effects.time_local import EVERY, OUTSIDE, TimeLocalEffect, since
 from tauscope.recording.recording import Array
+from tauscope.robot import Robot
 
 NEAR_EDGE = 0.03
 """Part of a recording within which an edge of a window is the recording's own."""
@@ -22,10 +23,13 @@ class PayloadChange(TimeLocalEffect):
 
     of_motion_alone = True
     id = "payload_change"
+    rank = 210
+    german = "wechselnde Nutzlast"
     arguments = frozenset({"position", "velocity", "acceleration", "others", "time"})
     equation = "tau = m Phi_body(q, qd, qdd; r) w(t), w = 1 from t_on to t_off"
     meaning = "a mass at the tool is picked up or dropped"
     remedy = "record with one payload at a time, or add the body to the last link while it is carried"
+    no_scenario = "a scenario starts anew each time, so only a load at the same time in every recording fits"
     revealing_motion = "the same motion without payload, and once more with it all the time"
     coefficients = (MASS,)
     shapes = (
@@ -107,6 +111,12 @@ class PayloadChange(TimeLocalEffect):
         said = [f"{verbs[name]} at {shape[place]:.2f} s" for name, place in instants.items()]
         where = self.recording_words(shape, names)
         return f"{' and '.join(said)} of {where}" if said else f"carried in {where}"
+
+    def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
+        """A load that is carried in every recording: a scenario starts anew each time."""
+        if shape[0] != EVERY or coefficients[0] <= 0.0:
+            return []
+        return [{"mass": coefficients[0], "offset": list(shape[4:7]), "start": shape[1], "end": shape[2]}]
 
 
 def carried(mass: float, shape: Array, durations: Sequence[float]) -> tuple[float, dict[str, int]]:

@@ -7,14 +7,15 @@ motor's revolution can occur; otherwise the angle-periodogram is scanned as fine
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from math import atan2, hypot
 
 import numpy as np
 
 from tauscope.effects.computation import THREADS, LastFew
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Quantity, Shape, per_joint_columns
+from tauscope.effects.effect import Coefficient, Effect, Entry, Quantity, Shape, per_joint_columns
 from tauscope.recording.recording import Array
-from tauscope.robot import JointType
+from tauscope.robot import JointType, Robot
 
 FEWEST_CYCLES = 1.5
 """Cycles over the range of motion below which a periodic torque is a spring or a bump by another name."""
@@ -194,6 +195,13 @@ class _Periodic(Effect):
             ),
         )
 
+    def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
+        """One wave; its order is counted a turn at a revolute joint, a metre at a prismatic one."""
+        sine, cosine = coefficients
+        turns = robot.joints[self.joint or 0].type is JointType.REVOLUTE
+        order = shape[0] if turns else shape[0] / (2.0 * np.pi)
+        return [{"amplitude": hypot(sine, cosine), "order": order, "phase": atan2(cosine, sine)}]
+
     def _waves(self, signals: Signals, shapes: Array) -> Array:
         """Sin kq, cos kq, (g, 2, N); of an order or two they are kept, for a fit asks again under other loads."""
         joint, orders = self.joint or 0, shapes[:, 0]
@@ -208,10 +216,13 @@ class Cogging(_Periodic):
 
     of_motion_alone = True
     id = "cogging"
+    rank = 100
+    german = "Rastmoment"
     arguments = frozenset({"position"})
     equation = "tau = sum a sin(k q + phi)"
     meaning = "torque repeats with the angle, whatever the load"
     remedy = "compensate the torque over the motor's angle"
+    code = "{c[0]} * sin({s[0]} * q) + {c[1]} * cos({s[0]} * q)"
     revealing_motion = "slow constant speed over the whole range, the load changed by other joints' poses"
     coefficients = (Coefficient("sine", "{tau}"), Coefficient("cosine", "{tau}"))
 
@@ -231,10 +242,13 @@ class TorqueRipple(_Periodic):
 
     of_motion_and_load = True
     id = "torque_ripple"
+    rank = 110
+    german = "Drehmomentwelligkeit"
     arguments = frozenset({"position", "load"})
     equation = "tau = tau_rb sum a sin(k q + phi)"
     meaning = "torque repeats with the angle, in proportion to the load"
     remedy = "correct the torque constant over the motor's angle"
+    code = "load * ({c[0]} * sin({s[0]} * q) + {c[1]} * cos({s[0]} * q))"
     revealing_motion = "the same angles under other loads: other poses of the other joints"
     coefficients = (
         Coefficient("sine", "1", largest=1.0),

@@ -10,9 +10,10 @@ from typing import ClassVar
 import numpy as np
 
 from tauscope.dynamics import smooth_sign
-from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Shape, per_joint_columns
+from tauscope.effects.context import Signals
+from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, per_joint_columns
 from tauscope.recording.recording import Array
+from tauscope.robot import Robot
 
 
 class PlainTerm(Effect):
@@ -23,17 +24,16 @@ class PlainTerm(Effect):
 
     term: ClassVar[str]
     screened = False
-
-    @classmethod
-    def forms(cls, context: ArmContext) -> Sequence[Effect]:
-        """One a joint that moves."""
-        return [cls(joint) for joint in context.joints if context.moves(joint)]
+    no_code = "the friction function beside it has it"
+    no_scenario = "the improved robot file has it in the joint's friction"
 
 
 class ViscousFriction(PlainTerm):
     """τ = c q̇."""
 
     id = "viscous_friction"
+    rank = 270
+    german = "viskose Reibung"
     arguments = frozenset({"velocity"})
     term = "viscous"
     equation = "tau = c qd"
@@ -51,6 +51,8 @@ class CoulombFriction(PlainTerm):
     """τ = f A(q̇)."""
 
     id = "coulomb_friction"
+    rank = 260
+    german = "coulombsche Reibung"
     arguments = frozenset({"velocity"})
     term = "stiction"
     equation = "tau = f sgn(qd)"
@@ -68,6 +70,8 @@ class TorqueOffset(PlainTerm):
     """τ = c."""
 
     id = "torque_offset"
+    rank = 250
+    german = "Drehmomentversatz"
     arguments = frozenset()
     term = "offset"
     equation = "tau = c"
@@ -80,10 +84,15 @@ class TorqueOffset(PlainTerm):
         """One."""
         return per_joint_columns(np.ones_like(signals.position[self.joint])[None, None])
 
+    def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
+        """One constant."""
+        return [{"torque": coefficients[0]}]
+
 
 class StribeckTerm(PlainTerm):
     """τ = s A(δ q̇): what the nominal model has as the catalogue's Stribeck friction."""
 
+    is_variant = True
     id = "stribeck_friction"
     arguments = frozenset({"velocity"})
     term = "stribeck"

@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import atan2, hypot
 
 import numpy as np
 
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Shape, per_joint_columns
+from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, per_joint_columns
 from tauscope.recording.recording import Array
-from tauscope.robot import JointType
+from tauscope.robot import JointType, Robot
 
 TIMES_A_TURN = np.array([1.0, 2.0, 3.0])
 """An eccentric bearing, an oval one, and one that three jaws hold."""
@@ -24,10 +25,13 @@ class PositionDependentFriction(Effect):
     has_step = True
     of_motion_and_step = True
     id = "position_dependent_friction"
+    rank = 50
+    german = "stellungsabhängige Reibung"
     arguments = frozenset({"position", "velocity"})
     equation = "tau = sgn(qd) (a cos kq + b sin kq)"
     meaning = "the friction level varies with the joint's position"
     remedy = "let the Coulomb level vary with the joint's position"
+    code = "({c[0]} * cos({s[0]} * q) + {c[1]} * sin({s[0]} * q)) * {step}"
     revealing_motion = "the same positions under other loads and speeds"
     coefficients = (Coefficient("a", "{tau}"), Coefficient("b", "{tau}"))
     shapes = (Shape("k", "1/{q}", logarithmic=True),)
@@ -64,3 +68,8 @@ class PositionDependentFriction(Effect):
         """
         step, angle = signals.step[self.joint], shapes * signals.position[self.joint]
         return per_joint_columns(np.stack([step * np.cos(angle), step * np.sin(angle)], axis=1))
+
+    def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
+        """One wave."""
+        a, b = coefficients
+        return [{"amplitude": hypot(a, b), "order": shape[0], "phase": atan2(a, b)}]

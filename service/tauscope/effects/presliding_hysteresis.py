@@ -10,8 +10,9 @@ from itertools import pairwise
 import numpy as np
 
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Shape, per_joint_columns
+from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, per_joint_columns
 from tauscope.recording.recording import Array
+from tauscope.robot import Robot
 
 DISTANCES = np.array([5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 1.6e-2, 3.2e-2])
 """Bristle lengths looked at, relative to the joint's range of motion."""
@@ -60,10 +61,13 @@ class PreslidingHysteresis(Effect):
     of_motion_and_step = True
     within_step = True
     id = "presliding_hysteresis"
+    rank = 70
+    german = "Hysterese vor dem Gleiten"
     arguments = frozenset({"position", "velocity"})
     equation = "tau = F (z - sgn(qd)), dz/dt = qd/x_s - |qd| z/x_s"
     meaning = "friction rises over a distance after each reversal instead of stepping"
     remedy = "replace the Coulomb step by a Dahl or LuGre bristle"
+    no_code = "it needs the state of the bristles"
     revealing_motion = "slow small reversals, a few hundredths of a radian per second"
     coefficients = (Coefficient("F", "{tau}", positive=True),)
     shapes = (Shape("x_s", "{q}", logarithmic=True),)
@@ -96,3 +100,7 @@ class PreslidingHysteresis(Effect):
             start = bristle_deflection(position, lengths, start)[:, -1]
         deflection = bristle_deflection(position, lengths, start)
         return per_joint_columns((deflection - signals.step[self.joint])[:, None])
+
+    def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
+        """Dahl's bristles in place of the robot file's Coulomb friction, whatever F is."""
+        return [{"distance": shape[0]}]

@@ -5,8 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Shape, mesh, per_joint_columns
+from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, mesh, per_joint_columns
 from tauscope.recording.recording import Array
+from tauscope.robot import Robot
 
 SPEEDS = np.array([0.04, 0.08, 0.15, 0.25, 0.4, 0.65, 1.0])
 """Decay speeds looked at, relative to the joint's top speed."""
@@ -24,10 +25,13 @@ class StribeckFriction(Effect):
     has_step = True
     of_motion_and_step = True
     id = "stribeck_friction"
+    rank = 60
+    german = "Stribeck-Reibung"
     arguments = frozenset({"velocity"})
     equation = "tau = s sgn(qd) exp(-(|qd|/v_s)^alpha)"
     meaning = "friction rises towards zero velocity more than the model's curve"
     remedy = "add a Stribeck term"
+    code = "{c[0]} * {step} * exp(-pow(fabs(v) / {s[0]}, {s[1]}))"
     revealing_motion = "slow sweeps between rest and a few v_s, beside motion at top speed"
     coefficients = (Coefficient("s", "{tau}", positive=True),)
     shapes = (Shape("v_s", "{q}/s", logarithmic=True), Shape("alpha", "1", fixed=True))
@@ -67,3 +71,7 @@ class StribeckFriction(Effect):
         speed = np.abs(signals.velocity[self.joint])
         decay = np.exp(-((speed / shapes[:, :1]) ** shapes[:, 1:]))
         return per_joint_columns((signals.step[self.joint] * decay)[:, None])
+
+    def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
+        """One decay."""
+        return [{"amplitude": coefficients[0], "velocity": shape[0], "exponent": shape[1]}]

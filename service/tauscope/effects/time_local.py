@@ -49,6 +49,7 @@ class TimeLocalEffect(Effect):
     """
 
     repeats_with_motion = False
+    no_code = "it belongs to instants of the recordings"
 
     @abstractmethod
     def torque(self, signals: Signals, shape: Array) -> Array:

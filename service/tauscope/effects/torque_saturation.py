@@ -1,13 +1,15 @@
-"""What is wrong with the size of the recorded torque: scaled, or compressed at high load."""
+"""A recorded torque that is compressed or clipped at high load."""
 
 from abc import abstractmethod
 from collections.abc import Sequence
+from math import sqrt
 
 import numpy as np
 
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Quantity, Shape, per_joint_columns
+from tauscope.effects.effect import Coefficient, Effect, Entry, Quantity, Shape, per_joint_columns
 from tauscope.recording.recording import Array
+from tauscope.robot import Robot
 
 COMPRESSIONS = np.array([0.3, 0.5, 0.8, 1.3, 2.2, 4.0])
 """Levels of a soft curve looked at, relative to the largest torque."""
@@ -19,44 +21,16 @@ CLIPPED_AT_LEAST = 0.5
 """Part of what lies beyond the level that a hard curve takes off: one that takes off little is a soft curve."""
 
 
-class TorqueGainError(Effect):
-    """τ_recorded = (1 + g) τ."""
-
-    id = "torque_gain_error"
-    equation = "tau_recorded = (1 + g) tau"
-    meaning = "the recorded torque is scaled: the torque constant is wrong"
-    remedy = "correct the joint's torque_constant by 1 + g"
-    revealing_motion = "fast motion of neighbouring joints that share inertia, or a known added mass"
-    coefficients = (Coefficient("g", "1"),)
-    may_exceed_measured = True
-
-    @classmethod
-    def forms(cls, context: ArmContext) -> Sequence[Effect]:
-        """One a joint."""
-        return [cls(joint) for joint in context.joints]
-
-    def columns(self, signals: Signals, shapes: Array) -> Array:
-        """The model's torque."""
-        return per_joint_columns(signals.torque[self.joint][None, None])
-
-    def factor(self, coefficients: Array) -> float:
-        """1 + g: with a wrong sign every parameter works the other way round.
-
-        Parameters
-        ----------
-        coefficients : (1,) float64
-            g
-        """
-        return 1.0 + float(coefficients[0])
-
-
 class Saturation(Effect):
     """τ_recorded = τ - a (τ - r(τ)): what all curves r have in common; a is 1 where nothing else bends them."""
 
     id = "torque_saturation"
+    rank = 160
+    german = "Drehmomentsättigung"
     equation = "tau_recorded = tau - a (tau - c tanh(tau/c)); clipped: tau - a (tau - clip(tau, +-c))"
     meaning = "the recorded torque is compressed or clipped at high load"
     remedy = "record within the sensor's or the drive's linear range"
+    no_code = "it changes the recorded torque, not the arm's"
     revealing_motion = "the same motion slower and without payload, well below the level"
     shapes = (Shape("c", "{tau}", logarithmic=True),)
     may_exceed_measured = True
@@ -153,10 +127,17 @@ class TorqueSaturation(Saturation):
         std = float(np.sqrt(max(slope @ covariance @ slope, 0.0)))
         return (Quantity("c", level / np.sqrt(share), std, self.unit("{tau}", context)),)
 
+    def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
+        """The soft curve: τ - a (τ - c tanh(τ/c)) is l tanh(τ/l) to third order, l = c/√a."""
+        if coefficients[0] <= 0.0:
+            return []
+        return [{"level": shape[0] / sqrt(coefficients[0]), "shape": "compression"}]
+
 
 class Clipping(Saturation):
     """r(τ) = clip(τ, ±c): what lies beyond the level is cut off."""
 
+    is_variant = True
     coefficients = (Coefficient("a", "1", positive=True, largest=2.0, smallest=CLIPPED_AT_LEAST),)
 
     @classmethod
@@ -175,3 +156,7 @@ class Clipping(Saturation):
             c [Nm or N]
         """
         return np.clip(torque, -levels, levels)
+
+    def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
+        """The level c."""
+        return [{"level": shape[0], "shape": "clip"}] if coefficients[0] > 0.0 else []

@@ -1,4 +1,4 @@
-"""Elastic torque that depends on the joint's own angle: springs, counterbalances, hoses and end stops."""
+"""Elastic torque that sets in past an angle: hoses, cables and end stops."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Shape, mesh, per_joint_columns
+from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, mesh, per_joint_columns
 from tauscope.recording.recording import Array
+from tauscope.robot import Robot
 
 ONSETS = np.linspace(0.2, 0.9, 8)
 """Angles at which a cable begins to pull, relative to the range of motion: one that always pulls is a spring."""
@@ -21,32 +22,6 @@ CLEARLY_BETTER = 10.0
 """What another exponent has to explain more [noise variances]."""
 
 
-class JointSpring(Effect):
-    """τ = k (q - q_0), k < 0 where a counterbalance pushes away; the constant is in the nominal model's offset.
-
-    What a counterbalance carries the motor need not: its torque may well be more than was measured.
-    """
-
-    of_motion_alone = True
-    may_exceed_measured = True
-    id = "joint_spring"
-    arguments = frozenset({"position"})
-    equation = "tau = k (q - q_0)"
-    meaning = "an elastic torque grows linearly with the angle"
-    remedy = "add a spring to the joint"
-    revealing_motion = "the joint's whole range, in several poses of the other joints"
-    coefficients = (Coefficient("k", "{tau}/{q}"),)
-
-    @classmethod
-    def forms(cls, context: ArmContext) -> Sequence[Effect]:
-        """One a joint that moves."""
-        return [cls(joint) for joint in context.joints if context.moves(joint)]
-
-    def columns(self, signals: Signals, shapes: Array) -> Array:
-        """The angle."""
-        return per_joint_columns(signals.position[self.joint][None, None])
-
-
 @dataclass(frozen=True, eq=False)
 class CableForce(Effect):
     """τ = ±k max(±(q - q_t), 0)^p."""
@@ -54,10 +29,13 @@ class CableForce(Effect):
     of_motion_alone = True
     may_exceed_measured = True
     id = "cable_force"
+    rank = 190
+    german = "Kabelkraft"
     arguments = frozenset({"position"})
     equation = "tau = +-k max(+-(q - q_t), 0)^p"
     meaning = "a one-sided elastic torque sets in past an angle"
     remedy = "re-route the hose or cable, or model its pull past the angle"
+    code = "{effect.side}.0 * {c[0]} * pow(fmax({effect.side}.0 * (q - {s[0]}), 0.0), {s[1]})"
     revealing_motion = "motion well past the angle on both sides"
     coefficients = (Coefficient("k", "{tau}/{q}^p", positive=True),)
     shapes = (Shape("q_t", "{q}"), Shape("p", "1", fixed=True))
@@ -107,3 +85,8 @@ class CableForce(Effect):
         """
         beyond = np.maximum(self.side * (signals.position[self.joint] - shapes[:, :1]), 0.0)
         return per_joint_columns((self.side * beyond ** shapes[:, 1:])[:, None])
+
+    def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
+        """One side."""
+        side = "above" if self.side > 0 else "below"
+        return [{"stiffness": coefficients[0], "angle": shape[0], "exponent": shape[1], "side_of_angle": side}]
