@@ -193,44 +193,17 @@ class Backlash(Deflection):
 
         A bounce at another instant than the model's adds nothing to how far the link moves; of how long it flies they
         still tell. Half the difference counts as an error that the covariance does not know.
-
-        Parameters
-        ----------
-        coefficients : (1,) float64
-            b [rad or m]
-        shape : (k,) float64
-            gap that is crossed [rad or m], and what else shapes the column
-        covariance : (1 + k, 1 + k) float64
-            of both
         """
         (found,) = super().quantities(context, coefficients, shape, covariance)
         apart = max(float(shape[0]) - found.value, 0.0)
         return (replace(found, value=found.value + apart, std=float(np.hypot(found.std, 0.5 * apart))),)
 
     def is_consistent(self, coefficients: Array, shape: Array, *, alone: bool = False) -> bool:
-        """Whether the gap that the link flies over is the one by which it moves.
-
-        Parameters
-        ----------
-        coefficients : (1,) float64
-            b [rad or m]
-        shape : (2,) float64
-            gap that is flown over [rad or m], band of the load [Hz]
-        """
+        """Whether the gap that the link flies over is the one by which it moves."""
         return bool(shape[0] <= FARTHEST_FLOWN * coefficients[0])
 
     def deflection(self, load: Array, inertia: Array, shape: Array, rate_hz: float) -> Array:
-        """Place between the teeth.
-
-        Parameters
-        ----------
-        load, inertia : (N,) float64
-            of the link [Nm or N, kg m² or kg]
-        shape : (2,) float64
-            gap that is flown over [rad or m], band of the load [Hz]
-        rate_hz : float
-            sampling rate [Hz]
-        """
+        """Place between the teeth."""
         return place_between_teeth(load, inertia, float(shape[0]), rate_hz)
 
 
@@ -266,43 +239,16 @@ class SpringyTeeth(Backlash):
         return ()
 
     def reluctance(self, shapes: Array) -> Array:
-        """They have to be clearly better than a spring: with next to no gap they are one, with a resonance to choose.
-
-        Parameters
-        ----------
-        shapes : (g, 4) float64
-            gap that is crossed [rad or m], band of the load [Hz], compliance of the teeth [rad/Nm or m/N], their loss
-            [s/rad or s/m]
-        """
+        """They must explain clearly more than a spring: with almost no gap they are one, with a resonance to choose."""
         return np.full(len(shapes), MORE_THAN_A_SPRING)
 
     def is_consistent(self, coefficients: Array, shape: Array, *, alone: bool = False) -> bool:
-        """Whether the gap that the link crosses is the one by which it moves.
-
-        Parameters
-        ----------
-        coefficients : (1,) float64
-            b [rad or m]
-        shape : (4,) float64
-            gap that is crossed [rad or m], band of the load [Hz], compliance of the teeth [rad/Nm or m/N], their loss
-            [s/rad or s/m]
-        """
+        """Whether the gap that the link crosses is the one by which it moves."""
         least = LEAST_MET if alone else 1.0 / SAME
         return bool(least < coefficients[0] / shape[0] < SAME)
 
     def deflection(self, load: Array, inertia: Array, shape: Array, rate_hz: float) -> Array:
-        """Place between and on the teeth; where no inertia is known that could swing, as on stiff ones.
-
-        Parameters
-        ----------
-        load, inertia : (N,) float64
-            of the link, inertia zero where it is not known [Nm or N, kg m² or kg]
-        shape : (4,) float64
-            gap that is crossed [rad or m], band of the load [Hz], compliance of the teeth [rad/Nm or m/N], their loss
-            [s/rad or s/m]
-        rate_hz : float
-            sampling rate [Hz]
-        """
+        """Place between and on the teeth; where no inertia is known that could swing, as on stiff ones."""
         if not inertia.all():
             return place_between_teeth(load, inertia, float(shape[0]), rate_hz)
         return place_between_springs(load, inertia, float(shape[0]), float(shape[2]), float(shape[3]), rate_hz)

@@ -56,33 +56,15 @@ class CableForce(Effect):
         return made
 
     def reluctance(self, shapes: Array) -> Array:
-        """Another exponent than the usual one has to be clearly better.
-
-        Parameters
-        ----------
-        shapes : (g, 2) float64
-            q_t [rad or m], p
-        """
+        """Another exponent than the usual one has to be clearly better."""
         return np.where(shapes[:, 1] == USUAL_EXPONENT, 0.0, CLEARLY_BETTER)
 
     def alike(self, shape: Array) -> Sequence[Array]:
-        """The other exponents: on a grid of onsets any of them may come nearest.
-
-        Parameters
-        ----------
-        shape : (2,) float64
-            q_t [rad or m], p
-        """
+        """The other exponents: on a grid of onsets any of them may come nearest."""
         return [self.grid[self.grid[:, 1] == exponent] for exponent in EXPONENTS if exponent != shape[1]]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """±max(±(q - q_t), 0)^p.
-
-        Parameters
-        ----------
-        shapes : (g, 2) float64
-            q_t [rad or m], p
-        """
+        """±max(±(q - q_t), 0)^p."""
         beyond = np.maximum(self.side * (signals.position[self.joint] - shapes[:, :1]), 0.0)
         return per_joint_columns((self.side * beyond ** shapes[:, 1:])[:, None])
 

@@ -64,17 +64,7 @@ class Deflection(Effect):
     def quantities(
         self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
-        """The size of the deflection, its standard error with that of the first order.
-
-        Parameters
-        ----------
-        coefficients : (1,) float64
-            of the effect
-        shape : (k,) float64
-            values of the shape parameters
-        covariance : (1 + k, 1 + k) float64
-            of both
-        """
+        """The size of the deflection, its standard error with that of the first order."""
         found = super().quantities(context, coefficients, shape, covariance)
         return tuple(replace(each, std=float(np.hypot(each.std, FIRST_ORDER * each.value))) for each in found)
 

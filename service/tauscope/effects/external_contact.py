@@ -63,13 +63,7 @@ class ExternalContact(TimeLocalEffect):
         return [*whole, *(JointContact(joint, grid, *bounds) for joint in context.joints)]
 
     def alike(self, shape: Array) -> Sequence[Array]:
-        """A push that rises and falls beside one that is there at once, and the other way about.
-
-        Parameters
-        ----------
-        shape : (4,) float64
-            the window
-        """
+        """A push that rises and falls beside one that is there at once, and the other way about."""
         scope, start, end, profile = shape
         was_sine = profile == HALF_SINE
         half = 0.5 * (end - start) * (1.0 / SINE_WIDTH if was_sine else SINE_WIDTH)
@@ -77,13 +71,7 @@ class ExternalContact(TimeLocalEffect):
         return [np.array([[scope, max(middle - half, 0.0), middle + half, 0.0 if was_sine else HALF_SINE]])]
 
     def torque(self, signals: Signals, shape: Array) -> Array:
-        """J(q)ᵀ, (3, n, N).
-
-        Parameters
-        ----------
-        shape : (4,) float64
-            the window
-        """
+        """J(q)ᵀ, (3, n, N)."""
         return signals.remembered_of_motion("transposed Jacobian", lambda: transposed_jacobian(signals))
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
@@ -103,13 +91,7 @@ class JointContact(ExternalContact):
     coefficients = (Coefficient("c", "{tau}"),)
 
     def torque(self, signals: Signals, shape: Array) -> Array:
-        """One, (1, 1, N).
-
-        Parameters
-        ----------
-        shape : (4,) float64
-            the window
-        """
+        """One, (1, 1, N)."""
         return np.ones((1, 1, signals.position.shape[1]))
 
 

@@ -59,13 +59,7 @@ class FrictionCoupling(Effect):
         return f"{joint_names[self.partner]} and {joint_names[self.joint or 0]} (on the {relation} of their speeds)"
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """A(K v) and v on both joints.
-
-        Parameters
-        ----------
-        shapes : (g, 1) float64
-            K [s/rad or s/m]
-        """
+        """A(K v) and v on both joints."""
         velocity = signals.velocity[self.joint] + self.sign * signals.velocity[self.partner]
         step = smooth_sign(velocity, shapes)
         own = np.stack([step, np.broadcast_to(velocity, step.shape)], axis=1)

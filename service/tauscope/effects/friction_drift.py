@@ -54,13 +54,7 @@ class FrictionDrift(Effect):
         return [cls(joint, *grid, longest, by_heat) for joint in moving for by_heat in (False, True)]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """A(q̇) h, q̇ h, repetition by repetition.
-
-        Parameters
-        ----------
-        shapes : (g, 1) float64
-            T [s]
-        """
+        """A(q̇) h, q̇ h, repetition by repetition."""
         constants = shapes[:, 0]
         if self.by_heat:
             course = self._temperature(signals, constants)

@@ -98,38 +98,18 @@ class JointElasticity(Deflection):
         return made
 
     def reluctance(self, shapes: Array) -> Array:
-        """A resonance has to be clearly better: where little is seen, any of them fits some noise.
-
-        Parameters
-        ----------
-        shapes : (g, 2) float64
-            band of the load [Hz], compliance on which the link swings, 0 where it does not [rad/Nm or m/N]
-        """
+        """A resonance has to be clearly better: where little is seen, any of them fits some noise."""
         return np.where(shapes[:, 1] == 0.0, 0.0, CLEARLY_BETTER)
 
     def alike(self, shape: Array) -> Sequence[Array]:
-        """What swings a little slower or faster, in either band.
-
-        Parameters
-        ----------
-        shape : (2,) float64
-            band of the load [Hz], compliance on which the link swings, 0 where it does not [rad/Nm or m/N]
-        """
+        """What swings a little slower or faster, in either band."""
         if shape[1] == 0.0:
             return ()
         bands = np.unique(self.grid[self.grid[:, 1] > 0.0, 0])
         return [np.stack([np.full(len(BETWEEN), band), shape[1] * BETWEEN], axis=1) for band in bands]
 
     def is_consistent(self, coefficients: Array, shape: Array, *, alone: bool = False) -> bool:
-        """Whether what gives way is what the link swings on.
-
-        Parameters
-        ----------
-        coefficients : (1,) float64
-            c [rad/Nm or m/N]
-        shape : (2,) float64
-            band of the load [Hz], compliance on which the link swings, 0 where it does not [rad/Nm or m/N]
-        """
+        """Whether what gives way is what the link swings on."""
         return bool(shape[1] == 0.0 or 1.0 / SAME < coefficients[0] / shape[1] < SAME)
 
     def quantities(
@@ -139,15 +119,6 @@ class JointElasticity(Deflection):
 
         The load of a resonance is known only within a band, which errs the one way in the amplitude and the other way
         in the frequency: half the difference is an error of their mean that the covariance does not know.
-
-        Parameters
-        ----------
-        coefficients : (1,) float64
-            c [rad/Nm or m/N]
-        shape : (2,) float64
-            band of the load [Hz], compliance on which the link swings, 0 where it does not [rad/Nm or m/N]
-        covariance : (3, 3) float64
-            of both
         """
         (found,) = super().quantities(context, coefficients, shape, covariance)
         swinging = float(shape[1])
@@ -157,16 +128,6 @@ class JointElasticity(Deflection):
         return (replace(found, value=found.value - apart, std=float(np.hypot(found.std, apart))),)
 
     def deflection(self, load: Array, inertia: Array, shape: Array, rate_hz: float) -> Array:
-        """What the spring transmits.
-
-        Parameters
-        ----------
-        load, inertia : (N,) float64
-            of the link [Nm or N, kg m² or kg]
-        shape : (2,) float64
-            band of the load [Hz], compliance on which the link swings, 0 where it does not [rad/Nm or m/N]
-        rate_hz : float
-            sampling rate [Hz]
-        """
+        """What the spring transmits."""
         swinging = float(shape[1])
         return load if swinging == 0.0 or not inertia.all() else transmitted(load, inertia, swinging, rate_hz)

@@ -50,26 +50,12 @@ class KinematicError(Effect):
         return self.grid[:0]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """Torque per metre, (g, 1, n, N).
-
-        Parameters
-        ----------
-        shapes : (g, 2) float64
-            number of the link and of the axis, from 1
-        """
+        """Torque per metre, (g, 1, n, N)."""
         exact, *longer = _torques(signals, [(shapes[0], 0.0), *((shape, STEP_M) for shape in shapes)])
         return np.stack([(each - exact) / STEP_M for each in longer])[:, None]
 
     def torque_of(self, signals: Signals, coefficients: Array, shape: Array) -> Array:
-        """Torque of the arm as it is less that of the arm as the file has it, (n, N).
-
-        Parameters
-        ----------
-        coefficients : (1,) float64
-            d [m]
-        shape : (2,) float64
-            number of the link and of the axis
-        """
+        """Torque of the arm as it is less that of the arm as the file has it, (n, N)."""
         longer, exact = _torques(signals, [(shape, float(coefficients[0])), (shape, 0.0)])
         return longer - exact
 

@@ -43,13 +43,7 @@ class NonlinearViscous(Effect):
         return [cls(joint, *side) for joint in context.joints if context.moves(joint) for side in sides]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """sgn(q̇) |q̇|ᵖ.
-
-        Parameters
-        ----------
-        shapes : (g, 1) float64
-            p
-        """
+        """sgn(q̇) |q̇|ᵖ."""
         velocity = signals.velocity[self.joint]
         return per_joint_columns((np.sign(velocity) * np.abs(velocity) ** shapes)[:, None])
 

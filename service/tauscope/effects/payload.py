@@ -37,28 +37,12 @@ class Payload(Effect):
         return [cls(None, np.zeros((1, 3)), np.full(3, -FARTHEST_M), np.full(3, FARTHEST_M))]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """Torque of one kilogramme at r.
-
-        Parameters
-        ----------
-        shapes : (g, 3) float64
-            r [m]
-        """
+        """Torque of one kilogramme at r."""
         body = body_columns(signals)
         return np.stack([np.tensordot(unit_body(place), body, axes=1)[None] for place in shapes])
 
     def quantities(
         self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
-        """Mass and first moment.
-
-        Parameters
-        ----------
-        coefficients : (1,) float64
-            m [kg]
-        shape : (3,) float64
-            r [m]
-        covariance : (4, 4) float64
-            of both
-        """
+        """Mass and first moment."""
         return tuple(body_quantities(float(coefficients[0]), shape, covariance))

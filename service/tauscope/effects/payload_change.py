@@ -50,13 +50,7 @@ class PayloadChange(TimeLocalEffect):
         return [cls(None, grid, lower, upper)] if len(grid) else []
 
     def outside(self, shape: Array) -> Array | None:
-        """What is missing within a window is carried outside it: which of the two, training recordings cannot say.
-
-        Parameters
-        ----------
-        shape : (7,) float64
-            the window, r [m]
-        """
+        """What is missing within a window is carried outside it: which of the two, training recordings cannot say."""
         if shape[0] == EVERY:  # held-out recordings have it at the same instants
             return None
         other = shape.copy()
@@ -64,29 +58,13 @@ class PayloadChange(TimeLocalEffect):
         return other
 
     def torque(self, signals: Signals, shape: Array) -> Array:
-        """Torque of one kilogramme at r, (1, n, N).
-
-        Parameters
-        ----------
-        shape : (7,) float64
-            the window, r [m]
-        """
+        """Torque of one kilogramme at r, (1, n, N)."""
         return np.tensordot(unit_body(shape[4:]), body_columns(signals), axes=1)[None]
 
     def quantities(
         self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
-        """Mass, first moment, and when.
-
-        Parameters
-        ----------
-        coefficients : (1,) float64
-            m [kg]
-        shape : (7,) float64
-            the window, r [m]
-        covariance : (8, 8) float64
-            of both
-        """
+        """Mass, first moment, and when."""
         body = (0, 5, 6, 7)
         sign, instants = carried(float(coefficients[0]), shape, context.durations)
         found = list(body_quantities(sign * float(coefficients[0]), shape[4:], covariance[np.ix_(body, body)]))
@@ -95,17 +73,7 @@ class PayloadChange(TimeLocalEffect):
         return tuple(found)
 
     def when(self, coefficients: Array, shape: Array, names: Sequence[str], durations: Sequence[float]) -> str:
-        """When it is picked up and dropped, in words.
-
-        Parameters
-        ----------
-        coefficients : (1,) float64
-            m [kg]
-        shape : (7,) float64
-            the window, r [m]
-        durations : sequence of float
-            of the same [s]
-        """
+        """When it is picked up and dropped, in words."""
         _, instants = carried(float(coefficients[0]), shape, durations)
         verbs = {"t_on": "picked up", "t_off": "dropped"}
         said = [f"{verbs[name]} at {shape[place]:.2f} s" for name, place in instants.items()]

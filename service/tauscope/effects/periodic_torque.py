@@ -162,17 +162,7 @@ class _Periodic(Effect):
     def quantities(
         self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
-        """Amplitude, phase and order instead of sine and cosine.
-
-        Parameters
-        ----------
-        coefficients : (2,) float64
-            of sine and cosine
-        shape : (1,) float64
-            order
-        covariance : (3, 3) float64
-            of both and the order
-        """
+        """Amplitude, phase and order instead of sine and cosine."""
         sine, cosine = (float(value) for value in coefficients)
         amplitude = float(np.hypot(sine, cosine)) or 1e-300
         of_amplitude = np.array([sine, cosine]) / amplitude
@@ -227,13 +217,7 @@ class Cogging(_Periodic):
     coefficients = (Coefficient("sine", "{tau}"), Coefficient("cosine", "{tau}"))
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """Sin kq, cos kq.
-
-        Parameters
-        ----------
-        shapes : (g, 1) float64
-            k [1/rad or 1/m]
-        """
+        """Sin kq, cos kq."""
         return per_joint_columns(self._waves(signals, shapes))
 
 
@@ -260,11 +244,5 @@ class TorqueRipple(_Periodic):
         return [joint for joint in super()._places(context) if context.is_loaded(joint)]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """τ_rb sin kq, τ_rb cos kq.
-
-        Parameters
-        ----------
-        shapes : (g, 1) float64
-            k [1/rad or 1/m]
-        """
+        """τ_rb sin kq, τ_rb cos kq."""
         return per_joint_columns(signals.load[self.joint] * self._waves(signals, shapes))

@@ -104,11 +104,5 @@ class StribeckTerm(PlainTerm):
     shapes = (Shape("delta", "s/{q}", fixed=True),)
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """A(δ q̇).
-
-        Parameters
-        ----------
-        shapes : (g, 1) float64
-            δ [s/rad or s/m]
-        """
+        """A(δ q̇)."""
         return per_joint_columns(smooth_sign(signals.velocity[self.joint][None], shapes)[:, None])

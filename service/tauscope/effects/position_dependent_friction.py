@@ -59,13 +59,7 @@ class PositionDependentFriction(Effect):
         return self.grid[:1] if self.turns else self.grid[::3]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """A(q̇) cos kq, A(q̇) sin kq.
-
-        Parameters
-        ----------
-        shapes : (g, 1) float64
-            k [1/rad or 1/m]
-        """
+        """A(q̇) cos kq, A(q̇) sin kq."""
         step, angle = signals.step[self.joint], shapes * signals.position[self.joint]
         return per_joint_columns(np.stack([step * np.cos(angle), step * np.sin(angle)], axis=1))
 

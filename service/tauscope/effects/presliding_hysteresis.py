@@ -87,13 +87,7 @@ class PreslidingHysteresis(Effect):
         return made
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """Deflection less step, z - A(q̇).
-
-        Parameters
-        ----------
-        shapes : (g, 1) float64
-            x_s [rad or m]
-        """
+        """Deflection less step, z - A(q̇)."""
         position, lengths = signals.position[self.joint], shapes[:, 0]
         start = np.full(len(lengths), signals.step[self.joint, 0])  # sliding where it moves, relaxed where it rests
         if signals.periodic:  # a period later the bristles stand as they stood

@@ -49,25 +49,11 @@ class StribeckFriction(Effect):
         return made
 
     def is_possible(self, shape: Array, k_v: float | None) -> bool:
-        """Whether friction rises before it decays.
-
-        Parameters
-        ----------
-        shape : (2,) float64
-            v_s [rad/s or m/s], α
-        k_v : float or None
-            K_v of the joint; None where there is none [s/rad or s/m]
-        """
+        """Whether friction rises before it decays."""
         return k_v is None or k_v * float(shape[0]) >= SHORTEST_DECAY
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """A(q̇) exp(-(|q̇|/v_s)^α).
-
-        Parameters
-        ----------
-        shapes : (g, 2) float64
-            v_s [rad/s or m/s], α
-        """
+        """A(q̇) exp(-(|q̇|/v_s)^α)."""
         speed = np.abs(signals.velocity[self.joint])
         decay = np.exp(-((speed / shapes[:, :1]) ** shapes[:, 1:]))
         return per_joint_columns((signals.step[self.joint] * decay)[:, None])

@@ -63,15 +63,7 @@ class TimeDelay(LateTorque):
         return -np.gradient(torque, 1.0 / signals.rate_hz, axis=-1)[None, None]
 
     def torque_of(self, signals: Signals, coefficients: Array, shape: Array) -> Array:
-        """τ(t - d) - τ(t): friction's step arrives late, it does not become a spike.
-
-        Parameters
-        ----------
-        coefficients : (1,) float64
-            d [s]
-        shape : (0,) float64
-            none
-        """
+        """τ(t - d) - τ(t): friction's step arrives late, it does not become a spike."""
         torque = self.measured(signals)
         return shifted(torque, float(coefficients[0]), signals) - torque
 
@@ -108,13 +100,7 @@ class Shift(LateTorque):
         return shifted(torque, constant, signals)
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """What is recorded less what is there.
-
-        Parameters
-        ----------
-        shapes : (g, 1) float64
-            T [s]
-        """
+        """What is recorded less what is there."""
         torque = self.measured(signals)
         recorded = np.stack([self.late(torque, float(constant), signals) for constant in shapes[:, 0]])
         return (recorded - torque)[:, None]
@@ -126,17 +112,7 @@ class Shift(LateTorque):
     def quantities(
         self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
-        """The mean delay d = a T: it is known well also where a and T are not.
-
-        Parameters
-        ----------
-        coefficients : (1,) float64
-            a
-        shape : (1,) float64
-            T [s]
-        covariance : (2, 2) float64
-            of both
-        """
+        """The mean delay d = a T: it is known well also where a and T are not."""
         share, constant = float(coefficients[0]), float(shape[0])
         slope = np.array([constant, share])
         return (Quantity("d", share * constant, float(np.sqrt(max(slope @ covariance @ slope, 0.0))), "s"),)
@@ -166,31 +142,13 @@ class Lag(Shift):
         return [cls(place, *_constants(context), order=order) for place in places for order in ORDERS]
 
     def late(self, torque: Array, constant: float, signals: Signals) -> Array:
-        """Torque (m, N) behind the filter.
-
-        Parameters
-        ----------
-        torque : (m, N) float64
-            before it [Nm or N]
-        constant : float
-            T [s]
-        """
+        """Torque (m, N) behind the filter."""
         return low_passed(torque, constant, self.order, signals)
 
     def quantities(
         self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
-        """The mean delay, T and n.
-
-        Parameters
-        ----------
-        coefficients : (1,) float64
-            a
-        shape : (1,) float64
-            T [s]
-        covariance : (2, 2) float64
-            of both
-        """
+        """The mean delay, T and n."""
         (each,) = super().quantities(context, coefficients, shape, covariance)
         own = float(np.sqrt(max(covariance[1, 1], 0.0)))
         return (

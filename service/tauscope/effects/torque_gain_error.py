@@ -32,13 +32,7 @@ class TorqueGainError(Effect):
         return per_joint_columns(signals.torque[self.joint][None, None])
 
     def factor(self, coefficients: Array) -> float:
-        """1 + g: with a wrong sign every parameter works the other way round.
-
-        Parameters
-        ----------
-        coefficients : (1,) float64
-            g
-        """
+        """1 + g: with a wrong sign every parameter works the other way round."""
         return 1.0 + float(coefficients[0])
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:

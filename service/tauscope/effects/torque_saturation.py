@@ -63,13 +63,7 @@ class Saturation(Effect):
         """
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """What the recorded torque falls short by.
-
-        Parameters
-        ----------
-        shapes : (g, 1) float64
-            c [Nm or N]
-        """
+        """What the recorded torque falls short by."""
         torque = signals.torque[self.joint]
         return per_joint_columns((self.recorded(torque, shapes) - torque)[:, None])
 
@@ -85,43 +79,17 @@ class TorqueSaturation(Saturation):
         return [*cls.of_levels(context, COMPRESSIONS), *Clipping.forms(context)]
 
     def recorded(self, torque: Array, levels: Array) -> Array:
-        """A soft curve, c tanh(τ/c), (g, N).
-
-        Parameters
-        ----------
-        torque : (N,) float64
-            as it is [Nm or N]
-        levels : (g, 1) float64
-            c [Nm or N]
-        """
+        """A soft curve, c tanh(τ/c), (g, N)."""
         return levels * np.tanh(torque / levels)
 
     def is_consistent(self, coefficients: Array, shape: Array, *, alone: bool = False) -> bool:
-        """Whether a curve with a = 1 that is bent as much has a level that a sensor may have.
-
-        Parameters
-        ----------
-        coefficients : (1,) float64
-            a
-        shape : (1,) float64
-            c [Nm or N]
-        """
+        """Whether a curve with a = 1 that is bent as much has a level that a sensor may have."""
         return bool(shape[0] >= self.lower[0] * np.sqrt(coefficients[0]))
 
     def quantities(
         self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
-        """The level c/√a.
-
-        Parameters
-        ----------
-        coefficients : (1,) float64
-            a
-        shape : (1,) float64
-            c [Nm or N]
-        covariance : (2, 2) float64
-            of both
-        """
+        """The level c/√a."""
         share, level = max(float(coefficients[0]), 1e-12), float(shape[0])
         slope = np.array([-0.5 * level / share**1.5, 1.0 / np.sqrt(share)])
         std = float(np.sqrt(max(slope @ covariance @ slope, 0.0)))
@@ -146,15 +114,7 @@ class Clipping(Saturation):
         return cls.of_levels(context, CLIPS)
 
     def recorded(self, torque: Array, levels: Array) -> Array:
-        """A hard curve, clip(τ, ±c), (g, N).
-
-        Parameters
-        ----------
-        torque : (N,) float64
-            as it is [Nm or N]
-        levels : (g, 1) float64
-            c [Nm or N]
-        """
+        """A hard curve, clip(τ, ±c), (g, N)."""
         return np.clip(torque, -levels, levels)
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
