@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagnosis.diagnosed_arm import at_joint, recordings
-from diagnosis.test_effect_columns import setting
+from effects.piece_of_motion import context
 from identification.simulated import Array, SimulatedArm, paper_robot
 from tauscope.diagnosis import diagnose
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
@@ -43,7 +43,7 @@ def candidates(diagnosis: Diagnosis, effect: str) -> list[Candidate]:
 
 def test_powers_of_speed_keep_away_from_the_model_s_own_line() -> None:
     """At a power of one, coefficients of any size cancel the viscous term."""
-    forms = [each for each in possible_effects(setting()) if isinstance(each, NonlinearViscous)]
+    forms = [each for each in possible_effects(context()) if isinstance(each, NonlinearViscous)]
     for form in forms:
         assert (form.lower > 1.0) | (form.upper < 1.0)
         assert form.lower <= form.grid.min()

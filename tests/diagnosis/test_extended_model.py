@@ -13,22 +13,24 @@ import numpy as np
 import pytest
 
 from diagnosis.diagnosed_arm import EffectTorque, at_joint, recordings
-from diagnosis.test_effect_columns import SIGNALS, setting
+from effects.piece_of_motion import SIGNALS, context
 from identification.simulated import Array, SimulatedArm, paper_robot
 from tauscope.diagnosis import Diagnosis, against_saved, diagnose, document
 from tauscope.diagnosis.extended_model.saved import ModelDocument, _entry, _term, model_document, read_model, restored
 from tauscope.diagnosis.model.extended import with_terms
 from tauscope.diagnosis.model.residual import raw_squares
 from tauscope.diagnosis.model.term import Term
-from tauscope.effects import Effect, possible_effects
+from tauscope.effects import Effect, TimeLocalEffect, catalogue, possible_effects
 from tauscope.errors import IdentificationError
-from tauscope.export.extended_compensation import EXPRESSIONS, compensation_code
-from tauscope.export.simulation_files import ENTRIES, improved_robot, scenario_text
+from tauscope.export.extended_compensation import compensation_code
+from tauscope.export.simulation_files import improved_robot, scenario_text
 from tauscope.recording import EffortKind
 from tauscope.robot import read_robot
 from tauscope_sim.examples import example_robot
 from tauscope_sim.plant import Plant
 from tauscope_sim.scenario_file import read_scenario, scenario_from_yaml
+
+CODED = {effect.id for effect in catalogue() if effect.code}
 
 
 def pulled(arm: SimulatedArm, rigid: Array) -> Array:
@@ -45,7 +47,7 @@ def found(effect: EffectTorque = pulled) -> Diagnosis:
 
 @cache
 def forms() -> list[Effect]:
-    return list(possible_effects(setting()))
+    return list(possible_effects(context()))
 
 
 def terms(rng: np.random.Generator, ids: set[str]) -> list[Term]:
@@ -128,7 +130,7 @@ def expected(diagnosis: Diagnosis, added: list[Term]) -> tuple[Array, Array, Arr
 
 
 def test_python_code_gives_the_torque_of_the_effects() -> None:
-    diagnosis, added = with_all(set(EXPRESSIONS))
+    diagnosis, added = with_all(CODED)
     space: dict[str, Any] = {}
     exec(code(diagnosis, ".py"), space)
     effect_torque = next(value for name, value in space.items() if name.endswith("_effect_torque"))
@@ -149,8 +151,8 @@ def test_code_gives_the_arms_own_torque_where_the_recorded_one_is_scaled() -> No
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
 def test_c_code_compiles_without_warnings_and_gives_the_same(tmp_path: Path) -> None:
-    diagnosis, added = with_all({*EXPRESSIONS, "time_delay"})
-    added = [term for term in added if term.effect.id in EXPRESSIONS]
+    diagnosis, added = with_all({*CODED, "time_delay"})
+    added = [term for term in added if term.effect.id in CODED]
     text = code(diagnosis, ".h")
     assert "time_delay" in text  # said to be left out
     (tmp_path / "model.h").write_text(text)
@@ -171,7 +173,8 @@ def test_a_scenario_can_say_every_effect_that_it_has_entries_for(tmp_path: Path)
     robot = tmp_path / "improved.yaml"
     robot.write_text(improved_robot(found(), example_robot("paper_arm"), robot))
     arm = read_robot(robot)
-    said = set(ENTRIES) - {"external_contact", "payload_change"}
+    lasting = [each for each in catalogue() if each.screened and not issubclass(each, TimeLocalEffect)]
+    said = {each.id for each in lasting if each.scenario_entries is not Effect.scenario_entries}
     diagnosis, _ = with_all(said)
     text = scenario_text(diagnosis)
     scenario = scenario_from_yaml(text.encode(), "scenario.yaml", arm)

@@ -14,7 +14,7 @@ from tauscope.diagnosis.fitting.projection import Moments
 from tauscope.diagnosis.model.term import Term
 from tauscope.effects import Effect, Quantity
 from tauscope.effects.periodic_torque import Cogging
-from tauscope.effects.torque_sensing import Clipping
+from tauscope.effects.torque_saturation import Clipping
 
 ERROR = 0.2
 WITHOUT: Any = SimpleNamespace(model=None)

@@ -16,7 +16,7 @@ from tauscope.diagnosis.model.term import Term
 from tauscope.diagnosis.second_look import agrees
 from tauscope.diagnosis.selection.selector import Selector
 from tauscope.effects import Effect
-from tauscope.effects.elastic_forces import JointSpring
+from tauscope.effects.joint_spring import JointSpring
 
 WIDER = "look again in a wider band"
 

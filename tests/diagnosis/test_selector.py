@@ -14,11 +14,11 @@ from tauscope.diagnosis.selection.confirmation import Confirmation
 from tauscope.diagnosis.selection.selector import Selector
 from tauscope.diagnosis.selection.table import Table
 from tauscope.effects import Effect
-from tauscope.effects.elastic_forces import CableForce, JointSpring
-from tauscope.effects.late_torque import Shift
+from tauscope.effects.cable_force import CableForce
+from tauscope.effects.joint_spring import JointSpring
 from tauscope.effects.periodic_torque import Cogging
 from tauscope.effects.rotor_inertia import RotorInertia
-from tauscope.effects.time_delay import TimeDelay
+from tauscope.effects.time_delay import Shift, TimeDelay
 
 JOINTS = tuple(SimpleNamespace(name=f"joint{number}") for number in (1, 2, 3))
 FIT: Any = SimpleNamespace(model=SimpleNamespace(structure=SimpleNamespace(robot=SimpleNamespace(joints=JOINTS))))

@@ -11,9 +11,9 @@ from tauscope.diagnosis import diagnose, document
 from tauscope.diagnosis.selection import shape_error
 from tauscope.diagnosis.selection.shape_error import EFFICIENCY, SHAPE_ERROR, Standing, standings
 from tauscope.effects import Effect
-from tauscope.effects.asymmetric_friction import AsymmetricCoulomb
+from tauscope.effects.asymmetric_coulomb import AsymmetricCoulomb
 from tauscope.effects.load_dependent_friction import LoadDependentFriction
-from tauscope.effects.torque_sensing import TorqueGainError
+from tauscope.effects.torque_gain_error import TorqueGainError
 
 EXPLAINED = 1000.0
 

@@ -7,7 +7,7 @@ from scipy import stats
 from tauscope.diagnosis.findings.detectability import detectable, needed_strength
 from tauscope.diagnosis.findings.verdict import Evidence, Verdict, verdict
 from tauscope.diagnosis.screening.screen import Candidate
-from tauscope.effects.elastic_forces import JointSpring
+from tauscope.effects.joint_spring import JointSpring
 
 
 @pytest.mark.parametrize(

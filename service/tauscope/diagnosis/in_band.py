@@ -30,7 +30,7 @@ from tauscope.diagnosis.selection.guided import guided_by
 from tauscope.diagnosis.selection.kinds import with_best_kinds
 from tauscope.diagnosis.selection.pruning import without_errors_of_larger_ones
 from tauscope.diagnosis.selection.selector import Selector
-from tauscope.effects import Effect, Setting
+from tauscope.effects import ArmContext, Effect
 from tauscope.effects.payload import Payload
 from tauscope.effects.plain_terms import TorqueOffset
 from tauscope.effects.rotor_inertia import RotorInertia
@@ -94,7 +94,7 @@ def _apart(observations: Observations) -> Observations:
 
 
 def selected(
-    selector: Selector, model: ExtendedModel, identification: Identification, setting: Setting, progress: Progress
+    selector: Selector, model: ExtendedModel, identification: Identification, setting: ArmContext, progress: Progress
 ) -> tuple[Selection, Selector]:
     """All that is missing, and the selector whose rows count as much as they should beside it."""
     rotors = [
@@ -156,7 +156,7 @@ def _weighted(observations: Observations, model: ExtendedModel) -> Observations:
 
 
 def concluded(
-    identification: Identification, setting: Setting, selector: Selector, selection: Selection, cutoff_hz: float
+    identification: Identification, setting: ArmContext, selector: Selector, selection: Selection, cutoff_hz: float
 ) -> Diagnosis:
     """All tests on the selected model.
 

@@ -1,21 +1,21 @@
-"""The catalogue of effects that a model may have left out: one small file an effect."""
+"""The catalogue of effects that a model may have left out: one small file an effect, found by itself."""
 
-from tauscope.effects.effect import Effect
-from tauscope.effects.parameters import Coefficient, Quantity, Shape
-from tauscope.effects.registry import catalogue, farther_effects, possible_effects
-from tauscope.effects.setting import Setting
-from tauscope.effects.signals import Signals
+from tauscope.effects.context import ArmContext, Signals
+from tauscope.effects.effect import Coefficient, Effect, Entry, Quantity, Shape
+from tauscope.effects.registry import catalogue, effect_class, farther_effects, possible_effects
 from tauscope.effects.time_local import TimeLocalEffect
 
 __all__ = [
+    "ArmContext",
     "Coefficient",
     "Effect",
+    "Entry",
     "Quantity",
-    "Setting",
     "Shape",
     "Signals",
     "TimeLocalEffect",
     "catalogue",
+    "effect_class",
     "farther_effects",
     "possible_effects",
 ]

@@ -6,16 +6,14 @@ Stiff teeth stop the link; on springy ones it swings, at frequencies that a diag
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import ClassVar
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicSpline
 
+from tauscope.effects.context import ArmContext
 from tauscope.effects.deflection import BAND, Deflection
-from tauscope.effects.effect import Effect, mesh
-from tauscope.effects.parameters import Coefficient, Quantity, Shape
-from tauscope.effects.setting import Setting
+from tauscope.effects.effect import Coefficient, Effect, Quantity, Shape, mesh
 from tauscope.recording.recording import Array
 
 GAPS = np.array([1e-4, 3e-4, 1e-3, 3e-3, 1e-2])
@@ -162,146 +160,95 @@ def _first(is_so: np.ndarray) -> int:
 class Backlash(Deflection):
     """q_link = q - b u, u the place of the link between the teeth."""
 
-    id: ClassVar[str] = "backlash"
-    equation: ClassVar[str] = "q_link = q - delta, delta = +-b/2 under load, I d2(delta)/dt2 = tau_rb in between"
-    meaning: ClassVar[str] = "the transmission has play when the load changes sign"
-    remedy: ClassVar[str] = "take up the play, or model a dead zone"
-    revealing_motion: ClassVar[str] = "poses in which the joint's load passes slowly through zero"
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("b", "{q}", positive=True),)
+    id = "backlash"
+    rank = 120
+    german = "Spiel"
+    equation = "q_link = q - delta, delta = +-b/2 under load, I d2(delta)/dt2 = tau_rb in between"
+    meaning = "the transmission has play when the load changes sign"
+    remedy = "take up the play, or model a dead zone"
+    revealing_motion = "poses in which the joint's load passes slowly through zero"
+    coefficients = (Coefficient("b", "{q}", positive=True),)
     # What is flown over is b, and less where the load is smoothed: without it the motor, too, moves on during a flight.
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("flown", "{q}", logarithmic=True, reported=False), BAND)
+    shapes = (Shape("flown", "{q}", logarithmic=True, reported=False), BAND)
 
     @classmethod
-    def forms(cls, setting: Setting) -> Sequence[Effect]:
+    def forms(cls, context: ArmContext) -> Sequence[Effect]:
         """One a joint that moves under load."""
         made = []
-        for joint in cls.deflected_joints(setting):
-            gaps, bands = GAPS * (setting.highest[joint] - setting.lowest[joint]), BANDS * setting.cutoff_hz
+        for joint in cls.deflected_joints(context):
+            gaps, bands = GAPS * (context.highest[joint] - context.lowest[joint]), BANDS * context.cutoff_hz
             bounds = np.array([0.5 * gaps[0], bands[-1]]), np.array([2.0 * gaps[-1], bands[0]])
             made.append(cls(joint, mesh(gaps, bands), *bounds))
         return made
 
     @classmethod
-    def farther_forms(cls, setting: Setting) -> Sequence[Effect]:
+    def farther_forms(cls, context: ArmContext) -> Sequence[Effect]:
         """The same with teeth that give way, one a joint whose link has an inertia."""
-        return SpringyTeeth.forms(setting)
+        return SpringyTeeth.forms(context)
 
     def quantities(
-        self, setting: Setting, coefficients: Array, shape: Array, covariance: Array
+        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
         """b; where the link crosses more than it is found to move by, what it crosses.
 
         A bounce at another instant than the model's adds nothing to how far the link moves; of how long it flies they
         still tell. Half the difference counts as an error that the covariance does not know.
-
-        Parameters
-        ----------
-        coefficients : (1,) float64
-            b [rad or m]
-        shape : (k,) float64
-            gap that is crossed [rad or m], and what else shapes the column
-        covariance : (1 + k, 1 + k) float64
-            of both
         """
-        (found,) = super().quantities(setting, coefficients, shape, covariance)
+        (found,) = super().quantities(context, coefficients, shape, covariance)
         apart = max(float(shape[0]) - found.value, 0.0)
         return (replace(found, value=found.value + apart, std=float(np.hypot(found.std, 0.5 * apart))),)
 
     def is_consistent(self, coefficients: Array, shape: Array, *, alone: bool = False) -> bool:
-        """Whether the gap that the link flies over is the one by which it moves.
-
-        Parameters
-        ----------
-        coefficients : (1,) float64
-            b [rad or m]
-        shape : (2,) float64
-            gap that is flown over [rad or m], band of the load [Hz]
-        """
+        """Whether the gap that the link flies over is the one by which it moves."""
         return bool(shape[0] <= FARTHEST_FLOWN * coefficients[0])
 
     def deflection(self, load: Array, inertia: Array, shape: Array, rate_hz: float) -> Array:
-        """Place between the teeth.
-
-        Parameters
-        ----------
-        load, inertia : (N,) float64
-            of the link [Nm or N, kg m² or kg]
-        shape : (2,) float64
-            gap that is flown over [rad or m], band of the load [Hz]
-        rate_hz : float
-            sampling rate [Hz]
-        """
+        """Place between the teeth."""
         return place_between_teeth(load, inertia, float(shape[0]), rate_hz)
 
 
 class SpringyTeeth(Backlash):
     """The same where the teeth give way, so that a link that has crossed the gap swings on them."""
 
-    shapes: ClassVar[tuple[Shape, ...]] = (
+    is_variant = True
+    shapes = (
         *Backlash.shapes,
         Shape("swinging", "{q}/{tau}", logarithmic=True, reported=False),
         Shape("loss", "s/{q}", logarithmic=True, reported=False),
     )
-    swings: ClassVar[bool] = True
+    swings = True
 
     @classmethod
-    def forms(cls, setting: Setting) -> Sequence[Effect]:
+    def forms(cls, context: ArmContext) -> Sequence[Effect]:
         """One a joint that moves under load, and whose link has an inertia."""
         made = []
-        for joint in cls.deflected_joints(setting):
-            if setting.inertia[joint] <= 0.0:
+        for joint in cls.deflected_joints(context):
+            if context.inertia[joint] <= 0.0:
                 continue
-            gaps = SPRINGY_GAPS * (setting.highest[joint] - setting.lowest[joint])
-            swinging = 1.0 / ((2.0 * np.pi * RESONANCES * setting.cutoff_hz) ** 2 * setting.inertia[joint])
-            grid = mesh(gaps, np.array([SPRINGY_BAND * setting.cutoff_hz]), swinging, LOSSES[1:2])
+            gaps = SPRINGY_GAPS * (context.highest[joint] - context.lowest[joint])
+            swinging = 1.0 / ((2.0 * np.pi * RESONANCES * context.cutoff_hz) ** 2 * context.inertia[joint])
+            grid = mesh(gaps, np.array([SPRINGY_BAND * context.cutoff_hz]), swinging, LOSSES[1:2])
             lower, upper = grid.min(axis=0) * [0.5, 1.0, 0.7, 1.0], grid.max(axis=0) * [2.0, 1.0, 1.4, 1.0]
             lower[-1], upper[-1] = LOSSES[0], LOSSES[-1]
             made.append(cls(joint, grid, lower, upper))
         return made
 
     @classmethod
-    def farther_forms(cls, setting: Setting) -> Sequence[Effect]:
+    def farther_forms(cls, context: ArmContext) -> Sequence[Effect]:
         """None: these are."""
         return ()
 
     def reluctance(self, shapes: Array) -> Array:
-        """They have to be clearly better than a spring: with next to no gap they are one, with a resonance to choose.
-
-        Parameters
-        ----------
-        shapes : (g, 4) float64
-            gap that is crossed [rad or m], band of the load [Hz], compliance of the teeth [rad/Nm or m/N], their loss
-            [s/rad or s/m]
-        """
+        """They must explain clearly more than a spring: with almost no gap they are one, with a resonance to choose."""
         return np.full(len(shapes), MORE_THAN_A_SPRING)
 
     def is_consistent(self, coefficients: Array, shape: Array, *, alone: bool = False) -> bool:
-        """Whether the gap that the link crosses is the one by which it moves.
-
-        Parameters
-        ----------
-        coefficients : (1,) float64
-            b [rad or m]
-        shape : (4,) float64
-            gap that is crossed [rad or m], band of the load [Hz], compliance of the teeth [rad/Nm or m/N], their loss
-            [s/rad or s/m]
-        """
+        """Whether the gap that the link crosses is the one by which it moves."""
         least = LEAST_MET if alone else 1.0 / SAME
         return bool(least < coefficients[0] / shape[0] < SAME)
 
     def deflection(self, load: Array, inertia: Array, shape: Array, rate_hz: float) -> Array:
-        """Place between and on the teeth; where no inertia is known that could swing, as on stiff ones.
-
-        Parameters
-        ----------
-        load, inertia : (N,) float64
-            of the link, inertia zero where it is not known [Nm or N, kg m² or kg]
-        shape : (4,) float64
-            gap that is crossed [rad or m], band of the load [Hz], compliance of the teeth [rad/Nm or m/N], their loss
-            [s/rad or s/m]
-        rate_hz : float
-            sampling rate [Hz]
-        """
+        """Place between and on the teeth; where no inertia is known that could swing, as on stiff ones."""
         if not inertia.all():
             return place_between_teeth(load, inertia, float(shape[0]), rate_hz)
         return place_between_springs(load, inertia, float(shape[0]), float(shape[2]), float(shape[3]), rate_hz)

@@ -2,16 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import ClassVar
 
 import numpy as np
 
 from tauscope.dynamics import gravity_torque
-from tauscope.effects.effect import Effect
-from tauscope.effects.parameters import Coefficient
-from tauscope.effects.setting import Setting
-from tauscope.effects.signals import Signals
+from tauscope.effects.context import ArmContext, Signals
+from tauscope.effects.effect import Coefficient, Effect, Entry
 from tauscope.recording.recording import Array
+from tauscope.robot import Robot
 
 
 def tilt_directions(gravity: Array) -> tuple[Array, Array]:
@@ -32,28 +30,26 @@ def tilt_directions(gravity: Array) -> tuple[Array, Array]:
 class BaseTilt(Effect):
     """τ = ∂τ/∂g (|g| α_1 e_1 + |g| α_2 e_2), e_1 and e_2 across gravity."""
 
-    of_motion_alone: ClassVar[bool] = True  # the consistent links, as for `KinematicError`
-    id: ClassVar[str] = "base_tilt"
-    arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "others"})
-    equation: ClassVar[str] = "tau = dtau/dg (|g| (alpha_1 e_1 + alpha_2 e_2)), e_1 and e_2 across gravity"
-    meaning: ClassVar[str] = "gravity points elsewhere in the base frame than the robot file says"
-    remedy: ClassVar[str] = "level the base, or correct gravity in the robot file"
-    revealing_motion: ClassVar[str] = "wide poses all round the first joint"
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("alpha_1", "rad"), Coefficient("alpha_2", "rad"))
+    of_motion_alone = True  # the consistent links, as for `KinematicError`
+    id = "base_tilt"
+    rank = 200
+    german = "geneigte Basis"
+    arguments = frozenset({"position", "others"})
+    equation = "tau = dtau/dg (|g| (alpha_1 e_1 + alpha_2 e_2)), e_1 and e_2 across gravity"
+    meaning = "gravity points elsewhere in the base frame than the robot file says"
+    remedy = "level the base, or correct gravity in the robot file"
+    no_code = "it needs the positions of all joints"
+    no_scenario = "a scenario tilts gravity along -z only"
+    revealing_motion = "wide poses all round the first joint"
+    coefficients = (Coefficient("alpha_1", "rad"), Coefficient("alpha_2", "rad"))
 
     @classmethod
-    def forms(cls, setting: Setting) -> Sequence[Effect]:
+    def forms(cls, context: ArmContext) -> Sequence[Effect]:
         """One for the arm, where there is gravity."""
-        return [cls(None)] if np.linalg.norm(setting.robot.gravity) > 0.0 else []
+        return [cls(None)] if np.linalg.norm(context.robot.gravity) > 0.0 else []
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """Torque of gravity of the same strength across the stated one.
-
-        Parameters
-        ----------
-        shapes : (1, 0) float64
-            none
-        """
+        """Torque of gravity of the same strength across the stated one."""
         strength = float(np.linalg.norm(signals.robot.gravity))
         position = np.ascontiguousarray(signals.position.T)
         torques = [
@@ -61,3 +57,9 @@ class BaseTilt(Effect):
             for direction in tilt_directions(signals.robot.gravity)
         ]
         return np.stack(torques)[None]
+
+    def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
+        """For gravity along -z: R_x(α) R_y(β) (0, 0, -g) is g (-β, α, -1) to first order."""
+        if robot.gravity[2] >= 0.0 or np.abs(robot.gravity[:2]).max() > 0.0:
+            return []
+        return [{"about_x": coefficients[1], "about_y": -coefficients[0]}]

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from tauscope.dynamics import torque_regressor
-from tauscope.effects.parameters import Coefficient, Quantity, Shape
-from tauscope.effects.signals import Signals
+from tauscope.effects.context import Signals
+from tauscope.effects.effect import Coefficient, Quantity, Shape
 from tauscope.recording.recording import Array
 from tauscope.robot import LinkInertia
 from tauscope.robot.robot import STANDARD_PARAMETERS

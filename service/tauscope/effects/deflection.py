@@ -6,19 +6,15 @@ stands the fourth derivative of the position: the load is smoothed before, to a 
 
 from abc import abstractmethod
 from dataclasses import replace
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from tauscope.dynamics import torque_regressor
-from tauscope.effects.effect import Effect
-from tauscope.effects.last_few import LastFew
-from tauscope.effects.parameters import Quantity, Shape
-from tauscope.effects.setting import Setting
-from tauscope.effects.side_by_side import THREADS
-from tauscope.effects.signals import Signals
+from tauscope.effects.computation import THREADS, LastFew
+from tauscope.effects.context import ArmContext, Signals
+from tauscope.effects.effect import Effect, Quantity, Shape
 from tauscope.recording.recording import Array
 
 SMALL = 1e-4
@@ -51,33 +47,25 @@ _Slopes = tuple[NDArray[np.intp], NDArray[np.float32]]
 class Deflection(Effect):
     """δ of one joint's transmission, per unit of its one coefficient: an effect says which δ its load makes."""
 
-    of_motion_and_load: ClassVar[bool] = True
-    arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "velocity", "acceleration", "load"})
+    of_motion_and_load = True
+    no_code = "it needs the positions of all joints and the state of the link"
+    no_scenario = "the simulated transmission also needs the inertia of its rotor, which was not measured"
+    arguments = frozenset({"position", "velocity", "acceleration", "load"})
 
     @staticmethod
-    def deflected_joints(setting: Setting) -> list[int]:
+    def deflected_joints(context: ArmContext) -> list[int]:
         """Joints that move, and whose transmission carries anything."""
-        return [joint for joint in setting.joints if setting.moves(joint) and setting.is_loaded(joint)]
+        return [joint for joint in context.joints if context.moves(joint) and context.is_loaded(joint)]
 
     def touched(self, joint_count: int) -> tuple[int, ...]:
         """All joints."""
         return tuple(range(joint_count))
 
     def quantities(
-        self, setting: Setting, coefficients: Array, shape: Array, covariance: Array
+        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
-        """The size of the deflection, its standard error with that of the first order.
-
-        Parameters
-        ----------
-        coefficients : (1,) float64
-            of the effect
-        shape : (k,) float64
-            values of the shape parameters
-        covariance : (1 + k, 1 + k) float64
-            of both
-        """
-        found = super().quantities(setting, coefficients, shape, covariance)
+        """The size of the deflection, its standard error with that of the first order."""
+        found = super().quantities(context, coefficients, shape, covariance)
         return tuple(replace(each, std=float(np.hypot(each.std, FIRST_ORDER * each.value))) for each in found)
 
     @abstractmethod

@@ -8,16 +8,20 @@ equation, its columns and the forms that it can take on a given arm.
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tauscope.effects.parameters import Coefficient, Quantity, Shape
-from tauscope.effects.setting import Setting
-from tauscope.effects.signals import Signals
+from tauscope.effects.context import ArmContext, Signals
 from tauscope.recording.recording import Array
-from tauscope.robot import JointType
+from tauscope.robot import JointType, Robot
+
+Entry = dict[str, Any]
+"""An entry of a scenario file without its joint; without its effect too where that is the effect's own id."""
+
+_STEP = "atan({k_v} * v) * 0.6366197723675814"
+"""A(K_v v), the smooth sign, in C and Python."""
 
 _POSITION = {JointType.REVOLUTE: "rad", JointType.PRISMATIC: "m"}
 _TORQUE = {JointType.REVOLUTE: "Nm", JointType.PRISMATIC: "N"}
@@ -25,6 +29,39 @@ _TORQUE = {JointType.REVOLUTE: "Nm", JointType.PRISMATIC: "N"}
 
 NO_SHAPE = np.zeros((1, 0))
 """The grid of an effect without shape parameters."""
+
+
+@dataclass(frozen=True)
+class Coefficient:
+    """A linear coefficient of an effect."""
+
+    name: str
+    unit: str
+    positive: bool = False
+    largest: float = np.inf
+    smallest: float = 0.0
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A quantity that shapes an effect's columns and is searched over a grid, then refined between bounds."""
+
+    name: str
+    unit: str
+    logarithmic: bool = False
+    fixed: bool = False
+    reported: bool = True
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A parameter as a finding reports it."""
+
+    name: str
+    value: float
+    std: float
+    unit: str
+    period: float = np.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +88,13 @@ class Effect(ABC):
     One that does not do the same whenever the motion does, that does not `repeats_with_motion`, passes for noise there.
     What its law depends on are its `arguments`: ``position``, ``velocity``, ``acceleration`` of its joint, the ``load``
     on its transmission, ``time``, the ``others``' motion; None where it acts on whatever torque there is.
+    `code` is the torque as an expression that C and Python share: q, v and load are position, velocity and rigid-body
+    torque of the joint, {c[0]} and {s[0]} the first coefficient and shape, {step} the smooth sign of v, {effect} the
+    object. Without it, `no_code` is the reason. `no_scenario` is the reason where a scenario cannot hold the effect.
+    `rank` is its place in the catalogue and in documents, `german` its name on the German page.
+    One that `is_variant` is a form of the effect of the same id and stands in no catalogue itself.
+    Every geared joint may have one that `is_expected`: it counts towards no limit, and nothing is doubted beside it.
+    One that `has_constant` of its own shows it as the nominal model's offset.
     """
 
     id: ClassVar[str]
@@ -58,6 +102,14 @@ class Effect(ABC):
     meaning: ClassVar[str]
     remedy: ClassVar[str]
     revealing_motion: ClassVar[str]
+    german: ClassVar[str] = ""
+    code: ClassVar[str] = ""
+    no_code: ClassVar[str] = ""
+    no_scenario: ClassVar[str] = ""
+    rank: ClassVar[int] = 0
+    is_variant: ClassVar[bool] = False
+    is_expected: ClassVar[bool] = False
+    has_constant: ClassVar[bool] = False
     coefficients: ClassVar[tuple[Coefficient, ...]]
     shapes: ClassVar[tuple[Shape, ...]] = ()
     repeats: ClassVar[bool] = False
@@ -78,12 +130,17 @@ class Effect(ABC):
     upper: Array = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
-    @abstractmethod
-    def forms(cls, setting: Setting) -> "Sequence[Effect]":
-        """All forms and places worth looking at on this arm and motion."""
+    def forms(cls, context: ArmContext) -> "Sequence[Effect]":
+        """All forms and places worth looking at on this arm and motion: one a joint where it can act."""
+        return [cls(joint) for joint in context.joints if cls.can_act(context, joint)]
 
     @classmethod
-    def farther_forms(cls, setting: Setting) -> "Sequence[Effect]":
+    def can_act(cls, context: ArmContext, joint: int) -> bool:
+        """Whether the motion of a joint, from 0, may show the effect: whether it moves."""
+        return context.moves(joint)
+
+    @classmethod
+    def farther_forms(cls, context: ArmContext) -> "Sequence[Effect]":
         """Forms that show in a small part of the motion: looked at where all others leave more than noise."""
         return ()
 
@@ -114,6 +171,21 @@ class Effect(ABC):
         """
         (columns,) = self.columns(signals, shape[None])
         return np.asarray(np.tensordot(coefficients, columns, axes=1), dtype=np.float64)
+
+    def torque_code(self, coefficients: Sequence[float], shape: Sequence[float], k_v: float) -> str:
+        """`code` with its numbers.
+
+        Parameters
+        ----------
+        k_v : float
+            K_v of the joint [s/rad or s/m]
+        """
+        step = _STEP.format(k_v=repr(k_v))
+        return self.code.format(c=[*map(repr, coefficients)], s=[*map(repr, shape)], step=step, effect=self)
+
+    def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
+        """Entries of a scenario file that stand for the effect; none where `no_scenario` tells why."""
+        return ()
 
     def factor(self, coefficients: Array) -> float:
         """By how much it multiplies what the parameters of the plain model make at its joint: 1 where it only adds.
@@ -205,12 +277,12 @@ class Effect(ABC):
         """The place in words."""
         return "the whole arm" if self.joint is None else joint_names[self.joint]
 
-    def unit(self, template: str, setting: Setting) -> str:
+    def unit(self, template: str, context: ArmContext) -> str:
         """A unit with the joint's own units of torque and position."""
-        return self.unit_at(template, setting, self.joint)
+        return self.unit_at(template, context, self.joint)
 
     @staticmethod
-    def unit_at(template: str, setting: Setting, joint: int | None) -> str:
+    def unit_at(template: str, context: ArmContext, joint: int | None) -> str:
         """The same for any joint.
 
         Parameters
@@ -218,11 +290,11 @@ class Effect(ABC):
         joint : int or None
             joint index, from 0; None for the whole arm
         """
-        kind = setting.robot.joints[joint or 0].type
+        kind = context.robot.joints[joint or 0].type
         return template.format(tau=_TORQUE[kind], q=_POSITION[kind])
 
     def quantities(
-        self, setting: Setting, coefficients: Array, shape: Array, covariance: Array
+        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
         """The parameters of a finding: coefficients, then shapes.
 
@@ -239,7 +311,7 @@ class Effect(ABC):
         names = (*self.coefficients, *self.shapes)
         values = (*coefficients, *shape)
         return tuple(
-            Quantity(each.name, float(value), float(error), self.unit(each.unit, setting))
+            Quantity(each.name, float(value), float(error), self.unit(each.unit, context))
             for each, value, error in zip(names, values, std, strict=True)
             if isinstance(each, Coefficient) or each.reported
         )

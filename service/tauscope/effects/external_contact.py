@@ -2,17 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import ClassVar
 
 import numpy as np
 
 from tauscope.dynamics import gravity_torque
-from tauscope.effects.effect import Effect
-from tauscope.effects.parameters import Coefficient, Shape
-from tauscope.effects.setting import Setting
-from tauscope.effects.signals import Signals
+from tauscope.effects.context import ArmContext, Signals
+from tauscope.effects.effect import Coefficient, Effect, Entry, Shape
 from tauscope.effects.time_local import EVERY, HALF_SINE, TimeLocalEffect
 from tauscope.recording.recording import Array
+from tauscope.robot import Robot
 from tauscope.robot.robot import STANDARD_PARAMETERS
 
 LENGTHS_S = (0.5, 1.5, 4.5)
@@ -38,37 +36,34 @@ _WINDOW = (
 class ExternalContact(TimeLocalEffect):
     """τ = J(q)ᵀ F w(t), F at the origin of the last link's frame in base axes."""
 
-    of_motion_alone: ClassVar[bool] = True
-    id: ClassVar[str] = "external_contact"
-    arguments: ClassVar[frozenset[str] | None] = frozenset({"time"})
-    equation: ClassVar[str] = "tau = J(q)^T F w(t), or tau_j = c w(t); w = 1 or a half sine from t_0 to t_1"
-    meaning: ClassVar[str] = "the arm touches something for a while"
-    remedy: ClassVar[str] = "clear what it touches, or leave that stretch of the recording out"
-    revealing_motion: ClassVar[str] = "the same motion once more without contact"
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (
+    of_motion_alone = True
+    id = "external_contact"
+    rank = 220
+    german = "Kontakt von außen"
+    arguments = frozenset({"time"})
+    equation = "tau = J(q)^T F w(t), or tau_j = c w(t); w = 1 or a half sine from t_0 to t_1"
+    meaning = "the arm touches something for a while"
+    remedy = "clear what it touches, or leave that stretch of the recording out"
+    no_scenario = "a scenario starts anew each time, so only contact at the same time in every recording fits"
+    revealing_motion = "the same motion once more without contact"
+    coefficients = (
         Coefficient("F_x", "N"),
         Coefficient("F_y", "N"),
         Coefficient("F_z", "N"),
     )
-    shapes: ClassVar[tuple[Shape, ...]] = _WINDOW
+    shapes = _WINDOW
 
     @classmethod
-    def forms(cls, setting: Setting) -> Sequence[Effect]:
+    def forms(cls, context: ArmContext) -> Sequence[Effect]:
         """A force at the tool of an arm with enough joints, and a torque at every joint."""
-        grid, bounds = contact_windows(setting.durations)
+        grid, bounds = contact_windows(context.durations)
         if not len(grid):
             return []
-        whole = [cls(None, grid, *bounds)] if setting.robot.joint_count >= JOINTS_FOR_A_FORCE else []
-        return [*whole, *(JointContact(joint, grid, *bounds) for joint in setting.joints)]
+        whole = [cls(None, grid, *bounds)] if context.robot.joint_count >= JOINTS_FOR_A_FORCE else []
+        return [*whole, *(JointContact(joint, grid, *bounds) for joint in context.joints)]
 
     def alike(self, shape: Array) -> Sequence[Array]:
-        """A push that rises and falls beside one that is there at once, and the other way about.
-
-        Parameters
-        ----------
-        shape : (4,) float64
-            the window
-        """
+        """A push that rises and falls beside one that is there at once, and the other way about."""
         scope, start, end, profile = shape
         was_sine = profile == HALF_SINE
         half = 0.5 * (end - start) * (1.0 / SINE_WIDTH if was_sine else SINE_WIDTH)
@@ -76,29 +71,27 @@ class ExternalContact(TimeLocalEffect):
         return [np.array([[scope, max(middle - half, 0.0), middle + half, 0.0 if was_sine else HALF_SINE]])]
 
     def torque(self, signals: Signals, shape: Array) -> Array:
-        """J(q)ᵀ, (3, n, N).
-
-        Parameters
-        ----------
-        shape : (4,) float64
-            the window
-        """
+        """J(q)ᵀ, (3, n, N)."""
         return signals.remembered_of_motion("transposed Jacobian", lambda: transposed_jacobian(signals))
+
+    def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
+        """A window that lies in every recording: a scenario starts anew each time."""
+        if shape[0] != EVERY:
+            return []
+        profile = "half_sine" if shape[3] == HALF_SINE else "rectangular"
+        window = {"start": max(shape[1], 0.0), "duration": shape[2] - shape[1], "profile": profile}
+        own = {"force": list(coefficients)} if self.joint is None else {"torque": coefficients[0]}
+        return [{**own, **window}]
 
 
 class JointContact(ExternalContact):
     """τ_j = c w(t): the same at one joint alone."""
 
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("c", "{tau}"),)
+    is_variant = True
+    coefficients = (Coefficient("c", "{tau}"),)
 
     def torque(self, signals: Signals, shape: Array) -> Array:
-        """One, (1, 1, N).
-
-        Parameters
-        ----------
-        shape : (4,) float64
-            the window
-        """
+        """One, (1, 1, N)."""
         return np.ones((1, 1, signals.position.shape[1]))
 
 

@@ -2,16 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
 from tauscope.dynamics import smooth_sign
-from tauscope.effects.effect import Effect
-from tauscope.effects.parameters import Coefficient, Shape
-from tauscope.effects.setting import Setting
-from tauscope.effects.signals import Signals
+from tauscope.effects.context import ArmContext, Signals
+from tauscope.effects.effect import Coefficient, Effect, Entry, Shape
 from tauscope.recording.recording import Array
+from tauscope.robot import Robot
 
 STEEPNESSES = np.array([30.0, 120.0, 500.0, 2000.0])
 """Steepness of the coupled motor's Coulomb step, times the rms of the joint's own speed."""
@@ -21,30 +19,33 @@ STEEPNESSES = np.array([30.0, 120.0, 500.0, 2000.0])
 class FrictionCoupling(Effect):
     """Friction of v = q̇_j + s q̇_k, s = ±1: τ_j = F(v), τ_k = s F(v), F(v) = f A(K v) + w v."""
 
-    of_motion_alone: ClassVar[bool] = True
-    id: ClassVar[str] = "friction_coupling"
-    arguments: ClassVar[frozenset[str] | None] = frozenset({"velocity", "others"})
-    equation: ClassVar[str] = "tau_j = f sgn(v) + w v, tau_k = +-tau_j, v = qd_j +- qd_k"
-    meaning: ClassVar[str] = "two joints share friction on the sum or difference of their motion"
-    remedy: ClassVar[str] = "add Coulomb and viscous friction of the coupled motor's own speed"
-    revealing_motion: ClassVar[str] = "both joints at once, in the same and in opposite directions, slowly and fast"
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (
+    of_motion_alone = True
+    id = "friction_coupling"
+    rank = 90
+    german = "gekoppelte Reibung"
+    arguments = frozenset({"velocity", "others"})
+    equation = "tau_j = f sgn(v) + w v, tau_k = +-tau_j, v = qd_j +- qd_k"
+    meaning = "two joints share friction on the sum or difference of their motion"
+    remedy = "add Coulomb and viscous friction of the coupled motor's own speed"
+    no_code = "it needs the velocities of two joints"
+    revealing_motion = "both joints at once, in the same and in opposite directions, slowly and fast"
+    coefficients = (
         Coefficient("f", "{tau}", positive=True),
         Coefficient("w", "{tau} s/{q}"),
     )
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("K", "s/{q}", logarithmic=True),)
+    shapes = (Shape("K", "s/{q}", logarithmic=True),)
 
     partner: int = 0
     sign: int = 1
 
     @classmethod
-    def forms(cls, setting: Setting) -> Sequence[Effect]:
+    def forms(cls, context: ArmContext) -> Sequence[Effect]:
         """Neighbours, on the sum and on the difference."""
         made = []
-        for joint in filter(setting.moves, setting.joints):
-            steepness = STEEPNESSES / setting.speed[joint]
+        for joint in filter(context.moves, context.joints):
+            steepness = STEEPNESSES / context.speed[joint]
             grid = steepness[:, None], 0.3 * steepness[:1], 5.0 * steepness[-1:]
-            if joint > 0 and setting.moves(joint - 1):
+            if joint > 0 and context.moves(joint - 1):
                 made += [cls(joint, *grid, partner=joint - 1, sign=sign) for sign in (1, -1)]
         return made
 
@@ -58,14 +59,14 @@ class FrictionCoupling(Effect):
         return f"{joint_names[self.partner]} and {joint_names[self.joint or 0]} (on the {relation} of their speeds)"
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """A(K v) and v on both joints.
-
-        Parameters
-        ----------
-        shapes : (g, 1) float64
-            K [s/rad or s/m]
-        """
+        """A(K v) and v on both joints."""
         velocity = signals.velocity[self.joint] + self.sign * signals.velocity[self.partner]
         step = smooth_sign(velocity, shapes)
         own = np.stack([step, np.broadcast_to(velocity, step.shape)], axis=1)
         return np.stack([self.sign * own, own], axis=2)
+
+    def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
+        """One coupling."""
+        f, w = coefficients
+        of = "sum" if self.sign > 0 else "difference"
+        return [{"other_joint": self.partner + 1, "of": of, "coulomb": f, "viscous": w, "k_v": shape[0]}]

@@ -2,15 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from scipy import signal
 
-from tauscope.effects.effect import Effect
-from tauscope.effects.parameters import Coefficient, Shape
-from tauscope.effects.setting import Setting
-from tauscope.effects.signals import Signals
+from tauscope.effects.context import ArmContext, Signals
+from tauscope.effects.effect import Coefficient, Effect, Shape
 from tauscope.recording.recording import Array
 
 TIMES = np.array([0.08, 0.2, 0.5, 1.2, 3.0])
@@ -29,39 +26,35 @@ class FrictionDrift(Effect):
         D, of the longest recording [s]
     """
 
-    repeats_with_motion: ClassVar[bool] = False
-    has_step: ClassVar[bool] = True
-    id: ClassVar[str] = "friction_drift"
-    arguments: ClassVar[frozenset[str] | None] = frozenset({"velocity", "time"})
-    equation: ClassVar[str] = (
-        "tau = (f sgn(qd) + w qd) h, T dh/dt = p / (1 - exp(-D/T)) - h, p = 1 or friction's own power / 1 W"
-    )
-    meaning: ClassVar[str] = "friction changes over time, as in a warm-up"
-    remedy: ClassVar[str] = "warm the joint up before recording, or let friction depend on temperature"
-    revealing_motion: ClassVar[str] = "the first motion once more at the end"
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("f", "{tau}"), Coefficient("w", "{tau} s/{q}"))
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("T", "s", logarithmic=True),)
+    repeats_with_motion = False
+    has_step = True
+    id = "friction_drift"
+    rank = 80
+    german = "Drift der Reibung"
+    arguments = frozenset({"velocity", "time"})
+    equation = "tau = (f sgn(qd) + w qd) h, T dh/dt = p / (1 - exp(-D/T)) - h, p = 1 or friction's own power / 1 W"
+    meaning = "friction changes over time, as in a warm-up"
+    remedy = "warm the joint up before recording, or let friction depend on temperature"
+    no_code = "it needs the clock or the temperature of the joint"
+    no_scenario = "the simulated drift needs a thermal resistance, which was not measured"
+    revealing_motion = "the first motion once more at the end"
+    coefficients = (Coefficient("f", "{tau}"), Coefficient("w", "{tau} s/{q}"))
+    shapes = (Shape("T", "s", logarithmic=True),)
 
     duration_s: float = 1.0
     by_heat: bool = False
 
     @classmethod
-    def forms(cls, setting: Setting) -> Sequence[Effect]:
+    def forms(cls, context: ArmContext) -> Sequence[Effect]:
         """Both ways, a joint that moves."""
-        longest = max(setting.durations)
+        longest = max(context.durations)
         times = TIMES * longest
         grid = times[:, None], 0.5 * times[:1], 1.5 * times[-1:]
-        moving = [joint for joint in setting.joints if setting.moves(joint)]
+        moving = [joint for joint in context.joints if context.moves(joint)]
         return [cls(joint, *grid, longest, by_heat) for joint in moving for by_heat in (False, True)]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """A(q̇) h, q̇ h, repetition by repetition.
-
-        Parameters
-        ----------
-        shapes : (g, 1) float64
-            T [s]
-        """
+        """A(q̇) h, q̇ h, repetition by repetition."""
         constants = shapes[:, 0]
         if self.by_heat:
             course = self._temperature(signals, constants)

@@ -2,15 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import ClassVar
 
 import numpy as np
 from scipy.linalg import solve_banded
 
+from tauscope.effects.context import ArmContext
 from tauscope.effects.deflection import BAND, Deflection
-from tauscope.effects.effect import Effect
-from tauscope.effects.parameters import Coefficient, Quantity, Shape
-from tauscope.effects.setting import Setting
+from tauscope.effects.effect import Coefficient, Effect, Quantity, Shape
 from tauscope.recording.recording import Array
 
 BANDS = np.array([1.41, 1.0, 0.35, 0.12])
@@ -73,83 +71,56 @@ def transmitted(load: Array, inertia: Array, compliance: float, rate_hz: float) 
 class JointElasticity(Deflection):
     """q_link = q - c τ, τ the load as the spring passes it on."""
 
-    id: ClassVar[str] = "joint_elasticity"
-    equation: ClassVar[str] = "q_link = q - c tau_rb, c = 1/stiffness"
-    meaning: ClassVar[str] = "the transmission gives way under load"
-    remedy: ClassVar[str] = "model the joint as two masses with a stiffness between them"
-    revealing_motion: ClassVar[str] = "sharp reversals from constant speed, and an encoder on the link"
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("c", "{q}/{tau}", positive=True),)
-    shapes: ClassVar[tuple[Shape, ...]] = (BAND, Shape("swinging", "{q}/{tau}", fixed=True, reported=False))
-    swings: ClassVar[bool] = True
+    id = "joint_elasticity"
+    rank = 130
+    german = "Gelenkelastizität"
+    equation = "q_link = q - c tau_rb, c = 1/stiffness"
+    meaning = "the transmission gives way under load"
+    remedy = "model the joint as two masses with a stiffness between them"
+    revealing_motion = "sharp reversals from constant speed, and an encoder on the link"
+    coefficients = (Coefficient("c", "{q}/{tau}", positive=True),)
+    shapes = (BAND, Shape("swinging", "{q}/{tau}", fixed=True, reported=False))
+    swings = True
 
     @classmethod
-    def forms(cls, setting: Setting) -> Sequence[Effect]:
+    def forms(cls, context: ArmContext) -> Sequence[Effect]:
         """One a joint that moves."""
-        bands = BANDS * setting.cutoff_hz
+        bands = BANDS * context.cutoff_hz
         stiff = np.stack([bands, np.zeros(len(bands))], axis=1)
         made = []
-        for joint in cls.deflected_joints(setting):
+        for joint in cls.deflected_joints(context):
             grid = stiff
-            if setting.inertia[joint] > 0.0:
-                swinging = 1.0 / ((2.0 * np.pi * RESONANCES * setting.cutoff_hz) ** 2 * setting.inertia[joint])
-                swings = [[band, each] for band in SWINGING_BANDS * setting.cutoff_hz for each in swinging]
+            if context.inertia[joint] > 0.0:
+                swinging = 1.0 / ((2.0 * np.pi * RESONANCES * context.cutoff_hz) ** 2 * context.inertia[joint])
+                swings = [[band, each] for band in SWINGING_BANDS * context.cutoff_hz for each in swinging]
                 grid = np.concatenate([stiff, np.array(swings)])
             made.append(cls(joint, grid, grid.min(axis=0), grid.max(axis=0)))
         return made
 
     def reluctance(self, shapes: Array) -> Array:
-        """A resonance has to be clearly better: where little is seen, any of them fits some noise.
-
-        Parameters
-        ----------
-        shapes : (g, 2) float64
-            band of the load [Hz], compliance on which the link swings, 0 where it does not [rad/Nm or m/N]
-        """
+        """A resonance has to be clearly better: where little is seen, any of them fits some noise."""
         return np.where(shapes[:, 1] == 0.0, 0.0, CLEARLY_BETTER)
 
     def alike(self, shape: Array) -> Sequence[Array]:
-        """What swings a little slower or faster, in either band.
-
-        Parameters
-        ----------
-        shape : (2,) float64
-            band of the load [Hz], compliance on which the link swings, 0 where it does not [rad/Nm or m/N]
-        """
+        """What swings a little slower or faster, in either band."""
         if shape[1] == 0.0:
             return ()
         bands = np.unique(self.grid[self.grid[:, 1] > 0.0, 0])
         return [np.stack([np.full(len(BETWEEN), band), shape[1] * BETWEEN], axis=1) for band in bands]
 
     def is_consistent(self, coefficients: Array, shape: Array, *, alone: bool = False) -> bool:
-        """Whether what gives way is what the link swings on.
-
-        Parameters
-        ----------
-        coefficients : (1,) float64
-            c [rad/Nm or m/N]
-        shape : (2,) float64
-            band of the load [Hz], compliance on which the link swings, 0 where it does not [rad/Nm or m/N]
-        """
+        """Whether what gives way is what the link swings on."""
         return bool(shape[1] == 0.0 or 1.0 / SAME < coefficients[0] / shape[1] < SAME)
 
     def quantities(
-        self, setting: Setting, coefficients: Array, shape: Array, covariance: Array
+        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
         """c; where the link swings, the mean of what gives way and what it swings on: both estimate one compliance.
 
         The load of a resonance is known only within a band, which errs the one way in the amplitude and the other way
         in the frequency: half the difference is an error of their mean that the covariance does not know.
-
-        Parameters
-        ----------
-        coefficients : (1,) float64
-            c [rad/Nm or m/N]
-        shape : (2,) float64
-            band of the load [Hz], compliance on which the link swings, 0 where it does not [rad/Nm or m/N]
-        covariance : (3, 3) float64
-            of both
         """
-        (found,) = super().quantities(setting, coefficients, shape, covariance)
+        (found,) = super().quantities(context, coefficients, shape, covariance)
         swinging = float(shape[1])
         if swinging == 0.0:
             return (found,)
@@ -157,16 +128,6 @@ class JointElasticity(Deflection):
         return (replace(found, value=found.value - apart, std=float(np.hypot(found.std, apart))),)
 
     def deflection(self, load: Array, inertia: Array, shape: Array, rate_hz: float) -> Array:
-        """What the spring transmits.
-
-        Parameters
-        ----------
-        load, inertia : (N,) float64
-            of the link [Nm or N, kg m² or kg]
-        shape : (2,) float64
-            band of the load [Hz], compliance on which the link swings, 0 where it does not [rad/Nm or m/N]
-        rate_hz : float
-            sampling rate [Hz]
-        """
+        """What the spring transmits."""
         swinging = float(shape[1])
         return load if swinging == 0.0 or not inertia.all() else transmitted(load, inertia, swinging, rate_hz)

@@ -5,15 +5,12 @@ The base parameters take nearly all of it: what is left of a few millimetres is 
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import ClassVar
 
 import numpy as np
 
 from tauscope.dynamics import inverse_dynamics
-from tauscope.effects.effect import Effect
-from tauscope.effects.parameters import Coefficient, Shape
-from tauscope.effects.setting import Setting
-from tauscope.effects.signals import Signals
+from tauscope.effects.context import ArmContext, Signals
+from tauscope.effects.effect import Coefficient, Effect, Entry, Shape
 from tauscope.recording.recording import Array
 from tauscope.robot import Placement, Robot
 
@@ -27,21 +24,24 @@ LARGEST_M = 0.2
 class KinematicError(Effect):
     """τ = ∂τ/∂d d: the frame of one link lies d farther along one axis, of those before its last turn."""
 
-    id: ClassVar[str] = "kinematic_error"
-    arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "velocity", "acceleration", "others"})
-    equation: ClassVar[str] = "tau = dtau/dd d, d the displacement of one link's frame along one of its axes"
-    meaning: ClassVar[str] = "a link length or frame is wrong"
-    remedy: ClassVar[str] = "measure the arm's geometry, and correct the robot file by d"
-    revealing_motion: ClassVar[str] = "none: measure the tool's place in several postures instead"
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("d", "m", largest=LARGEST_M),)
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("link", "1", fixed=True), Shape("axis", "1", fixed=True))
-    may_exceed_measured: ClassVar[bool] = True  # links that are balanced in one place are not in another
-    of_motion_alone: ClassVar[bool] = True  # the consistent links, which no model of a diagnosis changes
+    id = "kinematic_error"
+    rank = 230
+    german = "Kinematikfehler"
+    arguments = frozenset({"position", "velocity", "acceleration", "others"})
+    equation = "tau = dtau/dd d, d the displacement of one link's frame along one of its axes"
+    meaning = "a link length or frame is wrong"
+    remedy = "measure the arm's geometry, and correct the robot file by d"
+    no_code = "it needs the positions of all joints"
+    revealing_motion = "none: measure the tool's place in several postures instead"
+    coefficients = (Coefficient("d", "m", largest=LARGEST_M),)
+    shapes = (Shape("link", "1", fixed=True), Shape("axis", "1", fixed=True))
+    may_exceed_measured = True  # links that are balanced in one place are not in another
+    of_motion_alone = True  # the consistent links, which no model of a diagnosis changes
 
     @classmethod
-    def forms(cls, setting: Setting) -> Sequence[Effect]:
+    def forms(cls, context: ArmContext) -> Sequence[Effect]:
         """One for the arm; its shapes are links and axes, without the last link: its load hangs at its own frame."""
-        links = np.arange(1.0, setting.robot.joint_count)
+        links = np.arange(1.0, context.robot.joint_count)
         grid = np.stack(np.meshgrid(links, np.arange(1.0, 4.0), indexing="ij"), axis=-1).reshape(-1, 2)
         return [cls(None, grid, grid[0], grid[-1])] if len(grid) else []
 
@@ -50,28 +50,19 @@ class KinematicError(Effect):
         return self.grid[:0]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """Torque per metre, (g, 1, n, N).
-
-        Parameters
-        ----------
-        shapes : (g, 2) float64
-            number of the link and of the axis, from 1
-        """
+        """Torque per metre, (g, 1, n, N)."""
         exact, *longer = _torques(signals, [(shapes[0], 0.0), *((shape, STEP_M) for shape in shapes)])
         return np.stack([(each - exact) / STEP_M for each in longer])[:, None]
 
     def torque_of(self, signals: Signals, coefficients: Array, shape: Array) -> Array:
-        """Torque of the arm as it is less that of the arm as the file has it, (n, N).
-
-        Parameters
-        ----------
-        coefficients : (1,) float64
-            d [m]
-        shape : (2,) float64
-            number of the link and of the axis
-        """
+        """Torque of the arm as it is less that of the arm as the file has it, (n, N)."""
         longer, exact = _torques(signals, [(shape, float(coefficients[0])), (shape, 0.0)])
         return longer - exact
+
+    def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
+        """One displacement."""
+        link, axis = (int(each) for each in shape)
+        return [{"link": link, "translation": [coefficients[0] if each == axis else 0.0 for each in (1, 2, 3)]}]
 
 
 def _torques(signals: Signals, displacements: Sequence[tuple[Array, float]]) -> list[Array]:

@@ -4,60 +4,45 @@ In recordings alone it is one with the last link. Against a given model the last
 """
 
 from collections.abc import Sequence
-from typing import ClassVar
 
 import numpy as np
 
 from tauscope.effects.carried_body import FARTHEST_M, MASS, PLACE, body_columns, body_quantities, unit_body
-from tauscope.effects.effect import Effect
-from tauscope.effects.parameters import Coefficient, Quantity, Shape
-from tauscope.effects.setting import Setting
-from tauscope.effects.signals import Signals
+from tauscope.effects.context import ArmContext, Signals
+from tauscope.effects.effect import Effect, Quantity
 from tauscope.recording.recording import Array
 
 
 class Payload(Effect):
     """τ = m Φ_body(r), the torque of a point mass at r of the last link."""
 
-    of_motion_alone: ClassVar[bool] = True
-    id: ClassVar[str] = "payload"
-    arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "velocity", "acceleration", "others"})
-    equation: ClassVar[str] = "tau = m Phi_body(q, qd, qdd; r)"
-    meaning: ClassVar[str] = "a mass is fixed to the tool that the model does not have"
-    remedy: ClassVar[str] = "add the body to the last link (or correct the last link's own mass: torque cannot tell)"
-    revealing_motion: ClassVar[str] = "the same motion with the tool taken off"
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (MASS,)
-    shapes: ClassVar[tuple[Shape, ...]] = PLACE
-    screened: ClassVar[bool] = False
+    of_motion_alone = True
+    id = "payload"
+    rank = 240
+    german = "Nutzlast"
+    arguments = frozenset({"position", "velocity", "acceleration", "others"})
+    equation = "tau = m Phi_body(q, qd, qdd; r)"
+    meaning = "a mass is fixed to the tool that the model does not have"
+    remedy = "add the body to the last link (or correct the last link's own mass: torque cannot tell)"
+    no_code = "it needs the positions of all joints"
+    no_scenario = "the improved robot file has it in the last link"
+    revealing_motion = "the same motion with the tool taken off"
+    coefficients = (MASS,)
+    shapes = PLACE
+    screened = False
 
     @classmethod
-    def forms(cls, setting: Setting) -> Sequence[Effect]:
+    def forms(cls, context: ArmContext) -> Sequence[Effect]:
         """One for the arm."""
         return [cls(None, np.zeros((1, 3)), np.full(3, -FARTHEST_M), np.full(3, FARTHEST_M))]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """Torque of one kilogramme at r.
-
-        Parameters
-        ----------
-        shapes : (g, 3) float64
-            r [m]
-        """
+        """Torque of one kilogramme at r."""
         body = body_columns(signals)
         return np.stack([np.tensordot(unit_body(place), body, axes=1)[None] for place in shapes])
 
     def quantities(
-        self, setting: Setting, coefficients: Array, shape: Array, covariance: Array
+        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
-        """Mass and first moment.
-
-        Parameters
-        ----------
-        coefficients : (1,) float64
-            m [kg]
-        shape : (3,) float64
-            r [m]
-        covariance : (4, 4) float64
-            of both
-        """
+        """Mass and first moment."""
         return tuple(body_quantities(float(coefficients[0]), shape, covariance))

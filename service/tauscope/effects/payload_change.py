@@ -1,17 +1,15 @@
 """Mass picked up or dropped while it was recorded, or between two recordings."""
 
 from collections.abc import Sequence
-from typing import ClassVar
 
 import numpy as np
 
 from tauscope.effects.carried_body import FARTHEST_M, MASS, PLACE, body_columns, body_quantities, unit_body
-from tauscope.effects.effect import Effect
-from tauscope.effects.parameters import Coefficient, Quantity, Shape
-from tauscope.effects.setting import Setting
-from tauscope.effects.signals import Signals
+from tauscope.effects.context import ArmContext, Signals
+from tauscope.effects.effect import Effect, Entry, Quantity, Shape
 from tauscope.effects.time_local import EVERY, OUTSIDE, TimeLocalEffect, since
 from tauscope.recording.recording import Array
+from tauscope.robot import Robot
 
 NEAR_EDGE = 0.03
 """Part of a recording within which an edge of a window is the recording's own."""
@@ -23,15 +21,18 @@ INSTANTS = 12
 class PayloadChange(TimeLocalEffect):
     """τ = m Φ_body(r) w(t), Φ_body the torque of a point mass at r of the last link."""
 
-    of_motion_alone: ClassVar[bool] = True
-    id: ClassVar[str] = "payload_change"
-    arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "velocity", "acceleration", "others", "time"})
-    equation: ClassVar[str] = "tau = m Phi_body(q, qd, qdd; r) w(t), w = 1 from t_on to t_off"
-    meaning: ClassVar[str] = "a mass at the tool is picked up or dropped"
-    remedy: ClassVar[str] = "record with one payload at a time, or add the body to the last link while it is carried"
-    revealing_motion: ClassVar[str] = "the same motion without payload, and once more with it all the time"
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (MASS,)
-    shapes: ClassVar[tuple[Shape, ...]] = (
+    of_motion_alone = True
+    id = "payload_change"
+    rank = 210
+    german = "wechselnde Nutzlast"
+    arguments = frozenset({"position", "velocity", "acceleration", "others", "time"})
+    equation = "tau = m Phi_body(q, qd, qdd; r) w(t), w = 1 from t_on to t_off"
+    meaning = "a mass at the tool is picked up or dropped"
+    remedy = "record with one payload at a time, or add the body to the last link while it is carried"
+    no_scenario = "a scenario starts anew each time, so only a load at the same time in every recording fits"
+    revealing_motion = "the same motion without payload, and once more with it all the time"
+    coefficients = (MASS,)
+    shapes = (
         Shape("scope", "1", fixed=True, reported=False),
         Shape("t_on", "s"),
         Shape("t_off", "s"),
@@ -40,22 +41,16 @@ class PayloadChange(TimeLocalEffect):
     )
 
     @classmethod
-    def forms(cls, setting: Setting) -> Sequence[Effect]:
+    def forms(cls, context: ArmContext) -> Sequence[Effect]:
         """One for the arm."""
-        grid = payload_windows(setting.durations)
-        longest = max(setting.durations)
-        lower = np.array([since(len(setting.durations) - 1), 0.0, 0.0, OUTSIDE, *(-FARTHEST_M,) * 3])
-        upper = np.array([len(setting.durations) - 1.0, longest, 1.1 * longest, 0.0, *(FARTHEST_M,) * 3])
+        grid = payload_windows(context.durations)
+        longest = max(context.durations)
+        lower = np.array([since(len(context.durations) - 1), 0.0, 0.0, OUTSIDE, *(-FARTHEST_M,) * 3])
+        upper = np.array([len(context.durations) - 1.0, longest, 1.1 * longest, 0.0, *(FARTHEST_M,) * 3])
         return [cls(None, grid, lower, upper)] if len(grid) else []
 
     def outside(self, shape: Array) -> Array | None:
-        """What is missing within a window is carried outside it: which of the two, training recordings cannot say.
-
-        Parameters
-        ----------
-        shape : (7,) float64
-            the window, r [m]
-        """
+        """What is missing within a window is carried outside it: which of the two, training recordings cannot say."""
         if shape[0] == EVERY:  # held-out recordings have it at the same instants
             return None
         other = shape.copy()
@@ -63,53 +58,33 @@ class PayloadChange(TimeLocalEffect):
         return other
 
     def torque(self, signals: Signals, shape: Array) -> Array:
-        """Torque of one kilogramme at r, (1, n, N).
-
-        Parameters
-        ----------
-        shape : (7,) float64
-            the window, r [m]
-        """
+        """Torque of one kilogramme at r, (1, n, N)."""
         return np.tensordot(unit_body(shape[4:]), body_columns(signals), axes=1)[None]
 
     def quantities(
-        self, setting: Setting, coefficients: Array, shape: Array, covariance: Array
+        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
-        """Mass, first moment, and when.
-
-        Parameters
-        ----------
-        coefficients : (1,) float64
-            m [kg]
-        shape : (7,) float64
-            the window, r [m]
-        covariance : (8, 8) float64
-            of both
-        """
+        """Mass, first moment, and when."""
         body = (0, 5, 6, 7)
-        sign, instants = carried(float(coefficients[0]), shape, setting.durations)
+        sign, instants = carried(float(coefficients[0]), shape, context.durations)
         found = list(body_quantities(sign * float(coefficients[0]), shape[4:], covariance[np.ix_(body, body)]))
         std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         found += [Quantity(name, float(shape[place]), float(std[1 + place]), "s") for name, place in instants.items()]
         return tuple(found)
 
     def when(self, coefficients: Array, shape: Array, names: Sequence[str], durations: Sequence[float]) -> str:
-        """When it is picked up and dropped, in words.
-
-        Parameters
-        ----------
-        coefficients : (1,) float64
-            m [kg]
-        shape : (7,) float64
-            the window, r [m]
-        durations : sequence of float
-            of the same [s]
-        """
+        """When it is picked up and dropped, in words."""
         _, instants = carried(float(coefficients[0]), shape, durations)
         verbs = {"t_on": "picked up", "t_off": "dropped"}
         said = [f"{verbs[name]} at {shape[place]:.2f} s" for name, place in instants.items()]
         where = self.recording_words(shape, names)
         return f"{' and '.join(said)} of {where}" if said else f"carried in {where}"
+
+    def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
+        """A load that is carried in every recording: a scenario starts anew each time."""
+        if shape[0] != EVERY or coefficients[0] <= 0.0:
+            return []
+        return [{"mass": coefficients[0], "offset": list(shape[4:7]), "start": shape[1], "end": shape[2]}]
 
 
 def carried(mass: float, shape: Array, durations: Sequence[float]) -> tuple[float, dict[str, int]]:

@@ -7,18 +7,15 @@ motor's revolution can occur; otherwise the angle-periodogram is scanned as fine
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import ClassVar
+from math import atan2, hypot
 
 import numpy as np
 
-from tauscope.effects.effect import Effect, per_joint_columns
-from tauscope.effects.last_few import LastFew
-from tauscope.effects.parameters import Coefficient, Quantity, Shape
-from tauscope.effects.setting import Setting
-from tauscope.effects.side_by_side import THREADS
-from tauscope.effects.signals import Signals
+from tauscope.effects.computation import THREADS, LastFew
+from tauscope.effects.context import ArmContext, Signals
+from tauscope.effects.effect import Coefficient, Effect, Entry, Quantity, Shape, per_joint_columns
 from tauscope.recording.recording import Array
-from tauscope.robot import JointType
+from tauscope.robot import JointType, Robot
 
 FEWEST_CYCLES = 1.5
 """Cycles over the range of motion below which a periodic torque is a spring or a bump by another name."""
@@ -47,7 +44,7 @@ KEPT = 24 * THREADS
 """Sets of them that are kept a piece: those of a model with all orders that it may have."""
 
 
-def possible_orders(setting: Setting, joint: int) -> Array:
+def possible_orders(context: ArmContext, joint: int) -> Array:
     """Orders of a periodic torque that this motion can show, (g,), ascending; empty where there are none.
 
     Parameters
@@ -55,10 +52,10 @@ def possible_orders(setting: Setting, joint: int) -> Array:
     joint : int
         joint index, from 0
     """
-    return _orders(setting, joint, 1.0)[:MOST_ORDERS]
+    return _orders(context, joint, 1.0)[:MOST_ORDERS]
 
 
-def farther_orders(setting: Setting, joint: int) -> Array:
+def farther_orders(context: ArmContext, joint: int) -> Array:
     """Orders beyond those, that show in a part of the motion only, (g,), ascending.
 
     Parameters
@@ -66,19 +63,19 @@ def farther_orders(setting: Setting, joint: int) -> Array:
     joint : int
         joint index, from 0
     """
-    near = possible_orders(setting, joint)
-    return _orders(setting, joint, FARTHER)[len(near) :][:MOST_FARTHER_ORDERS]
+    near = possible_orders(context, joint)
+    return _orders(context, joint, FARTHER)[len(near) :][:MOST_FARTHER_ORDERS]
 
 
-def _orders(setting: Setting, joint: int, factor: float) -> Array:
+def _orders(context: ArmContext, joint: int, factor: float) -> Array:
     """Orders whose frequency at rms speed reaches up to some times the band."""
-    if not setting.moves(joint):
+    if not context.moves(joint):
         return np.zeros(0)
-    reach = float(setting.highest[joint] - setting.lowest[joint])
+    reach = float(context.highest[joint] - context.lowest[joint])
     lowest = FEWEST_CYCLES * 2.0 * np.pi / reach
-    highest = factor * BAND_SHARE * 2.0 * np.pi * setting.cutoff_hz / float(setting.speed[joint])
-    if _is_geared(setting, joint):
-        unit = abs(setting.robot.joints[joint].gear_ratio or 1.0) * _pole_pairs(setting, joint)
+    highest = factor * BAND_SHARE * 2.0 * np.pi * context.cutoff_hz / float(context.speed[joint])
+    if _is_geared(context, joint):
+        unit = abs(context.robot.joints[joint].gear_ratio or 1.0) * _pole_pairs(context, joint)
         lowest = min(lowest, unit) if reach >= 2.0 * np.pi / unit * FEWEST_CYCLES else lowest
         multiples = np.arange(max(1, int(np.ceil(lowest / unit - 1e-9))), int(highest / unit) + 1)
         return np.asarray(unit * multiples, dtype=np.float64)
@@ -86,14 +83,14 @@ def _orders(setting: Setting, joint: int, factor: float) -> Array:
     return np.asarray(np.arange(lowest, highest, step), dtype=np.float64)
 
 
-def _pole_pairs(setting: Setting, joint: int) -> int:
-    drive = setting.robot.joints[joint].drive or {}
+def _pole_pairs(context: ArmContext, joint: int) -> int:
+    drive = context.robot.joints[joint].drive or {}
     pairs = drive.get("pole_pairs", 1)
     return int(pairs) if isinstance(pairs, int | float) and pairs >= 1 else 1
 
 
-def _is_geared(setting: Setting, joint: int) -> bool:
-    described = setting.robot.joints[joint]
+def _is_geared(context: ArmContext, joint: int) -> bool:
+    described = context.robot.joints[joint]
     return described.gear_ratio is not None and described.type is JointType.REVOLUTE
 
 
@@ -131,63 +128,53 @@ class _Periodic(Effect):
 
     geared: bool = False
 
-    repeats: ClassVar[bool] = True
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("order", "1/{q}"),)
+    repeats = True
+    shapes = (Shape("order", "1/{q}"),)
 
     @classmethod
-    def forms(cls, setting: Setting) -> Sequence[Effect]:
+    def forms(cls, context: ArmContext) -> Sequence[Effect]:
         """One a joint whose motion covers enough cycles."""
-        return cls._of_orders(setting, possible_orders)
+        return cls._of_orders(context, possible_orders)
 
     @classmethod
-    def farther_forms(cls, setting: Setting) -> Sequence[Effect]:
+    def farther_forms(cls, context: ArmContext) -> Sequence[Effect]:
         """The same of orders that show near reversals only."""
-        return cls._of_orders(setting, farther_orders)
+        return cls._of_orders(context, farther_orders)
 
     @classmethod
-    def _of_orders(cls, setting: Setting, orders: Callable[[Setting, int], Array]) -> Sequence[Effect]:
+    def _of_orders(cls, context: ArmContext, orders: Callable[[ArmContext, int], Array]) -> Sequence[Effect]:
         """One a joint where the effect may be and has such orders."""
-        found = {joint: orders(setting, joint) for joint in cls._places(setting)}
+        found = {joint: orders(context, joint) for joint in cls._places(context)}
         return [
-            cls(joint, own[:, None], 0.9 * own[:1], 1.1 * own[-1:], geared=_is_geared(setting, joint))
+            cls(joint, own[:, None], 0.9 * own[:1], 1.1 * own[-1:], geared=_is_geared(context, joint))
             for joint, own in found.items()
             if len(own)
         ]
 
     @classmethod
-    def _places(cls, setting: Setting) -> Sequence[int]:
-        return setting.joints
+    def _places(cls, context: ArmContext) -> Sequence[int]:
+        return context.joints
 
     def is_free(self, place: int) -> bool:
         """Whether the order lies between the grid's points."""
         return not self.geared
 
     def quantities(
-        self, setting: Setting, coefficients: Array, shape: Array, covariance: Array
+        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
-        """Amplitude, phase and order instead of sine and cosine.
-
-        Parameters
-        ----------
-        coefficients : (2,) float64
-            of sine and cosine
-        shape : (1,) float64
-            order
-        covariance : (3, 3) float64
-            of both and the order
-        """
+        """Amplitude, phase and order instead of sine and cosine."""
         sine, cosine = (float(value) for value in coefficients)
         amplitude = float(np.hypot(sine, cosine)) or 1e-300
         of_amplitude = np.array([sine, cosine]) / amplitude
         of_phase = np.array([-cosine, sine]) / amplitude**2
         own = covariance[:2, :2]
         return (
-            Quantity("order", float(shape[0]), float(np.sqrt(max(covariance[2, 2], 0.0))), self.unit("1/{q}", setting)),
+            Quantity("order", float(shape[0]), float(np.sqrt(max(covariance[2, 2], 0.0))), self.unit("1/{q}", context)),
             Quantity(
                 "amplitude",
                 amplitude,
                 float(np.sqrt(of_amplitude @ own @ of_amplitude)),
-                self.unit(self.coefficients[0].unit, setting),
+                self.unit(self.coefficients[0].unit, context),
             ),
             Quantity(
                 "phase",
@@ -197,6 +184,13 @@ class _Periodic(Effect):
                 period=2.0 * np.pi,
             ),
         )
+
+    def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
+        """One wave; its order is counted a turn at a revolute joint, a metre at a prismatic one."""
+        sine, cosine = coefficients
+        turns = robot.joints[self.joint or 0].type is JointType.REVOLUTE
+        order = shape[0] if turns else shape[0] / (2.0 * np.pi)
+        return [{"amplitude": hypot(sine, cosine), "order": order, "phase": atan2(cosine, sine)}]
 
     def _waves(self, signals: Signals, shapes: Array) -> Array:
         """Sin kq, cos kq, (g, 2, N); of an order or two they are kept, for a fit asks again under other loads."""
@@ -210,53 +204,45 @@ class _Periodic(Effect):
 class Cogging(_Periodic):
     """τ = Σ a sin(k q + φ)."""
 
-    of_motion_alone: ClassVar[bool] = True
-    id: ClassVar[str] = "cogging"
-    arguments: ClassVar[frozenset[str] | None] = frozenset({"position"})
-    equation: ClassVar[str] = "tau = sum a sin(k q + phi)"
-    meaning: ClassVar[str] = "torque repeats with the angle, whatever the load"
-    remedy: ClassVar[str] = "compensate the torque over the motor's angle"
-    revealing_motion: ClassVar[str] = (
-        "slow constant speed over the whole range, the load changed by other joints' poses"
-    )
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("sine", "{tau}"), Coefficient("cosine", "{tau}"))
+    of_motion_alone = True
+    id = "cogging"
+    rank = 100
+    german = "Rastmoment"
+    arguments = frozenset({"position"})
+    equation = "tau = sum a sin(k q + phi)"
+    meaning = "torque repeats with the angle, whatever the load"
+    remedy = "compensate the torque over the motor's angle"
+    code = "{c[0]} * sin({s[0]} * q) + {c[1]} * cos({s[0]} * q)"
+    revealing_motion = "slow constant speed over the whole range, the load changed by other joints' poses"
+    coefficients = (Coefficient("sine", "{tau}"), Coefficient("cosine", "{tau}"))
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """Sin kq, cos kq.
-
-        Parameters
-        ----------
-        shapes : (g, 1) float64
-            k [1/rad or 1/m]
-        """
+        """Sin kq, cos kq."""
         return per_joint_columns(self._waves(signals, shapes))
 
 
 class TorqueRipple(_Periodic):
     """τ = τ_rb Σ a sin(k q + φ)."""
 
-    of_motion_and_load: ClassVar[bool] = True
-    id: ClassVar[str] = "torque_ripple"
-    arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "load"})
-    equation: ClassVar[str] = "tau = tau_rb sum a sin(k q + phi)"
-    meaning: ClassVar[str] = "torque repeats with the angle, in proportion to the load"
-    remedy: ClassVar[str] = "correct the torque constant over the motor's angle"
-    revealing_motion: ClassVar[str] = "the same angles under other loads: other poses of the other joints"
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (
+    of_motion_and_load = True
+    id = "torque_ripple"
+    rank = 110
+    german = "Drehmomentwelligkeit"
+    arguments = frozenset({"position", "load"})
+    equation = "tau = tau_rb sum a sin(k q + phi)"
+    meaning = "torque repeats with the angle, in proportion to the load"
+    remedy = "correct the torque constant over the motor's angle"
+    code = "load * ({c[0]} * sin({s[0]} * q) + {c[1]} * cos({s[0]} * q))"
+    revealing_motion = "the same angles under other loads: other poses of the other joints"
+    coefficients = (
         Coefficient("sine", "1", largest=1.0),
         Coefficient("cosine", "1", largest=1.0),
     )
 
     @classmethod
-    def _places(cls, setting: Setting) -> Sequence[int]:
-        return [joint for joint in super()._places(setting) if setting.is_loaded(joint)]
+    def _places(cls, context: ArmContext) -> Sequence[int]:
+        return [joint for joint in super()._places(context) if context.is_loaded(joint)]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """τ_rb sin kq, τ_rb cos kq.
-
-        Parameters
-        ----------
-        shapes : (g, 1) float64
-            k [1/rad or 1/m]
-        """
+        """τ_rb sin kq, τ_rb cos kq."""
         return per_joint_columns(signals.load[self.joint] * self._waves(signals, shapes))

@@ -10,11 +10,10 @@ from typing import ClassVar
 import numpy as np
 
 from tauscope.dynamics import smooth_sign
-from tauscope.effects.effect import Effect, per_joint_columns
-from tauscope.effects.parameters import Coefficient, Shape
-from tauscope.effects.setting import Setting
-from tauscope.effects.signals import Signals
+from tauscope.effects.context import Signals
+from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, per_joint_columns
 from tauscope.recording.recording import Array
+from tauscope.robot import Robot
 
 
 class PlainTerm(Effect):
@@ -24,102 +23,86 @@ class PlainTerm(Effect):
     """
 
     term: ClassVar[str]
-    screened: ClassVar[bool] = False
-
-    @classmethod
-    def forms(cls, setting: Setting) -> Sequence[Effect]:
-        """One a joint that moves."""
-        return [cls(joint) for joint in setting.joints if setting.moves(joint)]
+    screened = False
+    no_code = "the friction function beside it has it"
+    no_scenario = "the improved robot file has it in the joint's friction"
 
 
 class ViscousFriction(PlainTerm):
     """τ = c q̇."""
 
-    id: ClassVar[str] = "viscous_friction"
-    arguments: ClassVar[frozenset[str] | None] = frozenset({"velocity"})
-    term: ClassVar[str] = "viscous"
-    equation: ClassVar[str] = "tau = c qd"
-    meaning: ClassVar[str] = "viscous friction is missing from the given model"
-    remedy: ClassVar[str] = "add it to the joint's friction"
-    revealing_motion: ClassVar[str] = "several speeds"
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("c", "{tau} s/{q}", positive=True),)
+    id = "viscous_friction"
+    rank = 270
+    german = "viskose Reibung"
+    arguments = frozenset({"velocity"})
+    term = "viscous"
+    equation = "tau = c qd"
+    meaning = "viscous friction is missing from the given model"
+    remedy = "add it to the joint's friction"
+    revealing_motion = "several speeds"
+    coefficients = (Coefficient("c", "{tau} s/{q}", positive=True),)
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """q̇.
-
-        Parameters
-        ----------
-        shapes : (1, 0) float64
-            none
-        """
+        """q̇."""
         return per_joint_columns(signals.velocity[self.joint][None, None])
 
 
 class CoulombFriction(PlainTerm):
     """τ = f A(q̇)."""
 
-    id: ClassVar[str] = "coulomb_friction"
-    arguments: ClassVar[frozenset[str] | None] = frozenset({"velocity"})
-    term: ClassVar[str] = "stiction"
-    equation: ClassVar[str] = "tau = f sgn(qd)"
-    meaning: ClassVar[str] = "Coulomb friction is missing from the given model"
-    remedy: ClassVar[str] = "add it to the joint's friction"
-    revealing_motion: ClassVar[str] = "slow motion both ways"
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("f", "{tau}", positive=True),)
+    id = "coulomb_friction"
+    rank = 260
+    german = "coulombsche Reibung"
+    arguments = frozenset({"velocity"})
+    term = "stiction"
+    equation = "tau = f sgn(qd)"
+    meaning = "Coulomb friction is missing from the given model"
+    remedy = "add it to the joint's friction"
+    revealing_motion = "slow motion both ways"
+    coefficients = (Coefficient("f", "{tau}", positive=True),)
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """A(q̇).
-
-        Parameters
-        ----------
-        shapes : (1, 0) float64
-            none
-        """
+        """A(q̇)."""
         return per_joint_columns(signals.step[self.joint][None, None])
 
 
 class TorqueOffset(PlainTerm):
     """τ = c."""
 
-    id: ClassVar[str] = "torque_offset"
-    arguments: ClassVar[frozenset[str] | None] = frozenset()
-    term: ClassVar[str] = "offset"
-    equation: ClassVar[str] = "tau = c"
-    meaning: ClassVar[str] = "the torque has a constant part, which the robot file's friction does not declare"
-    remedy: ClassVar[str] = "zero the torque sensor, or add the constant to the joint's torque"
-    revealing_motion: ClassVar[str] = "slow motion both ways in several poses"
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("c", "{tau}"),)
+    id = "torque_offset"
+    rank = 250
+    german = "Drehmomentversatz"
+    arguments = frozenset()
+    term = "offset"
+    equation = "tau = c"
+    meaning = "the torque has a constant part, which the robot file's friction does not declare"
+    remedy = "zero the torque sensor, or add the constant to the joint's torque"
+    revealing_motion = "slow motion both ways in several poses"
+    coefficients = (Coefficient("c", "{tau}"),)
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """One.
-
-        Parameters
-        ----------
-        shapes : (1, 0) float64
-            none
-        """
+        """One."""
         return per_joint_columns(np.ones_like(signals.position[self.joint])[None, None])
+
+    def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
+        """One constant."""
+        return [{"torque": coefficients[0]}]
 
 
 class StribeckTerm(PlainTerm):
     """τ = s A(δ q̇): what the nominal model has as the catalogue's Stribeck friction."""
 
-    id: ClassVar[str] = "stribeck_friction"
-    arguments: ClassVar[frozenset[str] | None] = frozenset({"velocity"})
-    term: ClassVar[str] = "stribeck"
-    equation: ClassVar[str] = "tau = s (2/pi) atan(delta qd)"
-    meaning: ClassVar[str] = "a Stribeck term is missing from the given model"
-    remedy: ClassVar[str] = "add it to the joint's friction"
-    revealing_motion: ClassVar[str] = "slow sweeps beside motion at top speed"
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("s", "{tau}"),)
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("delta", "s/{q}", fixed=True),)
+    is_variant = True
+    id = "stribeck_friction"
+    arguments = frozenset({"velocity"})
+    term = "stribeck"
+    equation = "tau = s (2/pi) atan(delta qd)"
+    meaning = "a Stribeck term is missing from the given model"
+    remedy = "add it to the joint's friction"
+    revealing_motion = "slow sweeps beside motion at top speed"
+    coefficients = (Coefficient("s", "{tau}"),)
+    shapes = (Shape("delta", "s/{q}", fixed=True),)
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """A(δ q̇).
-
-        Parameters
-        ----------
-        shapes : (g, 1) float64
-            δ [s/rad or s/m]
-        """
+        """A(δ q̇)."""
         return per_joint_columns(smooth_sign(signals.velocity[self.joint][None], shapes)[:, None])

@@ -2,16 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from math import atan2, hypot
 
 import numpy as np
 
-from tauscope.effects.effect import Effect, per_joint_columns
-from tauscope.effects.parameters import Coefficient, Shape
-from tauscope.effects.setting import Setting
-from tauscope.effects.signals import Signals
+from tauscope.effects.context import ArmContext, Signals
+from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, per_joint_columns
 from tauscope.recording.recording import Array
-from tauscope.robot import JointType
+from tauscope.robot import JointType, Robot
 
 TIMES_A_TURN = np.array([1.0, 2.0, 3.0])
 """An eccentric bearing, an oval one, and one that three jaws hold."""
@@ -24,28 +22,31 @@ RADIANS_A_STROKE = np.array([1.0, 2.0, 4.0, 6.0, 9.0, 12.0, 15.0, 18.0])
 class PositionDependentFriction(Effect):
     """τ = A(q̇) (a cos kq + b sin kq)."""
 
-    has_step: ClassVar[bool] = True
-    of_motion_and_step: ClassVar[bool] = True
-    id: ClassVar[str] = "position_dependent_friction"
-    arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "velocity"})
-    equation: ClassVar[str] = "tau = sgn(qd) (a cos kq + b sin kq)"
-    meaning: ClassVar[str] = "the friction level varies with the joint's position"
-    remedy: ClassVar[str] = "let the Coulomb level vary with the joint's position"
-    revealing_motion: ClassVar[str] = "the same positions under other loads and speeds"
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("a", "{tau}"), Coefficient("b", "{tau}"))
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("k", "1/{q}", logarithmic=True),)
+    has_step = True
+    of_motion_and_step = True
+    id = "position_dependent_friction"
+    rank = 50
+    german = "stellungsabhängige Reibung"
+    arguments = frozenset({"position", "velocity"})
+    equation = "tau = sgn(qd) (a cos kq + b sin kq)"
+    meaning = "the friction level varies with the joint's position"
+    remedy = "let the Coulomb level vary with the joint's position"
+    code = "({c[0]} * cos({s[0]} * q) + {c[1]} * sin({s[0]} * q)) * {step}"
+    revealing_motion = "the same positions under other loads and speeds"
+    coefficients = (Coefficient("a", "{tau}"), Coefficient("b", "{tau}"))
+    shapes = (Shape("k", "1/{q}", logarithmic=True),)
 
     turns: bool = True
 
     @classmethod
-    def forms(cls, setting: Setting) -> Sequence[Effect]:
+    def forms(cls, context: ArmContext) -> Sequence[Effect]:
         """One a joint that moves."""
-        return [cls._of_joint(setting, joint) for joint in setting.joints if setting.moves(joint)]
+        return [cls._of_joint(context, joint) for joint in context.joints if context.moves(joint)]
 
     @classmethod
-    def _of_joint(cls, setting: Setting, joint: int) -> Effect:
-        turns = setting.robot.joints[joint].type is JointType.REVOLUTE
-        stroke = float(setting.highest[joint] - setting.lowest[joint])
+    def _of_joint(cls, context: ArmContext, joint: int) -> Effect:
+        turns = context.robot.joints[joint].type is JointType.REVOLUTE
+        stroke = float(context.highest[joint] - context.lowest[joint])
         waves = TIMES_A_TURN if turns else RADIANS_A_STROKE / stroke
         return cls(joint, waves[:, None], 0.8 * waves[:1], 1.2 * waves[-1:], turns=turns)
 
@@ -58,12 +59,11 @@ class PositionDependentFriction(Effect):
         return self.grid[:1] if self.turns else self.grid[::3]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """A(q̇) cos kq, A(q̇) sin kq.
-
-        Parameters
-        ----------
-        shapes : (g, 1) float64
-            k [1/rad or 1/m]
-        """
+        """A(q̇) cos kq, A(q̇) sin kq."""
         step, angle = signals.step[self.joint], shapes * signals.position[self.joint]
         return per_joint_columns(np.stack([step * np.cos(angle), step * np.sin(angle)], axis=1))
+
+    def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
+        """One wave."""
+        a, b = coefficients
+        return [{"amplitude": hypot(a, b), "order": shape[0], "phase": atan2(a, b)}]

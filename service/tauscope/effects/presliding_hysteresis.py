@@ -6,15 +6,13 @@ covered. The nominal model has the whole Coulomb step at once; the column is wha
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import ClassVar
 
 import numpy as np
 
-from tauscope.effects.effect import Effect, per_joint_columns
-from tauscope.effects.parameters import Coefficient, Shape
-from tauscope.effects.setting import Setting
-from tauscope.effects.signals import Signals
+from tauscope.effects.context import ArmContext, Signals
+from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, per_joint_columns
 from tauscope.recording.recording import Array
+from tauscope.robot import Robot
 
 DISTANCES = np.array([5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 1.6e-2, 3.2e-2])
 """Bristle lengths looked at, relative to the joint's range of motion."""
@@ -59,26 +57,29 @@ def bristle_deflection(position: Array, lengths: Array, start: Array) -> Array:
 class PreslidingHysteresis(Effect):
     """τ = F (z - A(q̇)), z the bristles' deflection."""
 
-    has_step: ClassVar[bool] = True
-    of_motion_and_step: ClassVar[bool] = True
-    within_step: ClassVar[bool] = True
-    id: ClassVar[str] = "presliding_hysteresis"
-    arguments: ClassVar[frozenset[str] | None] = frozenset({"position", "velocity"})
-    equation: ClassVar[str] = "tau = F (z - sgn(qd)), dz/dt = qd/x_s - |qd| z/x_s"
-    meaning: ClassVar[str] = "friction rises over a distance after each reversal instead of stepping"
-    remedy: ClassVar[str] = "replace the Coulomb step by a Dahl or LuGre bristle"
-    revealing_motion: ClassVar[str] = "slow small reversals, a few hundredths of a radian per second"
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("F", "{tau}", positive=True),)
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("x_s", "{q}", logarithmic=True),)
+    has_step = True
+    of_motion_and_step = True
+    within_step = True
+    id = "presliding_hysteresis"
+    rank = 70
+    german = "Hysterese vor dem Gleiten"
+    arguments = frozenset({"position", "velocity"})
+    equation = "tau = F (z - sgn(qd)), dz/dt = qd/x_s - |qd| z/x_s"
+    meaning = "friction rises over a distance after each reversal instead of stepping"
+    remedy = "replace the Coulomb step by a Dahl or LuGre bristle"
+    no_code = "it needs the state of the bristles"
+    revealing_motion = "slow small reversals, a few hundredths of a radian per second"
+    coefficients = (Coefficient("F", "{tau}", positive=True),)
+    shapes = (Shape("x_s", "{q}", logarithmic=True),)
 
     @classmethod
-    def forms(cls, setting: Setting) -> Sequence[Effect]:
+    def forms(cls, context: ArmContext) -> Sequence[Effect]:
         """One a joint that moves both ways."""
         made = []
-        for joint in setting.joints:
-            if setting.reverses(joint):
-                noise = 0.0 if setting.position_std is None else setting.position_std[joint]
-                lengths = DISTANCES * (setting.highest[joint] - setting.lowest[joint])
+        for joint in context.joints:
+            if context.reverses(joint):
+                noise = 0.0 if context.position_std is None else context.position_std[joint]
+                lengths = DISTANCES * (context.highest[joint] - context.lowest[joint])
                 lengths = lengths[lengths > RESOLVED * noise]
                 if len(lengths):
                     shortest = np.maximum(0.3 * lengths[:1], RESOLVED * noise)
@@ -86,16 +87,14 @@ class PreslidingHysteresis(Effect):
         return made
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """Deflection less step, z - A(q̇).
-
-        Parameters
-        ----------
-        shapes : (g, 1) float64
-            x_s [rad or m]
-        """
+        """Deflection less step, z - A(q̇)."""
         position, lengths = signals.position[self.joint], shapes[:, 0]
         start = np.full(len(lengths), signals.step[self.joint, 0])  # sliding where it moves, relaxed where it rests
         if signals.periodic:  # a period later the bristles stand as they stood
             start = bristle_deflection(position, lengths, start)[:, -1]
         deflection = bristle_deflection(position, lengths, start)
         return per_joint_columns((deflection - signals.step[self.joint])[:, None])
+
+    def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
+        """Dahl's bristles in place of the robot file's Coulomb friction, whatever F is."""
+        return [{"distance": shape[0]}]

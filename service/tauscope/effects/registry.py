@@ -1,80 +1,65 @@
 """All effects that are looked for: those of this package, and those that plugins add.
 
-A plugin names an `Effect` class under the entry point group ``tauscope.effects``.
+Every module of this package is read for its effects. A plugin names an `Effect` class under the entry point group
+``tauscope.effects``.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
+from importlib import import_module
 from importlib.metadata import entry_points
+from inspect import isabstract
+from pathlib import Path
+from pkgutil import iter_modules
 
-from tauscope.effects.asymmetric_friction import AsymmetricCoulomb, AsymmetricViscous
-from tauscope.effects.backlash import Backlash
-from tauscope.effects.base_tilt import BaseTilt
+from tauscope.effects.context import ArmContext
 from tauscope.effects.effect import Effect
-from tauscope.effects.elastic_forces import CableForce, JointSpring
-from tauscope.effects.external_contact import ExternalContact
-from tauscope.effects.friction_coupling import FrictionCoupling
-from tauscope.effects.friction_drift import FrictionDrift
-from tauscope.effects.joint_elasticity import JointElasticity
-from tauscope.effects.kinematic_error import KinematicError
-from tauscope.effects.load_dependent_friction import LoadDependentFriction
-from tauscope.effects.nonlinear_viscous import NonlinearViscous
-from tauscope.effects.payload import Payload
-from tauscope.effects.payload_change import PayloadChange
-from tauscope.effects.periodic_torque import Cogging, TorqueRipple
-from tauscope.effects.plain_terms import CoulombFriction, TorqueOffset, ViscousFriction
-from tauscope.effects.position_dependent_friction import PositionDependentFriction
-from tauscope.effects.presliding_hysteresis import PreslidingHysteresis
-from tauscope.effects.rotor_inertia import RotorInertia
-from tauscope.effects.setting import Setting
-from tauscope.effects.stribeck_friction import StribeckFriction
-from tauscope.effects.time_delay import TimeDelay
-from tauscope.effects.torque_sensing import TorqueGainError, TorqueSaturation
 from tauscope.errors import IdentificationError
 
 ENTRY_POINT_GROUP = "tauscope.effects"
 
-BUILT_IN: tuple[type[Effect], ...] = (
-    AsymmetricCoulomb,
-    AsymmetricViscous,
-    NonlinearViscous,
-    LoadDependentFriction,
-    PositionDependentFriction,
-    StribeckFriction,
-    PreslidingHysteresis,
-    FrictionDrift,
-    FrictionCoupling,
-    Cogging,
-    TorqueRipple,
-    Backlash,
-    JointElasticity,
-    RotorInertia,
-    TorqueGainError,
-    TorqueSaturation,
-    TimeDelay,
-    JointSpring,
-    CableForce,
-    BaseTilt,
-    PayloadChange,
-    ExternalContact,
-    KinematicError,
-    Payload,
-    TorqueOffset,
-    CoulombFriction,
-    ViscousFriction,
-)
-
 
 @cache
 def catalogue() -> tuple[type[Effect], ...]:
-    """The classes of all effects, built-in ones first.
+    """The classes of all effects by rank, built-in ones first.
 
     Raises
     ------
     IdentificationError
-        where a plugin cannot be loaded or is no effect
+        where a plugin cannot be loaded, is no effect or has the id of another one
     """
-    added = []
+    parts = [sorted(part, key=lambda each: (each.rank, each.id)) for part in (_built_in(), _plugins())]
+    found: dict[str, type[Effect]] = {}
+    for effect in (each for part in parts for each in part):
+        if found.setdefault(effect.id, effect) is not effect:
+            raise IdentificationError(f"two effects have the id {effect.id}: rename the one of {effect.__module__}")
+    return tuple(found.values())
+
+
+def effect_class(effect_id: str) -> type[Effect]:
+    """The class of an id of the catalogue."""
+    return next(effect for effect in catalogue() if effect.id == effect_id)
+
+
+def possible_effects(context: ArmContext) -> Sequence[Effect]:
+    """Every form of every effect worth looking at beside the nominal model."""
+    return [form for effect in catalogue() if effect.screened for form in effect.forms(context)]
+
+
+def farther_effects(context: ArmContext) -> Sequence[Effect]:
+    """Every form that is worth a look only where something is left."""
+    return [form for effect in catalogue() if effect.screened for form in effect.farther_forms(context)]
+
+
+def _built_in() -> Iterator[type[Effect]]:
+    for module in iter_modules([str(Path(__file__).parent)]):
+        for each in vars(import_module(f"{__package__}.{module.name}")).values():
+            is_own = isinstance(each, type) and each.__module__ == f"{__package__}.{module.name}"
+            if is_own and issubclass(each, Effect) and not isabstract(each) and not each.is_variant:
+                yield each
+
+
+def _plugins() -> Iterator[type[Effect]]:
     for entry in entry_points(group=ENTRY_POINT_GROUP):
         try:
             effect = entry.load()
@@ -84,15 +69,4 @@ def catalogue() -> tuple[type[Effect], ...]:
             raise IdentificationError(
                 f"effect {entry.name} ({entry.value}) is no subclass of Effect: correct the plugin"
             )
-        added.append(effect)
-    return (*BUILT_IN, *added)
-
-
-def possible_effects(setting: Setting) -> Sequence[Effect]:
-    """Every form of every effect worth looking at beside the nominal model."""
-    return [form for effect in catalogue() if effect.screened for form in effect.forms(setting)]
-
-
-def farther_effects(setting: Setting) -> Sequence[Effect]:
-    """Every form that is worth a look only where something is left."""
-    return [form for effect in catalogue() if effect.screened for form in effect.farther_forms(setting)]
+        yield effect

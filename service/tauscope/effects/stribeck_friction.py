@@ -1,15 +1,13 @@
 """Extra friction near zero velocity that decays with speed, beyond what the nominal curve has."""
 
 from collections.abc import Sequence
-from typing import ClassVar
 
 import numpy as np
 
-from tauscope.effects.effect import Effect, mesh, per_joint_columns
-from tauscope.effects.parameters import Coefficient, Shape
-from tauscope.effects.setting import Setting
-from tauscope.effects.signals import Signals
+from tauscope.effects.context import ArmContext, Signals
+from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, mesh, per_joint_columns
 from tauscope.recording.recording import Array
+from tauscope.robot import Robot
 
 SPEEDS = np.array([0.04, 0.08, 0.15, 0.25, 0.4, 0.65, 1.0])
 """Decay speeds looked at, relative to the joint's top speed."""
@@ -24,49 +22,42 @@ bump, and s is of any size."""
 class StribeckFriction(Effect):
     """τ = s A(q̇) exp(-(|q̇|/v_s)^α)."""
 
-    has_step: ClassVar[bool] = True
-    of_motion_and_step: ClassVar[bool] = True
-    id: ClassVar[str] = "stribeck_friction"
-    arguments: ClassVar[frozenset[str] | None] = frozenset({"velocity"})
-    equation: ClassVar[str] = "tau = s sgn(qd) exp(-(|qd|/v_s)^alpha)"
-    meaning: ClassVar[str] = "friction rises towards zero velocity more than the model's curve"
-    remedy: ClassVar[str] = "add a Stribeck term"
-    revealing_motion: ClassVar[str] = "slow sweeps between rest and a few v_s, beside motion at top speed"
-    coefficients: ClassVar[tuple[Coefficient, ...]] = (Coefficient("s", "{tau}", positive=True),)
-    shapes: ClassVar[tuple[Shape, ...]] = (Shape("v_s", "{q}/s", logarithmic=True), Shape("alpha", "1", fixed=True))
+    has_step = True
+    of_motion_and_step = True
+    id = "stribeck_friction"
+    rank = 60
+    german = "Stribeck-Reibung"
+    arguments = frozenset({"velocity"})
+    equation = "tau = s sgn(qd) exp(-(|qd|/v_s)^alpha)"
+    meaning = "friction rises towards zero velocity more than the model's curve"
+    remedy = "add a Stribeck term"
+    code = "{c[0]} * {step} * exp(-pow(fabs(v) / {s[0]}, {s[1]}))"
+    revealing_motion = "slow sweeps between rest and a few v_s, beside motion at top speed"
+    coefficients = (Coefficient("s", "{tau}", positive=True),)
+    shapes = (Shape("v_s", "{q}/s", logarithmic=True), Shape("alpha", "1", fixed=True))
 
     @classmethod
-    def forms(cls, setting: Setting) -> Sequence[Effect]:
+    def forms(cls, context: ArmContext) -> Sequence[Effect]:
         """Two a joint that moves, an exponent each: which of the two it is, only the fitted curves can say."""
         made = []
-        for joint in setting.joints:
-            if setting.moves(joint):
-                speeds = SPEEDS * setting.top_speed[joint]
+        for joint in context.joints:
+            if context.moves(joint):
+                speeds = SPEEDS * context.top_speed[joint]
                 for exponent in EXPONENTS:
                     bounds = np.array([0.5 * speeds[0], exponent]), np.array([1.5 * speeds[-1], exponent])
                     made.append(cls(joint, mesh(speeds, np.array([exponent])), *bounds))
         return made
 
     def is_possible(self, shape: Array, k_v: float | None) -> bool:
-        """Whether friction rises before it decays.
-
-        Parameters
-        ----------
-        shape : (2,) float64
-            v_s [rad/s or m/s], α
-        k_v : float or None
-            K_v of the joint; None where there is none [s/rad or s/m]
-        """
+        """Whether friction rises before it decays."""
         return k_v is None or k_v * float(shape[0]) >= SHORTEST_DECAY
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """A(q̇) exp(-(|q̇|/v_s)^α).
-
-        Parameters
-        ----------
-        shapes : (g, 2) float64
-            v_s [rad/s or m/s], α
-        """
+        """A(q̇) exp(-(|q̇|/v_s)^α)."""
         speed = np.abs(signals.velocity[self.joint])
         decay = np.exp(-((speed / shapes[:, :1]) ** shapes[:, 1:]))
         return per_joint_columns((signals.step[self.joint] * decay)[:, None])
+
+    def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
+        """One decay."""
+        return [{"amplitude": coefficients[0], "velocity": shape[0], "exponent": shape[1]}]

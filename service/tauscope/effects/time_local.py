@@ -7,13 +7,12 @@ refines.
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tauscope.effects.context import Signals
 from tauscope.effects.effect import Effect
-from tauscope.effects.signals import Signals
 from tauscope.recording.recording import Array
 
 IndexArray = NDArray[np.intp]
@@ -49,7 +48,8 @@ class TimeLocalEffect(Effect):
     The scope is the index of the one recording that the window belongs to, `EVERY`, or `since` a recording.
     """
 
-    repeats_with_motion: ClassVar[bool] = False
+    repeats_with_motion = False
+    no_code = "it belongs to instants of the recordings"
 
     @abstractmethod
     def torque(self, signals: Signals, shape: Array) -> Array:

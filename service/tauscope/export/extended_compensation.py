@@ -4,7 +4,7 @@ An effect can stand in a controller where its torque follows from the joint's ow
 same instant. What needs a state, other joints or the clock is named in the file's heading, and is not in the code.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from datetime import datetime
 
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
@@ -22,22 +22,6 @@ from tauscope.export.compensation import (
 )
 from tauscope.export.compensation.identifiers import identifier
 from tauscope.recording import EffortKind
-
-TWO_OVER_PI = "0.6366197723675814"
-
-EXPRESSIONS: Mapping[str, str] = {
-    "asymmetric_coulomb": "{c0} * fabs(atan({k_v} * v) * " + TWO_OVER_PI + ")",
-    "asymmetric_viscous": "{c0} * fabs(v)",
-    "nonlinear_viscous": "{c0} * copysign(pow(fabs(v), {s0}), v)",
-    "load_dependent_friction": "{c0} * fabs(load) * atan({k_v} * v) * " + TWO_OVER_PI,
-    "position_dependent_friction": "({c0} * cos({s0} * q) + {c1} * sin({s0} * q)) * atan({k_v} * v) * " + TWO_OVER_PI,
-    "stribeck_friction": "{c0} * atan({k_v} * v) * " + TWO_OVER_PI + " * exp(-pow(fabs(v) / {s0}, {s1}))",
-    "cogging": "{c0} * sin({s0} * q) + {c1} * cos({s0} * q)",
-    "torque_ripple": "load * ({c0} * sin({s0} * q) + {c1} * cos({s0} * q))",
-    "joint_spring": "{c0} * q",
-    "cable_force": "{side} * {c0} * pow(fmax({side} * (q - {s0}), 0.0), {s1})",
-}
-"""Torque by effect, in what C and Python have in common; q, v, load: position, velocity, rigid-body torque."""
 
 
 def compensation_code(
@@ -62,9 +46,13 @@ def compensation_code(
         for place, joint in enumerate(diagnosis.robot.joints)
     )
     plain = CompensationModel(diagnosis.robot.name, joints, created, tuple(sources), version)
-    included = [term for term in model.terms if term.effect.id in EXPRESSIONS]
+    included = [term for term in model.terms if term.effect.code]
     names = [joint.name for joint in diagnosis.robot.joints]
-    left_out = [term.effect.name(names) for term in model.terms if term.effect.id not in EXPRESSIONS]
+    left_out = [
+        f"{term.effect.name(names)}: {term.effect.no_code or 'it has no code'}"
+        for term in model.terms
+        if not term.effect.code
+    ]
     if suffix == ".py":
         return to_python(plain) + _python(identifier(plain.robot), included, left_out, diagnosis)
     if suffix == ".h":
@@ -86,12 +74,8 @@ def _friction(diagnosis: Diagnosis, joint: int) -> JointFriction:
 def _expression(term: Term, diagnosis: Diagnosis) -> str:
     """A term's torque, in the arm's own like the friction beside it."""
     term = on_the_arm(diagnosis.selection.fit.model, term)
-    joint = term.effect.joint or 0
-    values = {f"c{place}": repr(float(value)) for place, value in enumerate(term.coefficients)}
-    values |= {f"s{place}": repr(float(value)) for place, value in enumerate(term.shape)}
-    values["k_v"] = repr(float(diagnosis.selection.fit.model.structure.terms[joint].k_v))
-    values["side"] = repr(float(getattr(term.effect, "side", 1)))
-    return EXPRESSIONS[term.effect.id].format(**values)
+    k_v = float(diagnosis.selection.fit.model.structure.terms[term.effect.joint or 0].k_v)
+    return term.effect.torque_code(term.coefficients.tolist(), term.shape.tolist(), k_v)
 
 
 def _by_joint(terms: Sequence[Term], diagnosis: Diagnosis) -> list[tuple[int, list[str]]]:
@@ -102,16 +86,11 @@ def _by_joint(terms: Sequence[Term], diagnosis: Diagnosis) -> list[tuple[int, li
     return sorted(found.items())
 
 
-def _remark(left_out: Sequence[str]) -> str:
-    return f"Not in this code, for want of state, other joints or the clock: {', '.join(left_out)}." if left_out else ""
-
-
 def _python(name: str, terms: Sequence[Term], left_out: Sequence[str], diagnosis: Diagnosis) -> str:
     """Function of the effects in Python."""
     lines = ["", "", f"def {name}_effect_torque(joint, position, velocity, load):"]
     lines.append('    """Torque in Nm (force in N) of what was found beside friction; load: rigid-body torque."""')
-    remark = _remark(left_out)
-    lines += [f"    # {remark}"] if remark else []
+    lines += [f"    # Not in this code: {each}" for each in left_out]
     lines += ["    from math import atan, copysign, cos, exp, fabs, pow, sin", ""]
     lines += ["    fmax = max", "    q, v = position, velocity", "    torque = 0.0"]
     for joint, expressions in _by_joint(terms, diagnosis):
@@ -122,8 +101,7 @@ def _python(name: str, terms: Sequence[Term], left_out: Sequence[str], diagnosis
 
 def _c(name: str, terms: Sequence[Term], left_out: Sequence[str], diagnosis: Diagnosis) -> str:
     """Function of the effects in C."""
-    remark = _remark(left_out)
-    lines = [f"/* {remark} */"] if remark else []
+    lines = [f"/* Not in this code: {each} */" for each in left_out]
     lines.append("/* Torque in Nm (force in N) of what was found beside friction; load: rigid-body torque. */")
     lines.append(f"static inline double {name}_effect_torque(int joint, double q, double v, double load)")
     lines += ["{", "    double torque = 0.0;", "    (void)q;", "    (void)v;", "    (void)load;"]

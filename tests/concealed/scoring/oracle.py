@@ -9,7 +9,7 @@ from concealed.generator.trial import Trial
 from tauscope.diagnosis import diagnosis as steps
 from tauscope.diagnosis import document
 from tauscope.diagnosis.documents.document import DiagnosisDocument
-from tauscope.effects import Effect, Setting, possible_effects
+from tauscope.effects import ArmContext, Effect, possible_effects
 
 
 def oracle(trial: Trial) -> DiagnosisDocument:
@@ -20,7 +20,7 @@ def oracle(trial: Trial) -> DiagnosisDocument:
         return document(steps.diagnose(trial.robot, trial.train, trial.held_out))
 
 
-def _only(places: Collection[tuple[str, int | None]], setting: Setting) -> list[Effect]:
+def _only(places: Collection[tuple[str, int | None]], setting: ArmContext) -> list[Effect]:
     return [each for each in possible_effects(setting) if (each.id, each.joint) in places]
 
 

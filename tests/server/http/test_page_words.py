@@ -1,5 +1,6 @@
 """The page in German: every sentence and every id has its words, and no word is left that nobody says."""
 
+import json
 import re
 
 from server.http.page_words import german, sentences, tagged
@@ -7,7 +8,7 @@ from tauscope.diagnosis import Verdict
 from tauscope.effects import catalogue
 from tauscope.robot.robot import JointType
 from tauscope.runtime import RunState
-from tauscope.server.page.router import STATIC
+from tauscope.server.page.router import STATIC, assets
 from tauscope.server.queue.states import JobState
 from tauscope.server.store.layout import FOLDERS
 
@@ -33,7 +34,8 @@ def test_german_sentences_hold_the_same_parts() -> None:
 def test_every_id_that_the_service_shows_has_a_german_name() -> None:
     shown = {str(each) for kind in (RunState, JobState, Verdict, JointType) for each in kind}
     shown |= {effect.id for effect in catalogue()} | {"unknown", "damaged", "waiting"} | VARIABLES
-    assert shown | FOLDERS.keys() - {"excitation"} <= german()[1].keys()
+    names = german()[1].keys() | json.loads(assets()["effects.js"].content.split(b"= ")[1].rstrip(b";\n")).keys()
+    assert shown | FOLDERS.keys() - {"excitation"} <= names
 
 
 def test_no_words_are_said_in_one_language_only() -> None:

@@ -8,7 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tauscope_sim.effects import BaseTilt, ExternalContact, FrictionCoupling, KinematicError, Payload, PayloadChange
+from tauscope_sim.effects.base_tilt import BaseTilt
+from tauscope_sim.effects.external_contact import ExternalContact
+from tauscope_sim.effects.friction_coupling import FrictionCoupling
+from tauscope_sim.effects.kinematic_error import KinematicError
+from tauscope_sim.effects.payload import Payload
+from tauscope_sim.effects.payload_change import PayloadChange
 
 Array = NDArray[np.float64]
 Agree = Callable[..., dict[str, Array]]

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tauscope_sim.effects import FrictionDrift, PreslidingHysteresis
+from tauscope_sim.effects.friction_drift import FrictionDrift
+from tauscope_sim.effects.presliding_hysteresis import PreslidingHysteresis
 from tauscope_sim.plant import Plant
 
 Array = NDArray[np.float64]

@@ -7,15 +7,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tauscope_sim.effects import (
-    Backlash,
-    Cogging,
-    JointElasticity,
-    JointSpring,
-    LoadDependentFriction,
-    RotorInertia,
-    TorqueRipple,
-)
+from tauscope_sim.effects.backlash import Backlash
+from tauscope_sim.effects.cogging import Cogging
+from tauscope_sim.effects.joint_elasticity import JointElasticity
+from tauscope_sim.effects.joint_spring import JointSpring
+from tauscope_sim.effects.load_dependent_friction import LoadDependentFriction
+from tauscope_sim.effects.rotor_inertia import RotorInertia
+from tauscope_sim.effects.torque_ripple import TorqueRipple
 from tauscope_sim.plant import Plant
 from tauscope_sim.plant.loads import loaded_accelerations
 

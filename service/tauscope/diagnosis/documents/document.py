@@ -28,8 +28,9 @@ from tauscope.diagnosis.findings.verdict import Verdict
 from tauscope.diagnosis.model.term import Term
 from tauscope.diagnosis.model.torque_scale import on_the_arm
 from tauscope.diagnosis.next_experiment import PlannedExperiment
-from tauscope.diagnosis.selection.shape_error import GAIN, LOAD_FRICTION
-from tauscope.effects import Effect, Quantity, TimeLocalEffect, catalogue
+from tauscope.effects import Quantity, TimeLocalEffect, effect_class
+from tauscope.effects.load_dependent_friction import LoadDependentFriction
+from tauscope.effects.torque_gain_error import TorqueGainError
 from tauscope.recording.recording import Array
 
 SHIFTS_FROM = 3.0
@@ -105,7 +106,7 @@ def _detectable(diagnosis: Diagnosis, names: Sequence[str]) -> list[DetectableEn
             effect=each.effect,
             joint=None if each.joint is None else names[each.joint],
             minimum=each.minimum,
-            unit=_of(each.effect).unit_at(each.unit, diagnosis.setting, each.joint),
+            unit=effect_class(each.effect).unit_at(each.unit, diagnosis.setting, each.joint),
             visible=each.visible,
         )
         for each in diagnosis.detectable
@@ -123,10 +124,6 @@ def _differences(diagnosis: Diagnosis) -> list[DifferenceEntry]:
         )
         for each in diagnosis.differences
     ]
-
-
-def _of(effect_id: str) -> type[Effect]:
-    return next(effect for effect in catalogue() if effect.id == effect_id)
 
 
 def _where(place: Place | None) -> WhereEntry | None:
@@ -190,7 +187,7 @@ def _told(term: Term, diagnosis: Diagnosis, covariance: Array | None = None) -> 
 
 def _why_behind(finding: Finding) -> str:
     """Why a finding may be none beside the one that it is behind."""
-    if finding.terms[0].effect.id == GAIN and finding.behind is not None and finding.behind.id == LOAD_FRICTION:
+    if isinstance(finding.terms[0].effect, TorqueGainError) and isinstance(finding.behind, LoadDependentFriction):
         return "it may be none: a gear's efficiency, and load friction of another formula, show as both"
     return "it is so small that it may be an error of that effect's formula"
 

@@ -16,11 +16,8 @@ from tauscope.diagnosis.selection.equivalence import EQUIVALENT
 from tauscope.diagnosis.selection.selector import MOST_FITTED, Selector
 from tauscope.diagnosis.selection.table import fitted_option
 from tauscope.effects import TimeLocalEffect
+from tauscope.effects.computation import side_by_side
 from tauscope.effects.plain_terms import TorqueOffset
-from tauscope.effects.side_by_side import side_by_side
-
-WITH_A_CONSTANT = ("joint_spring",)
-"""Effects whose own constant is the nominal model's offset: beside one, the offset is no finding of its own."""
 
 
 def instead_of_a_constant(
@@ -49,7 +46,7 @@ def instead_of_a_constant(
 
 def with_better_than_constants(selection: Selection, selector: Selector) -> Selection:
     """The selection with what explains a joint's torque better than its constant in the constant's place."""
-    constants = {term.effect.joint for term in selection.fit.model.terms if term.effect.id in WITH_A_CONSTANT}
+    constants = {term.effect.joint for term in selection.fit.model.terms if term.effect.has_constant}
     for joint in range(selector.screen.observations.robot.joint_count):
         place = selection.nominal.model.structure.coefficient(joint, TorqueOffset.term)
         if place is not None and joint not in constants:

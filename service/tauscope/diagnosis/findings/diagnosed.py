@@ -15,7 +15,7 @@ from tauscope.diagnosis.fitting.lack_of_fit import LackOfFit
 from tauscope.diagnosis.screening.screen import Screen
 from tauscope.diagnosis.selection.choice import Selection
 from tauscope.diagnosis.selection.confirmation import HeldOut
-from tauscope.effects import Setting
+from tauscope.effects import ArmContext
 from tauscope.identification import Identification
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
@@ -54,7 +54,7 @@ class Diagnosis:
     """
 
     identification: Identification
-    setting: Setting
+    setting: ArmContext
     selection: Selection
     findings: tuple[Finding, ...]
     mismatch: tuple[JointMismatch, ...]

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tauscope.diagnosis.model.term import Term
-from tauscope.effects.parameters import Quantity
+from tauscope.effects.effect import Quantity
 
 
 @dataclass(frozen=True, eq=False)

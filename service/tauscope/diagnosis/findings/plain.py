@@ -11,7 +11,7 @@ from collections.abc import Collection
 import numpy as np
 from scipy import stats
 
-from tauscope.diagnosis.findings.constant_torque import WITH_A_CONSTANT, instead_of_a_constant
+from tauscope.diagnosis.findings.constant_torque import instead_of_a_constant
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
 from tauscope.diagnosis.findings.finding import Finding, sizes, without_nominal
 from tauscope.diagnosis.model.term import Term
@@ -47,7 +47,7 @@ def with_plain_terms(diagnosis: Diagnosis, lacking: Lacking) -> Diagnosis:
         what the given model does not have
     """
     named = {finding.place for finding in diagnosis.findings}
-    constants = {joint for effect, joint in named if effect in WITH_A_CONSTANT}
+    constants = {each.terms[0].effect.joint for each in diagnosis.findings if each.terms[0].effect.has_constant}
     added = []
     for kind in PLAIN:
         for joint, term in sorted(lacking):

@@ -14,7 +14,6 @@ import numpy as np
 
 from tauscope.diagnosis.fitting.fit import Fit
 from tauscope.diagnosis.fitting.lack_of_fit import LackOfFit
-from tauscope.diagnosis.selection.choice import EXPECTED
 from tauscope.effects import Effect
 
 LEFT = 0.15
@@ -27,7 +26,7 @@ DOUBTED = 0.5
 
 def certainty_as_law(effect: Effect, nominal: Fit, fit: Fit, without: Fit, left: LackOfFit) -> float:
     """Chance that a finding is a law of the catalogue, and not what comes nearest to another one."""
-    if effect.id in EXPECTED:
+    if effect.is_expected:
         return 1.0
     touched = list(effect.touched(len(left.structured)))
     after, before, alone = (each.joint_energies[touched] for each in (fit, nominal, without))

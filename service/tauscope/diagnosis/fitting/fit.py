@@ -12,7 +12,7 @@ from tauscope.diagnosis.fitting.white_columns import WhiteColumns
 from tauscope.diagnosis.model.extended import ExtendedModel, with_terms
 from tauscope.diagnosis.model.term import Term
 from tauscope.diagnosis.observations.observations import Observations
-from tauscope.effects.last_few import LastFew
+from tauscope.effects.computation import LastFew
 from tauscope.recording.recording import Array
 
 STEPS = 25

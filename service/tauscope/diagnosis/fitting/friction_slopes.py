@@ -13,7 +13,7 @@ import numpy as np
 
 from tauscope.diagnosis.fitting.fit import Fit, Fitter
 from tauscope.diagnosis.model.extended import ExtendedModel
-from tauscope.effects.side_by_side import side_by_side
+from tauscope.effects.computation import side_by_side
 from tauscope.identification import Identification
 from tauscope.identification.friction_shape import SEPARATION
 from tauscope.recording.recording import Array

@@ -12,7 +12,7 @@ from scipy import stats
 
 from tauscope.diagnosis.fitting.fit import Fit
 from tauscope.diagnosis.observations.observations import Observations, Piece
-from tauscope.effects.side_by_side import side_by_side
+from tauscope.effects.computation import side_by_side
 from tauscope.recording.recording import Array
 
 FEATURES = 60

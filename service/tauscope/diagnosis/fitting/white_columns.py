@@ -15,8 +15,7 @@ from tauscope.diagnosis.model.extended import ExtendedModel, shape_slopes, term_
 from tauscope.diagnosis.model.term import Term
 from tauscope.diagnosis.observations.observations import Observations
 from tauscope.effects import Effect
-from tauscope.effects.last_few import LastFew
-from tauscope.effects.side_by_side import THREADS
+from tauscope.effects.computation import THREADS, LastFew
 from tauscope.recording.recording import Array
 
 FRICTION_KEPT = 2 * THREADS

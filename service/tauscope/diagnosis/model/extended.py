@@ -9,8 +9,7 @@ from tauscope.diagnosis.model.term import Term, shape_step
 from tauscope.diagnosis.observations.observations import Piece
 from tauscope.dynamics import smooth_sign, smooth_sign_slope
 from tauscope.effects import Signals
-from tauscope.effects.last_few import LastFew
-from tauscope.effects.side_by_side import THREADS
+from tauscope.effects.computation import THREADS, LastFew
 from tauscope.identification.shape_sensitivity import ShapeParameter
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array

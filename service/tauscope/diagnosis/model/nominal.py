@@ -8,7 +8,7 @@ import numpy as np
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.observations.observations import Observations
 from tauscope.dynamics import mass_matrix
-from tauscope.effects import Setting
+from tauscope.effects import ArmContext
 from tauscope.identification import Identification
 from tauscope.identification.shape_sensitivity import ShapeParameter
 from tauscope.recording.conditioning import Conditioner
@@ -66,7 +66,7 @@ def identified_rotors(identification: Identification) -> dict[int, float]:
 
 def setting_of(
     model: ExtendedModel, observations: Observations, conditioners: Sequence[Conditioner], cutoff_hz: float | None
-) -> Setting:
+) -> ArmContext:
     """The arm and the ranges of its recorded motion."""
     robot = observations.robot
     motions = [piece.prepared.motion for piece in observations]
@@ -78,7 +78,7 @@ def setting_of(
     load = np.concatenate([each.load for each in signals], axis=1)
     torque = np.concatenate([each.torque for each in signals], axis=1)
     nyquist = min(conditioner.timing.rate_hz for conditioner in conditioners) / 2.0
-    return Setting(
+    return ArmContext(
         robot=robot,
         slowest=slowest,
         fastest=fastest,

@@ -14,7 +14,8 @@ import numpy as np
 
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.model.term import Term
-from tauscope.effects.torque_sensing import Saturation, TorqueGainError
+from tauscope.effects.torque_gain_error import TorqueGainError
+from tauscope.effects.torque_saturation import Saturation
 from tauscope.recording.recording import Array
 
 

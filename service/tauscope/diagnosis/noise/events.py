@@ -19,7 +19,7 @@ from tauscope.diagnosis.observations.whitening import JointNoise
 from tauscope.diagnosis.screening.refinement import refined
 from tauscope.diagnosis.screening.screen import Candidate, Screen, model_signals
 from tauscope.effects import Effect
-from tauscope.effects.side_by_side import side_by_side
+from tauscope.effects.computation import side_by_side
 from tauscope.identification.autocorrelation import Autoregression
 from tauscope.recording.recording import Array
 

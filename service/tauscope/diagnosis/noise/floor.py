@@ -20,7 +20,7 @@ from tauscope.diagnosis.observations.period_pairs import period_pairs, rounding_
 from tauscope.diagnosis.observations.whitening import JointNoise, fitted_noise
 from tauscope.diagnosis.screening.screen import Screen, model_signals
 from tauscope.effects import Effect
-from tauscope.effects.side_by_side import side_by_side
+from tauscope.effects.computation import side_by_side
 from tauscope.identification.autocorrelation import Autoregression
 from tauscope.recording.conditioning.common_band import Decimator
 from tauscope.recording.recording import Array

@@ -13,7 +13,7 @@ from tauscope.diagnosis.observations.observations import Observations
 from tauscope.diagnosis.screening.effective_number import effective_number
 from tauscope.diagnosis.screening.windows import Windows, white_torque, windowed_moments, windows_on_rows, windows_tried
 from tauscope.effects import Effect, Signals, TimeLocalEffect
-from tauscope.effects.side_by_side import side_by_side
+from tauscope.effects.computation import side_by_side
 from tauscope.recording.recording import Array
 
 MOST_KEPT = 400 * 1024 * 1024

@@ -14,7 +14,7 @@ from tauscope.diagnosis.fitting.fit import Fit
 from tauscope.diagnosis.fitting.projection import INVISIBLE, Moments
 from tauscope.diagnosis.observations.observations import Observations
 from tauscope.diagnosis.screening.effective_number import TAIL
-from tauscope.effects.signals import Signals
+from tauscope.effects.context import Signals
 from tauscope.effects.time_local import IndexArray, TimeLocalEffect, open_samples, open_share
 from tauscope.recording.recording import Array
 

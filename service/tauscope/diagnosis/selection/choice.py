@@ -14,9 +14,6 @@ from tauscope.diagnosis.selection.confirmation import Confirmation
 CERTAIN = 3.0
 """Standard errors by which a friction coefficient must be negative to be impossible."""
 
-EXPECTED = ("rotor_inertia",)
-"""Effects that every geared joint may have: they need no share to be believed, and nothing is doubted beside them."""
-
 Place = tuple[str, int | None]
 """Effect id and joint index, from 0; None for the whole arm."""
 
@@ -91,7 +88,7 @@ def is_physical(option: Option, before: Fit, *, instead: bool = False) -> bool:
     joint = term.effect.joint
     k_v = None if joint is None else option.fit.model.structure.terms[joint].k_v
     possible = possible and term.effect.is_possible(term.shape, k_v)
-    alone = instead or all(each.effect.id in EXPECTED for each in before.model.terms)
+    alone = instead or all(each.effect.is_expected for each in before.model.terms)
     possible = possible and term.effect.is_consistent(term.coefficients, term.shape, alone=alone)
     return option.gain > 0.0 and possible and not driving(option.fit) - driving(before)
 

@@ -14,14 +14,14 @@ from tauscope.diagnosis.selection.choice import Place, Selection, place_of
 from tauscope.diagnosis.selection.equivalence import EQUIVALENT
 from tauscope.diagnosis.selection.proxies import FULL
 from tauscope.diagnosis.selection.selector import WORTH_REFINING, Selector
-from tauscope.effects import Effect, Setting, farther_effects
+from tauscope.effects import ArmContext, Effect, farther_effects
 
 Stand = tuple[int, set[Place]]
 """A joint, and effects that were selected there."""
 
 
 def looked_farther(
-    selection: Selection, selector: Selector, setting: Setting, progress: Callable[[str], None]
+    selection: Selection, selector: Selector, setting: ArmContext, progress: Callable[[str], None]
 ) -> Selection:
     """The selection with what such forms explain: in the place of what was found, and beside it where some is left."""
     chosen = stands(selection)

@@ -19,7 +19,7 @@ from tauscope.diagnosis.selection.equivalence import FORMULA_ERROR, doubt
 from tauscope.diagnosis.selection.pruning import without_superfluous
 from tauscope.diagnosis.selection.selector import WORTH_REFINING, Selector
 from tauscope.effects import Effect, Signals
-from tauscope.effects.side_by_side import side_by_side
+from tauscope.effects.computation import side_by_side
 
 FARTHER = 1.0
 """What a fit has to explain more to take another's place, in units of what counts as one noise variance between them:

@@ -20,8 +20,8 @@ from tauscope.diagnosis.observations.observations import Piece
 from tauscope.diagnosis.screening.screen import Screen, model_signals
 from tauscope.diagnosis.selection.choice import Option
 from tauscope.effects import Effect, Signals
+from tauscope.effects.computation import side_by_side
 from tauscope.effects.deflection import torque_of_deflection
-from tauscope.effects.side_by_side import side_by_side
 from tauscope.recording.conditioning.filters import smooth_each
 from tauscope.recording.recording import Array
 

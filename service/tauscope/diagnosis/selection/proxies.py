@@ -12,8 +12,8 @@ from collections.abc import Iterable, Sequence
 from tauscope.diagnosis.fitting.fit import Fit
 from tauscope.diagnosis.fitting.lack_of_fit import LackOfFit, lack_of_fit
 from tauscope.diagnosis.observations.observations import Observations
-from tauscope.diagnosis.selection.choice import EXPECTED, Choice, Place, place_of
-from tauscope.effects import TimeLocalEffect
+from tauscope.diagnosis.selection.choice import Choice, Place, place_of
+from tauscope.effects import TimeLocalEffect, effect_class
 from tauscope.recording.recording import Array
 
 EXPLAINED = 0.6
@@ -124,7 +124,7 @@ def full(choices: Sequence[Choice]) -> set[int]:
 
 def _joints_of(places: Iterable[Place], least: int) -> set[int]:
     """Joints that have at least so many different effects."""
-    counts = Counter(joint for effect, joint in places if joint is not None and effect not in EXPECTED)
+    counts = Counter(joint for effect, joint in places if joint is not None and not effect_class(effect).is_expected)
     return {joint for joint, count in counts.items() if count >= least}
 
 

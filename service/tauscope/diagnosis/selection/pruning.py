@@ -12,7 +12,7 @@ from tauscope.diagnosis.selection.admission import Admission
 from tauscope.diagnosis.selection.choice import Choice, Selection
 from tauscope.diagnosis.selection.proxies import proxies, weak_likenesses
 from tauscope.diagnosis.selection.shape_error import HARDLY, groups_of, standings
-from tauscope.effects.side_by_side import THREADS, side_by_side
+from tauscope.effects.computation import THREADS, side_by_side
 
 Pruned = tuple[Fit, list[Choice]]
 """A model, and the choices that are left in it."""

@@ -28,17 +28,14 @@ from tauscope.diagnosis.selection.position_bias import is_position_noise
 from tauscope.diagnosis.selection.proxies import TELLING, endless, full, hopeless
 from tauscope.diagnosis.selection.pruning import without_proxies, without_superfluous, without_weak_likenesses
 from tauscope.diagnosis.selection.table import Table, fitted_option
-from tauscope.effects import Effect, TimeLocalEffect
-from tauscope.effects.side_by_side import side_by_side
+from tauscope.effects import Effect, TimeLocalEffect, effect_class
+from tauscope.effects.computation import side_by_side
 
 MOST_EFFECTS = 4
 """Different effects in one model; what one joint does, the others may do as well."""
 
 UNCONFIRMED = 0.1
 """Share of the level that is left to effects that no other motion can confirm."""
-
-UNCOUNTED = ("rotor_inertia",)
-"""Effects beside which others are looked for without limit: every geared joint may have one."""
 
 MOST_REPEATS = 12
 """Terms of one effect that comes in several orders."""
@@ -243,8 +240,8 @@ class Selector:
             return False
         if place in chosen:
             return effect.repeats and chosen.count(place) < MOST_REPEATS
-        kinds = {effect for effect, _ in chosen if effect not in UNCOUNTED}
-        return place[0] in (*UNCOUNTED, *kinds) or len(kinds) < MOST_EFFECTS
+        kinds = {name for name, _ in chosen if not effect_class(name).is_expected}
+        return effect.is_expected or effect.id in kinds or len(kinds) < MOST_EFFECTS
 
     def _option(self, fit: Fit, term: Term) -> Option:
         """A term that was not screened for, fitted."""

@@ -20,8 +20,10 @@ import numpy as np
 
 from tauscope.diagnosis.fitting.fit import Fit, Fitter
 from tauscope.diagnosis.model.extended import ExtendedModel, with_terms
-from tauscope.diagnosis.selection.choice import EXPECTED, Place
+from tauscope.diagnosis.selection.choice import Place
 from tauscope.effects import Effect
+from tauscope.effects.load_dependent_friction import LoadDependentFriction
+from tauscope.effects.torque_gain_error import TorqueGainError
 from tauscope.recording.recording import Array
 
 SHAPE_ERROR = 0.1
@@ -34,8 +36,6 @@ LIKENESS = 0.02
 EFFICIENCY = 0.4
 """The same for a wrong gain beside load friction: on two arms whose load friction grows with the square of the load,
 and nothing else is missing, it is 0.34 and 0.40; on a third it led."""
-
-GAIN, LOAD_FRICTION = "torque_gain_error", "load_dependent_friction"
 
 PLAIN = 0.9
 """Certainty from which a finding is not doubted."""
@@ -91,7 +91,7 @@ def standings(nominal: Fit, fit: Fit, without: Sequence[Fit], fitter: Fitter, in
         own = list(touched[number])
         gear = _gear_of(effect, effects)
         leader = (leads[own] == number).any() and gear is None
-        if effect.id in EXPECTED or not counts[own].all() or leader:
+        if effect.is_expected or not counts[own].all() or leader:
             found.append(LEADING)
             continue
         shares = (without[number].joint_energies[own] - after[own]) / explained[own]
@@ -105,9 +105,10 @@ def standings(nominal: Fit, fit: Fit, without: Sequence[Fit], fitter: Fitter, in
 
 def _gear_of(effect: Effect, others: Sequence[Effect]) -> Effect | None:
     """The load friction beside which a wrong gain may be a gear's efficiency; None for anything else."""
-    if effect.id != GAIN:
+    if not isinstance(effect, TorqueGainError):
         return None
-    return next((each for each in others if each.id == LOAD_FRICTION and each.joint == effect.joint), None)
+    friction = (each for each in others if isinstance(each, LoadDependentFriction))
+    return next((each for each in friction if each.joint == effect.joint), None)
 
 
 def _is_of_the_same(effect: Effect, leading: Effect) -> bool:

@@ -13,7 +13,7 @@ from tauscope.diagnosis.screening.refinement import refined
 from tauscope.diagnosis.screening.screen import Candidate, Screen, model_signals
 from tauscope.diagnosis.selection.choice import Option, Place, driving, outsized, place_of
 from tauscope.effects import Effect
-from tauscope.effects.side_by_side import side_by_side
+from tauscope.effects.computation import side_by_side
 
 Done = TypeVar("Done")
 

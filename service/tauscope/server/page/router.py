@@ -1,6 +1,7 @@
 """The page and its files."""
 
 import hashlib
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -9,7 +10,8 @@ from pathlib import Path
 
 from fastapi import APIRouter, Request, Response
 
-from tauscope.errors import NotFoundError
+from tauscope.effects import catalogue
+from tauscope.errors import IdentificationError, NotFoundError
 from tauscope.robot.messages import one_line, shown
 
 router = APIRouter(include_in_schema=False)
@@ -71,10 +73,18 @@ def assets() -> Mapping[str, Asset]:
     package = distribution("uplot-python")
     paths = {path.name: path for path in sorted(STATIC.iterdir()) if path.suffix in MEDIA_TYPES}
     paths |= {name: Path(str(package.locate_file(file))) for name, file in PLOT_LIBRARY.items()}
-    return {name: _read(path) for name, path in paths.items()}
+    found = {name: _asset(path.read_bytes(), path.suffix) for name, path in paths.items()}
+    return {**found, "effects.js": _asset(f"export const EFFECTS = {json.dumps(_german_effects())};\n".encode(), ".js")}
 
 
-def _read(path: Path) -> Asset:
+def _german_effects() -> Mapping[str, str]:
+    """German names of the effects; none where a plugin is broken, for the page has to come nevertheless."""
+    try:
+        return {each.id: each.german for each in catalogue() if each.german}
+    except IdentificationError:
+        return {}
+
+
+def _asset(content: bytes, suffix: str) -> Asset:
     """A file with its tag."""
-    content = path.read_bytes()
-    return Asset(content, MEDIA_TYPES[path.suffix], f'"{hashlib.sha256(content).hexdigest()[:24]}"')
+    return Asset(content, MEDIA_TYPES[suffix], f'"{hashlib.sha256(content).hexdigest()[:24]}"')

@@ -1,5 +1,6 @@
 // The page's words in the reader's language: English stands where it is said, German beside it in german.js.
 
+import { EFFECTS } from "./effects.js";
 import { NAMES, SENTENCES } from "./german.js";
 
 const STORE = "tauscope-language";
@@ -24,5 +25,6 @@ export function t(strings, ...values) {
 
 /** An id of the service, such as load_dependent_friction, as words. */
 export function named(id) {
-  return isGerman && Object.hasOwn(NAMES, id) ? NAMES[id] : id.replaceAll("_", " ");
+  const german = isGerman && [NAMES, EFFECTS].find((names) => Object.hasOwn(names, id));
+  return german ? german[id] : id.replaceAll("_", " ");
 }

@@ -2,8 +2,7 @@
 
 import threading
 
-from tauscope.effects.last_few import LastFew
-from tauscope.effects.side_by_side import THREADS, side_by_side
+from tauscope.effects.computation import THREADS, LastFew, side_by_side
 
 WAIT_S = 30.0
 

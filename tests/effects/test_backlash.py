@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 from concealed.generator.concealment import Concealed
 from concealed.generator.trial import recorded_trial
-from diagnosis.test_effect_columns import setting
+from effects.piece_of_motion import context
 from tauscope.diagnosis import diagnose, document
 from tauscope.effects.backlash import DAMPING, Backlash, SpringyTeeth, place_between_springs, place_between_teeth
 from tauscope.effects.deflection import FIRST_ORDER
@@ -99,7 +99,7 @@ def test_on_springy_teeth_it_is_where_a_solver_with_small_steps_has_it(loss: flo
 
 
 def test_a_link_of_no_known_inertia_crosses_at_once_however_its_teeth_give_way() -> None:
-    """A fit may know of none where little is excited, though the arm's setting had one."""
+    """A fit may know of none where little is excited, though the arm's context had one."""
     load = 3.0 * np.sin(2.0 * np.pi * 0.7 * TIME)
     place = SpringyTeeth(0).deflection(load, np.zeros(len(TIME)), np.array([1e-3, 10.0, 1e-4, 8.0]), RATE)
     np.testing.assert_array_equal(place, np.where(load >= 0.0, 0.5, -0.5))
@@ -142,7 +142,7 @@ def test_the_gap_is_what_the_link_crosses_where_it_seems_to_move_by_less(
     crossed: float, moved: float, told: float
 ) -> None:
     covariance = np.diag([1e-10, 0.0, 0.0])
-    (gap,) = Backlash(0).quantities(setting(), np.array([moved]), np.array([crossed, 10.0]), covariance)
+    (gap,) = Backlash(0).quantities(context(), np.array([moved]), np.array([crossed, 10.0]), covariance)
     assert gap.value == pytest.approx(told)
     assert gap.std == pytest.approx(np.hypot(np.hypot(1e-5, FIRST_ORDER * moved), 0.5 * (told - moved)))
 

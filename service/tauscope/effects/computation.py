@@ -1,15 +1,27 @@
-"""What was made last, kept for whoever asks for the same."""
+"""Computation that effects and fits share: two threads, and a cache of the last few results."""
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterable
+from concurrent.futures import ThreadPoolExecutor
 from threading import Lock
 from typing import Generic, TypeVar
 
+Item = TypeVar("Item")
+Done = TypeVar("Done")
 Key = TypeVar("Key", bound=Hashable)
 Made = TypeVar("Made")
 
+THREADS = 2
+"""More threads gain nothing: they share the memory's speed, and Python between arrays."""
+
+
+def side_by_side(work: Callable[[Item], Done], items: Iterable[Item]) -> list[Done]:
+    """The result of every item, in their order."""
+    with ThreadPoolExecutor(THREADS) as threads:
+        return list(threads.map(work, items))
+
 
 class LastFew(Generic[Key, Made]):
-    """Keeps what was asked for last. Threads may ask at once; what two ask for at the same time, both make."""
+    """A cache of the last few results. Threads may ask at once; two that ask for the same may both compute it."""
 
     def __init__(self, count: int) -> None:
         self._count = count
@@ -17,7 +29,7 @@ class LastFew(Generic[Key, Made]):
         self._lock = Lock()
 
     def get(self, key: Key, make: Callable[[], Made]) -> Made:
-        """What belongs to a key."""
+        """The result of a key."""
         with self._lock:
             if key in self._kept:
                 self._kept[key] = found = self._kept.pop(key)
@@ -31,6 +43,6 @@ class LastFew(Generic[Key, Made]):
 
     @property
     def latest(self) -> Made | None:
-        """What was asked for last; None where nothing was."""
+        """The result that was used last; None at first."""
         with self._lock:
             return self._kept[next(reversed(self._kept))] if self._kept else None

@@ -1,4 +1,4 @@
-"""The reference page of the catalogue: `python tests/diagnosis/write_catalogue.py` writes it anew from the classes."""
+"""The reference page of the catalogue: `python tests/effects/write_catalogue.py` writes it anew from the classes."""
 
 import re
 import sys
@@ -10,7 +10,7 @@ PAGE = ROOT / "docs" / "reference" / "effects.md"
 
 HEAD = """# Effects that a diagnosis looks for
 
-Written by `tests/diagnosis/write_catalogue.py` from the classes in `service/tauscope/effects`; a test holds the two
+Written by `tests/effects/write_catalogue.py` from the classes in `service/tauscope/effects`; a test holds the two
 together. Torques are signed as what the drive has to overcome in addition: measured = rigid bodies + friction + effect.
 `sgn` is smoothed, (2/π) atan(K_v q̇). `{tau}` and `{q}` are the joint's own units: Nm and rad, or N and m.
 

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 import pytest
 
-from diagnosis.test_effect_columns import RATE, SIGNALS, Array, setting, torque
+from effects.piece_of_motion import RATE, SIGNALS, Array, context, torque
 from pinocchio_arm import pinocchio_model
 from tauscope.effects import TimeLocalEffect, possible_effects
 from tauscope.effects.external_contact import ExternalContact, JointContact
@@ -21,7 +21,7 @@ PICKED = slice(None, None, 200)
 
 
 def form(kind: type, joint: int | None = None) -> TimeLocalEffect:
-    (found,) = [each for each in possible_effects(setting()) if type(each) is kind and each.joint == joint]
+    (found,) = [each for each in possible_effects(context()) if type(each) is kind and each.joint == joint]
     assert isinstance(found, TimeLocalEffect)
     return found
 
@@ -43,7 +43,7 @@ def test_a_carried_body_is_the_torque_of_links_that_have_it_less_that_of_links_t
     place = np.array([0.05, -0.12, 0.2])
     expected = torque(SIGNALS.robot, loaded(0.7, place), *states(PICKED)) - SIGNALS.load[:, PICKED]
     if kind is Payload:
-        (effect,) = Payload.forms(setting())
+        (effect,) = Payload.forms(context())
         found = 0.7 * effect.columns(SIGNALS, place[None])[0, 0][:, PICKED]
     else:
         shape = np.array([[0.0, 2.0, 3.0, 0.0, *place]])
@@ -121,7 +121,7 @@ def test_a_window_is_shut_outside_its_samples(recording: int) -> None:
 
 
 def test_a_displaced_frame_is_the_difference_of_two_arms() -> None:
-    (effect,) = KinematicError.forms(setting())
+    (effect,) = KinematicError.forms(context())
     thinned = replace(
         SIGNALS,
         position=SIGNALS.position[:, PICKED],

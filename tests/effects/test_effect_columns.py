@@ -5,93 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 import pytest
-from numpy.typing import NDArray
 
-from arms import random_parameters, ur5_like
+from effects.piece_of_motion import K_V, RATE, SIGNALS, Array, context, torque
 from pinocchio_arm import pinocchio_model
-from tauscope.effects import Effect, Setting, Signals, catalogue, possible_effects
+from tauscope.effects import Effect, possible_effects
 from tauscope.effects.deflection import FIRST_ORDER, inertia_of_link, torque_of_deflection
 from tauscope.effects.joint_elasticity import DAMPING, transmitted
-from tauscope.effects.late_torque import Lag, Shift
-from tauscope.robot import JointType, Robot
+from tauscope.effects.time_delay import Lag, Shift
+from tauscope.robot import JointType
 
-Array = NDArray[np.float64]
-
-RATE = 1000.0
-K_V = 80.0
 STEPS = 20
 
 
-def motion(robot: Robot, rng: np.random.Generator, samples: int = 4000) -> tuple[Array, Array, Array]:
-    """A smooth motion that closes after its samples, with exact derivatives, (n, N) each."""
-    time = np.arange(samples) / RATE
-    omega = 2.0 * np.pi / (samples / RATE) * np.arange(1, 4)
-    amplitude = rng.uniform(-0.5, 0.5, (2, robot.joint_count, 3))
-    sine, cosine = np.sin(np.outer(omega, time)), np.cos(np.outer(omega, time))
-    q = amplitude[0] @ sine + amplitude[1] @ cosine
-    qd = (amplitude[0] * omega) @ cosine - (amplitude[1] * omega) @ sine
-    qdd = -(amplitude[0] * omega**2) @ sine - (amplitude[1] * omega**2) @ cosine
-    return q, qd, qdd
-
-
-def signals(seed: int = 0) -> Signals:
-    """Motion of a six-joint arm with Pinocchio's torque as the load."""
-    rng = np.random.default_rng(seed)
-    robot = ur5_like()
-    links = random_parameters(rng, robot.joint_count)
-    q, qd, qdd = motion(robot, rng)
-    load = torque(robot, links, q, qd, qdd)
-    step = 2.0 / np.pi * np.arctan(K_V * qd)
-    return Signals(
-        robot=robot,
-        rate_hz=RATE,
-        time=np.arange(8000).reshape(2, 4000) / RATE,
-        recording=0,
-        position=q,
-        velocity=qd,
-        acceleration=qdd,
-        load=load,
-        torque=load + 2.0 * step + 0.5 * qd,
-        step=step,
-        steepness=np.full(robot.joint_count, K_V),
-        bodies=links,
-        links=links,
-        periodic=True,
-    )
-
-
-def torque(robot: Robot, links: Array, q: Array, qd: Array, qdd: Array) -> Array:
-    """Inverse dynamics by Pinocchio, (n, N)."""
-    model = pinocchio_model(robot, links)
-    data = model.createData()
-    rows = [pin.rnea(model, data, *state) for state in zip(q.T, qd.T, qdd.T, strict=True)]
-    return np.array(rows).T
-
-
-SIGNALS = signals()
-
-
-def setting(gear_ratio: float | None = None) -> Setting:
-    s = SIGNALS
-    robot = replace(s.robot, joints=tuple(replace(joint, gear_ratio=gear_ratio) for joint in s.robot.joints))
-    return Setting(
-        robot=robot,
-        slowest=s.velocity.min(axis=1),
-        fastest=s.velocity.max(axis=1),
-        lowest=s.position.min(axis=1),
-        highest=s.position.max(axis=1),
-        speed=s.velocity.std(axis=1),
-        top_speed=np.abs(s.velocity).max(axis=1),
-        load=s.load.std(axis=1),
-        top_torque=np.abs(s.torque).max(axis=1),
-        inertia=np.full(6, 0.5),
-        durations=(8.0,),
-        cutoff_hz=30.0,
-    )
-
-
 def form(effect: str, joint: int | None, number: int = 0) -> Effect:
-    found = [each for each in possible_effects(setting()) if each.id == effect and each.joint == joint]
+    found = [each for each in possible_effects(context()) if each.id == effect and each.joint == joint]
     return found[number]
 
 
@@ -130,7 +57,7 @@ def test_columns_that_need_no_state(effect: str, shape: tuple[float, ...], expec
 
 
 def test_friction_varies_by_whole_waves_a_turn_and_by_any_along_a_rail() -> None:
-    given = setting()
+    given = context()
     joints = tuple(replace(joint, type=JointType.PRISMATIC) for joint in given.robot.joints)
     turning, sliding = (
         next(each for each in possible_effects(one) if each.id == "position_dependent_friction" and each.joint == 2)
@@ -186,7 +113,7 @@ def test_coupled_friction_acts_on_both_joints_with_the_power_of_the_common_speed
 def test_drift_goes_on_from_repetition_to_repetition() -> None:
     found = columns("friction_drift", 2, (5.0,))
     time = np.arange(8000).reshape(2, 4000) / RATE
-    course = (1.0 - np.exp(-time / 5.0)) / (1.0 - np.exp(-setting().durations[0] / 5.0))
+    course = (1.0 - np.exp(-time / 5.0)) / (1.0 - np.exp(-context().durations[0] / 5.0))
     assert found.shape == (2, 1, 2, len(V))
     assert found[1, 0] == pytest.approx(V * course)
     assert found[0, 0] == pytest.approx(S * course)
@@ -201,7 +128,7 @@ def test_a_joint_warms_as_fast_as_its_friction_dissipates() -> None:
     for each in np.tile(power, 2):
         warmth = each + (warmth - each) * np.exp(-1.0 / (2.0 * RATE))
         course.append(warmth)
-    scale = 1.0 - np.exp(-setting().durations[0] / 2.0)
+    scale = 1.0 - np.exp(-context().durations[0] / 2.0)
     assert found[1, 0] * scale == pytest.approx(V * np.reshape(course, (2, 4000)), abs=1e-9)
     resting = replace(SIGNALS, velocity=np.zeros_like(SIGNALS.velocity))
     assert not by_heat.columns(resting, np.array([[2.0]])).any()
@@ -220,7 +147,7 @@ def test_a_late_torque_is_the_shifted_torque_to_first_order() -> None:
 @pytest.mark.parametrize("joint", [None, 2])
 @pytest.mark.parametrize(("constant", "order"), [(0.004, 1), (0.05, 1), (0.01, 2)])
 def test_a_filtered_torque_follows_the_filter_s_equation(joint: int | None, constant: float, order: int) -> None:
-    lags = [each for each in possible_effects(setting()) if isinstance(each, Lag) and each.joint == joint]
+    lags = [each for each in possible_effects(context()) if isinstance(each, Lag) and each.joint == joint]
     lag = next(each for each in lags if each.order == order)
     chosen = slice(None) if joint is None else slice(joint, joint + 1)
     torque = SIGNALS.torque[chosen]
@@ -244,7 +171,7 @@ def test_a_filtered_torque_follows_the_filter_s_equation(joint: int | None, cons
 
 @pytest.mark.parametrize("joint", [None, 2])
 def test_a_shifted_torque_is_late_by_its_delay(joint: int | None) -> None:
-    shift = next(each for each in possible_effects(setting()) if type(each) is Shift and each.joint == joint)
+    shift = next(each for each in possible_effects(context()) if type(each) is Shift and each.joint == joint)
     torque = SIGNALS.torque if joint is None else SIGNALS.torque[joint : joint + 1]
     found = shift.columns(replace(SIGNALS, periodic=True), np.array([[0.007], [0.0105]]))[:, 0]
     between = 0.5 * (np.roll(torque, 10, axis=1) + np.roll(torque, 11, axis=1))
@@ -292,47 +219,17 @@ def test_an_elastic_joint_swings_on_its_spring() -> None:
 
 
 def test_a_stated_gear_ratio_leaves_whole_turns_of_the_motor_only() -> None:
-    geared = [each for each in possible_effects(setting(gear_ratio=20.0)) if each.id == "cogging"]
+    geared = [each for each in possible_effects(context(gear_ratio=20.0)) if each.id == "cogging"]
     assert geared
     for effect in geared:
         assert effect.grid[:, 0] / 20.0 == pytest.approx(np.rint(effect.grid[:, 0] / 20.0))
         assert not effect.is_free(0)
-    free = [each for each in possible_effects(setting()) if each.id == "cogging"]
+    free = [each for each in possible_effects(context()) if each.id == "cogging"]
     assert all(effect.is_free(0) for effect in free)
 
 
-def test_every_form_makes_columns_of_the_promised_shape() -> None:
-    for effect in possible_effects(setting()):
-        touched = effect.touched(6)
-        found = effect.columns(SIGNALS, effect.grid[:2])
-        count = min(2, len(effect.grid))
-        assert found.shape[:3] == (count, len(effect.coefficients), len(touched)), effect.id
-        assert found.shape[-1] == SIGNALS.position.shape[1]
-        assert np.isfinite(found).all()
-        assert effect.grid.shape[1] == len(effect.shapes) == len(effect.lower) == len(effect.upper)
-        assert (effect.grid >= effect.lower - 1e-12).all()
-        assert (effect.grid <= effect.upper + 1e-12).all()
-
-
-CONTRACT_IDS = {
-    *("viscous_friction", "coulomb_friction", "stribeck_friction", "asymmetric_coulomb", "asymmetric_viscous"),
-    *("nonlinear_viscous", "load_dependent_friction", "position_dependent_friction", "presliding_hysteresis"),
-    *("friction_drift", "friction_coupling", "cogging", "torque_ripple", "backlash", "joint_elasticity"),
-    *("rotor_inertia", "torque_offset", "torque_gain_error", "torque_saturation", "time_delay", "joint_spring"),
-    *("cable_force", "payload", "payload_change", "external_contact", "base_tilt", "kinematic_error"),
-}
-"""All ids of CONTRACT.md but ``unknown``, which has no torque of its own."""
-
-
-def test_ids_are_those_of_the_contract_and_each_is_described() -> None:
-    ids = [effect.id for effect in catalogue()]
-    assert sorted(ids) == sorted(CONTRACT_IDS)
-    for effect in catalogue():
-        assert all([effect.equation, effect.meaning, effect.remedy, effect.revealing_motion, effect.coefficients])
-
-
 def test_bristles_shorter_than_the_encoder_s_noise_are_not_looked_for() -> None:
-    given = setting()
+    given = context()
     noise = 1e-3 * (given.highest - given.lowest)
     (fine,), (coarse,) = (
         [each for each in possible_effects(one) if each.id == "presliding_hysteresis" and each.joint == 2]
@@ -345,11 +242,11 @@ def test_bristles_shorter_than_the_encoder_s_noise_are_not_looked_for() -> None:
 
 def test_a_swinging_link_tells_its_compliance_twice() -> None:
     elastic, covariance = form("joint_elasticity", 2), np.diag([1e-12, 0.0, 0.0])
-    (twice,) = elastic.quantities(setting(), np.array([1.6e-4]), np.array([10.0, 1.0e-4]), covariance)
+    (twice,) = elastic.quantities(context(), np.array([1.6e-4]), np.array([10.0, 1.0e-4]), covariance)
     formula = FIRST_ORDER * 1.6e-4
     assert (twice.name, twice.value) == ("c", pytest.approx(1.3e-4))
     assert twice.std == pytest.approx(np.hypot(0.3e-4, formula), rel=0.01)
-    (once,) = elastic.quantities(setting(), np.array([1.6e-4]), np.array([10.0, 0.0]), covariance)
+    (once,) = elastic.quantities(context(), np.array([1.6e-4]), np.array([10.0, 0.0]), covariance)
     assert (once.value, once.std) == (pytest.approx(1.6e-4), pytest.approx(np.hypot(1e-6, formula)))
 
 
@@ -372,7 +269,7 @@ def test_a_soft_curve_that_is_only_bent_a_little_may_have_any_share_of_a_higher_
     lowest = float(soft.lower[0])
     assert soft.is_consistent(np.array([11.7]), np.array([4.0 * lowest]))
     assert not soft.is_consistent(np.array([17.0]), np.array([4.0 * lowest]))
-    (level,) = soft.quantities(setting(), np.array([11.7]), np.array([33.4]), np.zeros((2, 2)))
+    (level,) = soft.quantities(context(), np.array([11.7]), np.array([33.4]), np.zeros((2, 2)))
     assert level.value == pytest.approx(33.4 / np.sqrt(11.7))
 
 

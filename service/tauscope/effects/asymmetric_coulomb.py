@@ -1,0 +1,41 @@
+"""Coulomb friction that differs with the direction of motion: a worn screw, a preloaded gear."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tauscope.effects.context import ArmContext, Signals
+from tauscope.effects.effect import Coefficient, Effect, Entry, per_joint_columns
+from tauscope.recording.recording import Array
+from tauscope.robot import Robot
+
+
+class AsymmetricCoulomb(Effect):
+    """τ = a |A(q̇)|: Coulomb friction is larger by a one way and smaller by a the other."""
+
+    has_step = True
+    of_motion_and_step = True
+    id = "asymmetric_coulomb"
+    rank = 10
+    german = "richtungsabhängige coulombsche Reibung"
+    arguments = frozenset({"velocity"})
+    equation = "tau = a |sgn(qd)|, sgn smoothed: Coulomb friction F_c + a forwards, F_c - a backwards"
+    meaning = "Coulomb friction differs with the direction of motion"
+    remedy = "use a Coulomb level for each direction"
+    code = "{c[0]} * fabs({step})"
+    revealing_motion = "slow oscillation with many reversals, so that rest differs from sliding"
+    coefficients = (Coefficient("a", "{tau}"),)
+
+    @classmethod
+    def can_act(cls, context: ArmContext, joint: int) -> bool:
+        """Whether the joint moves both ways."""
+        return context.reverses(joint)
+
+    def columns(self, signals: Signals, shapes: Array) -> Array:
+        """|A(q̇)|."""
+        return per_joint_columns(np.abs(signals.step[self.joint])[None, None])
+
+    def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
+        """Twice the amplitude in one direction, and that much less Coulomb friction in both."""
+        (level,) = coefficients
+        return [{"amplitude": 2.0 * level}, {"effect": "coulomb_friction", "level": -level}]

@@ -1,0 +1,122 @@
+"""A recorded torque that is compressed or clipped at high load."""
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from math import sqrt
+
+import numpy as np
+
+from tauscope.effects.context import ArmContext, Signals
+from tauscope.effects.effect import Coefficient, Effect, Entry, Quantity, Shape, per_joint_columns
+from tauscope.recording.recording import Array
+from tauscope.robot import Robot
+
+COMPRESSIONS = np.array([0.3, 0.5, 0.8, 1.3, 2.2, 4.0])
+"""Levels of a soft curve looked at, relative to the largest torque."""
+
+CLIPS = np.array([0.3, 0.45, 0.6, 0.7, 0.8, 0.9])
+"""Levels of a hard one."""
+
+CLIPPED_AT_LEAST = 0.5
+"""Part of what lies beyond the level that a hard curve takes off: one that takes off little is a soft curve."""
+
+
+class Saturation(Effect):
+    """τ_recorded = τ - a (τ - r(τ)): what all curves r have in common; a is 1 where nothing else bends them."""
+
+    id = "torque_saturation"
+    rank = 160
+    german = "Drehmomentsättigung"
+    equation = "tau_recorded = tau - a (tau - c tanh(tau/c)); clipped: tau - a (tau - clip(tau, +-c))"
+    meaning = "the recorded torque is compressed or clipped at high load"
+    remedy = "record within the sensor's or the drive's linear range"
+    no_code = "it changes the recorded torque, not the arm's"
+    revealing_motion = "the same motion slower and without payload, well below the level"
+    shapes = (Shape("c", "{tau}", logarithmic=True),)
+    may_exceed_measured = True
+
+    @classmethod
+    def of_levels(cls, context: ArmContext, parts: Array) -> list[Effect]:
+        """One a joint.
+
+        Parameters
+        ----------
+        parts : (g,) float64
+            levels looked at, relative to the joint's largest torque
+        """
+        made: list[Effect] = []
+        for joint in context.joints:
+            levels = parts * float(context.top_torque[joint])
+            made.append(cls(joint, levels[:, None], 0.7 * levels[:1], 1.5 * levels[-1:]))
+        return made
+
+    @abstractmethod
+    def recorded(self, torque: Array, levels: Array) -> Array:
+        """Torque r(τ) as it is recorded with a = 1, (g, N).
+
+        Parameters
+        ----------
+        torque : (N,) float64
+            as it is [Nm or N]
+        levels : (g, 1) float64
+            c [Nm or N]
+        """
+
+    def columns(self, signals: Signals, shapes: Array) -> Array:
+        """What the recorded torque falls short by."""
+        torque = signals.torque[self.joint]
+        return per_joint_columns((self.recorded(torque, shapes) - torque)[:, None])
+
+
+class TorqueSaturation(Saturation):
+    """r(τ) = c tanh(τ/c), a soft curve; where it is only bent a little no data tell a and c apart, but c/√a."""
+
+    coefficients = (Coefficient("a", "1", positive=True),)
+
+    @classmethod
+    def forms(cls, context: ArmContext) -> Sequence[Effect]:
+        """Both curves at every joint."""
+        return [*cls.of_levels(context, COMPRESSIONS), *Clipping.forms(context)]
+
+    def recorded(self, torque: Array, levels: Array) -> Array:
+        """A soft curve, c tanh(τ/c), (g, N)."""
+        return levels * np.tanh(torque / levels)
+
+    def is_consistent(self, coefficients: Array, shape: Array, *, alone: bool = False) -> bool:
+        """Whether a curve with a = 1 that is bent as much has a level that a sensor may have."""
+        return bool(shape[0] >= self.lower[0] * np.sqrt(coefficients[0]))
+
+    def quantities(
+        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
+    ) -> tuple[Quantity, ...]:
+        """The level c/√a."""
+        share, level = max(float(coefficients[0]), 1e-12), float(shape[0])
+        slope = np.array([-0.5 * level / share**1.5, 1.0 / np.sqrt(share)])
+        std = float(np.sqrt(max(slope @ covariance @ slope, 0.0)))
+        return (Quantity("c", level / np.sqrt(share), std, self.unit("{tau}", context)),)
+
+    def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
+        """The soft curve: τ - a (τ - c tanh(τ/c)) is l tanh(τ/l) to third order, l = c/√a."""
+        if coefficients[0] <= 0.0:
+            return []
+        return [{"level": shape[0] / sqrt(coefficients[0]), "shape": "compression"}]
+
+
+class Clipping(Saturation):
+    """r(τ) = clip(τ, ±c): what lies beyond the level is cut off."""
+
+    is_variant = True
+    coefficients = (Coefficient("a", "1", positive=True, largest=2.0, smallest=CLIPPED_AT_LEAST),)
+
+    @classmethod
+    def forms(cls, context: ArmContext) -> Sequence[Effect]:
+        """One a joint."""
+        return cls.of_levels(context, CLIPS)
+
+    def recorded(self, torque: Array, levels: Array) -> Array:
+        """A hard curve, clip(τ, ±c), (g, N)."""
+        return np.clip(torque, -levels, levels)
+
+    def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
+        """The level c."""
+        return [{"level": shape[0], "shape": "clip"}] if coefficients[0] > 0.0 else []
