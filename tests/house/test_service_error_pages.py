@@ -29,7 +29,7 @@ from tauscope.server.auth.scopes import Scope
 from tauscope.server.http import Settings, create_app
 from tauscope.server.http.services import Services
 from tauscope.server.problems import KINDS
-from tauscope.server.queue.queued_job import MOST_ATTEMPTS
+from tauscope.server.queue.queue import MOST_ATTEMPTS
 
 RUNS, LEASES, IDENTIFICATIONS = (f"/api/v1/{name}" for name in ("runs", "leases", "identifications"))
 ARM = {"robot": "two-joint-arm", "backend": "sim"}

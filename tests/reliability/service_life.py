@@ -23,7 +23,7 @@ from reliability.requests import Note, Requests
 from server.conftest import connected
 from tauscope.server.http import Settings, assembly, create_app
 from tauscope.server.http.services import Services
-from tauscope.server.queue.worker_pool import WorkerPool
+from tauscope.server.queue.executors import WorkerPool
 from tauscope.server.store.database import engine as database_engine
 from tauscope.server.store.database.database import FILE_NAME
 

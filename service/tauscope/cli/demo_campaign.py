@@ -20,7 +20,7 @@ from tauscope.server.http.services import Services
 from tauscope.server.http.settings import Settings
 from tauscope.server.queue.diagnosis_order import DiagnosisOptions
 from tauscope.server.queue.excitation_order import ExcitationDesignOptions
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.record import JobState
 
 ROOT = "/api/v1"
 POLL_S = 0.2

@@ -25,10 +25,8 @@ from tauscope.server.queue.diagnosis_workspace import DiagnosisWorkspace
 from tauscope.server.queue.excitation_order import ExcitationDesignOptions
 from tauscope.server.queue.excitation_workspace import ExcitationWorkspace
 from tauscope.server.queue.identification_workspace import IdentificationWorkspace
-from tauscope.server.queue.queue import JobQueue
-from tauscope.server.queue.queued_job import JobKind
-from tauscope.server.queue.record import JobProblem, JobRecord
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.queue import JobKind, JobQueue
+from tauscope.server.queue.record import JobProblem, JobRecord, JobState
 from tauscope.server.queue.workspace import Workspace
 from tauscope.server.store.items import ItemStore
 from tauscope.server.store.recordings import RecordingStore

@@ -6,9 +6,7 @@ from pathlib import Path
 import pytest
 
 from tauscope.server.control.device_claims import BusyError, DeviceClaims
-from tauscope.server.control.lease import Lease
-from tauscope.server.control.lease_errors import LeasedError, LeaseLostError, LeaseNeededError, NotArmedError
-from tauscope.server.control.leases import Leases
+from tauscope.server.control.leases import Lease, LeasedError, LeaseLostError, LeaseNeededError, Leases, NotArmedError
 
 ARM, OTHER = "arm on sim", "other on sim"
 

@@ -12,8 +12,7 @@ from snapshots import SNAPSHOTS, unpacked
 from tauscope.errors import StoreError
 from tauscope.server.history.indexer import ChangedItem, Indexer, open_index
 from tauscope.server.queue.housekeeping import Housekeeping
-from tauscope.server.queue.record import JobRecord
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.record import JobRecord, JobState
 from tauscope.server.queue.workspace import Workspace
 from tauscope.server.store.database.database import Database
 from tauscope.server.store.database.facts import ItemEntry, ItemQuery

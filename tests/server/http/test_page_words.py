@@ -8,7 +8,7 @@ from tauscope.effects import catalogue
 from tauscope.robot.robot import JointType
 from tauscope.runtime import RunState
 from tauscope.server.page.router import STATIC
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.record import JobState
 from tauscope.server.store.layout import FOLDERS
 
 PART = re.compile(r"\{\d+\}")

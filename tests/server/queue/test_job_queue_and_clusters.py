@@ -5,8 +5,7 @@ import pytest
 from server.queue.executors import ManualExecutor
 from server.queue.one_kind import make_queue, problem_of, state_of, succeed
 from tauscope.server.queue.cluster_executor import ClusterAwayError
-from tauscope.server.queue.queue import JobQueue
-from tauscope.server.queue.queued_job import MOST_ATTEMPTS, JobKind
+from tauscope.server.queue.queue import MOST_ATTEMPTS, JobKind, JobQueue
 from tauscope.server.store.items import ItemStore
 
 

@@ -11,7 +11,7 @@ import pytest
 from tauscope.errors import NotFoundError, StoreError, TauscopeError
 from tauscope.server.control.device_claims import BusyError
 from tauscope.server.control.interlock import FOLDER
-from tauscope.server.control.lease_errors import LeasedError
+from tauscope.server.control.leases import LeasedError
 from tauscope.server.schedules.definition import ScheduleDefinition
 from tauscope.server.schedules.entries import FiringEntry, ScheduleEntry
 from tauscope.server.schedules.repeater import NothingToDoError, Repeater

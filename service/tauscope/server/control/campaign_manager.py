@@ -7,11 +7,10 @@ from tauscope.errors import TauscopeError
 from tauscope.server.control.campaign_runner import CampaignDependencies, CampaignRunner
 from tauscope.server.control.campaign_workspace import CampaignWorkspace
 from tauscope.server.control.device_claims import BusyError
-from tauscope.server.control.permits import FREE, Permit
+from tauscope.server.control.leases import FREE, Permit
 from tauscope.server.control.supervised_threads import SupervisedThreads
 from tauscope.server.queue.queue import INTERRUPTED
-from tauscope.server.queue.record import JobRecord
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.record import JobRecord, JobState
 from tauscope.server.store.items import ItemStore, staged_identifier
 
 PATIENCE_S = 15.0

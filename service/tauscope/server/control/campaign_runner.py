@@ -12,8 +12,8 @@ from tauscope.runtime.record import RunRecord
 from tauscope.runtime.states import RunState
 from tauscope.server.control.campaign_order import CampaignOrder
 from tauscope.server.control.campaign_workspace import CampaignWorkspace
+from tauscope.server.control.leases import FREE, Permit
 from tauscope.server.control.motions import StepFailedError, require_succeeded, wait_for_end
-from tauscope.server.control.permits import FREE, Permit
 from tauscope.server.control.run_manager import RunManager, run_recording_name
 from tauscope.server.control.run_order import RunRequestRecord
 from tauscope.server.control.run_submission import hand_in_run
@@ -24,10 +24,8 @@ from tauscope.server.queue.excitation_order import ExcitationDesignOptions
 from tauscope.server.queue.excitation_submission import hand_in_excitation
 from tauscope.server.queue.excitation_workspace import ExcitationWorkspace
 from tauscope.server.queue.identification_submission import hand_in_identification
-from tauscope.server.queue.queue import CANCELLED, INTERNAL, INTERRUPTED, JobQueue, QueueFullError
-from tauscope.server.queue.queued_job import JobKind
-from tauscope.server.queue.record import JobProblem
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.queue import CANCELLED, INTERNAL, INTERRUPTED, JobKind, JobQueue, QueueFullError
+from tauscope.server.queue.record import JobProblem, JobState
 from tauscope.server.queue.work import StoppedError
 from tauscope.server.queue.workspace import Workspace
 from tauscope.server.store.recordings import RecordingStore

@@ -8,8 +8,8 @@ from pathlib import Path
 from tauscope.errors import TauscopeError
 from tauscope.runtime.record import RunRecord
 from tauscope.server.control.device_claims import BusyError, DeviceClaims
+from tauscope.server.control.leases import FREE, Permit
 from tauscope.server.control.motions import Motion
-from tauscope.server.control.permits import FREE, Permit
 from tauscope.server.control.run_supervisor import Live, RunSupervisor, StartControl
 from tauscope.server.control.run_workspace import RunWorkspace
 from tauscope.server.control.supervised_threads import SupervisedThreads

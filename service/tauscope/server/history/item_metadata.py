@@ -12,7 +12,7 @@ from tauscope.server.control.run_workspace import RunWorkspace
 from tauscope.server.queue.diagnosis_workspace import DiagnosisWorkspace
 from tauscope.server.queue.excitation_workspace import ExcitationWorkspace
 from tauscope.server.queue.identification_workspace import IdentificationWorkspace
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.record import JobState
 from tauscope.server.queue.workspace import Workspace
 from tauscope.server.store.database.facts import FileMetadata, ItemMetadata, RecordingRole
 from tauscope.server.store.incoming import hash_file

@@ -17,8 +17,7 @@ from tauscope.server.auth.rate_limit import RateLimit
 from tauscope.server.control.campaign_manager import CampaignManager
 from tauscope.server.control.campaign_runner import CampaignDependencies
 from tauscope.server.control.device_claims import DeviceClaims
-from tauscope.server.control.lease import Lease
-from tauscope.server.control.leases import Leases
+from tauscope.server.control.leases import Lease, Leases
 from tauscope.server.control.run_manager import RunManager
 from tauscope.server.control.run_start import start_control
 from tauscope.server.control.run_supervisor import StartControl
@@ -36,12 +35,10 @@ from tauscope.server.http.settings import Settings
 from tauscope.server.queue.cluster_executor import ClusterExecutor
 from tauscope.server.queue.diagnosis_work import run_diagnosis
 from tauscope.server.queue.excitation_work import run_excitation
-from tauscope.server.queue.executors import open_executor
+from tauscope.server.queue.executors import WorkerPool, open_executor
 from tauscope.server.queue.housekeeping import Housekeeping
 from tauscope.server.queue.identification_work import run_identification
-from tauscope.server.queue.queue import JobQueue
-from tauscope.server.queue.queued_job import JobKind
-from tauscope.server.queue.worker_pool import WorkerPool
+from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.schedules.repeater import Repeater
 from tauscope.server.schedules.repository import ScheduleRepository
 from tauscope.server.schedules.scheduler import Scheduler, new_boot

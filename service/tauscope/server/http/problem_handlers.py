@@ -11,7 +11,7 @@ from starlette.requests import ClientDisconnect
 from tauscope.errors import TauscopeError
 from tauscope.files import is_disk_full
 from tauscope.server.control.device_claims import BusyError
-from tauscope.server.control.lease_errors import LeasedError, LeaseLostError, LeaseNeededError, NotArmedError
+from tauscope.server.control.leases import LeasedError, LeaseLostError, LeaseNeededError, NotArmedError
 from tauscope.server.problems import ProblemError, answer_code, field_errors, make_problem, problem_answer, summarised
 from tauscope.server.queue.queue import QueueFullError
 from tauscope.server.store.recordings import NameTakenError

@@ -19,8 +19,7 @@ from tauscope.server.http.heartbeat import Heartbeat
 from tauscope.server.http.idempotency.answers import Answers
 from tauscope.server.http.operations.metrics import Metrics
 from tauscope.server.http.settings import Settings
-from tauscope.server.queue.queue import JobQueue
-from tauscope.server.queue.queued_job import JobKind
+from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.schedules.scheduler import Scheduler
 from tauscope.server.store.recordings import RecordingStore
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pydantic import JsonValue
 
-from tauscope.server.queue.events import JobEvent, ProgressEvent, StepEvent
+from tauscope.server.queue.record import JobEvent, ProgressEvent, StepEvent
 from tauscope.server.store.event_log import EventLog
 
 _log = logging.getLogger("tauscope.jobs")

@@ -12,7 +12,7 @@ from tauscope.server.control.campaign_manager import CampaignManager
 from tauscope.server.control.campaign_order import CampaignOrder
 from tauscope.server.control.campaign_runner import CampaignDependencies
 from tauscope.server.control.campaign_workspace import CampaignWorkspace
-from tauscope.server.control.permits import FREE, Permit
+from tauscope.server.control.leases import FREE, Permit
 from tauscope.server.queue.diagnosis_order import DiagnosisOrder
 from tauscope.server.queue.diagnosis_workspace import DiagnosisWorkspace
 from tauscope.server.queue.identification_order import IdentificationOrder, OrderedRecording

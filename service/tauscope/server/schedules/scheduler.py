@@ -8,10 +8,10 @@ from pathlib import Path
 from tauscope.errors import TauscopeError
 from tauscope.server.control.device_claims import BusyError
 from tauscope.server.control.interlock import objection
-from tauscope.server.control.lease_errors import LeasedError
+from tauscope.server.control.leases import LeasedError
 from tauscope.server.control.run_order import BackendChoice
-from tauscope.server.queue.messages import without_folders
 from tauscope.server.queue.queue import QueueFullError
+from tauscope.server.queue.record import without_folders
 from tauscope.server.schedules.definition import ScheduleDefinition
 from tauscope.server.schedules.entries import FiringEntry, ScheduleEntry
 from tauscope.server.schedules.repeater import NothingToDoError, Repeater

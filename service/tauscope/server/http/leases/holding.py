@@ -5,7 +5,7 @@ from typing import Annotated
 from fastapi import Header, Request
 
 from tauscope.server.auth.gate import caller_of
-from tauscope.server.control.permits import Permit
+from tauscope.server.control.leases import Permit
 from tauscope.server.http.services import Services
 
 LEASE_TOKEN = "Lease-Token"  # noqa: S105 - name of a header

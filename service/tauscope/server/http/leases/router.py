@@ -10,8 +10,7 @@ from tauscope.errors import NotFoundError
 from tauscope.robot.messages import one_line, shown
 from tauscope.server.auth.gate import caller_of
 from tauscope.server.auth.scopes import Scope
-from tauscope.server.control.lease import Lease
-from tauscope.server.control.lease_errors import LeaseLostError
+from tauscope.server.control.leases import Lease, LeaseLostError
 from tauscope.server.control.run_order import BackendChoice
 from tauscope.server.http.documents import JSON, media_type, read_document, refuse_media_type
 from tauscope.server.http.leases.holding import LeaseToken, owner_of

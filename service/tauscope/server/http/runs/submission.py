@@ -10,8 +10,8 @@ from starlette.concurrency import run_in_threadpool
 from tauscope.errors import ExcitationError
 from tauscope.robot import Robot
 from tauscope.runtime.options import RunOptions
+from tauscope.server.control.leases import Permit
 from tauscope.server.control.motions import DesignedMotion, Motion, ready_motion, take_trajectory
-from tauscope.server.control.permits import Permit
 from tauscope.server.control.run_order import BackendChoice, RunRequestRecord
 from tauscope.server.control.run_workspace import RunWorkspace
 from tauscope.server.http.backends import chosen_backend
