@@ -6,16 +6,16 @@ from datetime import timedelta
 import pytest
 
 from identified import identified
-from tauscope.server.history import (
+from tauscope.server.history.drift import (
     Drift,
-    ModelPolicy,
     drift_between,
     drift_words,
+    duration_words,
     is_beyond,
     largest_by_joint,
     named_parameters,
 )
-from tauscope.server.history.words import duration_words
+from tauscope.server.history.gates import ModelPolicy
 
 
 def drifts(before: dict[str, float], after: dict[str, float], **changes: float) -> dict[str, Drift]:

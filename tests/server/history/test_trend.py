@@ -5,7 +5,7 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 import pytest
 
-from tauscope.server.history import TrendPoint, trend_of
+from tauscope.server.history.trend import TrendPoint, trend_of
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
 

@@ -1,16 +1,18 @@
-"""Sees to it that every identification that succeeds is judged, once, whoever handed it in."""
+"""The model registry: it judges each new identification once, and monitors the drift of active models."""
 
 import logging
+from collections import Counter
 from collections.abc import Mapping
+from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from sqlalchemy.exc import IntegrityError
 
 from tauscope.errors import NotFoundError
 from tauscope.server.control.run_workspace import RunWorkspace
-from tauscope.server.history.model_entries import ModelEntry
-from tauscope.server.history.model_history import ModelHistory
-from tauscope.server.history.model_judgement import Candidate
+from tauscope.server.history.drift import Drift
+from tauscope.server.history.model_history import ModelEntry, ModelHistory
+from tauscope.server.history.model_judgement import Candidate, compared
 from tauscope.server.queue.identification_order import IdentificationOrder
 from tauscope.server.queue.identification_workspace import IdentificationWorkspace
 from tauscope.server.store.items import ItemStore
@@ -83,3 +85,51 @@ class ModelRegistry:
         except NotFoundError:
             return None
         return None if request is None else request.backend.name
+
+
+_MOST_EVENTS = 10_000
+
+
+@dataclass(frozen=True)
+class RobotDrift:
+    """The active model of a robot against the one that drift is counted from."""
+
+    active: str
+    reference: str
+    drifts: tuple[Drift, ...]
+    open_events: int
+
+
+class DriftMonitor:
+    """Looks at the history now and then; models are read again only where others became active or the reference."""
+
+    def __init__(self, history: ModelHistory, site: str) -> None:
+        """Prepare; nothing is known before `look`."""
+        self._history, self._site = history, site
+        self.robots: Mapping[str, RobotDrift] = {}
+
+    def look(self) -> None:
+        """Bring what is known up to date.
+
+        Raises
+        ------
+        StoreError
+            if the database does not answer; what was known before stays
+        """
+        pairs = self._history.active_and_reference(self._site)
+        told = self._history.events(None, only_open=True, limit=_MOST_EVENTS) if pairs else []
+        events = Counter(event.robot for event in told if event.kind == "drift")
+        known = self.robots
+        self.robots = {
+            robot: RobotDrift(*pair, self._drifts(known.get(robot), *pair), events[robot])
+            for robot, pair in pairs.items()
+        }
+
+    def _drifts(self, known: RobotDrift | None, active: str, reference: str) -> tuple[Drift, ...]:
+        """The change between two models."""
+        if known is not None and (known.active, known.reference) == (active, reference):
+            return known.drifts
+        try:
+            return compared(self._history.document(reference), self._history.document(active))
+        except NotFoundError:  # it was removed a moment ago
+            return ()

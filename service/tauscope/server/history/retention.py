@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 
 from tauscope.errors import NotFoundError
-from tauscope.server.history.indexer import Indexer
-from tauscope.server.history.item_metadata import DAMAGED
+from tauscope.server.history.indexer import DAMAGED, Indexer
 from tauscope.server.history.model_history import ModelHistory
 from tauscope.server.store.database.facts import ItemEntry, ItemQuery
 from tauscope.server.store.items import utc_now

@@ -9,7 +9,7 @@ from fastapi import FastAPI
 from tauscope.server.auth.audit.recorder import Audited
 from tauscope.server.auth.gate import Gate
 from tauscope.server.control.run_supervisor import StartControl
-from tauscope.server.history import ModelPolicy
+from tauscope.server.history.gates import ModelPolicy
 from tauscope.server.http import health, pages
 from tauscope.server.http.assembly import open_services
 from tauscope.server.http.body_limit import BodyLimit

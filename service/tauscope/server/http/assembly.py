@@ -21,10 +21,9 @@ from tauscope.server.control.leases import Lease, Leases
 from tauscope.server.control.run_manager import RunManager
 from tauscope.server.control.run_start import start_control
 from tauscope.server.control.run_supervisor import StartControl
-from tauscope.server.history.drift_monitor import DriftMonitor
 from tauscope.server.history.indexer import open_index
 from tauscope.server.history.model_history import ModelHistory
-from tauscope.server.history.model_registry import ModelRegistry
+from tauscope.server.history.model_registry import DriftMonitor, ModelRegistry
 from tauscope.server.history.retention import RetentionRule, RetentionSweeper
 from tauscope.server.http.heartbeat import Heartbeat
 from tauscope.server.http.idempotency.on_disk import AnswersOnDisk

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from dataclasses import asdict
 
 from tauscope.identification import IdentificationDocument
-from tauscope.server.history import largest_by_joint
-from tauscope.server.history.model_entries import ModelEntry
+from tauscope.server.history.drift import largest_by_joint
+from tauscope.server.history.model_history import ModelEntry
 from tauscope.server.history.model_judgement import compared
-from tauscope.server.history.parameter_trends import parameter_trends
+from tauscope.server.history.trend import parameter_trends
 from tauscope.server.http.history.models import (
     ComparisonAnswer,
     DriftAnswer,

@@ -8,7 +8,7 @@ from starlette.concurrency import run_in_threadpool
 
 from tauscope.errors import NotFoundError
 from tauscope.identification import IdentificationDocument
-from tauscope.server.history import ModelPolicy
+from tauscope.server.history.gates import ModelPolicy
 from tauscope.server.http.documents import JSON, media_type, read_document, refuse_media_type
 from tauscope.server.http.history.answers import comparison_answer, model_answer, trend_answer
 from tauscope.server.http.history.models import (

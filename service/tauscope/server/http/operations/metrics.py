@@ -13,7 +13,7 @@ from prometheus_client.registry import Collector
 
 from tauscope.runtime.record import RunRecord
 from tauscope.server.control.run_supervisor import Live
-from tauscope.server.history.drift_monitor import DriftMonitor
+from tauscope.server.history.model_registry import DriftMonitor
 
 CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 
