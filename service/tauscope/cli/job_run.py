@@ -14,8 +14,7 @@ from tauscope.report.table import Table
 from tauscope.server.http.assembly import open_services
 from tauscope.server.http.services import Services
 from tauscope.server.http.settings import Settings, default_data_folder
-from tauscope.server.schedules.entries import FiringEntry
-from tauscope.server.schedules.repository import ScheduleRepository
+from tauscope.server.schedules.repository import FiringEntry, ScheduleRepository
 from tauscope.server.schedules.scheduler import new_boot
 from tauscope.server.store.folder_lock import FolderLock
 from tauscope.server.store.items import utc_now

@@ -13,9 +13,8 @@ from tauscope.server.control.device_claims import BusyError
 from tauscope.server.control.interlock import FOLDER
 from tauscope.server.control.leases import LeasedError
 from tauscope.server.schedules.definition import ScheduleDefinition
-from tauscope.server.schedules.entries import FiringEntry, ScheduleEntry
 from tauscope.server.schedules.repeater import NothingToDoError, Repeater
-from tauscope.server.schedules.repository import ScheduleRepository
+from tauscope.server.schedules.repository import FiringEntry, ScheduleEntry, ScheduleRepository
 from tauscope.server.schedules.scheduler import Scheduler
 from tauscope.server.store.database.database import Database
 from tauscope.server.store.database.index import Index

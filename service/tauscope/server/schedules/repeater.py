@@ -1,5 +1,6 @@
-"""Starting what a schedule repeats: a campaign, or an analysis of the newest recordings."""
+"""The repeater: it starts what a schedule repeats, and makes schedules from items that were done once."""
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -21,7 +22,7 @@ from tauscope.server.queue.identification_workspace import IdentificationWorkspa
 from tauscope.server.queue.stored import StoredModel
 from tauscope.server.queue.workspace import Workspace
 from tauscope.server.schedules.definition import RecordingChoice, ScheduleDefinition
-from tauscope.server.schedules.entries import ScheduleEntry
+from tauscope.server.schedules.repository import ScheduleEntry
 from tauscope.server.store.items import ItemStore
 from tauscope.server.store.recordings import RecordingStore
 
@@ -154,3 +155,46 @@ def write_robot(folder: Path, entry: ScheduleEntry) -> None:
 def _order(entry: ScheduleEntry, kind: type[Order]) -> Order:
     """The order that is repeated."""
     return kind.model_validate(dict(entry.order), strict=False)
+
+
+_WORKSPACES = {
+    "campaign": CampaignWorkspace,
+    "identification": IdentificationWorkspace,
+    "diagnosis": DiagnosisWorkspace,
+}
+
+
+def make_schedule(
+    name: str, like: str, definition: ScheduleDefinition, repeater: Repeater, site: str | None, now: datetime
+) -> ScheduleEntry:
+    """A schedule that repeats an item of this site.
+
+    Parameters
+    ----------
+    site : str or None
+        of the data folder whose service does it; None for whichever comes first
+
+    Raises
+    ------
+    NotFoundError
+        if there is no such item, or its files are damaged
+    """
+    workspace = _WORKSPACES[definition.kind](repeater.items(definition.kind).folder(like))
+    order = workspace.read_order()
+    if order is None:
+        raise NotFoundError(f"{definition.kind} {like}: its order is missing or damaged; name another one")
+    plain = json.loads(order.model_dump_json(exclude={"recordings", "held_out", "simulated"} & _lists(definition)))
+    if definition.kind != "campaign":
+        plain["recordings"] = []
+    try:
+        files = {path.name: path.read_text(encoding="utf-8") for path in sorted(workspace.robot.iterdir())}
+    except (OSError, UnicodeDecodeError):
+        text = f"{definition.kind} {like}: its robot file is missing or damaged; name another one"
+        raise NotFoundError(text) from None
+    due = definition.next_after(now, now)
+    return ScheduleEntry(name, site, definition.model_dump(mode="json"), plain, files, now, due)
+
+
+def _lists(definition: ScheduleDefinition) -> set[str]:
+    """Fields of an order that name recordings: a campaign's `held_out` is a motion."""
+    return set() if definition.kind == "campaign" else {"recordings", "held_out", "simulated"}

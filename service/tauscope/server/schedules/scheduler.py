@@ -13,9 +13,8 @@ from tauscope.server.control.run_order import BackendChoice
 from tauscope.server.queue.queue import QueueFullError
 from tauscope.server.queue.record import without_folders
 from tauscope.server.schedules.definition import ScheduleDefinition
-from tauscope.server.schedules.entries import FiringEntry, ScheduleEntry
 from tauscope.server.schedules.repeater import NothingToDoError, Repeater
-from tauscope.server.schedules.repository import ScheduleRepository
+from tauscope.server.schedules.repository import FiringEntry, ScheduleEntry, ScheduleRepository
 from tauscope.server.store.items import utc_now
 
 _log = logging.getLogger("tauscope.jobs")

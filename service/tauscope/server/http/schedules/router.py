@@ -20,9 +20,9 @@ from tauscope.server.http.schedules.models import (
 )
 from tauscope.server.http.services import Services, ServicesDep
 from tauscope.server.problems import problem_responses
-from tauscope.server.schedules.entries import FiringEntry, ScheduleEntry
+from tauscope.server.schedules.repeater import make_schedule
+from tauscope.server.schedules.repository import FiringEntry, ScheduleEntry
 from tauscope.server.schedules.scheduler import parse_schedule
-from tauscope.server.schedules.template import make_schedule
 from tauscope.server.store.layout import FOLDERS
 
 router = APIRouter(prefix="/schedules", tags=["schedules"], responses=problem_responses("invalid-request", "store"))
