@@ -8,7 +8,7 @@ from reliability.requests import IDENTIFICATIONS, RECORDINGS, BrokenPromiseError
 from tauscope.server.http.services import Services
 from tauscope.server.queue.queue import MOST_ATTEMPTS
 from tauscope.server.queue.workspace import Workspace
-from tauscope.server.store.incoming import hash_file
+from tauscope.server.store.files import hash_file
 
 PATIENCE_S = 100.0
 GOES_ON = ("queued", "running")

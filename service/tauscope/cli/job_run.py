@@ -16,9 +16,8 @@ from tauscope.server.http.services import Services
 from tauscope.server.http.settings import Settings, default_data_folder
 from tauscope.server.schedules.repository import FiringEntry, ScheduleRepository
 from tauscope.server.schedules.scheduler import new_boot
-from tauscope.server.store.folder_lock import FolderLock
+from tauscope.server.store.data_folder import FolderLock, site_identifier
 from tauscope.server.store.items import utc_now
-from tauscope.server.store.site import site_identifier
 
 POLL_S = 0.5
 """How often the end is looked for [s]."""

@@ -9,8 +9,7 @@ from tauscope.errors import StoreError
 from tauscope.server.history.model_history import ModelHistory
 from tauscope.server.history.model_registry import DriftMonitor
 from tauscope.server.store.database.database import Database
-from tauscope.server.store.database.facts import ItemMetadata
-from tauscope.server.store.database.index import Index
+from tauscope.server.store.database.index import Index, ItemMetadata
 
 
 @pytest.fixture

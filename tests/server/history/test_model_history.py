@@ -14,9 +14,8 @@ from tauscope.identification import IdentificationDocument
 from tauscope.server.history.gates import ModelPolicy
 from tauscope.server.history.model_history import ModelEntry, ModelHistory
 from tauscope.server.store.database.database import Database
-from tauscope.server.store.database.facts import ItemMetadata
-from tauscope.server.store.database.index import Index
-from tauscope.server.store.database.model_tables import Model, ModelChoice
+from tauscope.server.store.database.index import Index, ItemMetadata
+from tauscope.server.store.database.tables import Model, ModelChoice
 
 
 @pytest.fixture

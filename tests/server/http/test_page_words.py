@@ -9,7 +9,7 @@ from tauscope.robot.robot import JointType
 from tauscope.runtime import RunState
 from tauscope.server.page.router import STATIC
 from tauscope.server.queue.record import JobState
-from tauscope.server.store.layout import FOLDERS
+from tauscope.server.store.data_folder import FOLDERS
 
 PART = re.compile(r"\{\d+\}")
 VARIABLES = {"velocity", "position", "load", "acceleration", "time", "temperature", "motor_position"}

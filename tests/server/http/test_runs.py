@@ -20,7 +20,7 @@ from tauscope.server.control.run_workspace import RunWorkspace
 from tauscope.server.http import Settings, create_app
 from tauscope.server.http.jobs import events as event_routes
 from tauscope.server.queue.excitation_workspace import ExcitationWorkspace
-from tauscope.server.store.incoming import KeptFile
+from tauscope.server.store.files import KeptFile
 from tauscope.server.store.recordings import RecordingStore, StoredRecording
 
 RUNS, EXCITATIONS = "/api/v1/runs", "/api/v1/excitations"

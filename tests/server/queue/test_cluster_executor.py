@@ -27,7 +27,7 @@ from tauscope.server.queue.identification_workspace import IdentificationWorkspa
 from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.queue.record import JobState
 from tauscope.server.queue.workspace import Workspace
-from tauscope.server.store.incoming import hash_file
+from tauscope.server.store.files import hash_file
 from tauscope.server.store.items import ItemStore
 
 if TYPE_CHECKING:

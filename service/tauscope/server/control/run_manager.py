@@ -13,7 +13,7 @@ from tauscope.server.control.motions import Motion
 from tauscope.server.control.run_supervisor import Live, RunSupervisor, StartControl
 from tauscope.server.control.run_workspace import RunWorkspace
 from tauscope.server.control.supervised_threads import SupervisedThreads
-from tauscope.server.store.incoming import KeptFile, hash_file
+from tauscope.server.store.files import KeptFile, hash_file
 from tauscope.server.store.items import ItemStore, staged_identifier
 from tauscope.server.store.recordings import RecordingStore
 

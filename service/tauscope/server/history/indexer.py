@@ -18,11 +18,9 @@ from tauscope.server.queue.excitation_workspace import ExcitationWorkspace
 from tauscope.server.queue.identification_workspace import IdentificationWorkspace
 from tauscope.server.queue.record import JobState
 from tauscope.server.queue.workspace import Workspace
-from tauscope.server.store.database.facts import FileMetadata, ItemMetadata, RecordingRole
-from tauscope.server.store.database.index import Index
-from tauscope.server.store.incoming import hash_file
+from tauscope.server.store.database.index import FileMetadata, Index, ItemMetadata, RecordingRole
+from tauscope.server.store.files import hash_file, identifier_time
 from tauscope.server.store.items import ItemStore
-from tauscope.server.store.names import identifier_time
 from tauscope.server.store.recordings import RecordingStore
 
 DAMAGED = "damaged"

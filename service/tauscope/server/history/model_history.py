@@ -14,8 +14,7 @@ from tauscope.robot.messages import nearest, one_line, shown
 from tauscope.server.history.gates import Gate, ModelPolicy
 from tauscope.server.history.model_judgement import Candidate, choose, judge
 from tauscope.server.store.database.database import Database
-from tauscope.server.store.database.model_tables import Model, ModelEvent, RobotPolicy
-from tauscope.server.store.database.tables import Item, Robot
+from tauscope.server.store.database.tables import Item, Model, ModelEvent, Robot, RobotPolicy
 
 
 @dataclass(frozen=True)

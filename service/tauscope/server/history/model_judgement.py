@@ -12,8 +12,7 @@ from sqlalchemy.orm import Session, undefer
 from tauscope.identification import IdentificationDocument
 from tauscope.server.history.drift import Drift, drift_between, drift_words, is_beyond, named_parameters
 from tauscope.server.history.gates import Gate, ModelPolicy, check_gates, passes
-from tauscope.server.store.database.model_tables import Model, ModelChoice, ModelEvent
-from tauscope.server.store.database.tables import Robot
+from tauscope.server.store.database.tables import Model, ModelChoice, ModelEvent, Robot
 
 
 @dataclass(frozen=True)

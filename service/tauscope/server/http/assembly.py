@@ -41,13 +41,11 @@ from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.schedules.repeater import Repeater
 from tauscope.server.schedules.repository import ScheduleRepository
 from tauscope.server.schedules.scheduler import Scheduler, new_boot
+from tauscope.server.store.data_folder import FOLDERS, FolderLock, item_stores, site_identifier
 from tauscope.server.store.database.database import Database
 from tauscope.server.store.database.index import Index
-from tauscope.server.store.folder_lock import FolderLock
 from tauscope.server.store.items import ItemStore
-from tauscope.server.store.layout import FOLDERS, item_stores
 from tauscope.server.store.recordings import RecordingStore
-from tauscope.server.store.site import site_identifier
 
 PRUNING_S = 3600.0
 """How often what is old is removed, where the operator asked for it [s]."""

@@ -10,7 +10,7 @@ from pathlib import Path
 from tauscope.errors import RecordingError
 from tauscope.robot.messages import one_line, shown
 from tauscope.server.queue.cluster_executor import ClusterAwayError
-from tauscope.server.store.names import FILE_NAME_RULE, is_file_name
+from tauscope.server.store.files import FILE_NAME_RULE, is_file_name
 
 COLUMNS = ("name", "robot", "recordings", "held_out")
 SEPARATOR = ";"

@@ -20,7 +20,7 @@ from tauscope.server.queue.identification_workspace import IdentificationWorkspa
 from tauscope.server.queue.job_provenance import job_provenance
 from tauscope.server.queue.record import JobProblem, without_folders
 from tauscope.server.queue.work import begin_step, do_work
-from tauscope.server.store.incoming import hash_file
+from tauscope.server.store.files import hash_file
 
 
 def run_identification(folder: Path, server_recordings: Path) -> JobProblem | None:

@@ -11,8 +11,7 @@ from sqlalchemy.orm import Session
 from tauscope.errors import NotFoundError
 from tauscope.robot.messages import nearest, one_line, shown
 from tauscope.server.store.database.database import Database
-from tauscope.server.store.database.schedule_tables import Firing, Schedule
-from tauscope.server.store.database.tables import Item
+from tauscope.server.store.database.tables import Firing, Item, Schedule
 
 UNDECIDED = ("asked", "claimed")
 """States of a firing that will become another one."""

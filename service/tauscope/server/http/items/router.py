@@ -10,8 +10,8 @@ from tauscope.server.http.items.models import ItemAnswer, ItemListAnswer, KnownR
 from tauscope.server.http.jobs.routes import Limit
 from tauscope.server.http.services import ServicesDep
 from tauscope.server.problems import problem_responses
-from tauscope.server.store.database.facts import ItemEntry, ItemQuery
-from tauscope.server.store.layout import FOLDERS
+from tauscope.server.store.data_folder import FOLDERS
+from tauscope.server.store.database.index import ItemEntry, ItemQuery
 
 router = APIRouter(tags=["items"], responses=problem_responses("invalid-request", "store"))
 

@@ -23,7 +23,7 @@ from tauscope.server.problems import problem_responses
 from tauscope.server.schedules.repeater import make_schedule
 from tauscope.server.schedules.repository import FiringEntry, ScheduleEntry
 from tauscope.server.schedules.scheduler import parse_schedule
-from tauscope.server.store.layout import FOLDERS
+from tauscope.server.store.data_folder import FOLDERS
 
 router = APIRouter(prefix="/schedules", tags=["schedules"], responses=problem_responses("invalid-request", "store"))
 
