@@ -24,7 +24,7 @@ from server.conftest import connected
 from tauscope.server.http import Settings, assembly, create_app
 from tauscope.server.http.services import Services
 from tauscope.server.queue.executors import WorkerPool
-from tauscope.server.store.database import engine as database_engine
+from tauscope.server.store.database import database as database_engine
 from tauscope.server.store.database.database import FILE_NAME
 
 FULL, LOCKED, DAMAGED, WORKER = "disk full", "database locked", "file damaged", "worker killed"

@@ -14,9 +14,8 @@ from server.http.motions import ROBOT, move_document
 from server.http.problem_check import assert_problem
 from server.queue.controls import HandControls
 from server.queue.executors import InlineExecutor
-from tauscope.server.auth.key_ring import LOOK_S
-from tauscope.server.auth.keys import KeyFile
-from tauscope.server.auth.rate_limit import RateLimit
+from tauscope.server.auth.gate import RateLimit
+from tauscope.server.auth.keys import LOOK_S, KeyFile
 from tauscope.server.auth.scopes import Scope
 from tauscope.server.http import Settings, create_app
 from tauscope.server.http.services import Services

@@ -10,9 +10,8 @@ from pathlib import Path
 import pytest
 
 from tauscope.errors import TauscopeError
-from tauscope.server.auth.key_ring import LOCAL, Caller, KeyRing
-from tauscope.server.auth.keys import KEY_FILE, KeyFile, matching_key
-from tauscope.server.auth.rate_limit import MOST_CALLERS, RateLimit
+from tauscope.server.auth.gate import MOST_CALLERS, RateLimit
+from tauscope.server.auth.keys import KEY_FILE, LOCAL, Caller, KeyFile, KeyRing, matching_key
 from tauscope.server.auth.scopes import Scope
 
 NOW = datetime(2026, 11, 22, tzinfo=UTC)

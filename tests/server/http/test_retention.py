@@ -13,7 +13,7 @@ from server.queue.executors import InlineExecutor, ManualExecutor
 from server.queue.waiting import wait_until
 from snapshots import SNAPSHOTS, unpacked
 from tauscope.cli.program import main
-from tauscope.server.auth.audit.log import AuditLog
+from tauscope.server.auth.audit_log import AuditLog
 from tauscope.server.http import Settings, create_app
 
 ITEMS = "/api/v1/items"

@@ -9,11 +9,9 @@ from datetime import timedelta
 from functools import partial
 
 from tauscope.errors import TauscopeError
-from tauscope.server.auth.audit.log import AuditLog, AuditTrail
-from tauscope.server.auth.gate import Access
-from tauscope.server.auth.key_ring import KeyRing
-from tauscope.server.auth.keys import KeyFile
-from tauscope.server.auth.rate_limit import RateLimit
+from tauscope.server.auth.audit_log import AuditLog, AuditTrail
+from tauscope.server.auth.gate import Access, RateLimit
+from tauscope.server.auth.keys import KeyFile, KeyRing
 from tauscope.server.control.campaign_manager import CampaignManager
 from tauscope.server.control.campaign_runner import CampaignDependencies
 from tauscope.server.control.device_claims import DeviceClaims

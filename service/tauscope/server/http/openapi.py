@@ -8,7 +8,7 @@ from fastapi.openapi.utils import get_openapi
 from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
-from tauscope.server.auth.audit.recorder import is_noted
+from tauscope.server.auth.audit_requests import is_noted
 from tauscope.server.auth.scopes import is_stop, needed_scope
 from tauscope.server.http.idempotency.repeatable import HEADER as ONCE
 from tauscope.server.http.idempotency.repeatable import LONGEST_KEY, is_repeatable

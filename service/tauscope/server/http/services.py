@@ -8,7 +8,7 @@ from typing import Annotated, cast
 from anyio import CapacityLimiter
 from fastapi import Depends, Request
 
-from tauscope.server.auth.audit.log import AuditTrail
+from tauscope.server.auth.audit_log import AuditTrail
 from tauscope.server.auth.gate import Access
 from tauscope.server.control.campaign_manager import CampaignManager
 from tauscope.server.control.leases import Leases

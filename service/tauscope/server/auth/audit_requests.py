@@ -1,4 +1,4 @@
-"""Every request that changes something leaves an entry; one that moves an arm leaves one before anything moves."""
+"""Audited requests: each change leaves an entry, and a motion leaves one before anything moves."""
 
 import logging
 from typing import cast
@@ -8,7 +8,7 @@ from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Send
 from starlette.types import Scope as AsgiScope
 
-from tauscope.server.auth.audit.log import AuditTrail
+from tauscope.server.auth.audit_log import AuditTrail
 from tauscope.server.auth.gate import caller_of
 from tauscope.server.auth.scopes import Scope, is_stop, needed_scope
 from tauscope.server.problems import make_problem, problem_answer

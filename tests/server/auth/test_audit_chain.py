@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 
 from tauscope.cli.program import main
 from tauscope.errors import NotFoundError
-from tauscope.server.auth.audit.chain import GENESIS, chained_line, verify_lines
-from tauscope.server.auth.audit.log import AUDIT_FILE, AuditLog, AuditTrail
+from tauscope.server.auth.audit_log import AUDIT_FILE, GENESIS, AuditLog, AuditTrail, chained_line, verify_lines
 
 NOW = datetime(2026, 11, 22, tzinfo=UTC)
 

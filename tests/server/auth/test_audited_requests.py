@@ -15,7 +15,7 @@ from server.http.contract.test_route_scopes import CHANGING
 from server.http.motions import ROBOT, move_document
 from server.queue.controls import HandControls, finish_at_once
 from server.queue.executors import InlineExecutor
-from tauscope.server.auth.audit.log import AuditLog
+from tauscope.server.auth.audit_log import AuditLog
 from tauscope.server.auth.scopes import Scope, needed_scope
 from tauscope.server.http import Settings, create_app
 
