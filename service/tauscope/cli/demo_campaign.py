@@ -14,9 +14,8 @@ from tauscope.runtime import RunOptions
 from tauscope.server.control.campaign_order import CampaignOrder, HeldOutMotion
 from tauscope.server.control.campaign_workspace import CampaignWorkspace
 from tauscope.server.control.run_order import BackendChoice
-from tauscope.server.http.assembly import open_services
 from tauscope.server.http.campaigns.status import describe, result_of
-from tauscope.server.http.services import Services
+from tauscope.server.http.services import Services, open_services
 from tauscope.server.http.settings import Settings
 from tauscope.server.queue.diagnosis_order import DiagnosisOptions
 from tauscope.server.queue.excitation_order import ExcitationDesignOptions

@@ -11,8 +11,7 @@ from tauscope.cli.terminal import output, plain, table
 from tauscope.errors import StoreError, TauscopeError
 from tauscope.report.quantities import ABSENT
 from tauscope.report.table import Table
-from tauscope.server.http.assembly import open_services
-from tauscope.server.http.services import Services
+from tauscope.server.http.services import Services, open_services
 from tauscope.server.http.settings import Settings, default_data_folder
 from tauscope.server.schedules.repository import FiringEntry, ScheduleRepository
 from tauscope.server.schedules.scheduler import new_boot

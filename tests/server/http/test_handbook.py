@@ -12,7 +12,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from shared_data import REPOSITORY
-from tauscope.server.http.handbook import chapters, rendered
+from tauscope.server.http.pages import chapters, rendered
 from tauscope.server.problems import KINDS, TYPE_PREFIX
 
 
@@ -85,7 +85,7 @@ def test_they_come_with_the_installed_package(tmp_path: Path) -> None:
     (wheel,) = tmp_path.glob("*.whl")
     zipfile.ZipFile(wheel).extractall(tmp_path / "installed")
     assert not {"docs", "tests"} & {entry.name for entry in (tmp_path / "installed").iterdir()}
-    tell = "from tauscope.server.http.handbook import chapters; print(*chapters())"
+    tell = "from tauscope.server.http.pages import chapters; print(*chapters())"
     told = subprocess.run(
         [sys.executable, "-c", tell],
         cwd=tmp_path / "installed",

@@ -19,10 +19,8 @@ from server.queue.executors import InlineExecutor
 from tauscope.server.auth.scopes import Scope
 from tauscope.server.control.run_manager import RunManager
 from tauscope.server.http import Settings, create_app
-from tauscope.server.http.idempotency.answers import LIFE_S, KeptAnswer
-from tauscope.server.http.idempotency.fingerprint import Fingerprint
-from tauscope.server.http.idempotency.on_disk import AnswersOnDisk
-from tauscope.server.http.idempotency.passing import MOST, PassingAnswers
+from tauscope.server.http.repeated_answers import LIFE_S, MOST, AnswersOnDisk, KeptAnswer, PassingAnswers
+from tauscope.server.http.repeated_requests import Fingerprint
 from tauscope.server.http.services import Services
 
 RUNS, LEASES = "/api/v1/runs", "/api/v1/leases"

@@ -6,7 +6,7 @@ from collections.abc import Awaitable, Callable
 import pytest
 from starlette.types import Message, Receive, Scope, Send
 
-from tauscope.server.http.concurrency_limiter import TakingTurns
+from tauscope.server.http.protection import TakingTurns
 
 NEVER_S = 3600.0
 

@@ -10,8 +10,8 @@ from pydantic.json_schema import models_json_schema
 
 from tauscope.server.auth.audit_requests import is_noted
 from tauscope.server.auth.scopes import is_stop, needed_scope
-from tauscope.server.http.idempotency.repeatable import HEADER as ONCE
-from tauscope.server.http.idempotency.repeatable import LONGEST_KEY, is_repeatable
+from tauscope.server.http.repeated_requests import HEADER as ONCE
+from tauscope.server.http.repeated_requests import LONGEST_KEY, is_repeatable
 from tauscope.server.problems import MEDIA_TYPE, problem_responses
 
 _REFERENCE = "#/components/schemas/{model}"

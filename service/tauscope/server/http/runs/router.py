@@ -7,7 +7,7 @@ from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import FileResponse
 from starlette.concurrency import run_in_threadpool
 
-from tauscope.server.http.downloads import file_answer
+from tauscope.server.http.documents import file_answer
 from tauscope.server.http.jobs.events import add_events_route
 from tauscope.server.http.jobs.routes import MOTION, SUBMISSION, Identifier, Limit, collection
 from tauscope.server.http.jobs.submission import request_body

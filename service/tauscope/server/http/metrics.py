@@ -1,4 +1,4 @@
-"""What Prometheus is told: requests, jobs, runs, how well the control loops kept their time, and how models drift."""
+"""Prometheus metrics: requests, jobs, runs, lateness of the control loops, and drift of models."""
 
 import threading
 import time

@@ -14,8 +14,8 @@ import pytest
 from starlette.testclient import TestClient
 
 from server.http.problem_check import assert_problem
-from tauscope.server.http.operations import readiness, systemd
-from tauscope.server.http.operations.logs import log_as_json
+from tauscope.server.http import health, heartbeat
+from tauscope.server.http.server import log_as_json
 from tauscope.server.http.services import Services
 
 
@@ -37,14 +37,14 @@ def test_a_disk_that_takes_nothing(client: TestClient, monkeypatch: pytest.Monke
 
 
 def test_a_disk_that_is_nearly_full(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(readiness, "LEAST_FREE_BYTES", 2**60)
+    monkeypatch.setattr(health, "LEAST_FREE_BYTES", 2**60)
     assert "MiB left" in assert_problem(client.get("/readyz"), "not-ready", 503)["detail"]
 
 
 def test_a_disk_that_hangs(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     let_go = threading.Event()
     monkeypatch.setattr("tauscope.server.http.health.PATIENCE_S", 0.05)
-    monkeypatch.setattr(readiness, "_disk_obstacles", lambda _: let_go.wait(20.0) and [])
+    monkeypatch.setattr(health, "_disk_obstacles", lambda _: let_go.wait(20.0) and [])
     try:
         assert "not answered" in assert_problem(client.get("/readyz"), "not-ready", 503)["detail"]
     finally:
@@ -114,7 +114,7 @@ def test_systemd_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
         heard: list[bytes] = []
 
         async def session() -> None:
-            async with systemd.told():
+            async with heartbeat.told():
                 while heard.count(b"WATCHDOG=1") < 3:
                     heard.append(await asyncio.to_thread(listener.recv, 100))
 
@@ -127,11 +127,11 @@ def test_systemd_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
 
 @pytest.mark.parametrize("address", ["", "relative", "/nowhere/at/all"])
 def test_without_systemd_nobody_is_told(address: str) -> None:
-    assert not systemd.notify("READY=1", {"NOTIFY_SOCKET": address})
+    assert not heartbeat.notify("READY=1", {"NOTIFY_SOCKET": address})
 
 
 def test_whose_watchdog_it_is() -> None:
-    assert systemd.watchdog_interval_s({"WATCHDOG_USEC": "10000000"}) == 5.0
-    assert systemd.watchdog_interval_s({"WATCHDOG_USEC": "10000000", "WATCHDOG_PID": "1"}) is None
-    assert systemd.watchdog_interval_s({"WATCHDOG_USEC": "x"}) is None
-    assert systemd.watchdog_interval_s({}) is None
+    assert heartbeat.watchdog_interval_s({"WATCHDOG_USEC": "10000000"}) == 5.0
+    assert heartbeat.watchdog_interval_s({"WATCHDOG_USEC": "10000000", "WATCHDOG_PID": "1"}) is None
+    assert heartbeat.watchdog_interval_s({"WATCHDOG_USEC": "x"}) is None
+    assert heartbeat.watchdog_interval_s({}) is None

@@ -1,9 +1,11 @@
-"""A POST with the header Idempotency-Key is done once, however often it comes, crash of the service included."""
+"""Repeated requests: a POST with an Idempotency-Key is done once, however often it comes, also across a crash."""
 
 import base64
+import hashlib
 import re
 from typing import cast
 
+from python_multipart.multipart import parse_options_header
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import Headers
 from starlette.responses import Response
@@ -11,10 +13,38 @@ from starlette.types import ASGIApp, Message, Receive, Send
 from starlette.types import Scope as AsgiScope
 
 from tauscope.server.auth.gate import caller_of
-from tauscope.server.http.idempotency.answers import Answers, KeptAnswer, request_name
-from tauscope.server.http.idempotency.fingerprint import Fingerprint
+from tauscope.server.http.repeated_answers import Answers, KeptAnswer, request_name
 from tauscope.server.http.services import Services
 from tauscope.server.problems import make_problem, problem_answer
+
+
+class Fingerprint:
+    """A hash of a body as it arrives. Clients draw a new boundary for every form: it is left out."""
+
+    def __init__(self, content_type: str) -> None:
+        """Begin with an empty body."""
+        media_type, options = parse_options_header(content_type)
+        self._boundary = options.get(b"boundary") or b""
+        self._hash = hashlib.sha256(media_type + b"\n")
+        self._held = b""
+
+    def add(self, piece: bytes) -> None:
+        """Take the next bytes."""
+        if not self._boundary:
+            self._hash.update(piece)
+            return
+        text = (self._held + piece).replace(self._boundary, b"")
+        # The last bytes may be the beginning of a boundary.
+        keep = min(len(text), len(self._boundary) - 1)
+        self._hash.update(text[: len(text) - keep])
+        self._held = text[len(text) - keep :]
+
+    def digest(self) -> str:
+        """The hash of everything so far, in hexadecimal."""
+        whole = self._hash.copy()
+        whole.update(self._held)
+        return whole.hexdigest()
+
 
 HEADER = "Idempotency-Key"
 
