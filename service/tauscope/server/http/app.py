@@ -18,11 +18,11 @@ from tauscope.server.http.diagnoses.router import router as diagnoses
 from tauscope.server.http.excitations.models import ExcitationRequest
 from tauscope.server.http.excitations.router import router as excitations
 from tauscope.server.http.heartbeat import told
-from tauscope.server.http.history.models import ReasonRequest
-from tauscope.server.http.history.router import router as history
+from tauscope.server.http.history import ReasonRequest
+from tauscope.server.http.history import router as history
 from tauscope.server.http.identifications.models import IdentificationRequest
 from tauscope.server.http.identifications.router import router as identifications
-from tauscope.server.http.items.router import router as items
+from tauscope.server.http.items import router as items
 from tauscope.server.http.jobs.events import EVENT_MODELS
 from tauscope.server.http.leases.models import LeaseRequest
 from tauscope.server.http.leases.router import router as leases
@@ -36,8 +36,8 @@ from tauscope.server.http.robots.models import RobotCheckRequest
 from tauscope.server.http.robots.router import router as robots
 from tauscope.server.http.runs.models import RunRequest
 from tauscope.server.http.runs.router import router as runs
-from tauscope.server.http.schedules.models import ScheduleRequest
-from tauscope.server.http.schedules.router import router as schedules
+from tauscope.server.http.schedules import ScheduleRequest
+from tauscope.server.http.schedules import router as schedules
 from tauscope.server.http.services import open_services
 from tauscope.server.http.settings import Settings
 from tauscope.server.page.router import router as page

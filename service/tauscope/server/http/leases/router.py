@@ -1,19 +1,18 @@
-"""Routes about leases, and the stop of everything."""
+"""Routes of leases, the lease that comes with a request, and the stop of everything."""
 
 from datetime import UTC, datetime
 from typing import Annotated
 
-from fastapi import APIRouter, Path, Request, Response
+from fastapi import APIRouter, Header, Path, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from tauscope.errors import NotFoundError
 from tauscope.robot.messages import one_line, shown
 from tauscope.server.auth.gate import caller_of
 from tauscope.server.auth.scopes import Scope
-from tauscope.server.control.leases import Lease, LeaseLostError
+from tauscope.server.control.leases import Lease, LeaseLostError, Permit
 from tauscope.server.control.run_order import BackendChoice
 from tauscope.server.http.documents import JSON, media_type, read_document, refuse_media_type
-from tauscope.server.http.leases.holding import LeaseToken, owner_of
 from tauscope.server.http.leases.models import (
     EXAMPLES,
     LeaseAnswer,
@@ -25,6 +24,35 @@ from tauscope.server.http.leases.models import (
 from tauscope.server.http.openapi import json_body
 from tauscope.server.http.services import Services, ServicesDep
 from tauscope.server.problems import ProblemError, problem_responses
+
+LEASE_TOKEN = "Lease-Token"  # noqa: S105 - name of a header
+
+LeaseToken = Annotated[
+    str | None,
+    Header(
+        alias=LEASE_TOKEN,
+        max_length=200,
+        description="token of the arm's lease; a service without API keys asks for none unless somebody has a lease",
+    ),
+]
+
+
+def owner_of(request: Request) -> str:
+    """Whose a lease is that this request takes or uses."""
+    return caller_of(request.scope).key or "local"
+
+
+def permit_of(request: Request, services: Services, device: str) -> Permit:
+    """Leave to move an arm, by the lease that comes with a request.
+
+    Raises
+    ------
+    LeaseError
+        if there is no such leave
+    """
+    is_needed = services.settings.require_lease or caller_of(request.scope).key is not None
+    return services.leases.permit(device, request.headers.get(LEASE_TOKEN), owner_of(request), is_needed=is_needed)
+
 
 router = APIRouter(prefix="/leases", tags=["leases"], responses=problem_responses("invalid-request"))
 stop_router = APIRouter(tags=["runs"])

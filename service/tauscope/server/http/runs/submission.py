@@ -19,7 +19,7 @@ from tauscope.server.http.documents import to_json_text
 from tauscope.server.http.excitations.status import finished_excitation
 from tauscope.server.http.form import PartRule
 from tauscope.server.http.jobs.submission import Received, keep_robot, receive_request
-from tauscope.server.http.leases.holding import permit_of
+from tauscope.server.http.leases.router import permit_of
 from tauscope.server.http.robots.files import read_received_robot
 from tauscope.server.http.runs.models import RunRequest
 from tauscope.server.http.services import Services
