@@ -6,9 +6,8 @@ from hypothesis import strategies as st
 
 from runtime.doubles import PointArm
 from runtime.test_guard import limits
-from tauscope.runtime.guard import Guard
+from tauscope.runtime.guard import Guard, GuardViolationError
 from tauscope.runtime.loop import GuardedArm
-from tauscope.runtime.violation import GuardViolationError
 from tauscope_drivers import ControlMode, Setpoint, StopPolicy
 
 PERIOD_S = 0.002

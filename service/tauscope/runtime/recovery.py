@@ -7,6 +7,7 @@ from pathlib import Path
 
 from tauscope.errors import AcquisitionError
 from tauscope.recording.journal_process import wait_for_writer
+from tauscope.runtime.processes import wait_until_free
 from tauscope.runtime.record import (
     JOURNAL_FILE,
     LOG_FILE,
@@ -18,8 +19,7 @@ from tauscope.runtime.record import (
     read_record,
     write_record,
 )
-from tauscope.runtime.recording_files import UNKNOWN_LOSS, save_recording
-from tauscope.runtime.run_lock import wait_until_free
+from tauscope.runtime.recorder import UNKNOWN_LOSS, save_recording
 from tauscope.runtime.states import RunState
 
 INTERRUPTED = "interrupted"

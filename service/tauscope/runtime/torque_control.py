@@ -5,8 +5,7 @@ from numpy.typing import NDArray
 
 from tauscope.errors import AcquisitionError
 from tauscope.robot import Robot
-from tauscope.runtime.feed_forward import inertia_along
-from tauscope.runtime.plan import Plan
+from tauscope.runtime.plan import Plan, inertia_along
 from tauscope_drivers import ArmState
 
 Array = NDArray[np.float64]

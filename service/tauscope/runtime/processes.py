@@ -1,11 +1,40 @@
-"""Who moves the arm holds its run's folder; the system lets go of it when that process ends, however it ends."""
+"""Processes of our own: their environment, their identity, and the lock on the folder of their run."""
 
 import fcntl
 import os
 import time
 from pathlib import Path
 
+import tauscope
 from tauscope.errors import AcquisitionError
+
+_THREAD_SETTINGS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+def child_environment() -> dict[str, str]:
+    """Environment of a child process: it imports the modules that this process has, and computes in one thread."""
+    source = str(Path(tauscope.__file__).resolve().parents[1])
+    known = os.environ.get("PYTHONPATH")
+    threads = dict.fromkeys(_THREAD_SETTINGS, "1")
+    return {**os.environ, **threads, "PYTHONPATH": f"{source}{os.pathsep}{known}" if known else source}
+
+
+def process_start(pid: int) -> int | None:
+    """When a process was started, in the kernel's ticks; with its number it names a process for good.
+
+    Returns
+    -------
+    int or None
+        None where there is no such process
+    """
+    try:
+        status = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return None
+    # The name before it stands in parentheses and may hold anything.
+    fields = status.rpartition(")")[2].split()
+    return None if fields[0] in "ZX" else int(fields[19])
+
 
 LOCK_FILE = ".lock"
 
