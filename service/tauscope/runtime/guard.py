@@ -43,7 +43,7 @@ class Rule(StrEnum):
 
 @dataclass(frozen=True)
 class Violation:
-    """One objection.
+    """One find_objection.
 
     joint : str or None
         name of the joint; None where it concerns the whole arm

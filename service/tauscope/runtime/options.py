@@ -62,7 +62,7 @@ class RunOptions(StoredModel, strict=False):
     )
 
 
-def cycle_rate_hz(options: RunOptions, capabilities: Capabilities) -> float:
+def choose_rate_hz(options: RunOptions, capabilities: Capabilities) -> float:
     """Cycles a second of a run.
 
     Raises

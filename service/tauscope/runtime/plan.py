@@ -10,7 +10,7 @@ from tauscope.errors import AcquisitionError
 from tauscope.recording.journal_rows import Phase
 from tauscope.robot import Robot
 from tauscope.runtime.guard import GuardLimits, guard_limits
-from tauscope.runtime.options import RunOptions, cycle_rate_hz
+from tauscope.runtime.options import RunOptions, choose_rate_hz
 from tauscope.trajectory.limits import motion_limits
 from tauscope.trajectory.segments import MoveSegment
 from tauscope.trajectory.trajectory import Trajectory, ramp
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 _MOST_POSTURES = 100_000
 
 
-def predicted_torque(robot: Robot, position: Array, velocity: Array, acceleration: Array) -> Array | None:
+def predict_torque(robot: Robot, position: Array, velocity: Array, acceleration: Array) -> Array | None:
     """Joint torque of the model, τ = H(q) q̈ + h(q, q̇) + c(q) + τ_f(q̇); None where the robot file has no model.
 
     Friction is left out where its coefficients or its shape are not stated.
@@ -47,7 +47,7 @@ def predicted_torque(robot: Robot, position: Array, velocity: Array, acceleratio
     return torque
 
 
-def inertia_along(robot: Robot, position: Array) -> tuple[Array, int] | None:
+def compute_inertia(robot: Robot, position: Array) -> tuple[Array, int] | None:
     """Joint-space inertia H along a motion; None where the robot file has no model.
 
     Parameters
@@ -144,7 +144,7 @@ def make_plan(
         the motion does not fit the arm or its limits, or the arm stands outside them
     """
     _require_fitting(robot, trajectory, start, capabilities)
-    rate_hz = cycle_rate_hz(options, capabilities)
+    rate_hz = choose_rate_hz(options, capabilities)
     if trajectory.duration_s * rate_hz > MOST_CYCLES:
         raise AcquisitionError(
             f"the motion lasts {trajectory.duration_s:.4g} s; at {rate_hz:g} cycles a second at most "
@@ -225,5 +225,5 @@ def _feed_forward(
 ) -> Array:
     """What the model predicts, cut to the torque limits: a model may be wrong, the arm must not pay for it."""
     wanted = options.mode is ControlMode.TORQUE or (options.feed_forward and capabilities.takes_feed_forward)
-    torque = predicted_torque(robot, *motion) if wanted else None
+    torque = predict_torque(robot, *motion) if wanted else None
     return np.zeros_like(motion[0]) if torque is None else np.clip(torque, -limits.torque, limits.torque)

@@ -19,7 +19,7 @@ def child_environment() -> dict[str, str]:
     return {**os.environ, **threads, "PYTHONPATH": f"{source}{os.pathsep}{known}" if known else source}
 
 
-def process_start(pid: int) -> int | None:
+def read_process_start(pid: int) -> int | None:
     """When a process was started, in the kernel's ticks; with its number it names a process for good.
 
     Returns
@@ -64,7 +64,7 @@ class RunLock:
         os.close(self._descriptor)
 
 
-def wait_until_free(folder: Path, patience_s: float) -> RunLock | None:
+def wait_for_lock(folder: Path, patience_s: float) -> RunLock | None:
     """Take a folder as soon as nobody holds it.
 
     Parameters

@@ -12,7 +12,7 @@ from tauscope.errors import AcquisitionError
 from tauscope.files import write_atomically
 from tauscope.runtime.guard import Violation
 from tauscope.runtime.options import StoredModel
-from tauscope.runtime.processes import process_start
+from tauscope.runtime.processes import read_process_start
 from tauscope.runtime.states import RunState, may_follow
 from tauscope.runtime.timing import RealTime, Timing
 
@@ -33,12 +33,12 @@ class ProcessName(StoredModel):
     @staticmethod
     def of(pid: int) -> "ProcessName":
         """The name of a living process."""
-        return ProcessName(pid=pid, start=process_start(pid))
+        return ProcessName(pid=pid, start=read_process_start(pid))
 
     @property
     def is_alive(self) -> bool:
         """Whether it still runs, or is stopped and might."""
-        start = process_start(self.pid)
+        start = read_process_start(self.pid)
         return start is not None and self.start in (None, start)
 
 

@@ -16,7 +16,7 @@ from server.http.motions import ROBOT, move_document
 from server.queue.controls import HandControls, finish_at_once
 from server.queue.executors import InlineExecutor
 from tauscope.server.auth.audit_log import AuditLog
-from tauscope.server.auth.scopes import Scope, needed_scope
+from tauscope.server.auth.scopes import Scope, find_needed_scope
 from tauscope.server.http import Settings, create_app
 
 RUNS, LEASES = "/api/v1/runs", "/api/v1/leases"
@@ -66,7 +66,7 @@ def test_every_operation_that_changes_something_leaves_an_entry(settings: Settin
     noted = [entry["action"] for entry in entries if "status" in entry]
     assert noted == [f"{method} {path}" for method, path in addresses]
     first = [entry["action"] for entry in entries if entry["action"].startswith("asked: ")]
-    moves = [f"asked: {method} {path}" for method, path in addresses if needed_scope(method, path) in MOVING]
+    moves = [f"asked: {method} {path}" for method, path in addresses if find_needed_scope(method, path) in MOVING]
     assert first == moves
     assert len(moves) > 10
 

@@ -68,10 +68,10 @@ class Bench:
         self.claims = DeviceClaims(4)
         items = ItemStore(folder / "runs", "run")
         self.runs = RunManager(items, self.recordings, start, self.claims, lambda: True)
-        shop = CampaignDependencies(
+        dependencies = CampaignDependencies(
             self.jobs, self.excitations, self.identifications, self.diagnoses, self.runs, self.recordings
         )
-        self.desk = CampaignManager(ItemStore(folder / "campaigns", "campaign"), shop)
+        self.desk = CampaignManager(ItemStore(folder / "campaigns", "campaign"), dependencies)
 
     def submit(self, **changes: object) -> str:
         staged = self.desk.items.stage()

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tauscope.server.control.interlock import FOLDER, objection
+from tauscope.server.control.interlock import FOLDER, find_objection
 
 
 def program(data: Path, text: str, mode: int = 0o755) -> Path:
@@ -16,7 +16,7 @@ def program(data: Path, text: str, mode: int = 0o755) -> Path:
 
 
 def ask(data: Path) -> str | None:
-    return objection(data, "free", "arm 3", "arm 3 on sim")
+    return find_objection(data, "free", "arm 3", "arm 3 on sim")
 
 
 def test_yes(tmp_path: Path) -> None:

@@ -58,7 +58,7 @@ def test_it_lasts_as_long_as_there_are_signs_of_life_and_no_longer(
         clock.now += 9.999
         assert leases.renew(ARM, lease.token, "a") is lease
     clock.now += 10.0
-    assert leases.end_of(lease) == "no sign of life for 10 s"
+    assert leases.find_end_reason(lease) == "no sign of life for 10 s"
     assert ended == [(lease.number, "no sign of life for 10 s")]
     with pytest.raises(LeaseLostError, match="nobody has it"):
         leases.renew(ARM, lease.token, "a")

@@ -15,11 +15,11 @@ def test_a_pulse_that_is_not_shown_is_not_felt_for_long() -> None:
     pulse = Heartbeat(lambda: now[0])
     for elapsed in (0.0, 0.9 * PATIENCE_S):
         now[0] = 100.0 + elapsed
-        assert pulse.is_felt()
+        assert pulse.is_alive()
     now[0] = 100.0 + 1.1 * PATIENCE_S
-    assert not pulse.is_felt()
+    assert not pulse.is_alive()
     pulse.beat()
-    assert pulse.is_felt()
+    assert pulse.is_alive()
 
 
 def test_an_event_loop_shows_its_pulse_only_while_it_turns() -> None:

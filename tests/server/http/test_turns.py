@@ -6,7 +6,7 @@ from collections.abc import Awaitable, Callable
 import pytest
 from starlette.types import Message, Receive, Scope, Send
 
-from tauscope.server.http.protection import TakingTurns
+from tauscope.server.http.protection import ConcurrencyLimiter
 
 NEVER_S = 3600.0
 
@@ -53,7 +53,7 @@ def play(
 
     async def run() -> None:
         work = Work()
-        turns = TakingTurns(work, at_a_time=2, longest_turn_s=longest_turn_s)
+        turns = ConcurrencyLimiter(work, at_a_time=2, longest_turn_s=longest_turn_s)
 
         def ask(method: str, path: str) -> asyncio.Task[None]:
             scope = {"type": "http", "method": method, "path": path}

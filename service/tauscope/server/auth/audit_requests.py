@@ -1,4 +1,4 @@
-"""Audited requests: each change leaves an entry, and a motion leaves one before anything moves."""
+"""AuditedRequests requests: each change leaves an entry, and a motion leaves one before anything moves."""
 
 import logging
 from typing import cast
@@ -9,14 +9,14 @@ from starlette.types import ASGIApp, Message, Receive, Send
 from starlette.types import Scope as AsgiScope
 
 from tauscope.server.auth.audit_log import AuditTrail
-from tauscope.server.auth.gate import caller_of
-from tauscope.server.auth.scopes import Scope, is_stop, needed_scope
+from tauscope.server.auth.gate import find_caller
+from tauscope.server.auth.scopes import Scope, find_needed_scope, is_stop
 from tauscope.server.problems import make_problem, problem_answer
 
 _log = logging.getLogger("tauscope.audit")
 
 
-class Audited:
+class AuditedRequests:
     """Notes who asked for what, and what was answered."""
 
     def __init__(self, app: ASGIApp) -> None:
@@ -25,11 +25,11 @@ class Audited:
 
     async def __call__(self, scope: AsgiScope, receive: Receive, send: Send) -> None:
         """Answer a request."""
-        if scope["type"] != "http" or not is_noted(scope["method"], scope["path"]):
+        if scope["type"] != "http" or not is_audited(scope["method"], scope["path"]):
             return await self.app(scope, receive, send)
         trail = cast(AuditTrail, scope["app"].state.services.audit)
         method, path = scope["method"], scope["path"]
-        actor, action = caller_of(scope).name, f"{method} {path[:300]}"
+        actor, action = find_caller(scope).name, f"{method} {path[:300]}"
         address = (scope.get("client") or (None,))[0]
         if _is_asked_first(method, path):
             # Where the log takes nothing, nothing moves: the failure ends the request.
@@ -53,12 +53,12 @@ class Audited:
             trail.note(actor, action, address=address, status=status, subject=subject)
 
 
-def is_noted(method: str, path: str) -> bool:
+def is_audited(method: str, path: str) -> bool:
     """Whether a request leaves an entry: not where it only reads, and not for signs of life."""
     return method not in ("GET", "HEAD", "OPTIONS") and not path.endswith("/heartbeat")
 
 
 def _is_asked_first(method: str, path: str) -> bool:
     """Whether the entry has to be on the disk before the request is looked at; never so for a stop."""
-    scope = needed_scope(method, path)
+    scope = find_needed_scope(method, path)
     return scope is not None and scope.includes(Scope.MOVE) and not is_stop(method, path)

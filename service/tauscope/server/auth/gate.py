@@ -13,7 +13,7 @@ from starlette.types import Scope as AsgiScope
 
 from tauscope.server.auth.audit_log import AuditTrail
 from tauscope.server.auth.keys import LOCAL, Caller, KeyRing
-from tauscope.server.auth.scopes import is_stop, needed_scope
+from tauscope.server.auth.scopes import find_needed_scope, is_stop
 from tauscope.server.problems import make_problem, problem_answer
 
 MOST_CALLERS = 10_000
@@ -98,7 +98,7 @@ class Gate:
         return await self.app(scope, receive, send)
 
 
-def caller_of(scope: AsgiScope) -> Caller:
+def find_caller(scope: AsgiScope) -> Caller:
     """Who makes a request."""
     return cast(Caller, scope.get(CALLER, LOCAL))
 
@@ -106,7 +106,7 @@ def caller_of(scope: AsgiScope) -> Caller:
 def _admit(access: Access, scope: AsgiScope) -> Caller | _Refusal:
     """Who calls, or why they may not."""
     method, path = scope["method"], scope["path"]
-    needed = needed_scope(method, path)
+    needed = find_needed_scope(method, path)
     if needed is None:
         return LOCAL
     stops = is_stop(method, path)

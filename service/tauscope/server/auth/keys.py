@@ -146,7 +146,7 @@ class KeyFile:
             os.close(lock)
 
 
-def matching_key(keys: tuple[ApiKey, ...], text: str) -> ApiKey | None:
+def match_key(keys: tuple[ApiKey, ...], text: str) -> ApiKey | None:
     """The key that a text is; takes the same time whatever is wrong with the text."""
     prefix, _, rest = text.partition("_")
     identifier, _, secret = rest.partition("_")
@@ -168,7 +168,7 @@ def _hashed(salt: str, secret: str) -> str:
 
 _log = logging.getLogger("tauscope.api")
 
-LOOK_S = 1.0
+CHECK_S = 1.0
 """How often the file is looked at: a key that was revoked or added counts after this time at the latest [s]."""
 
 
@@ -220,7 +220,7 @@ class KeyRing:
             return LOCAL
         if text is None:
             return "no API key came with the request; send the header Authorization: Bearer KEY"
-        key = matching_key(self._keys, text)
+        key = match_key(self._keys, text)
         state = None if key is None else key.state(self._clock())
         if key is None or state == "revoked":
             return "the API key is not known, or was revoked; ask the operator for one (tauscope key add)"
@@ -248,7 +248,7 @@ class KeyRing:
         is_over = threading.Event()
 
         def watch() -> None:
-            while not is_over.wait(LOOK_S):
+            while not is_over.wait(CHECK_S):
                 self.look()
 
         thread = threading.Thread(target=watch, name="keys", daemon=True)

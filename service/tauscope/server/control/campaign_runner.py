@@ -58,7 +58,7 @@ class CampaignRunner:
         self,
         workspace: CampaignWorkspace,
         order: CampaignOrder,
-        shop: CampaignDependencies,
+        dependencies: CampaignDependencies,
         release_arm: Callable[[], None],
         permit: Permit = FREE,
     ) -> None:
@@ -66,7 +66,7 @@ class CampaignRunner:
         self.state = JobState.QUEUED
         self._workspace = workspace
         self._order = order
-        self._shop = shop
+        self._dependencies = dependencies
         self._release_arm = release_arm
         self._permit = permit
         self._robot = (order.robot_file, order.robot_name)
@@ -86,7 +86,7 @@ class CampaignRunner:
         # Whoever begins a run looks at the flag after it has told us of the run.
         run = self._run
         if run is not None:
-            self._shop.runs.stop(run)
+            self._dependencies.runs.stop(run)
 
     def interrupt(self) -> None:
         """Stop because the service ends: what is left of the analysis is done after the next start."""
@@ -132,13 +132,13 @@ class CampaignRunner:
             excitation = self._design(order.excitation, "excitation")
             held_out_options = order.held_out_options()
             held_out = held_out_options and self._design(held_out_options, "held_out_excitation")
-            self._wait(ExcitationWorkspace, self._shop.excitations, excitation, "excitation")
+            self._wait(ExcitationWorkspace, self._dependencies.excitations, excitation, "excitation")
             self._begin("run the motion")
             recordings = (self._run_motion(excitation, "run"),)
             judges: tuple[str, ...] = ()
             if held_out:
                 self._begin("design the held-out motion")
-                self._wait(ExcitationWorkspace, self._shop.excitations, held_out, "excitation")
+                self._wait(ExcitationWorkspace, self._dependencies.excitations, held_out, "excitation")
                 self._begin("run the held-out motion")
                 judges = (self._run_motion(held_out, "held_out_run"),)
             self._note(recordings=recordings, held_out=judges)
@@ -151,7 +151,7 @@ class CampaignRunner:
 
     def _design(self, options: ExcitationDesignOptions, link: str) -> str:
         """Have a motion designed; returns at once."""
-        jobs, kind, folder = self._shop.jobs, self._shop.excitations, self._workspace.robot
+        jobs, kind, folder = self._dependencies.jobs, self._dependencies.excitations, self._workspace.robot
         identifier = self._when_there_is_room(lambda: hand_in_excitation(jobs, kind, folder, self._robot, options))
         self._note(**{link: identifier})
         return identifier
@@ -174,7 +174,7 @@ class CampaignRunner:
 
     def _run_motion(self, excitation: str, link: str) -> str:
         """Run a motion to its end; the name of its recording."""
-        order, shop = self._order, self._shop
+        order, dependencies = self._order, self._dependencies
         request = RunRequestRecord(
             robot_file=order.robot_file,
             robot_name=order.robot_name,
@@ -184,13 +184,13 @@ class CampaignRunner:
             campaign=self._workspace.folder.name,
             options=order.run,
         )
-        motion = ExcitationWorkspace(shop.excitations.items.folder(excitation))
-        self._run = hand_in_run(shop.runs, self._workspace.robot, request, motion, self.holder, self._permit)
+        motion = ExcitationWorkspace(dependencies.excitations.items.folder(excitation))
+        self._run = hand_in_run(dependencies.runs, self._workspace.robot, request, motion, self.holder, self._permit)
         self._note(**{link: self._run})
         if self._stop_asked.is_set():
-            shop.runs.stop(self._run)
+            dependencies.runs.stop(self._run)
         self._follow(self._run)
-        record = RunWorkspace(shop.runs.items.folder(self._run)).read_run()
+        record = RunWorkspace(dependencies.runs.items.folder(self._run)).read_run()
         if record is None or record.state is not RunState.FINISHED:
             if self._stop_asked.is_set():
                 raise StoppedError
@@ -201,7 +201,7 @@ class CampaignRunner:
     def _follow(self, run: str) -> None:
         """Tell the progress of a run until it is over."""
         told = None
-        while (live := self._shop.runs.live(run)) is not None:
+        while (live := self._dependencies.runs.live(run)) is not None:
             if live.percent is not None and live.percent != told:
                 told = live.percent
                 self._workspace.write_progress(told, {"run": run, "state": live.state.value})
@@ -209,12 +209,12 @@ class CampaignRunner:
 
     def _identify(self) -> None:
         """From the recordings to the model."""
-        made, shop = self._workspace.read_made(), self._shop
-        identifier = self._handed_in(shop.identifications, made.identification) or self._when_there_is_room(
+        made, dependencies = self._workspace.read_made(), self._dependencies
+        identifier = self._handed_in(dependencies.identifications, made.identification) or self._when_there_is_room(
             lambda: hand_in_identification(
-                shop.jobs,
-                shop.identifications,
-                shop.recordings,
+                dependencies.jobs,
+                dependencies.identifications,
+                dependencies.recordings,
                 self._workspace.robot,
                 self._robot,
                 train=made.recordings,
@@ -223,16 +223,16 @@ class CampaignRunner:
             )
         )
         self._note(identification=identifier)
-        self._wait(Workspace, shop.identifications, identifier, "identification")
+        self._wait(Workspace, dependencies.identifications, identifier, "identification")
 
     def _diagnose(self, options: DiagnosisOptions) -> None:
         """From the same recordings to what the model leaves out."""
-        made, shop = self._workspace.read_made(), self._shop
-        identifier = self._handed_in(shop.diagnoses, made.diagnosis) or self._when_there_is_room(
+        made, dependencies = self._workspace.read_made(), self._dependencies
+        identifier = self._handed_in(dependencies.diagnoses, made.diagnosis) or self._when_there_is_room(
             lambda: hand_in_diagnosis(
-                shop.jobs,
-                shop.diagnoses,
-                shop.recordings,
+                dependencies.jobs,
+                dependencies.diagnoses,
+                dependencies.recordings,
                 self._workspace.robot,
                 self._robot,
                 train=made.recordings,
@@ -241,7 +241,7 @@ class CampaignRunner:
             )
         )
         self._note(diagnosis=identifier)
-        self._wait(Workspace, shop.diagnoses, identifier, "diagnosis")
+        self._wait(Workspace, dependencies.diagnoses, identifier, "diagnosis")
 
     def _handed_in(self, kind: JobKind, identifier: str | None) -> str | None:
         """The job that this campaign handed in before the service was started again, where that one counts still."""
@@ -249,8 +249,8 @@ class CampaignRunner:
             record = None if identifier is None else Workspace(kind.items.folder(identifier)).read_record()
         except NotFoundError:
             return None
-        given_up = (JobState.CANCELLED, JobState.INTERRUPTED)
-        return None if record is None or record.state in given_up else identifier
+        requeue = (JobState.CANCELLED, JobState.INTERRUPTED)
+        return None if record is None or record.state in requeue else identifier
 
     def _begin(self, step: str) -> None:
         """Tell a step, unless nobody wants to know any more."""
@@ -264,14 +264,14 @@ class CampaignRunner:
 
     def _cancel_jobs(self) -> None:
         """Nobody waits for what is still designed, identified or diagnosed."""
-        made, shop = self._workspace.read_made(), self._shop
-        jobs = [(shop.excitations, made.excitation), (shop.excitations, made.held_out_excitation)]
-        jobs += [(shop.identifications, made.identification), (shop.diagnoses, made.diagnosis)]
+        made, dependencies = self._workspace.read_made(), self._dependencies
+        jobs = [(dependencies.excitations, made.excitation), (dependencies.excitations, made.held_out_excitation)]
+        jobs += [(dependencies.identifications, made.identification), (dependencies.diagnoses, made.diagnosis)]
         for kind, identifier in jobs:
             # one that a full disk does not let be cancelled is done for nobody
             with suppress(NotFoundError, OSError):
                 if identifier is not None:
-                    shop.jobs.cancel(kind, identifier)
+                    dependencies.jobs.cancel(kind, identifier)
 
     def _move(self, state: JobState, problem: JobProblem | None = None) -> bool:
         """Write the campaign's new state, if it may follow the present one; False where the disk does not take it."""

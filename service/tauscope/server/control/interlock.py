@@ -11,7 +11,7 @@ PATIENCE_S = 10.0
 """How long the program may take [s]."""
 
 
-def objection(data_folder: Path, name: str, robot: str, device: str) -> str | None:
+def find_objection(data_folder: Path, name: str, robot: str, device: str) -> str | None:
     """Ask whether an arm is free. Whatever goes wrong with asking counts as no.
 
     Only programs in the folder are called, never a command that came over the network.

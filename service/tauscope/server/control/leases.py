@@ -128,9 +128,9 @@ def next_number(counter: Path) -> int:
 class LeasePermit:
     """Leave by a lease that was shown."""
 
-    def __init__(self, lease: Lease, end_of: Callable[[Lease], str | None]) -> None:
+    def __init__(self, lease: Lease, find_end_reason: Callable[[Lease], str | None]) -> None:
         """Nothing is asked yet."""
-        self._lease, self._end_of = lease, end_of
+        self._lease, self._end_of = lease, find_end_reason
 
     def require(self) -> None:
         """Refuse what its end would stop at once."""
@@ -195,7 +195,7 @@ class Leases:
 
     def active(self) -> list[Lease]:
         """Leases that hold, the newest first."""
-        leases = [lease for lease in self._active.values() if self.end_of(lease) is None]
+        leases = [lease for lease in self._active.values() if self.find_end_reason(lease) is None]
         return sorted(leases, key=lambda lease: -lease.number)
 
     def seconds_left(self, lease: Lease) -> float:
@@ -315,7 +315,7 @@ class Leases:
             if there is no such leave
         """
         if token is not None:
-            permit: Permit = LeasePermit(self.require(device, token, owner), self.end_of)
+            permit: Permit = LeasePermit(self.require(device, token, owner), self.find_end_reason)
         elif is_needed:
             hint = "POST /api/v1/leases, arm the lease, and send its token as header Lease-Token"
             raise LeaseNeededError(one_line(f"{device}: moves for whoever has its lease; {hint}"))
@@ -324,7 +324,7 @@ class Leases:
         permit.require()
         return permit
 
-    def end_of(self, lease: Lease) -> str | None:
+    def find_end_reason(self, lease: Lease) -> str | None:
         """Why a lease does not hold; None while it does. Takes no lock."""
         if lease.lost is None and self._clock() >= lease.ends:
             self._finish(lease, f"no sign of life for {lease.ttl_s:g} s")
@@ -345,7 +345,7 @@ class Leases:
     def _present(self, device: str) -> Lease | None:
         """The lease that holds for an arm."""
         lease = self._active.get(device)
-        return None if lease is None or self.end_of(lease) is not None else lease
+        return None if lease is None or self.find_end_reason(lease) is not None else lease
 
     def _finish(self, lease: Lease, why: str) -> None:
         """A lease ends, once."""

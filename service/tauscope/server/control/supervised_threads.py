@@ -63,7 +63,7 @@ class SupervisedThreads(Generic[L]):
         """What goes on now."""
         return tuple(self._active)
 
-    def leaders(self) -> tuple[L, ...]:
+    def supervisors(self) -> tuple[L, ...]:
         """Who leads what goes on now."""
         return tuple(led.leader for led in self._active.values())
 

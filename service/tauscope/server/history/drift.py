@@ -32,7 +32,7 @@ class NamedParameter:
     scale: float
 
 
-def named_parameters(document: IdentificationDocument) -> tuple[NamedParameter, ...]:
+def extract_parameters(document: IdentificationDocument) -> tuple[NamedParameter, ...]:
     """The parameters of an identification that its recordings tell.
 
     Base parameters are those of the free estimate: their standard errors belong to it. The shape constants K_v and δ
@@ -97,13 +97,13 @@ class Drift:
     share: float
 
 
-def drift_between(before: Sequence[NamedParameter], after: Sequence[NamedParameter]) -> tuple[Drift, ...]:
+def compute_drift(before: Sequence[NamedParameter], after: Sequence[NamedParameter]) -> tuple[Drift, ...]:
     """The change of every parameter that both identifications tell."""
     later = {parameter.name: parameter for parameter in after}
     return tuple(_drift(parameter, later[parameter.name]) for parameter in before if parameter.name in later)
 
 
-def largest_by_joint(drifts: Sequence[Drift]) -> Mapping[str, Drift]:
+def find_largest_by_joint(drifts: Sequence[Drift]) -> Mapping[str, Drift]:
     """For each joint its most significant change."""
     largest: dict[str, Drift] = {}
     for drift in drifts:
@@ -132,7 +132,7 @@ _NOUNS = {
 }
 
 
-def drift_words(drift: Drift, elapsed: timedelta) -> str:
+def describe_drift(drift: Drift, elapsed: timedelta) -> str:
     """A change in one sentence."""
     term = drift.name.partition(" ")[0]
     noun = _NOUNS.get(term, drift.name) if drift.name == f"{term} {drift.joint}" else drift.name

@@ -29,7 +29,7 @@ _LIVING = {"state.json", "events.jsonl", "progress", "cancel", "run.json", "stop
 """Files that may still change when an item has ended, or that say nothing of its result."""
 
 
-def read_facts(kind: str, folder: Path) -> ItemMetadata:
+def read_metadata(kind: str, folder: Path) -> ItemMetadata:
     """What an item's folder shows."""
     facts = _READERS[kind](folder)
     if not facts.is_final:
@@ -52,7 +52,7 @@ def stamp(kind: str, folder: Path) -> str:
     return "none"
 
 
-def changed_file(folder: Path, artefacts: tuple[FileMetadata, ...], *, deep: bool) -> str | None:
+def find_changed_file(folder: Path, artefacts: tuple[FileMetadata, ...], *, deep: bool) -> str | None:
     """The first file of an item that is not what it was when the item ended.
 
     Returns
@@ -249,14 +249,14 @@ class Indexer:
             folder = store.folder(identifier)
         except NotFoundError:
             return []
-        path = changed_file(folder, self.index.artefacts(kind, identifier), deep=deep)
+        path = find_changed_file(folder, self.index.artefacts(kind, identifier), deep=deep)
         if path is not None:
             hint = "restore it from a backup, or remove the item"
             self.index.mark_damaged(kind, identifier, f"{identifier}: {path} is not what it was; {hint}")
             return [ChangedItem(kind, identifier, path)]
         if identifier not in damaged:
             return []
-        facts = read_facts(kind, folder)
+        facts = read_metadata(kind, folder)
         if facts.state == DAMAGED or not deep:
             return [ChangedItem(kind, identifier, "")]
         self.index.put(facts)
@@ -285,7 +285,7 @@ class Indexer:
             return
         if indexed is not None and indexed[0] == stamp(kind, folder):
             return
-        facts = read_facts(kind, folder)
+        facts = read_metadata(kind, folder)
         if folder.is_dir():
             self.index.put(facts)
             self._known[kind][identifier] = (facts.stamp, facts.is_final)

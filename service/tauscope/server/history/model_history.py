@@ -55,7 +55,7 @@ class ModelHistory:
         """Look at the history."""
         self._database = database
 
-    def unjudged(self, site: str) -> list[str]:
+    def list_unjudged(self, site: str) -> list[str]:
         """Identifications that succeeded and were not judged yet, the oldest first."""
         judged = select(Model.identifier).where(Model.site == site)
         query = (
@@ -97,7 +97,7 @@ class ModelHistory:
             choose(session, model, role, reason, now)
             return _entry(model)
 
-    def relied_upon(self) -> frozenset[str]:
+    def list_protected(self) -> frozenset[str]:
         """Identifiers of the models that are active, or that drift is counted from."""
         with self._database.reading() as session:
             return frozenset(session.scalars(select(Model.identifier).where(Model.is_active | Model.is_reference)))

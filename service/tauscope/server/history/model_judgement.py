@@ -10,7 +10,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session, undefer
 
 from tauscope.identification import IdentificationDocument
-from tauscope.server.history.drift import Drift, drift_between, drift_words, is_beyond, named_parameters
+from tauscope.server.history.drift import Drift, compute_drift, describe_drift, extract_parameters, is_beyond
 from tauscope.server.history.gates import Gate, ModelPolicy, check_gates, passes
 from tauscope.server.store.database.tables import Model, ModelChoice, ModelEvent, Robot
 
@@ -82,7 +82,7 @@ def choose(session: Session, model: Model, role: str, reason: str, now: datetime
 
 def compared(before: IdentificationDocument, after: IdentificationDocument) -> tuple[Drift, ...]:
     """The change of every parameter that two models tell."""
-    return drift_between(named_parameters(before), named_parameters(after))
+    return compute_drift(extract_parameters(before), extract_parameters(after))
 
 
 def _place_gates(candidate: Candidate, active: Model | None) -> Sequence[Gate]:
@@ -122,7 +122,7 @@ def _tell_drift(
                 robot_id=model.robot_id, kind="drift", parameter=drift.name, raised=now, text="", details={}
             )
             session.add(event)
-        event.text, event.details, event.last_seen = drift_words(drift, elapsed), details, now
+        event.text, event.details, event.last_seen = describe_drift(drift, elapsed), details, now
 
 
 def _open_drifts(robot_id: int):

@@ -31,7 +31,7 @@ class ModelRegistry:
         self._runs = items["run"]
         self._strange: set[str] = set()
 
-    def consider_new(self) -> list[ModelEntry]:
+    def judge_new(self) -> list[ModelEntry]:
         """Judge every identification in the index that was not judged yet.
 
         Raises
@@ -39,7 +39,7 @@ class ModelRegistry:
         StoreError
             if the database does not answer; the next call goes on where this one ended
         """
-        return [entry for identifier in self.history.unjudged(self._site) if (entry := self._consider(identifier))]
+        return [entry for identifier in self.history.list_unjudged(self._site) if (entry := self._consider(identifier))]
 
     def _consider(self, identifier: str) -> ModelEntry | None:
         """Judge one identification; None where it was removed or judged meanwhile, or names an unknown robot."""

@@ -45,7 +45,7 @@ def plan_removal(
         if the database does not answer
     """
     keeper.sync(thorough=True)
-    relied_upon = history.relied_upon()
+    list_protected = history.list_protected()
     going = [
         entry
         for entry in keeper.index.search(ItemQuery(site=keeper.index.site, limit=_ALL))
@@ -53,11 +53,11 @@ def plan_removal(
         and entry.ended is not None
         and entry.ended < now - rule.older_than
         and entry.state != DAMAGED
-        and not (entry.kind == "identification" and entry.identifier in relied_upon)
+        and not (entry.kind == "identification" and entry.identifier in list_protected)
     ]
     names: tuple[str, ...] = ()
     if rule.recordings:
-        used = keeper.index.recordings_used(except_by={(entry.kind, entry.identifier) for entry in going})
+        used = keeper.index.list_used_recordings(except_by={(entry.kind, entry.identifier) for entry in going})
         old = (entry for entry in recordings.entries() if entry.modified < now - rule.older_than)
         names = tuple(entry.name for entry in old if entry.name not in used)
     return Removal(tuple(going), names)

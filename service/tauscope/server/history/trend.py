@@ -8,7 +8,7 @@ from datetime import datetime
 import numpy as np
 
 from tauscope.identification import IdentificationDocument
-from tauscope.server.history.drift import named_parameters
+from tauscope.server.history.drift import extract_parameters
 from tauscope.server.history.model_history import ModelEntry
 
 WEEK_S = 7 * 86400.0
@@ -49,7 +49,7 @@ class Trend:
         return self.slope / self.slope_std
 
 
-def trend_of(points: Sequence[TrendPoint]) -> Trend | None:
+def fit_trend(points: Sequence[TrendPoint]) -> Trend | None:
     """The line through all points, by weighted least squares.
 
     Returns
@@ -96,7 +96,7 @@ def parameter_trends(models: Sequence[tuple[ModelEntry, IdentificationDocument]]
     models : sequence of (ModelEntry, IdentificationDocument)
         every model that was ever active, the oldest first
     """
-    told = [(entry, {each.name: each for each in named_parameters(document)}) for entry, document in models]
+    told = [(entry, {each.name: each for each in extract_parameters(document)}) for entry, document in models]
     trends = []
     for name, newest in told[-1][1].items() if told else ():
         points = tuple(
@@ -104,5 +104,5 @@ def parameter_trends(models: Sequence[tuple[ModelEntry, IdentificationDocument]]
             for entry, parameters in told
             if name in parameters
         )
-        trends.append(ParameterTrend(name, newest.joint, points, trend_of([point for _, point in points])))
+        trends.append(ParameterTrend(name, newest.joint, points, fit_trend([point for _, point in points])))
     return trends

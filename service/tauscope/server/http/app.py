@@ -6,7 +6,7 @@ from contextlib import asynccontextmanager
 
 from fastapi import FastAPI
 
-from tauscope.server.auth.audit_requests import Audited
+from tauscope.server.auth.audit_requests import AuditedRequests
 from tauscope.server.auth.gate import Gate
 from tauscope.server.control.run_supervisor import StartControl
 from tauscope.server.history.gates import ModelPolicy
@@ -29,9 +29,9 @@ from tauscope.server.http.leases.router import router as leases
 from tauscope.server.http.leases.router import stop_router
 from tauscope.server.http.openapi import install_openapi
 from tauscope.server.http.problem_handlers import install_problem_handlers
-from tauscope.server.http.protection import BodyLimit, KnownCallers, Observed, SafeAnswers, TakingTurns
+from tauscope.server.http.protection import BodyLimit, ConcurrencyLimiter, OriginCheck, RequestLog, ResponseProtection
 from tauscope.server.http.recordings.router import router as recordings
-from tauscope.server.http.repeated_requests import Repeatable
+from tauscope.server.http.repeated_requests import IdempotentRequests
 from tauscope.server.http.robots.models import RobotCheckRequest
 from tauscope.server.http.robots.router import router as robots
 from tauscope.server.http.runs.models import RunRequest
@@ -107,12 +107,12 @@ def create_app(settings: Settings, executor: Executor | None = None, start: Star
     install_problem_handlers(app)
     install_openapi(app, [*REQUESTS, Problem, *EVENT_MODELS])
     # The last one added is the first to see a request.
-    app.add_middleware(Repeatable)
-    app.add_middleware(Audited)
+    app.add_middleware(IdempotentRequests)
+    app.add_middleware(AuditedRequests)
     app.add_middleware(Gate)
     app.add_middleware(BodyLimit, limit=settings.max_upload_bytes)
-    app.add_middleware(KnownCallers, answers_for=settings.answers_for)
-    app.add_middleware(TakingTurns)
-    app.add_middleware(Observed)
-    app.add_middleware(SafeAnswers)
+    app.add_middleware(OriginCheck, answers_for=settings.answers_for)
+    app.add_middleware(ConcurrencyLimiter)
+    app.add_middleware(RequestLog)
+    app.add_middleware(ResponseProtection)
     return app

@@ -26,7 +26,7 @@ class Heartbeat:
         """Show a sign of life."""
         self._last = self._clock()
 
-    def is_felt(self) -> bool:
+    def is_alive(self) -> bool:
         """Whether the last sign of life is recent."""
         return self._clock() - self._last < PATIENCE_S
 

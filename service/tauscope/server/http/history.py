@@ -11,7 +11,7 @@ from starlette.concurrency import run_in_threadpool
 
 from tauscope.errors import NotFoundError
 from tauscope.identification import IdentificationDocument
-from tauscope.server.history.drift import largest_by_joint
+from tauscope.server.history.drift import find_largest_by_joint
 from tauscope.server.history.gates import ModelPolicy
 from tauscope.server.history.model_history import ModelEntry
 from tauscope.server.history.model_judgement import compared
@@ -150,7 +150,7 @@ class EventListAnswer(AnswerModel):
     events: list[EventAnswer] = Field(description="the newest first")
 
 
-def model_answer(entry: ModelEntry, collection: str) -> ModelAnswer:
+def make_model_answer(entry: ModelEntry, collection: str) -> ModelAnswer:
     """The answer that holds a model."""
     here = f"{collection}/{entry.identifier}"
     return ModelAnswer(
@@ -176,7 +176,7 @@ def comparison_answer(
         before=before,
         after=after,
         parameters=[DriftAnswer.model_validate(drift) for drift in drifts],
-        joints={joint: DriftAnswer.model_validate(drift) for joint, drift in largest_by_joint(drifts).items()},
+        joints={joint: DriftAnswer.model_validate(drift) for joint, drift in find_largest_by_joint(drifts).items()},
     )
 
 
@@ -220,14 +220,14 @@ def list_models(request: Request, services: ServicesDep, robot: AnyRobot = None,
     """Every identification that was judged: the active one of each robot, those that were, those that were refused."""
     _bring_up_to_date(services)
     entries = services.models.history.models(robot, limit)
-    return ModelListAnswer(models=[model_answer(entry, request.url.path) for entry in entries])
+    return ModelListAnswer(models=[make_model_answer(entry, request.url.path) for entry in entries])
 
 
 @router.get("/models/{identifier}", summary="Look a model up", responses=problem_responses("not-found"))
 def get_model(request: Request, identifier: Identifier, services: ServicesDep) -> ModelAnswer:
     """Its state and the gates that it had to pass; the identifier is the identification's."""
     _bring_up_to_date(services)
-    return model_answer(services.models.history.find(identifier), collection(request, 1))
+    return make_model_answer(services.models.history.find(identifier), collection(request, 1))
 
 
 @router.get(
@@ -339,7 +339,7 @@ async def _choose(request: Request, identifier: str, services: Services, role: s
     body = await _read(request, ReasonRequest, services)
     history, now = services.models.history, datetime.now(UTC)
     entry = await run_in_threadpool(history.activate, identifier, role, body.reason, now)
-    return model_answer(entry, collection(request, 2))
+    return make_model_answer(entry, collection(request, 2))
 
 
 async def _read(request: Request, kind: type[Body], services: Services) -> Body:
@@ -352,4 +352,4 @@ async def _read(request: Request, kind: type[Body], services: Services) -> Body:
 def _bring_up_to_date(services: Services) -> None:
     """What ended a moment ago counts already."""
     services.index.sync()
-    services.models.consider_new()
+    services.models.judge_new()

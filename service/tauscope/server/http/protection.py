@@ -13,7 +13,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from tauscope.errors import LimitExceededError
-from tauscope.server.auth.gate import caller_of
+from tauscope.server.auth.gate import find_caller
 from tauscope.server.http.metrics import Metrics
 from tauscope.server.problems import make_problem, problem_answer
 
@@ -22,7 +22,7 @@ _request_log = logging.getLogger("tauscope.requests")
 REQUEST_ID = "X-Request-Id"
 
 
-class Observed:
+class RequestLog:
     """Counts, times and logs requests."""
 
     def __init__(self, app: ASGIApp) -> None:
@@ -52,7 +52,7 @@ class Observed:
             metrics.request_seconds.labels(scope["method"], route).observe(seconds)
             details = {"request": number, "method": scope["method"], "path": scope["path"], "status": status}
             _request_log.info(
-                "answered", extra={**details, "seconds": round(seconds, 4), "caller": caller_of(scope).name}
+                "answered", extra={**details, "seconds": round(seconds, 4), "caller": find_caller(scope).name}
             )
 
 
@@ -83,7 +83,7 @@ HEADERS: Mapping[str, str] = {
 }
 
 
-class SafeAnswers:
+class ResponseProtection:
     """Adds the headers of every answer, and turns an unforeseen exception into a problem without internals."""
 
     def __init__(self, app: ASGIApp) -> None:
@@ -116,7 +116,7 @@ class SafeAnswers:
             await answer(scope, receive, send_safely)
 
 
-class KnownCallers:
+class OriginCheck:
     """Turns away requests for other host names (DNS rebinding) and those that a page of another origin makes."""
 
     def __init__(self, app: ASGIApp, answers_for: Callable[[str | None], bool]) -> None:
@@ -252,7 +252,7 @@ _PROBES = ("/healthz", "/readyz")
 """They take turns among themselves: whoever restarts a service that does not answer stops its arms."""
 
 
-class TakingTurns:
+class ConcurrencyLimiter:
     """Lets a few reading requests in at a time, in the order in which they came; all others pass at once.
 
     A turn ends when the answer begins: what is streamed after that, events above all, keeps nobody waiting.

@@ -67,7 +67,7 @@ def request_name(caller: str, path: str, key: str) -> str:
 _TIDY_EVERY = 500
 
 
-class AnswersOnDisk(Answers):
+class StoredAnswers(Answers):
     """Answers that outlast the service, each request durably claimed."""
 
     def __init__(self, folder: Path, clock: Callable[[], float] = time.time) -> None:
@@ -120,7 +120,7 @@ MOST = 1000
 """Requests that are remembered; beyond it the oldest is forgotten."""
 
 
-class PassingAnswers(Answers):
+class MemoryAnswers(Answers):
     """Answers none of which is ever written to a disk."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:

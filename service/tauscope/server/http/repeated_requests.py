@@ -12,7 +12,7 @@ from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Send
 from starlette.types import Scope as AsgiScope
 
-from tauscope.server.auth.gate import caller_of
+from tauscope.server.auth.gate import find_caller
 from tauscope.server.http.repeated_answers import Answers, KeptAnswer, request_name
 from tauscope.server.http.services import Services
 from tauscope.server.problems import make_problem, problem_answer
@@ -58,7 +58,7 @@ _REPEATABLE = re.compile(
 _KEY = re.compile(rf"[\x21-\x7e]{{1,{LONGEST_KEY}}}")
 
 
-class Repeatable:
+class IdempotentRequests:
     """Answers a request that came before with the answer of then."""
 
     def __init__(self, app: ASGIApp) -> None:
@@ -75,7 +75,7 @@ class Repeatable:
             text = f"header {HEADER}: give 1 to {LONGEST_KEY} characters without blanks, for example a UUID"
             return await problem_answer(make_problem("invalid-request", text, scope["path"]))(scope, receive, send)
         store = _answers_of(scope)
-        name = request_name(caller_of(scope).key or "local", scope["path"], key)
+        name = request_name(find_caller(scope).key or "local", scope["path"], key)
         is_underway = name in self._underway
         try:
             is_new = not is_underway and await run_in_threadpool(store.begin, name)

@@ -17,7 +17,7 @@ from tauscope.server.problems import problem_responses
 from tauscope.server.schedules.definition import ScheduleDefinition
 from tauscope.server.schedules.repeater import make_schedule
 from tauscope.server.schedules.repository import FiringEntry, ScheduleEntry
-from tauscope.server.schedules.scheduler import parse_schedule
+from tauscope.server.schedules.scheduler import read_definition
 from tauscope.server.store.data_folder import FOLDERS
 
 
@@ -186,7 +186,7 @@ def _answer(entry: ScheduleEntry, path: str) -> ScheduleAnswer:
         name=entry.name,
         site=entry.site,
         robot=robot if isinstance(robot, str) else None,
-        definition=parse_schedule(entry),
+        definition=read_definition(entry),
         created=entry.created,
         next_due=entry.next_due,
         firings=f"{path}/{entry.name}/firings",

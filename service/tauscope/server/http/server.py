@@ -36,7 +36,7 @@ def log_as_json(level: int = logging.INFO, stream: TextIO | None = None) -> None
         processors=[
             structlog.stdlib.ProcessorFormatter.remove_processors_meta,
             structlog.processors.format_exc_info,
-            without_secrets,
+            hide_secrets,
             structlog.processors.JSONRenderer(ensure_ascii=False, default=str),
         ],
     )
@@ -49,7 +49,7 @@ def log_as_json(level: int = logging.INFO, stream: TextIO | None = None) -> None
     logging.getLogger("uvicorn.error").setLevel(logging.INFO)
 
 
-def without_secrets(_logger: Any, _method: str, event: MutableMapping[str, Any]) -> MutableMapping[str, Any]:
+def hide_secrets(_logger: Any, _method: str, event: MutableMapping[str, Any]) -> MutableMapping[str, Any]:
     """An event without anything that looks like a key or a token."""
     event.pop("color_message", None)  # uvicorn's, for terminals
     for name, value in event.items():

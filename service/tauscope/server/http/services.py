@@ -30,7 +30,7 @@ from tauscope.server.history.model_registry import DriftMonitor, ModelRegistry
 from tauscope.server.history.retention import RetentionRule, RetentionSweeper
 from tauscope.server.http.heartbeat import Heartbeat
 from tauscope.server.http.metrics import Metrics, TimedExecutor
-from tauscope.server.http.repeated_answers import Answers, AnswersOnDisk, PassingAnswers
+from tauscope.server.http.repeated_answers import Answers, MemoryAnswers, StoredAnswers
 from tauscope.server.http.settings import Settings
 from tauscope.server.queue.cluster_executor import ClusterExecutor
 from tauscope.server.queue.diagnosis_work import run_diagnosis
@@ -121,7 +121,7 @@ def open_services(
     drift = DriftMonitor(services.models.history, site)
     _watch(services, drift)
     housekeeping = Housekeeping(
-        [services.jobs.settle, services.runs.settle, services.index.sync, services.models.consider_new, drift.look]
+        [services.jobs.settle, services.runs.settle, services.index.sync, services.models.judge_new, drift.look]
     )
     clock = Housekeeping([services.schedules.tick])  # apart: an interlock may take its time
     housekeeping.start()
@@ -177,14 +177,14 @@ def _assemble(ground: _Ground, executor: Executor | None, start: StartControl | 
     claims = DeviceClaims(settings.max_arms)
     leases = Leases(claims, settings.data_folder / "lease-number", on_end=partial(_note_end, audit))
     start = start or partial(start_control, sim_socket=settings.sim_socket)
-    runs = RunManager(items["run"], recordings, start, claims, pulse.is_felt, metrics.run_ended)
-    shop = CampaignDependencies(jobs, excitations, identifications, diagnoses, runs, recordings)
-    campaigns = CampaignManager(items["campaign"], shop)
+    runs = RunManager(items["run"], recordings, start, claims, pulse.is_alive, metrics.run_ended)
+    dependencies = CampaignDependencies(jobs, excitations, identifications, diagnoses, runs, recordings)
+    campaigns = CampaignManager(items["campaign"], dependencies)
     models = ModelRegistry(ModelHistory(database), site, items)
     index = open_index(Index(database, site), items, recordings, settings.data_folder.name)
-    models.consider_new()
+    models.judge_new()
     # What a schedule moves has no lease: it waits for its next time where somebody has one.
-    repeater = Repeater(shop, campaigns, partial(leases.permit, token=None, owner="schedule", is_needed=False))
+    repeater = Repeater(dependencies, campaigns, partial(leases.permit, token=None, owner="schedule", is_needed=False))
     return Services(
         settings=settings,
         recordings=recordings,
@@ -198,8 +198,8 @@ def _assemble(ground: _Ground, executor: Executor | None, start: StartControl | 
         access=ground.access,
         leases=leases,
         audit=audit,
-        answers=AnswersOnDisk(settings.data_folder / "idempotency"),
-        lease_answers=PassingAnswers(),
+        answers=StoredAnswers(settings.data_folder / "idempotency"),
+        lease_answers=MemoryAnswers(),
         metrics=metrics,
         pulse=pulse,
         index=index,

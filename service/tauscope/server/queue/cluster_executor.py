@@ -72,11 +72,11 @@ SCHEDULER = "DASK_SCHEDULER_ADDRESS"
 PATIENCE_S = 10
 """How long a scheduler may take to answer [s]."""
 
-LOOK_S = 1.0
+CHECK_S = 1.0
 """How often the scheduler is looked at: whether it is there, and how many workers it has [s]."""
 
 
-class ClusterAwayError(BrokenExecutor):
+class ClusterUnavailableError(BrokenExecutor):
     """The scheduler was lost, with whatever it had in hand. Nothing is said against the task: it can be done again."""
 
 
@@ -84,7 +84,7 @@ class ClusterExecutor(Executor):
     """A Dask cluster; a task whose worker dies again and again ends with BrokenExecutor, as in a pool of processes.
 
     Dask's own client gives up for good where the scheduler is away for longer than it waits. A thread reaches the
-    scheduler again then, as often as it takes; meanwhile `is_there` says no, and tasks end with `ClusterAwayError`.
+    scheduler again then, as often as it takes; meanwhile `is_there` says no, and tasks end with `ClusterUnavailableError`.
     """
 
     def __init__(self, address: str, wait_s: float = 0.0) -> None:
@@ -131,7 +131,7 @@ class ClusterExecutor(Executor):
 
         Raises
         ------
-        ClusterAwayError
+        ClusterUnavailableError
             if the scheduler is away
         RuntimeError
             after `shutdown`
@@ -145,7 +145,7 @@ class ClusterExecutor(Executor):
         except Exception as error:
             if self.is_there():
                 raise
-            raise ClusterAwayError(f"{self._address}: is away") from error
+            raise ClusterUnavailableError(f"{self._address}: is away") from error
         outer: Future[Result] = Future()
         outer.add_done_callback(lambda done: inner.cancel() if done.cancelled() else None)
         inner.add_done_callback(lambda done: self._hand_on(done, outer))
@@ -172,7 +172,7 @@ class ClusterExecutor(Executor):
 
     def _watch(self) -> None:
         """Look at the scheduler until it is left."""
-        while not self._closing.wait(LOOK_S):
+        while not self._closing.wait(CHECK_S):
             try:
                 self._look()
             except Exception:  # whatever Dask raises of a scheduler that goes and comes: the next look tells
@@ -204,7 +204,7 @@ class ClusterExecutor(Executor):
             if self._closing.is_set():
                 outer.cancel()
             else:
-                outer.set_exception(ClusterAwayError(f"{self._address}: was lost"))
+                outer.set_exception(ClusterUnavailableError(f"{self._address}: was lost"))
             return
         error = inner.exception()
         if isinstance(error, KilledWorker):

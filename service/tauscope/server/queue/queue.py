@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tauscope.errors import LimitExceededError, NotFoundError
-from tauscope.server.queue.cluster_executor import ClusterAwayError
+from tauscope.server.queue.cluster_executor import ClusterUnavailableError
 from tauscope.server.queue.record import JobProblem, JobRecord, JobState
 from tauscope.server.queue.workspace import Workspace
 from tauscope.server.store.items import ItemStore
@@ -84,7 +84,7 @@ class QueuedJob:
         workspace.write_record(record.moved(state, self.kind.items.clock(), problem))
         return True
 
-    def take_up(self) -> JobRecord | None:
+    def resume(self) -> JobRecord | None:
         """Have the job wait, if an earlier service left it unfinished; None where it has ended, or ends here."""
         workspace = Workspace(self.folder)
         record = workspace.read_record()
@@ -98,13 +98,13 @@ class QueuedJob:
             workspace.write_record(record.moved(JobState.QUEUED, self.kind.items.clock()))
         return record
 
-    def give_up(self) -> None:
+    def requeue(self) -> None:
         """Have the job wait, because its work is ended with the service, or could not begin."""
         try:
             workspace = Workspace(self.folder)
             record = workspace.read_record()
             if record is not None and record.may_become(JobState.QUEUED):
-                workspace.write_record(record.given_up(self.kind.items.clock()))
+                workspace.write_record(record.requeue(self.kind.items.clock()))
         except (NotFoundError, OSError):
             _log.exception("the state of job %s could not be written", self.identifier)
 
@@ -159,7 +159,7 @@ class JobQueue:
         for kind in kinds:
             kind.items.tidy()
         jobs = [QueuedJob(kind, identifier) for kind in kinds for identifier in kind.items.identifiers()]
-        unfinished = [(record.created, job) for job in jobs if (record := job.take_up()) is not None]
+        unfinished = [(record.created, job) for job in jobs if (record := job.resume()) is not None]
         with self._lock:
             self._waiting.extend(job for _, job in sorted(unfinished, key=lambda pair: pair[0]))
             self._go_on()
@@ -257,7 +257,7 @@ class JobQueue:
             self._is_closed = True
             self._waiting.clear()
             for job in self._running:
-                job.give_up()
+                job.requeue()
         self._executor.shutdown(wait=True, cancel_futures=True)
 
     def _pass_over(self, job: QueuedJob) -> None:
@@ -289,8 +289,8 @@ class JobQueue:
             future = self._executor.submit(job.kind.work, job.folder)
         except NotFoundError:
             return
-        except ClusterAwayError:  # it went a moment ago
-            job.give_up()
+        except ClusterUnavailableError:  # it went a moment ago
+            job.requeue()
             self._waiting.appendleft(job)
             return
         except (BrokenExecutor, RuntimeError, OSError):
@@ -321,11 +321,11 @@ class JobQueue:
         """How a job ended by what came of its work."""
         try:
             problem = self._problem_of(job, future)
-        except ClusterAwayError as error:
+        except ClusterUnavailableError as error:
             return self._end_of_lost(job, error)
         return _End(JobState.SUCCEEDED if problem is None else JobState.FAILED, problem)
 
-    def _end_of_lost(self, job: QueuedJob, error: ClusterAwayError) -> _End:
+    def _end_of_lost(self, job: QueuedJob, error: ClusterUnavailableError) -> _End:
         """A job that was lost with its cluster waits again, unless that happened too often: it may be the cause."""
         if job.attempts() >= MOST_ATTEMPTS:
             _log.error("job %s: lost with its cluster %d times", job.identifier, MOST_ATTEMPTS)
@@ -334,10 +334,10 @@ class JobQueue:
         return _End(JobState.QUEUED, None)
 
     def _problem_of(self, job: QueuedJob, future: "Future[JobProblem | None]") -> JobProblem | None:
-        """Why the work of a job has no result; None where it has one. Raises ClusterAwayError."""
+        """Why the work of a job has no result; None where it has one. Raises ClusterUnavailableError."""
         try:
             return future.result()
-        except ClusterAwayError:
+        except ClusterUnavailableError:
             raise
         except CancelledError:
             return INTERRUPTED

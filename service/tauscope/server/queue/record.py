@@ -92,7 +92,7 @@ class JobRecord(StoredModel):
             changes = {"started": None}
         return self.model_copy(update={"state": state, "problem": problem, **changes})
 
-    def given_up(self, now: datetime) -> "JobRecord":
+    def requeue(self, now: datetime) -> "JobRecord":
         """The record of a job that waits again because the service ends in good order: that counts as no attempt."""
         return self.moved(JobState.QUEUED, now).model_copy(update={"attempts": max(0, self.attempts - 1)})
 

@@ -37,7 +37,7 @@ class NothingToDoError(TauscopeError):
 class Repeater:
     """Starts what schedules repeat."""
 
-    shop: CampaignDependencies
+    dependencies: CampaignDependencies
     campaigns: CampaignManager
     permit_for: Callable[[str], Permit] = field(default_factory=lambda: lambda _device: FREE)
 
@@ -60,7 +60,7 @@ class Repeater:
         if definition.kind == "campaign":
             return "campaign", self._campaign(entry)
         assert definition.recordings is not None  # noqa: S101 - checked by the definition
-        train, held_out = newest_recordings(self.shop.recordings, definition.recordings, since)
+        train, held_out = newest_recordings(self.dependencies.recordings, definition.recordings, since)
         if definition.kind == "identification":
             return "identification", self._identification(entry, train, held_out)
         return "diagnosis", self._diagnosis(entry, train, held_out)
@@ -76,7 +76,7 @@ class Repeater:
         """The folders of what is repeated."""
         if kind == "campaign":
             return self.campaigns.items
-        return (self.shop.identifications if kind == "identification" else self.shop.diagnoses).items
+        return (self.dependencies.identifications if kind == "identification" else self.dependencies.diagnoses).items
 
     def _campaign(self, entry: ScheduleEntry) -> str:
         """A campaign like the one that the schedule was made from."""
@@ -96,7 +96,7 @@ class Repeater:
         self, entry: ScheduleEntry, train: tuple[OrderedRecording, ...], held_out: tuple[OrderedRecording, ...]
     ) -> str:
         """An identification from other recordings."""
-        kind = self.shop.identifications
+        kind = self.dependencies.identifications
         staged = kind.items.stage()
         try:
             workspace = IdentificationWorkspace(staged)
@@ -104,7 +104,7 @@ class Repeater:
             write_robot(workspace.robot, entry)
             changes = {"recordings": train, "held_out": held_out}
             workspace.write_order(_order(entry, IdentificationOrder).model_copy(update=changes))
-            return self.shop.jobs.submit(kind, staged)
+            return self.dependencies.jobs.submit(kind, staged)
         finally:
             kind.items.discard(staged)
 
@@ -112,7 +112,7 @@ class Repeater:
         self, entry: ScheduleEntry, train: tuple[OrderedRecording, ...], held_out: tuple[OrderedRecording, ...]
     ) -> str:
         """A diagnosis of other recordings."""
-        kind = self.shop.diagnoses
+        kind = self.dependencies.diagnoses
         staged = kind.items.stage()
         try:
             workspace = DiagnosisWorkspace(staged)
@@ -120,7 +120,7 @@ class Repeater:
             write_robot(workspace.robot, entry)
             changes = {"recordings": train, "held_out": held_out}
             workspace.write_order(_order(entry, DiagnosisOrder).model_copy(update=changes))
-            return self.shop.jobs.submit(kind, staged)
+            return self.dependencies.jobs.submit(kind, staged)
         finally:
             kind.items.discard(staged)
 

@@ -193,7 +193,7 @@ class Index:
                     session.add(row)
                 row.size, row.modified, row.sha256 = entry.size, entry.modified, entry.sha256
 
-    def recordings_used(self, except_by: Collection[tuple[str, str]] = ()) -> frozenset[str]:
+    def list_used_recordings(self, except_by: Collection[tuple[str, str]] = ()) -> frozenset[str]:
         """Names of the recordings on the server that items of this site were made from or judged by.
 
         Parameters
