@@ -69,8 +69,8 @@ def _begun(services: Services, robot_file: Path, scenario: Mapping[str, Any]) ->
 
 
 async def _ended(services: Services, identifier: str, told: Told) -> None:
-    """Wait for the end, the service's pulse beating: no run goes on without it."""
-    async with services.pulse.beating():
+    """Wait for the end, with the heartbeat on: no run goes on without it."""
+    async with services.heartbeat.keep_beating():
         while True:
             answer = describe(services, identifier, ROOT)
             if answer.state == "damaged" or JobState(answer.state).is_end:

@@ -102,7 +102,7 @@ def _fresh(services: Services, number: int) -> Callable[[], FiringEntry]:
 
     def look() -> FiringEntry:
         services.index.sync()
-        return services.schedules.book.firing(number)
+        return services.schedules.repository.firing(number)
 
     return look
 

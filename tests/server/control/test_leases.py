@@ -108,9 +108,9 @@ def test_an_arm_is_taken_by_whoever_may(leases: Leases, ended: list[tuple[int, s
     lease = leases.acquire(ARM, "Ann", "a", 10.0)
     leases.arm(ARM, lease.token, "a", armed=True)
     permit = leases.permit(ARM, lease.token, "a", is_needed=True)
-    assert permit.end() is None
+    assert permit.find_end_reason() is None
     taken = leases.acquire(ARM, "Eve", "e", 10.0, take=True)
-    assert permit.end() == "lease 1 of Ann ended: Eve took the arm"
+    assert permit.find_end_reason() == "lease 1 of Ann ended: Eve took the arm"
     assert ended == [(1, "Eve took the arm")]
     assert not taken.is_armed
 
@@ -138,15 +138,15 @@ def test_motion_by_a_lease_wants_it_armed_and_ends_with_it(leases: Leases, clock
         leases.permit(ARM, lease.token, "a", is_needed=False)
     leases.arm(ARM, lease.token, "a", armed=True)
     permit = leases.permit(ARM, lease.token, "a", is_needed=True)
-    assert permit.end() is None
-    permit.stopped()
-    assert permit.end() == "lease 1 of Ann was disarmed"
+    assert permit.find_end_reason() is None
+    permit.disarm()
+    assert permit.find_end_reason() == "lease 1 of Ann was disarmed"
     with pytest.raises(NotArmedError):
         permit.require()
     leases.arm(ARM, lease.token, "a", armed=True)
     permit.require()
     clock.now += 10.0
-    assert permit.end() == "lease 1 of Ann ended: no sign of life for 10 s"
+    assert permit.find_end_reason() == "lease 1 of Ann ended: no sign of life for 10 s"
     with pytest.raises(LeaseLostError):
         permit.require()
 
@@ -158,7 +158,7 @@ def test_a_stop_of_everything_disarms_everything(leases: Leases) -> None:
         leases.arm(device, lease.token, "a", armed=True)
         permits.append(leases.permit(device, lease.token, "a", is_needed=True))
     leases.disarm_all()
-    assert all(permit.end() is not None for permit in permits)
+    assert all(permit.find_end_reason() is not None for permit in permits)
     assert len(leases.active()) == 2
 
 

@@ -166,7 +166,7 @@ def test_any_damage_is_shown_never_raised(file: str, content: bytes, data: Path,
 
 @pytest.fixture
 def locked(data: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Indexer, sqlite3.Connection]]:
-    monkeypatch.setattr("tauscope.server.store.database.database.PATIENCE_S", 0.02)
+    monkeypatch.setattr("tauscope.server.store.database.database.TIMEOUT_S", 0.02)
     database = Database(data / "tauscope.db")
     other = sqlite3.connect(data / "tauscope.db", isolation_level=None)
     yield opened(data, database), other

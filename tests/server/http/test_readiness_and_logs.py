@@ -43,7 +43,7 @@ def test_a_disk_that_is_nearly_full(client: TestClient, monkeypatch: pytest.Monk
 
 def test_a_disk_that_hangs(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     let_go = threading.Event()
-    monkeypatch.setattr("tauscope.server.http.health.PATIENCE_S", 0.05)
+    monkeypatch.setattr("tauscope.server.http.health.TIMEOUT_S", 0.05)
     monkeypatch.setattr(health, "_disk_obstacles", lambda _: let_go.wait(20.0) and [])
     try:
         assert "not answered" in assert_problem(client.get("/readyz"), "not-ready", 503)["detail"]
@@ -114,7 +114,7 @@ def test_systemd_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
         heard: list[bytes] = []
 
         async def session() -> None:
-            async with heartbeat.told():
+            async with heartbeat.notify_systemd():
                 while heard.count(b"WATCHDOG=1") < 3:
                     heard.append(await asyncio.to_thread(listener.recv, 100))
 

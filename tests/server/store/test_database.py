@@ -167,7 +167,7 @@ def test_a_damaged_file_is_said_to_be_so_and_left_alone(content: bytes, tmp_path
 
 
 def test_a_locked_database_is_said_to_be_locked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tauscope.server.store.database.database.PATIENCE_S", 0.05)
+    monkeypatch.setattr("tauscope.server.store.database.database.TIMEOUT_S", 0.05)
     path = tmp_path / "tauscope.db"
     database = Database(path)
     other = sqlite3.connect(path, isolation_level=None)

@@ -137,7 +137,6 @@ class AuditLog:
     """Entries chained by their hashes. Several processes may append at the same time."""
 
     def __init__(self, folder: Path, clock: Callable[[], datetime] = utc_now) -> None:
-        """Look at the log of a data folder; nothing is opened yet."""
         self.path = folder / AUDIT_FILE
         self._clock = clock
 
@@ -195,7 +194,6 @@ class AuditTrail:
     """The log as the service writes it: what must not wait for the disk is handed to a thread."""
 
     def __init__(self, log: AuditLog) -> None:
-        """Begin with nothing to write."""
         self.log = log
         self._waiting: queue.Queue[tuple[str, str, dict[str, Any]] | None] = queue.Queue(MOST_WAITING)
         self.lost = 0

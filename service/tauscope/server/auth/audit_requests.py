@@ -20,7 +20,6 @@ class AuditedRequests:
     """Notes who asked for what, and what was answered."""
 
     def __init__(self, app: ASGIApp) -> None:
-        """Wrap an application."""
         self.app = app
 
     async def __call__(self, scope: AsgiScope, receive: Receive, send: Send) -> None:

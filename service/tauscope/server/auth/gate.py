@@ -82,7 +82,6 @@ class Gate:
     """Lets a request pass that comes with a key of the scope that it needs."""
 
     def __init__(self, app: ASGIApp) -> None:
-        """Wrap an application."""
         self.app = app
 
     async def __call__(self, scope: AsgiScope, receive: Receive, send: Send) -> None:

@@ -63,7 +63,6 @@ class KeyFile:
     """The keys of a service, in one file that only its owner can read. Another store needs these four methods."""
 
     def __init__(self, folder: Path) -> None:
-        """Look at the keys of a data folder; nothing is opened yet."""
         self.path = folder / KEY_FILE
 
     def read(self) -> tuple[ApiKey, ...]:

@@ -1,4 +1,4 @@
-"""Leads one campaign: design, run, held-out run, identification, each step a job or a run of its own."""
+"""The runner of one campaign: design, run, held-out run, identification and diagnosis, one job or run each."""
 
 import logging
 import threading
@@ -35,7 +35,7 @@ _log = logging.getLogger("tauscope.jobs")
 POLL_S = 0.2
 """How often the progress of a run is told [s]."""
 
-ROOM_POLL_S = 0.5
+RETRY_S = 0.5
 """How often a queue, or a disk, that is full is asked again [s]."""
 
 
@@ -62,7 +62,6 @@ class CampaignRunner:
         release_arm: Callable[[], None],
         permit: Permit = FREE,
     ) -> None:
-        """Prepare; nothing happens before `lead`."""
         self.state = JobState.QUEUED
         self._workspace = workspace
         self._order = order
@@ -70,8 +69,8 @@ class CampaignRunner:
         self._release_arm = release_arm
         self._permit = permit
         self._robot = (order.robot_file, order.robot_name)
-        self._run: str | None = None
-        self._stop_asked = threading.Event()
+        self._run_identifier: str | None = None
+        self._stop_requested = threading.Event()
         self._is_closing = False
 
     @property
@@ -81,10 +80,10 @@ class CampaignRunner:
 
     def stop(self) -> None:
         """Stop the campaign, in whatever step it is; the arm has to be armed again before it moves again."""
-        self._permit.stopped()
-        self._stop_asked.set()
+        self._permit.disarm()
+        self._stop_requested.set()
         # Whoever begins a run looks at the flag after it has told us of the run.
-        run = self._run
+        run = self._run_identifier
         if run is not None:
             self._dependencies.runs.stop(run)
 
@@ -93,21 +92,21 @@ class CampaignRunner:
         self._is_closing = True
         self.stop()
 
-    def lead(self) -> None:
+    def run(self) -> None:
         """Take the campaign to its end; never raises."""
         self._move(JobState.RUNNING)
         try:
-            end = self._taken_to_its_end()
+            end = self._run_to_end()
         finally:
             self._release_arm()
         # a disk that is full now may take it later; else it becomes `interrupted` with the next start
         while end is not None and not self._move(*end) and not self._is_closing:
-            threading.Event().wait(ROOM_POLL_S)
+            threading.Event().wait(RETRY_S)
 
-    def _taken_to_its_end(self) -> tuple[JobState, JobProblem | None] | None:
+    def _run_to_end(self) -> tuple[JobState, JobProblem | None] | None:
         """How it ended; None where it goes on after the next start."""
         try:
-            self._go()
+            self._run_steps()
         except StoppedError:
             if self._is_closing and self._workspace.read_made().recordings:
                 return None  # the job that is in the queue goes on then, too
@@ -124,7 +123,7 @@ class CampaignRunner:
             return JobState.FAILED, INTERNAL
         return JobState.SUCCEEDED, None
 
-    def _go(self) -> None:
+    def _run_steps(self) -> None:
         """Every step that is not done yet, one after the other."""
         made, order = self._workspace.read_made(), self._order
         if not made.recordings:
@@ -141,7 +140,7 @@ class CampaignRunner:
                 self._wait(ExcitationWorkspace, self._dependencies.excitations, held_out, "excitation")
                 self._begin("run the held-out motion")
                 judges = (self._run_motion(held_out, "held_out_run"),)
-            self._note(recordings=recordings, held_out=judges)
+            self._record(recordings=recordings, held_out=judges)
         self._release_arm()
         self._begin("identify")
         self._identify()
@@ -152,22 +151,22 @@ class CampaignRunner:
     def _design(self, options: ExcitationDesignOptions, link: str) -> str:
         """Have a motion designed; returns at once."""
         jobs, kind, folder = self._dependencies.jobs, self._dependencies.excitations, self._workspace.robot
-        identifier = self._when_there_is_room(lambda: hand_in_excitation(jobs, kind, folder, self._robot, options))
-        self._note(**{link: identifier})
+        identifier = self._submit_with_retry(lambda: hand_in_excitation(jobs, kind, folder, self._robot, options))
+        self._record(**{link: identifier})
         return identifier
 
-    def _when_there_is_room(self, hand_in: Callable[[], str]) -> str:
+    def _submit_with_retry(self, hand_in: Callable[[], str]) -> str:
         """Hand a job in, as soon as the queue takes one."""
         while True:
             try:
                 return hand_in()
             except QueueFullError:
-                if self._stop_asked.wait(ROOM_POLL_S):
+                if self._stop_requested.wait(RETRY_S):
                     raise StoppedError from None
 
     def _wait(self, workspace: type[Workspace], kind: JobKind, identifier: str, noun: str) -> None:
         """Wait for a job to succeed."""
-        record = wait_for_end(workspace(kind.items.folder(identifier)), self._stop_asked)
+        record = wait_for_end(workspace(kind.items.folder(identifier)), self._stop_requested)
         if record is None:
             raise StoppedError
         require_succeeded(record, f"{noun} {identifier}")
@@ -185,17 +184,19 @@ class CampaignRunner:
             options=order.run,
         )
         motion = ExcitationWorkspace(dependencies.excitations.items.folder(excitation))
-        self._run = hand_in_run(dependencies.runs, self._workspace.robot, request, motion, self.holder, self._permit)
-        self._note(**{link: self._run})
-        if self._stop_asked.is_set():
-            dependencies.runs.stop(self._run)
-        self._follow(self._run)
-        record = RunWorkspace(dependencies.runs.items.folder(self._run)).read_run()
+        self._run_identifier = hand_in_run(
+            dependencies.runs, self._workspace.robot, request, motion, self.holder, self._permit
+        )
+        self._record(**{link: self._run_identifier})
+        if self._stop_requested.is_set():
+            dependencies.runs.stop(self._run_identifier)
+        self._follow(self._run_identifier)
+        record = RunWorkspace(dependencies.runs.items.folder(self._run_identifier)).read_run()
         if record is None or record.state is not RunState.FINISHED:
-            if self._stop_asked.is_set():
+            if self._stop_requested.is_set():
                 raise StoppedError
-            raise StepFailedError(_run_problem(self._run, record))
-        name, self._run = run_recording_name(self._run), None
+            raise StepFailedError(_run_problem(self._run_identifier, record))
+        name, self._run_identifier = run_recording_name(self._run_identifier), None
         return name
 
     def _follow(self, run: str) -> None:
@@ -210,7 +211,7 @@ class CampaignRunner:
     def _identify(self) -> None:
         """From the recordings to the model."""
         made, dependencies = self._workspace.read_made(), self._dependencies
-        identifier = self._handed_in(dependencies.identifications, made.identification) or self._when_there_is_room(
+        identifier = self._find_submitted(dependencies.identifications, made.identification) or self._submit_with_retry(
             lambda: hand_in_identification(
                 dependencies.jobs,
                 dependencies.identifications,
@@ -222,13 +223,13 @@ class CampaignRunner:
                 options=self._order.identification,
             )
         )
-        self._note(identification=identifier)
+        self._record(identification=identifier)
         self._wait(Workspace, dependencies.identifications, identifier, "identification")
 
     def _diagnose(self, options: DiagnosisOptions) -> None:
         """From the same recordings to what the model leaves out."""
         made, dependencies = self._workspace.read_made(), self._dependencies
-        identifier = self._handed_in(dependencies.diagnoses, made.diagnosis) or self._when_there_is_room(
+        identifier = self._find_submitted(dependencies.diagnoses, made.diagnosis) or self._submit_with_retry(
             lambda: hand_in_diagnosis(
                 dependencies.jobs,
                 dependencies.diagnoses,
@@ -240,10 +241,10 @@ class CampaignRunner:
                 options=options,
             )
         )
-        self._note(diagnosis=identifier)
+        self._record(diagnosis=identifier)
         self._wait(Workspace, dependencies.diagnoses, identifier, "diagnosis")
 
-    def _handed_in(self, kind: JobKind, identifier: str | None) -> str | None:
+    def _find_submitted(self, kind: JobKind, identifier: str | None) -> str | None:
         """The job that this campaign handed in before the service was started again, where that one counts still."""
         try:
             record = None if identifier is None else Workspace(kind.items.folder(identifier)).read_record()
@@ -254,11 +255,11 @@ class CampaignRunner:
 
     def _begin(self, step: str) -> None:
         """Tell a step, unless nobody wants to know any more."""
-        if self._stop_asked.is_set():
+        if self._stop_requested.is_set():
             raise StoppedError
         self._workspace.write_step(step)
 
-    def _note(self, **made: object) -> None:
+    def _record(self, **made: object) -> None:
         """Keep what was made."""
         self._workspace.write_made(self._workspace.read_made().model_copy(update=made))
 

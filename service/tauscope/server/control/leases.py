@@ -32,11 +32,11 @@ class Permit(Protocol):
         """
         ...
 
-    def end(self) -> str | None:
+    def find_end_reason(self) -> str | None:
         """Why the motion may not go on; None while it may."""
         ...
 
-    def stopped(self) -> None:
+    def disarm(self) -> None:
         """Somebody stopped the arm: before it moves again, it has to be armed again."""
         ...
 
@@ -47,11 +47,11 @@ class FreePermit:
     def require(self) -> None:
         """Nothing to refuse."""
 
-    def end(self) -> str | None:
+    def find_end_reason(self) -> str | None:
         """The motion may go on."""
         return None
 
-    def stopped(self) -> None:
+    def disarm(self) -> None:
         """Nothing to take back."""
 
 
@@ -129,7 +129,6 @@ class LeasePermit:
     """Leave by a lease that was shown."""
 
     def __init__(self, lease: Lease, find_end_reason: Callable[[Lease], str | None]) -> None:
-        """Nothing is asked yet."""
         self._lease, self._end_of = lease, find_end_reason
 
     def require(self) -> None:
@@ -141,14 +140,14 @@ class LeasePermit:
             hint = f"POST /api/v1/leases/{self._lease.id}/arm first"
             raise NotArmedError(one_line(f"{self._lease.device}: its lease is not armed; {hint}"))
 
-    def end(self) -> str | None:
+    def find_end_reason(self) -> str | None:
         """Why the motion has to end."""
         lost = self._end_of(self._lease)
         if lost is not None:
             return f"lease {self._lease.number} of {self._lease.holder} ended: {lost}"
         return None if self._lease.is_armed else f"lease {self._lease.number} of {self._lease.holder} was disarmed"
 
-    def stopped(self) -> None:
+    def disarm(self) -> None:
         """A stop disarms."""
         self._lease.is_armed = False
 
@@ -157,18 +156,17 @@ class UnleasedPermit:
     """Leave for one motion, by the arm's claim alone; nobody can lease the arm while it lasts."""
 
     def __init__(self, device: str, require_unleased: Callable[[str], None]) -> None:
-        """Nothing is asked yet."""
         self._device, self._require_unleased = device, require_unleased
 
     def require(self) -> None:
         """Refuse an arm that is leased."""
         self._require_unleased(self._device)
 
-    def end(self) -> str | None:
+    def find_end_reason(self) -> str | None:
         """The motion may go on."""
-        return FREE.end()
+        return FREE.find_end_reason()
 
-    def stopped(self) -> None:
+    def disarm(self) -> None:
         """Nothing to take back."""
 
 
@@ -187,7 +185,6 @@ class Leases:
         clock: Callable[[], float] = time.monotonic,
         on_end: LeaseEnd | None = None,
     ) -> None:
-        """Begin with no lease."""
         self._claims, self._counter, self._clock = claims, counter, clock
         self._on_end = on_end or (lambda _lease, _why: None)
         self._lock = threading.Lock()

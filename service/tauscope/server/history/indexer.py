@@ -207,7 +207,6 @@ class Indexer:
     """
 
     def __init__(self, index: Index, items: Mapping[str, ItemStore], recordings: RecordingStore) -> None:
-        """Prepare; nothing is read yet."""
         self.index = index
         self._items = items
         self._recordings = recordings

@@ -52,7 +52,6 @@ class ModelHistory:
     """Models of every robot. Every method is one short transaction, and may be called from any thread."""
 
     def __init__(self, database: Database) -> None:
-        """Look at the history."""
         self._database = database
 
     def list_unjudged(self, site: str) -> list[str]:

@@ -24,7 +24,6 @@ class ModelRegistry:
     """Brings identifications before the history of models, in the order in which they were handed in."""
 
     def __init__(self, history: ModelHistory, site: str, items: Mapping[str, ItemStore]) -> None:
-        """Prepare; nothing is judged yet."""
         self.history = history
         self._site = site
         self._identifications = items["identification"]
@@ -104,7 +103,6 @@ class DriftMonitor:
     """Looks at the history now and then; models are read again only where others became active or the reference."""
 
     def __init__(self, history: ModelHistory, site: str) -> None:
-        """Prepare; nothing is known before `look`."""
         self._history, self._site = history, site
         self.robots: Mapping[str, RobotDrift] = {}
 

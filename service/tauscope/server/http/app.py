@@ -17,7 +17,7 @@ from tauscope.server.http.diagnoses.models import DiagnosisRequest
 from tauscope.server.http.diagnoses.router import router as diagnoses
 from tauscope.server.http.excitations.models import ExcitationRequest
 from tauscope.server.http.excitations.router import router as excitations
-from tauscope.server.http.heartbeat import told
+from tauscope.server.http.heartbeat import notify_systemd
 from tauscope.server.http.history import ReasonRequest
 from tauscope.server.http.history import router as history
 from tauscope.server.http.identifications.models import IdentificationRequest
@@ -87,7 +87,7 @@ def create_app(settings: Settings, executor: Executor | None = None, start: Star
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         with open_services(settings, executor, start) as services:
             app.state.services = services
-            async with services.pulse.beating(), told():
+            async with services.heartbeat.keep_beating(), notify_systemd():
                 yield
 
     app = FastAPI(

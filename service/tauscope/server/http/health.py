@@ -20,11 +20,11 @@ from tauscope.version import tauscope_version
 LEAST_FREE_BYTES = 64 * 2**20
 """Room on the disk below which no run should begin [bytes]."""
 
-PATIENCE_S = 2.0
+TIMEOUT_S = 2.0
 """How long the disk may take [s]."""
 
 
-def obstacles(services: Services) -> list[str]:
+def find_obstacles(services: Services) -> list[str]:
     """Everything that stands in the way of work, each in a few words; asks the disk, so that it may hang."""
     found = ["the service is ending"] if services.closing.is_set() else []
     if not services.jobs.can_work():
@@ -73,9 +73,9 @@ async def get_health() -> HealthAnswer:
 @router.get("/readyz", summary="Ask whether the service can work", responses=problem_responses("not-ready"))
 async def get_readiness(services: ServicesDep) -> ReadyAnswer:
     """Writes to the disk and looks at its room; a disk that hangs is an answer too."""
-    found = [f"the disk has not answered within {PATIENCE_S:g} s"]
-    with anyio.move_on_after(PATIENCE_S):
-        found = await to_thread.run_sync(obstacles, services, abandon_on_cancel=True, limiter=services.followers)
+    found = [f"the disk has not answered within {TIMEOUT_S:g} s"]
+    with anyio.move_on_after(TIMEOUT_S):
+        found = await to_thread.run_sync(find_obstacles, services, abandon_on_cancel=True, limiter=services.followers)
     if found:
         raise ProblemError("not-ready", "; ".join(found), headers={"Retry-After": "5"})
     return ReadyAnswer(status="ready")

@@ -10,7 +10,7 @@ from contextlib import asynccontextmanager, suppress
 BEAT_S = 0.1
 """How often the event loop shows that it turns [s]."""
 
-PATIENCE_S = 2.0
+TIMEOUT_S = 2.0
 """Silence of the event loop after which it counts as stuck [s]."""
 
 
@@ -18,7 +18,6 @@ class Heartbeat:
     """The last sign of life of the event loop."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        """Begin alive."""
         self._clock = clock
         self._last = clock()
 
@@ -28,10 +27,10 @@ class Heartbeat:
 
     def is_alive(self) -> bool:
         """Whether the last sign of life is recent."""
-        return self._clock() - self._last < PATIENCE_S
+        return self._clock() - self._last < TIMEOUT_S
 
     @asynccontextmanager
-    async def beating(self) -> AsyncIterator[None]:
+    async def keep_beating(self) -> AsyncIterator[None]:
         """Show signs of life as long as the event loop turns, within the context."""
 
         async def beat() -> None:
@@ -69,7 +68,7 @@ def watchdog_interval_s(environment: Mapping[str, str] = os.environ) -> float | 
 
 
 @asynccontextmanager
-async def told() -> AsyncIterator[None]:
+async def notify_systemd() -> AsyncIterator[None]:
     """Say that the service is ready, give signs of life as long as the event loop turns, and say that it ends."""
 
     async def live(interval_s: float) -> None:

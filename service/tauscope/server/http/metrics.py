@@ -24,7 +24,6 @@ class Metrics:
     """All counters of one service; each application has its own registry."""
 
     def __init__(self) -> None:
-        """Begin at zero."""
         self.registry = CollectorRegistry()
         self.loops = LoopTimes()
         self.registry.register(self.loops)
@@ -67,7 +66,6 @@ class LoopTimes(Collector):
     """How late the cycles of the control loops were: whole runs when they have ended, and what goes on now."""
 
     def __init__(self) -> None:
-        """Begin with no cycle."""
         self.live: Callable[[], Iterable[Live]] = tuple
         self._lock = threading.Lock()
         self._late: dict[str, Tally[float]] = {}
@@ -116,7 +114,6 @@ class ModelDrift(Collector):
     """How far each robot's active model is from the one that drift is counted from; a series a parameter."""
 
     def __init__(self, watch: DriftMonitor) -> None:
-        """Prepare."""
         self._watch = watch
 
     def collect(self) -> Iterator[Metric]:
@@ -143,7 +140,6 @@ class TimedExecutor(Executor):
     """An executor whose work is timed; what it does is another executor's."""
 
     def __init__(self, executor: Executor, seconds: Histogram) -> None:
-        """Wrap an executor."""
         self._executor, self._seconds = executor, seconds
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> "Future[Any]":

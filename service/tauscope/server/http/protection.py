@@ -26,7 +26,6 @@ class RequestLog:
     """Counts, times and logs requests."""
 
     def __init__(self, app: ASGIApp) -> None:
-        """Wrap an application."""
         self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -87,7 +86,6 @@ class ResponseProtection:
     """Adds the headers of every answer, and turns an unforeseen exception into a problem without internals."""
 
     def __init__(self, app: ASGIApp) -> None:
-        """Wrap an application."""
         self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -120,7 +118,6 @@ class OriginCheck:
     """Turns away requests for other host names (DNS rebinding) and those that a page of another origin makes."""
 
     def __init__(self, app: ASGIApp, answers_for: Callable[[str | None], bool]) -> None:
-        """Wrap an application."""
         self.app = app
         self.answers_for = answers_for
 

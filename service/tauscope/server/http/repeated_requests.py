@@ -22,7 +22,6 @@ class Fingerprint:
     """A hash of a body as it arrives. Clients draw a new boundary for every form: it is left out."""
 
     def __init__(self, content_type: str) -> None:
-        """Begin with an empty body."""
         media_type, options = parse_options_header(content_type)
         self._boundary = options.get(b"boundary") or b""
         self._hash = hashlib.sha256(media_type + b"\n")
@@ -62,7 +61,6 @@ class IdempotentRequests:
     """Answers a request that came before with the answer of then."""
 
     def __init__(self, app: ASGIApp) -> None:
-        """Wrap an application."""
         self.app = app
         self._underway: set[str] = set()
 

@@ -108,7 +108,7 @@ _BODY_PROBLEMS = ("bad-request", "limit-exceeded", "media-type", "not-found")
 @router.get("", summary="List schedules")
 def list_schedules(request: Request, services: ServicesDep) -> ScheduleListAnswer:
     """Those of every service that shares the database."""
-    entries = services.schedules.book.schedules()
+    entries = services.schedules.repository.schedules()
     return ScheduleListAnswer(schedules=[_answer(entry, request.url.path) for entry in entries])
 
 
@@ -131,20 +131,20 @@ async def put_schedule(request: Request, name: Name, services: ServicesDep) -> S
 @router.get("/{name}", summary="Look a schedule up", responses=problem_responses("not-found"))
 def get_schedule(request: Request, name: Name, services: ServicesDep) -> ScheduleAnswer:
     """What is repeated, and when it is due next."""
-    return _answer(services.schedules.book.find(name), collection(request, 1))
+    return _answer(services.schedules.repository.find(name), collection(request, 1))
 
 
 @router.delete("/{name}", status_code=204, summary="Remove a schedule", responses=problem_responses("not-found"))
 def remove_schedule(name: Name, services: ServicesDep) -> None:
     """Its firings are forgotten; what they started stays."""
-    services.schedules.book.remove(name)
+    services.schedules.repository.remove(name)
 
 
 @router.get("/{name}/firings", summary="List the firings of a schedule", responses=problem_responses("not-found"))
 def list_firings(name: Name, services: ServicesDep, limit: Limit = 100) -> FiringListAnswer:
     """Every time that it was due, what was started, and why nothing was."""
     services.index.sync()
-    return FiringListAnswer(firings=[_firing(each) for each in services.schedules.book.firings(name, limit)])
+    return FiringListAnswer(firings=[_firing(each) for each in services.schedules.repository.firings(name, limit)])
 
 
 @router.post(
@@ -173,10 +173,12 @@ async def _read(request: Request, services: Services) -> ScheduleRequest:
 
 def _put(name: str, body: ScheduleRequest, services: Services) -> ScheduleEntry:
     """Set it up, and look it up again."""
-    keeper = services.schedules
-    site = None if body.anywhere else keeper.book.site
-    keeper.book.put(make_schedule(name, body.like, body.definition, keeper.repeater, site, datetime.now(UTC)))
-    return keeper.book.find(name)
+    scheduler = services.schedules
+    site = None if body.anywhere else scheduler.repository.site
+    scheduler.repository.put(
+        make_schedule(name, body.like, body.definition, scheduler.repeater, site, datetime.now(UTC))
+    )
+    return scheduler.repository.find(name)
 
 
 def _answer(entry: ScheduleEntry, path: str) -> ScheduleAnswer:

@@ -68,7 +68,7 @@ class Services:
     answers: Answers
     lease_answers: Answers
     metrics: Metrics
-    pulse: Heartbeat
+    heartbeat: Heartbeat
     index: Indexer
     models: ModelRegistry
     schedules: Scheduler
@@ -78,8 +78,8 @@ class Services:
     def begin_to_close(self) -> None:
         """Stop every arm, and let go of whoever follows events; returns at once."""
         self.closing.set()
-        self.campaigns.stop_all()
-        self.runs.stop_all()
+        self.campaigns.begin_close()
+        self.runs.begin_close()
 
 
 async def _services_of(request: Request) -> Services:
@@ -163,7 +163,7 @@ class _Ground:
 def _assemble(ground: _Ground, executor: Executor | None, start: StartControl | None) -> Services:
     """Everything that the routes work with; nothing of it moves yet, and unfinished analysis goes on."""
     settings, database, site = ground.settings, ground.database, ground.site
-    items, metrics, pulse = item_stores(settings.data_folder), Metrics(), Heartbeat()
+    items, metrics, heartbeat = item_stores(settings.data_folder), Metrics(), Heartbeat()
     recordings = RecordingStore(settings.recordings_folder)
     recordings.tidy()
     identifications, diagnoses, excitations = kinds = _kinds(settings, items)
@@ -177,7 +177,7 @@ def _assemble(ground: _Ground, executor: Executor | None, start: StartControl | 
     claims = DeviceClaims(settings.max_arms)
     leases = Leases(claims, settings.data_folder / "lease-number", on_end=partial(_note_end, audit))
     start = start or partial(start_control, sim_socket=settings.sim_socket)
-    runs = RunManager(items["run"], recordings, start, claims, pulse.is_alive, metrics.run_ended)
+    runs = RunManager(items["run"], recordings, start, claims, heartbeat.is_alive, metrics.run_ended)
     dependencies = CampaignDependencies(jobs, excitations, identifications, diagnoses, runs, recordings)
     campaigns = CampaignManager(items["campaign"], dependencies)
     models = ModelRegistry(ModelHistory(database), site, items)
@@ -201,7 +201,7 @@ def _assemble(ground: _Ground, executor: Executor | None, start: StartControl | 
         answers=StoredAnswers(settings.data_folder / "idempotency"),
         lease_answers=MemoryAnswers(),
         metrics=metrics,
-        pulse=pulse,
+        heartbeat=heartbeat,
         index=index,
         models=models,
         schedules=Scheduler(ScheduleRepository(database, site, new_boot()), repeater, settings.data_folder),
@@ -243,7 +243,7 @@ def _retention(services: Services) -> list[Callable[[], object]]:
 def _watch(services: Services, drift: DriftMonitor) -> None:
     """Numbers that are asked for when somebody looks at the metrics."""
     metrics, folder = services.metrics, services.settings.data_folder
-    metrics.loops.live = services.runs.lives
+    metrics.loops.live = services.runs.list_live
     metrics.watch_drift(drift)
     metrics.watch("tauscope_jobs_waiting", "Jobs that wait", services.jobs.waiting)
     metrics.watch("tauscope_leases", "Leases that hold", lambda: len(services.leases.active()))

@@ -69,7 +69,7 @@ _log = logging.getLogger("tauscope.jobs")
 SCHEDULER = "DASK_SCHEDULER_ADDRESS"
 """Environment variable that names the scheduler of a Dask cluster, as in ``tcp://scheduler:8786``."""
 
-PATIENCE_S = 10
+TIMEOUT_S = 10
 """How long a scheduler may take to answer [s]."""
 
 CHECK_S = 1.0
@@ -84,7 +84,7 @@ class ClusterExecutor(Executor):
     """A Dask cluster; a task whose worker dies again and again ends with BrokenExecutor, as in a pool of processes.
 
     Dask's own client gives up for good where the scheduler is away for longer than it waits. A thread reaches the
-    scheduler again then, as often as it takes; meanwhile `is_there` says no, and tasks end with `ClusterUnavailableError`.
+    scheduler again then; meanwhile `is_there` is false, tasks end with `ClusterUnavailableError`.
     """
 
     def __init__(self, address: str, wait_s: float = 0.0) -> None:
@@ -110,7 +110,7 @@ class ClusterExecutor(Executor):
             self._executor = _executor_of(self._client)
             self._look()
         except (ImportError, OSError, ValueError) as error:
-            self._loop.stop(PATIENCE_S)
+            self._loop.stop(TIMEOUT_S)
             raise _not_reached(address, error) from None
         self._watcher = threading.Thread(target=self._watch, name="cluster", daemon=True)
         self._watcher.start()
@@ -154,7 +154,7 @@ class ClusterExecutor(Executor):
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """Leave the cluster."""
         self._closing.set()
-        self._watcher.join(2 * PATIENCE_S)
+        self._watcher.join(2 * TIMEOUT_S)
         try:
             self._executor.shutdown(wait=wait and not cancel_futures and self.is_there())
             self._client.close()
@@ -162,13 +162,13 @@ class ClusterExecutor(Executor):
             if self.is_there():
                 raise
         finally:
-            self._loop.stop(PATIENCE_S)
+            self._loop.stop(TIMEOUT_S)
 
     def _open_client(self) -> "Client":
         """A connection of its own; raises what Dask raises."""
         from distributed import Client
 
-        return Client(self._address, self._loop.open(), timeout=PATIENCE_S, set_as_default=False)
+        return Client(self._address, self._loop.open(), timeout=TIMEOUT_S, set_as_default=False)
 
     def _watch(self) -> None:
         """Look at the scheduler until it is left."""
@@ -188,7 +188,7 @@ class ClusterExecutor(Executor):
         if self.is_there():
             # `Client.nthreads` asks the same, and waits for ever where the scheduler is lost meanwhile.
             scheduler: Any = self._client.scheduler
-            threads: Any = self._client.sync(scheduler.ncores, callback_timeout=PATIENCE_S)
+            threads: Any = self._client.sync(scheduler.ncores, callback_timeout=TIMEOUT_S)
             self._width = max(1, sum(threads.values()))
             self._there.set()
         else:

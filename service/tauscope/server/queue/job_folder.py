@@ -17,7 +17,6 @@ class JobFolder:
     """Step, events and the wish to stop."""
 
     def __init__(self, folder: Path) -> None:
-        """Look at a folder; nothing is opened yet."""
         self.folder = folder
         self.events = EventLog(folder / "events.jsonl")
         self._progress = folder / "progress"

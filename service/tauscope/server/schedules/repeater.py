@@ -1,7 +1,7 @@
 """The repeater: it starts what a schedule repeats, and makes schedules from items that were done once."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 from fnmatch import fnmatchcase
@@ -35,7 +35,7 @@ class NothingToDoError(TauscopeError):
 
 @dataclass(frozen=True, eq=False)
 class Repeater:
-    """Starts what schedules repeat."""
+    """Starts the campaigns and analyses of schedules."""
 
     dependencies: CampaignDependencies
     campaigns: CampaignManager
@@ -61,9 +61,7 @@ class Repeater:
             return "campaign", self._campaign(entry)
         assert definition.recordings is not None  # noqa: S101 - checked by the definition
         train, held_out = newest_recordings(self.dependencies.recordings, definition.recordings, since)
-        if definition.kind == "identification":
-            return "identification", self._identification(entry, train, held_out)
-        return "diagnosis", self._diagnosis(entry, train, held_out)
+        return definition.kind, self._analyse(definition.kind, entry, {"recordings": train, "held_out": held_out})
 
     def goes_on(self, kind: str, identifier: str) -> bool:
         """Whether something that was started has not ended; what was removed has."""
@@ -92,37 +90,24 @@ class Repeater:
         finally:
             items.discard(staged)
 
-    def _identification(
-        self, entry: ScheduleEntry, train: tuple[OrderedRecording, ...], held_out: tuple[OrderedRecording, ...]
-    ) -> str:
-        """An identification from other recordings."""
-        kind = self.dependencies.identifications
-        staged = kind.items.stage()
+    def _analyse(self, kind: str, entry: ScheduleEntry, recordings: Mapping[str, tuple[OrderedRecording, ...]]) -> str:
+        """Submit an identification or a diagnosis of other recordings."""
+        dependencies = self.dependencies
+        job_kind = dependencies.identifications if kind == "identification" else dependencies.diagnoses
+        staged = job_kind.items.stage()
         try:
-            workspace = IdentificationWorkspace(staged)
-            workspace.prepare()
+            if kind == "identification":
+                workspace, order = IdentificationWorkspace(staged), _order(entry, IdentificationOrder)
+                workspace.prepare()
+                workspace.write_order(order.model_copy(update=recordings))
+            else:
+                workspace, order = DiagnosisWorkspace(staged), _order(entry, DiagnosisOrder)
+                workspace.prepare()
+                workspace.write_order(order.model_copy(update=recordings))
             write_robot(workspace.robot, entry)
-            changes = {"recordings": train, "held_out": held_out}
-            workspace.write_order(_order(entry, IdentificationOrder).model_copy(update=changes))
-            return self.dependencies.jobs.submit(kind, staged)
+            return dependencies.jobs.submit(job_kind, staged)
         finally:
-            kind.items.discard(staged)
-
-    def _diagnosis(
-        self, entry: ScheduleEntry, train: tuple[OrderedRecording, ...], held_out: tuple[OrderedRecording, ...]
-    ) -> str:
-        """A diagnosis of other recordings."""
-        kind = self.dependencies.diagnoses
-        staged = kind.items.stage()
-        try:
-            workspace = DiagnosisWorkspace(staged)
-            workspace.prepare()
-            write_robot(workspace.robot, entry)
-            changes = {"recordings": train, "held_out": held_out}
-            workspace.write_order(_order(entry, DiagnosisOrder).model_copy(update=changes))
-            return self.dependencies.jobs.submit(kind, staged)
-        finally:
-            kind.items.discard(staged)
+            job_kind.items.discard(staged)
 
 
 def newest_recordings(

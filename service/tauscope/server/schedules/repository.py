@@ -81,7 +81,6 @@ class ScheduleRepository:
     """Schedules and their firings, as one site sees them. Every method is one short transaction."""
 
     def __init__(self, database: Database, site: str, boot: str) -> None:
-        """Look at the book."""
         self._database = database
         self.site = site
         self._boot = boot

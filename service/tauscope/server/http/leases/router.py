@@ -141,7 +141,7 @@ async def release_lease(request: Request, identifier: Identifier, services: Serv
 async def stop_everything(services: ServicesDep) -> StopAllAnswer:
     """Stops all runs and campaigns and disarms all leases; needs no lease and no body, and waits for nothing."""
     services.leases.disarm_all()
-    campaigns, runs = services.campaigns.stop_all_running(), services.runs.stop_all_running()
+    campaigns, runs = services.campaigns.stop_all(), services.runs.stop_all()
     return StopAllAnswer(runs=runs, campaigns=campaigns, time=datetime.now(UTC))
 
 

@@ -18,7 +18,7 @@ from sqlalchemy.orm import Session
 from tauscope.errors import StoreError
 from tauscope.robot.messages import one_line
 
-PATIENCE_S = 5
+TIMEOUT_S = 5
 """How long a write waits for another one, and a connection for its server [s]."""
 
 WRITES = "tauscope_writes"
@@ -38,15 +38,15 @@ def open_engine(address: Path | str) -> Engine:
     """
     url = URL.create("sqlite", database=str(address)) if isinstance(address, Path) else _parsed(address)
     if url.get_backend_name() == "sqlite":
-        engine = create_engine(url, connect_args={"timeout": PATIENCE_S})
+        engine = create_engine(url, connect_args={"timeout": TIMEOUT_S})
         event.listen(engine, "connect", _prepare_sqlite)
         event.listen(engine, "begin", _begin_sqlite)
         return engine
-    options = f"-c lock_timeout={PATIENCE_S}s"
+    options = f"-c lock_timeout={TIMEOUT_S}s"
     return create_engine(
         url.set(drivername="postgresql+psycopg"),
         pool_pre_ping=True,
-        connect_args={"connect_timeout": PATIENCE_S, "options": options},
+        connect_args={"connect_timeout": TIMEOUT_S, "options": options},
     )
 
 

@@ -107,7 +107,6 @@ class Index:
     """The part of the index that one data folder fills, and the search over all of it."""
 
     def __init__(self, database: Database, site: str) -> None:
-        """Look at the index."""
         self._database = database
         self.site = site
 
