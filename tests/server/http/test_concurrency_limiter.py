@@ -47,17 +47,17 @@ async def settle() -> None:
 
 
 def play(
-    scene: Callable[[Work, Callable[[str, str], asyncio.Task[None]]], Awaitable[None]], longest_turn_s: float = NEVER_S
+    scene: Callable[[Work, Callable[[str, str], asyncio.Task[None]]], Awaitable[None]], slot_timeout_s: float = NEVER_S
 ) -> None:
     """A scene with an application that lets two readers in at a time."""
 
     async def run() -> None:
         work = Work()
-        turns = ConcurrencyLimiter(work, at_a_time=2, longest_turn_s=longest_turn_s)
+        slots = ConcurrencyLimiter(work, readers=2, slot_timeout_s=slot_timeout_s)
 
         def ask(method: str, path: str) -> asyncio.Task[None]:
             scope = {"type": "http", "method": method, "path": path}
-            return asyncio.create_task(turns(scope, receive, send))
+            return asyncio.create_task(slots(scope, receive, send))
 
         await scene(work, ask)
         work.may_begin.set()
@@ -140,4 +140,4 @@ def test_readers_that_are_stuck_let_others_in_after_a_while() -> None:
         await asyncio.gather(*stuck)
         await asyncio.gather(*(ask("GET", "/other") for _ in range(3)))
 
-    play(scene, longest_turn_s=0.0)
+    play(scene, slot_timeout_s=0.0)

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+from typing_extensions import override
+
 from tauscope.errors import AcquisitionError
 from tauscope.files import write_atomically
 from tauscope.robot.messages import one_line
@@ -152,22 +154,16 @@ class LeasePermit:
         self._lease.is_armed = False
 
 
-class UnleasedPermit:
-    """Leave for one motion, by the arm's claim alone; nobody can lease the arm while it lasts."""
+class UnleasedPermit(FreePermit):
+    """Permit for one motion, by the claim of the arm alone; the arm cannot be leased while it lasts."""
 
     def __init__(self, device: str, require_unleased: Callable[[str], None]) -> None:
         self._device, self._require_unleased = device, require_unleased
 
+    @override
     def require(self) -> None:
         """Refuse an arm that is leased."""
         self._require_unleased(self._device)
-
-    def find_end_reason(self) -> str | None:
-        """The motion may go on."""
-        return FREE.find_end_reason()
-
-    def disarm(self) -> None:
-        """Nothing to take back."""
 
 
 LeaseEnd = Callable[[Lease, str], None]

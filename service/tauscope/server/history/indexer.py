@@ -237,10 +237,10 @@ class Indexer:
             damaged = self.index.damaged(kind)
             for identifier, (_, is_final) in sorted(self._known[kind].items()):
                 if is_final:
-                    found += self._checked(kind, store, identifier, damaged, deep=deep)
+                    found += self._check_item(kind, store, identifier, damaged, deep=deep)
         return found
 
-    def _checked(
+    def _check_item(
         self, kind: str, store: ItemStore, identifier: str, damaged: Collection[str], *, deep: bool
     ) -> list[ChangedItem]:
         """The file of an item that changed, if there is one; a damaged item that was put right is read anew."""

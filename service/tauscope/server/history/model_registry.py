@@ -12,7 +12,7 @@ from tauscope.errors import NotFoundError
 from tauscope.server.control.run_workspace import RunWorkspace
 from tauscope.server.history.drift import Drift
 from tauscope.server.history.model_history import ModelEntry, ModelHistory
-from tauscope.server.history.model_judgement import Candidate, compared
+from tauscope.server.history.model_judgement import Candidate, compare_models
 from tauscope.server.queue.identification_order import IdentificationOrder
 from tauscope.server.queue.identification_workspace import IdentificationWorkspace
 from tauscope.server.store.items import ItemStore
@@ -28,7 +28,7 @@ class ModelRegistry:
         self._site = site
         self._identifications = items["identification"]
         self._runs = items["run"]
-        self._strange: set[str] = set()
+        self._failed: set[str] = set()
 
     def judge_new(self) -> list[ModelEntry]:
         """Judge every identification in the index that was not judged yet.
@@ -62,9 +62,9 @@ class ModelRegistry:
         except IntegrityError:
             return None
         except NotFoundError as error:  # the order was damaged; one such identification holds up no service
-            if identifier not in self._strange:
+            if identifier not in self._failed:
                 _log.warning("identification %s is not judged, its order may be damaged: %s", identifier, error)
-            self._strange.add(identifier)
+            self._failed.add(identifier)
             return None
         _log.info("model %s of %s is %s", identifier, entry.robot, entry.state)
         return entry
@@ -128,6 +128,6 @@ class DriftMonitor:
         if known is not None and (known.active, known.reference) == (active, reference):
             return known.drifts
         try:
-            return compared(self._history.document(reference), self._history.document(active))
+            return compare_models(self._history.document(reference), self._history.document(active))
         except NotFoundError:  # it was removed a moment ago
             return ()

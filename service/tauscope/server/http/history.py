@@ -14,7 +14,7 @@ from tauscope.identification import IdentificationDocument
 from tauscope.server.history.drift import find_largest_by_joint
 from tauscope.server.history.gates import ModelPolicy
 from tauscope.server.history.model_history import ModelEntry
-from tauscope.server.history.model_judgement import compared
+from tauscope.server.history.model_judgement import compare_models
 from tauscope.server.history.trend import parameter_trends
 from tauscope.server.http.documents import JSON, media_type, read_document, refuse_media_type
 from tauscope.server.http.jobs.routes import Identifier, Limit, collection
@@ -75,7 +75,7 @@ class DriftAnswer(AnswerModel):
 
     name: str = Field(description="of the parameter", examples=["viscous joint3"])
     joint: str = Field(description="that it belongs to")
-    before: float = Field(description="in the model that it is compared with [SI]")
+    before: float = Field(description="in the model that it is compare_models with [SI]")
     after: float = Field(description="in this model [SI]")
     std: float = Field(description="standard error of the difference [SI]")
     in_std: float = Field(description="difference in standard errors")
@@ -83,9 +83,9 @@ class DriftAnswer(AnswerModel):
 
 
 class ComparisonAnswer(AnswerModel):
-    """One model compared with another."""
+    """One model compare_models with another."""
 
-    before: str = Field(description="identifier of the model that it is compared with")
+    before: str = Field(description="identifier of the model that it is compare_models with")
     after: str = Field(description="identifier of this model")
     parameters: list[DriftAnswer] = Field(description="every parameter that both tell")
     joints: dict[str, DriftAnswer] = Field(description="for each joint its most significant change")
@@ -171,7 +171,7 @@ def comparison_answer(
     before: str, earlier: IdentificationDocument, after: str, later: IdentificationDocument
 ) -> ComparisonAnswer:
     """The answer that compares two models."""
-    drifts = compared(earlier, later)
+    drifts = compare_models(earlier, later)
     return ComparisonAnswer(
         before=before,
         after=after,

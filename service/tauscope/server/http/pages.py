@@ -37,27 +37,27 @@ class Chapter:
 
 
 @cache
-def chapters() -> Mapping[str, Chapter]:
+def load_chapters() -> Mapping[str, Chapter]:
     """Every page, by its path below /docs: ``errors/recording``."""
     root = next((each for each in _ROOTS if (each / SECTIONS[0]).is_dir()), None)
     if root is None:
         return {}
     files = (file for section in SECTIONS for file in sorted((root / section).glob("*.md")) if file.stem != "README")
     texts = {f"{file.parent.name}/{file.stem}": file.read_text(encoding="utf-8") for file in files}
-    return MappingProxyType({path: rendered(text, path, texts) for path, text in texts.items()})
+    return MappingProxyType({path: render_chapter(text, path, texts) for path, text in texts.items()})
 
 
-def rendered(text: str, path: str, known: Mapping[str, object]) -> Chapter:
+def render_chapter(text: str, path: str, known: Mapping[str, object]) -> Chapter:
     """A page from its Markdown. Markup of HTML stays text, and a link that leads to no page becomes its words."""
     tokens = _markdown.parse(text)
     for token in tokens:
         if token.children is not None:
-            token.children = _relinked(token.children, path, known)
+            token.children = _relink_tokens(token.children, path, known)
     heading = next((token.content for token in tokens if token.type == "inline"), path)
     return Chapter(heading.replace("`", ""), _markdown.renderer.render(tokens, _markdown.options, {}))
 
 
-def _relinked(tokens: Sequence[Token], path: str, known: Mapping[str, object]) -> list[Token]:
+def _relink_tokens(tokens: Sequence[Token], path: str, known: Mapping[str, object]) -> list[Token]:
     """Inline tokens whose links lead to pages of the service; of other links the words stay, of pictures nothing."""
     kept, is_open = [], True
     for token in tokens:
@@ -98,7 +98,7 @@ def show_interface(request: Request) -> Response:
     """Every operation, from the OpenAPI document."""
     document = request.app.openapi()
     page = _templates.get_template("interface.html")
-    guides = [(path, chapter.title) for path, chapter in chapters().items() if path.startswith("how-to/")]
+    guides = [(path, chapter.title) for path, chapter in load_chapters().items() if path.startswith("how-to/")]
     operations, kinds = _operations(document), KINDS.values()
     return HTMLResponse(page.render(info=document["info"], operations=operations, kinds=kinds, guides=guides))
 
@@ -115,14 +115,14 @@ def show_problem_kind(code: str) -> Response:
     kind = KINDS.get(code)
     if kind is None:
         raise NotFoundError(one_line(f"there is no error code {shown(code)}; /docs lists them"))
-    chapter = chapters().get(f"errors/{code}")
+    chapter = load_chapters().get(f"errors/{code}")
     return HTMLResponse(_templates.get_template("problem.html").render(kind=kind, chapter=chapter))
 
 
 @router.get("/how-to/{name}")
 def show_guide(name: str) -> Response:
     """How something is done."""
-    chapter = chapters().get(f"how-to/{name}")
+    chapter = load_chapters().get(f"how-to/{name}")
     if chapter is None:
         raise NotFoundError(one_line(f"there is no page {shown(name)}; /docs lists them"))
     return HTMLResponse(_templates.get_template("guide.html").render(chapter=chapter))

@@ -161,13 +161,7 @@ class BodyLimit:
     """
 
     def __init__(self, app: ASGIApp, limit: int) -> None:
-        """Wrap an application.
-
-        Parameters
-        ----------
-        limit : int
-            largest body [bytes]
-        """
+        """Limit bodies to `limit` [bytes]."""
         self.app = app
         self.limit = limit
 
@@ -238,63 +232,57 @@ class _CountedBody:
         return message
 
 
-AT_A_TIME = 2
-"""Reading requests that are worked on at once: threads that share an interpreter do not read faster for being more."""
+READERS = 2
+"""Reading requests at a time: more threads of one interpreter read no faster."""
 
-LONGEST_TURN_S = 0.5
-"""A reader that is stuck, with a disk or a lock, keeps its turn no longer [s]."""
+SLOT_TIMEOUT_S = 0.5
+"""A reader that a disk or a lock holds up loses its slot after this time [s]."""
 
 _READING = ("GET", "HEAD")
 _PROBES = ("/healthz", "/readyz")
-"""They take turns among themselves: whoever restarts a service that does not answer stops its arms."""
+"""Probes have a slot of their own: a supervisor that gets no answer restarts the service, which stops its arms."""
 
 
 class ConcurrencyLimiter:
-    """Lets a few reading requests in at a time, in the order in which they came; all others pass at once.
+    """Admits a few reading requests at a time, first come first served; all other requests pass at once.
 
-    A turn ends when the answer begins: what is streamed after that, events above all, keeps nobody waiting.
+    A slot is free again when the answer begins: a stream of events keeps no other request waiting.
     """
 
-    def __init__(self, app: ASGIApp, at_a_time: int = AT_A_TIME, longest_turn_s: float = LONGEST_TURN_S) -> None:
-        """Wrap an application.
-
-        Parameters
-        ----------
-        longest_turn_s : float
-            after which the next one is let in although the answer has not begun [s]
-        """
+    def __init__(self, app: ASGIApp, readers: int = READERS, slot_timeout_s: float = SLOT_TIMEOUT_S) -> None:
+        """Admit `readers` at a time; one that is stuck keeps its slot for `slot_timeout_s` [s]."""
         self.app = app
-        self._turns, self._probes = asyncio.Semaphore(at_a_time), asyncio.Semaphore(1)
-        self._longest_turn_s = longest_turn_s
+        self._slots, self._probes = asyncio.Semaphore(readers), asyncio.Semaphore(1)
+        self._slot_timeout_s = slot_timeout_s
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer a request when its turn has come."""
+        """Answer a request when a slot is free."""
         if scope["type"] != "http" or scope["method"] not in _READING:
             return await self.app(scope, receive, send)
-        turns = self._probes if scope["path"] in _PROBES else self._turns
-        await turns.acquire()
-        turn = _Turn(turns, self._longest_turn_s)
+        slots = self._probes if scope["path"] in _PROBES else self._slots
+        await slots.acquire()
+        slot = _Slot(slots, self._slot_timeout_s)
 
-        async def send_and_make_room(message: Message) -> None:
-            turn.end()
+        async def send_and_free_slot(message: Message) -> None:
+            slot.end()
             await send(message)
 
         try:
-            await self.app(scope, receive, send_and_make_room)
+            await self.app(scope, receive, send_and_free_slot)
         finally:
-            turn.end()
+            slot.end()
 
 
-class _Turn:
-    """One reader's turn; ends once, however often that is said."""
+class _Slot:
+    """One reader's slot; ends once, however often that is said."""
 
-    def __init__(self, turns: asyncio.Semaphore, longest_s: float) -> None:
-        self._turns, self._has_ended = turns, False
-        self._patience = asyncio.get_running_loop().call_later(longest_s, self.end)
+    def __init__(self, slots: asyncio.Semaphore, longest_s: float) -> None:
+        self._slots, self._has_ended = slots, False
+        self._timer = asyncio.get_running_loop().call_later(longest_s, self.end)
 
     def end(self) -> None:
         """Let the next one in."""
         if not self._has_ended:
             self._has_ended = True
-            self._patience.cancel()
-            self._turns.release()
+            self._timer.cancel()
+            self._slots.release()

@@ -73,11 +73,11 @@ def serve(settings: Settings, announce: Callable[[str], None]) -> None:
         if the address cannot be had, others could reach it and there is no API key, or another service works with the
         data folder; or the certificate cannot be used
     """
-    _require_certificate(settings)
+    _check_certificate(settings)
     require_data_folder(settings)
     if settings.log_format == "json":
         log_as_json()
-    with _listening(settings) as listener:
+    with _listen(settings) as listener:
         app = create_app(settings)
         config = uvicorn.Config(
             app,
@@ -117,7 +117,7 @@ class _Server(uvicorn.Server):
         await super().shutdown(sockets)
 
 
-def _require_certificate(settings: Settings) -> None:
+def _check_certificate(settings: Settings) -> None:
     """Refuse a certificate without key, or files that are neither."""
     if (settings.tls_certificate is None) != (settings.tls_key is None):
         raise TauscopeError("TLS: certificate and key belong together; give --tls-certificate and --tls-key")
@@ -130,7 +130,7 @@ def _require_certificate(settings: Settings) -> None:
         raise TauscopeError(f"{settings.tls_certificate}: no usable certificate with its key ({reason})") from None
 
 
-def _listening(settings: Settings) -> socket.socket:
+def _listen(settings: Settings) -> socket.socket:
     """A socket that listens at the address."""
     family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
     # With the protocol named, answers are sent at once (TCP_NODELAY); asyncio would let them wait for each other else.

@@ -24,7 +24,7 @@ _Outcome = tuple[str, str | None, tuple[str, str] | None]
 
 
 class Scheduler:
-    """Looks at the repository again and again; a firing that is missed, or not possible, is written down as such."""
+    """Fires due schedules; a firing that is missed, or not possible, is recorded as such."""
 
     def __init__(
         self,
