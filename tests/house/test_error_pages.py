@@ -156,7 +156,7 @@ def test_run_examples(case: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("case", ["damaged", "locked", "newer", "site"])
 def test_store_examples(case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("tauscope.server.store.database.database.PATIENCE_S", 0.02)
+    monkeypatch.setattr("tauscope.server.store.database.database.TIMEOUT_S", 0.02)
     Path("data").mkdir()
     path = Path("data/tauscope.db")
     with closing(sqlite3.connect(path, isolation_level=None)) as other:

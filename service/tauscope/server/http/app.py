@@ -6,7 +6,7 @@ from contextlib import asynccontextmanager
 
 from fastapi import FastAPI
 
-from tauscope.server.auth.audit_requests import AuditedRequests
+from tauscope.server.auth.audited_requests import AuditedRequests
 from tauscope.server.auth.gate import Gate
 from tauscope.server.control.run_supervisor import StartControl
 from tauscope.server.history.gates import ModelPolicy

@@ -75,7 +75,7 @@ class DriftAnswer(AnswerModel):
 
     name: str = Field(description="of the parameter", examples=["viscous joint3"])
     joint: str = Field(description="that it belongs to")
-    before: float = Field(description="in the model that it is compare_models with [SI]")
+    before: float = Field(description="in the model that it is compared with [SI]")
     after: float = Field(description="in this model [SI]")
     std: float = Field(description="standard error of the difference [SI]")
     in_std: float = Field(description="difference in standard errors")
@@ -83,9 +83,9 @@ class DriftAnswer(AnswerModel):
 
 
 class ComparisonAnswer(AnswerModel):
-    """One model compare_models with another."""
+    """One model compared with another."""
 
-    before: str = Field(description="identifier of the model that it is compare_models with")
+    before: str = Field(description="identifier of the model that it is compared with")
     after: str = Field(description="identifier of this model")
     parameters: list[DriftAnswer] = Field(description="every parameter that both tell")
     joints: dict[str, DriftAnswer] = Field(description="for each joint its most significant change")

@@ -8,7 +8,7 @@ from fastapi.openapi.utils import get_openapi
 from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
-from tauscope.server.auth.audit_requests import is_audited
+from tauscope.server.auth.audited_requests import is_audited
 from tauscope.server.auth.scopes import find_needed_scope, is_stop
 from tauscope.server.http.repeated_requests import HEADER as ONCE
 from tauscope.server.http.repeated_requests import LONGEST_KEY, is_repeatable

@@ -1,4 +1,4 @@
-"""AuditedRequests requests: each change leaves an entry, and a motion leaves one before anything moves."""
+"""Audited requests: each change leaves an entry, and a motion leaves one before anything moves."""
 
 import logging
 from typing import cast
