@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from tauscope.cli.program import main
-from tauscope.server.auth.keys import KeyFile, matching_key
+from tauscope.server.auth.keys import KeyFile, match_key
 
 
 def test_a_key_from_its_making_to_its_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -13,7 +13,7 @@ def test_a_key_from_its_making_to_its_end(tmp_path: Path, capsys: pytest.Capture
     assert main(["key", "add", "night job", "--scope", "move", "--days", "30", *data]) == 0
     out, err = capsys.readouterr()
     (key,) = KeyFile(tmp_path / "data").read()
-    assert matching_key((key,), out.strip()) == key
+    assert match_key((key,), out.strip()) == key
     assert out.strip() not in err
     assert key.expires is not None
     assert (key.expires - key.created).days == 30

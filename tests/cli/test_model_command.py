@@ -9,10 +9,9 @@ import pytest
 from cli.conftest import Ended
 from identified import NOON, candidate, identified
 from tauscope.server.history.model_history import ModelHistory
+from tauscope.server.store.data_folder import FolderLock
 from tauscope.server.store.database.database import FILE_NAME, Database
-from tauscope.server.store.database.facts import ItemMetadata
-from tauscope.server.store.database.index import Index
-from tauscope.server.store.folder_lock import FolderLock
+from tauscope.server.store.database.index import Index, ItemMetadata
 
 Run = Callable[..., Ended]
 

@@ -10,8 +10,7 @@ from server.conftest import connected
 from server.queue.executors import InlineExecutor
 from snapshots import SNAPSHOTS, unpacked
 from tauscope.server.http import Settings, create_app
-from tauscope.server.store.folder_lock import FolderLock
-from tauscope.server.store.layout import RECORDINGS, item_stores
+from tauscope.server.store.data_folder import RECORDINGS, FolderLock, item_stores
 from tauscope.server.store.recordings import RecordingStore
 
 Run = Callable[..., Ended]

@@ -18,7 +18,7 @@ from tauscope.client.transport import Transport, form_content
 from tauscope.runtime import RunState
 from tauscope.server.auth.scopes import Scope
 from tauscope.server.http import Settings, create_app
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.record import JobState
 
 
 @pytest.fixture

@@ -17,7 +17,7 @@ from tauscope.recording.recording import Array
         (200.0, 3.4, 3.6, 1.2, -1.0, True),  # predicts so well that too little to estimate it anew does not matter
         (-6.0, -0.7, 2.9, 2.1, -1.0, False),  # expected there, and less likely with it
         (5.0, 1.0, 6.0, 0.3, -12.0, False),  # should be there, and is not
-        (-2.0, -0.5, 0.5, -0.2, -0.3, True),  # nothing to be seen: no objection
+        (-2.0, -0.5, 0.5, -0.2, -0.3, True),  # nothing to be seen: no find_objection
         (-9.0, -4.0, 0.5, -0.2, 1.0, False),  # nothing to be seen, and yet it spoils the prediction
         (-80.8, -1.7, 0.5, -0.5, -7.5, False),  # nothing of it to be seen, and much else less likely
         (-4.0, -1.0, 20.0, 19.0, -2.0, True),  # there beyond doubt: its size is off

@@ -118,7 +118,7 @@ def test_links_and_columns_are_made_of_the_corrected_accelerations() -> None:
     expected = np.einsum(
         "tij,tj->it", mass_matrix(robot, bodies, motion.position), motion.acceleration - before.acceleration
     )
-    torque = [each.prepared.predicted_torque(model.structure, model.parameters[None])[0] for each in (piece, measured)]
+    torque = [each.prepared.predict_torque(model.structure, model.parameters[None])[0] for each in (piece, measured)]
     assert torque[0] - torque[1] == pytest.approx(expected, abs=1e-9 * np.abs(torque).max())
     assert (motion.velocity == before.velocity).all()
 

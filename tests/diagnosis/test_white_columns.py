@@ -51,7 +51,7 @@ def test_load_is_the_torque_of_the_links_without_the_noise_of_their_inertia(diag
     structure = model.structure
     links = np.where(np.arange(structure.size) < structure.base_count, model.parameters, 0.0)
     for piece in diagnosis.fitter.observations:
-        whole, rigid = piece.prepared.predicted_torque(structure, np.stack([model.parameters, links]))
+        whole, rigid = piece.prepared.predict_torque(structure, np.stack([model.parameters, links]))
         signals, load = model.signals(piece), piece.without_noise_of_inertia(rigid)
         np.testing.assert_allclose(signals.load, load, atol=1e-9 * np.abs(load).max())
         np.testing.assert_allclose(signals.torque, whole - rigid + load, atol=1e-9 * np.abs(whole).max())

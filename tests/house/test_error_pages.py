@@ -16,8 +16,8 @@ from tauscope.export.compensation.drive_units import drive_units
 from tauscope.recording import EffortKind, read_recording
 from tauscope.robot import Joint, read_robot
 from tauscope.runtime import make_backend, run_trajectory
+from tauscope.server.store.data_folder import site_identifier
 from tauscope.server.store.database.database import Database
-from tauscope.server.store.site import site_identifier
 from tauscope.trajectory import read_trajectory
 
 ROBOT = """\
@@ -156,7 +156,7 @@ def test_run_examples(case: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("case", ["damaged", "locked", "newer", "site"])
 def test_store_examples(case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("tauscope.server.store.database.engine.PATIENCE_S", 0.02)
+    monkeypatch.setattr("tauscope.server.store.database.database.TIMEOUT_S", 0.02)
     Path("data").mkdir()
     path = Path("data/tauscope.db")
     with closing(sqlite3.connect(path, isolation_level=None)) as other:

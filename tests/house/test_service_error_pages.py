@@ -23,13 +23,13 @@ from server.http.problem_check import assert_problem
 from server.queue.controls import HandControls
 from server.queue.executors import ManualExecutor
 from shared_data import REPOSITORY
+from tauscope.server.auth.gate import RateLimit
 from tauscope.server.auth.keys import KeyFile
-from tauscope.server.auth.rate_limit import RateLimit
 from tauscope.server.auth.scopes import Scope
 from tauscope.server.http import Settings, create_app
 from tauscope.server.http.services import Services
 from tauscope.server.problems import KINDS
-from tauscope.server.queue.queued_job import MOST_ATTEMPTS
+from tauscope.server.queue.queue import MOST_ATTEMPTS
 
 RUNS, LEASES, IDENTIFICATIONS = (f"/api/v1/{name}" for name in ("runs", "leases", "identifications"))
 ARM = {"robot": "two-joint-arm", "backend": "sim"}

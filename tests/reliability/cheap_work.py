@@ -9,7 +9,7 @@ from tauscope.files import write_atomically
 from tauscope.server.queue.identification_workspace import IdentificationWorkspace
 from tauscope.server.queue.record import JobProblem
 from tauscope.server.queue.work import begin_step, do_work
-from tauscope.server.store.incoming import hash_file
+from tauscope.server.store.files import hash_file
 
 SCHEMA = "tauscope.identification/1"
 

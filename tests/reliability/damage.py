@@ -6,8 +6,8 @@ from pathlib import Path
 
 from reliability.ledger import Ledger
 from reliability.requests import Note
-from tauscope.server.store.incoming import hash_file
-from tauscope.server.store.layout import FOLDERS, RECORDINGS
+from tauscope.server.store.data_folder import FOLDERS, RECORDINGS
+from tauscope.server.store.files import hash_file
 
 
 def damage_something(data: Path, ledger: Ledger, note: Note, chance: random.Random) -> bool:

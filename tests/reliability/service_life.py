@@ -21,10 +21,11 @@ from reliability.judgement import Judge
 from reliability.ledger import Ledger
 from reliability.requests import Note, Requests
 from server.conftest import connected
-from tauscope.server.http import Settings, assembly, create_app
+from tauscope.server.http import Settings, create_app
+from tauscope.server.http import services as http_services
 from tauscope.server.http.services import Services
-from tauscope.server.queue.worker_pool import WorkerPool
-from tauscope.server.store.database import engine as database_engine
+from tauscope.server.queue.executors import WorkerPool
+from tauscope.server.store.database import database as database_engine
 from tauscope.server.store.database.database import FILE_NAME
 
 FULL, LOCKED, DAMAGED, WORKER = "disk full", "database locked", "file damaged", "worker killed"
@@ -98,8 +99,8 @@ class Life:
 
     def _application(self) -> FastAPI:
         """The service as it is, but for what takes time: cheap work, and no patience with a locked database."""
-        assembly.run_identification = partial(cheap_identification, fate=_meet_fate)
-        database_engine.PATIENCE_S = LOCK_PATIENCE_S
+        http_services.run_identification = partial(cheap_identification, fate=_meet_fate)
+        database_engine.TIMEOUT_S = LOCK_PATIENCE_S
         event.listen(database_engine.Engine, "begin", self._bound_pages)
         settings = Settings(data_folder=self._folder, fires_schedules=False, max_waiting=50)
         return create_app(settings, self._executor())

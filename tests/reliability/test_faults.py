@@ -8,7 +8,7 @@ import pytest
 from reliability.damage import damage_something
 from reliability.faulty_disk import FaultyDisk, full
 from reliability.ledger import Ledger
-from tauscope.server.store.layout import FOLDERS
+from tauscope.server.store.data_folder import FOLDERS
 
 
 def test_a_step_that_was_drawn_fails_and_those_before_it_do_not(tmp_path: Path) -> None:

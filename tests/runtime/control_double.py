@@ -20,7 +20,7 @@ from tauscope.runtime.backends import Connection
 from tauscope.runtime.control import control
 from tauscope.runtime.in_process import open_recorder
 from tauscope.runtime.recorder import Recorder, RecorderProcess
-from tauscope.runtime.stop_request import Stops
+from tauscope.runtime.states import Stops
 from tauscope_drivers import MonotonicClock
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from runtime.doubles import point_robot, short_motion
 from shared_data import REPOSITORY
 from tauscope.robot import read_robot
-from tauscope.runtime.order import BackendOrder, RunOrder
+from tauscope.runtime.options import BackendOrder, RunOrder
 from tauscope.runtime.record import RunRecord, read_record
 from tauscope.runtime.run_process import RunProcess
 from tauscope.trajectory import write_trajectory

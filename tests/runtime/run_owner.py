@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from tauscope.robot import read_robot
-from tauscope.runtime.order import RunOrder
+from tauscope.runtime.options import RunOrder
 from tauscope.runtime.run_process import RunProcess
 
 

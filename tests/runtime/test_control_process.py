@@ -240,7 +240,7 @@ def test_an_order_that_cannot_be_carried_out(tmp_path: Path) -> None:
 def _start_order(folder: Path, text: str) -> tuple[RunProcess, Events]:
     from runtime.control_runs import DOUBLE
     from runtime.doubles import point_robot
-    from tauscope.runtime.order import RunOrder
+    from tauscope.runtime.options import RunOrder
 
     events = Events()
     order = RunOrder.model_validate_json(text)

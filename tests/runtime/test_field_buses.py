@@ -16,7 +16,7 @@ from tauscope.runtime.backends import make_backend
 from tauscope.runtime.dynamixel_bus import dynamixel_joints
 from tauscope.runtime.field_bus import FrameRequest
 from tauscope.runtime.field_buses import bus_of, find_bus
-from tauscope.runtime.options import chosen_stop_policy, cycle_rate_hz
+from tauscope.runtime.options import choose_rate_hz, chosen_stop_policy
 from tauscope_drivers import Capabilities, ControlMode, DriveLimits, StopPolicy
 
 
@@ -141,5 +141,5 @@ def test_a_policy_is_held_against_the_mode() -> None:
     assert chosen_stop_policy(RunOptions(), joints, capabilities) is StopPolicy.HOLD
     torque = RunOptions(mode=ControlMode.TORQUE)
     assert "in mode torque; choose torque_off" in refusal(chosen_stop_policy, torque, joints, capabilities)
-    assert "the wire takes 4 ms" in refusal(cycle_rate_hz, RunOptions(rate_hz=500.0), capabilities)
-    assert cycle_rate_hz(RunOptions(), capabilities) == 200.0
+    assert "the wire takes 4 ms" in refusal(choose_rate_hz, RunOptions(rate_hz=500.0), capabilities)
+    assert choose_rate_hz(RunOptions(), capabilities) == 200.0

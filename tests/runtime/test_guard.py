@@ -7,9 +7,7 @@ import numpy as np
 import pytest
 
 from runtime.doubles import with_fault
-from tauscope.runtime.guard import Guard
-from tauscope.runtime.guard_limits import GuardLimits
-from tauscope.runtime.violation import Rule, Violation
+from tauscope.runtime.guard import Guard, GuardLimits, Rule, Violation
 from tauscope_drivers import ArmState, Setpoint
 
 T0 = 10**9

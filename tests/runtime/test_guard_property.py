@@ -6,9 +6,8 @@ from hypothesis import strategies as st
 
 from runtime.doubles import PointArm
 from runtime.test_guard import limits
-from tauscope.runtime.guard import Guard
+from tauscope.runtime.guard import Guard, GuardViolationError
 from tauscope.runtime.loop import GuardedArm
-from tauscope.runtime.violation import GuardViolationError
 from tauscope_drivers import ControlMode, Setpoint, StopPolicy
 
 PERIOD_S = 0.002
@@ -55,7 +54,7 @@ def test_nothing_outside_the_limits_is_sent(cycles: list[dict]) -> None:
             objected = True
             assert len(arm.sent) == sent, "a command that was refused was sent"
             continue
-        assert not objected, "a command was sent after an objection"
+        assert not objected, "a command was sent after an find_objection"
         when.append((due, arm.clock.now_ns()))
     _assert_within(arm, bounds, start_ns, when)
 

@@ -3,7 +3,7 @@
 import os
 import threading
 
-from tauscope.runtime.real_time import BESIDE, PRIORITY, real_time
+from tauscope.runtime.timing import BESIDE, PRIORITY, real_time
 
 
 def test_the_loop_is_above_the_other_threads_of_its_process_and_all_are_put_back() -> None:

@@ -14,9 +14,9 @@ from tauscope.recording.journal_process import wait_for_writer
 from tauscope.recording.journal_reading import read_journal
 from tauscope.runtime import recorder as module
 from tauscope.runtime.in_process import open_recorder
+from tauscope.runtime.processes import child_environment
 from tauscope.runtime.recorder import DirectRecorder, RecorderProcess
-from tauscope.runtime.spawning import child_environment
-from tauscope.runtime.stop_request import ManualStop, StopAskedError
+from tauscope.runtime.states import ManualStop, StopAskedError
 
 WRITER = f"exec {sys.executable} -m tauscope.recording.journal_process"
 
@@ -113,7 +113,7 @@ import os, signal
 from pathlib import Path
 from recording.test_journal import header, rows
 from tauscope.runtime.recorder import RecorderProcess
-from tauscope.runtime.stop_request import ManualStop
+from tauscope.runtime.states import ManualStop
 recorder = RecorderProcess(Path({str(path)!r}), header())
 recorder.wait_until_open(ManualStop())
 table = rows(983)

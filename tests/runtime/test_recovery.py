@@ -14,9 +14,8 @@ from runtime.doubles import PointArm, connection, point_robot, short_motion
 from tauscope.errors import AcquisitionError
 from tauscope.recording import read_recording
 from tauscope.runtime import RunOrder, RunRecord, RunState, read_record, recover_runs, run_trajectory, write_order
+from tauscope.runtime.processes import RunLock, child_environment
 from tauscope.runtime.record import ProcessName, write_process, write_record
-from tauscope.runtime.run_lock import RunLock
-from tauscope.runtime.spawning import child_environment
 from tauscope.runtime.states import may_follow
 
 GONE = ProcessName(pid=2**22 + 5, start=1)
@@ -88,7 +87,7 @@ def test_a_run_whose_owner_lives_is_left_to_its_owner(tmp_path: Path, ended: Pat
 HOLDER = """
 import sys, time
 from pathlib import Path
-from tauscope.runtime.run_lock import RunLock
+from tauscope.runtime.processes import RunLock
 lock = RunLock(Path(sys.argv[1]))
 print("held", flush=True)
 time.sleep(float(sys.argv[2]))

@@ -15,8 +15,7 @@ from tauscope.recording.journal_rows import Phase
 from tauscope.runtime.in_process import run_trajectory
 from tauscope.runtime.options import RunOptions
 from tauscope.runtime.record import RunRecord, read_record
-from tauscope.runtime.states import RunState
-from tauscope.runtime.stop_request import ManualStop, StopSource
+from tauscope.runtime.states import ManualStop, RunState, StopSource
 from tauscope_drivers import ArmState, ControlMode, DriverError, StopPolicy
 from tauscope_drivers.errors import DriverErrorKind
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import typer
 
 from tauscope.errors import TauscopeError
-from tauscope.server.auth.audit.log import AuditLog
+from tauscope.server.auth.audit_log import AuditLog
 from tauscope.server.http.settings import default_data_folder
 
 

@@ -13,7 +13,7 @@ from tauscope.robot import Robot, read_robot
 from tauscope.runtime import RunOptions
 from tauscope.runtime.field_bus import FoundDevice, FrameRequest
 from tauscope.runtime.field_buses import bus_of, find_bus
-from tauscope.runtime.guard_limits import guard_limits
+from tauscope.runtime.guard import guard_limits
 from tauscope.trajectory import read_trajectory
 
 SHOWN_CYCLES = 3

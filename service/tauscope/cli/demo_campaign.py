@@ -14,13 +14,12 @@ from tauscope.runtime import RunOptions
 from tauscope.server.control.campaign_order import CampaignOrder, HeldOutMotion
 from tauscope.server.control.campaign_workspace import CampaignWorkspace
 from tauscope.server.control.run_order import BackendChoice
-from tauscope.server.http.assembly import open_services
 from tauscope.server.http.campaigns.status import describe, result_of
-from tauscope.server.http.services import Services
+from tauscope.server.http.services import Services, open_services
 from tauscope.server.http.settings import Settings
 from tauscope.server.queue.diagnosis_order import DiagnosisOptions
 from tauscope.server.queue.excitation_order import ExcitationDesignOptions
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.record import JobState
 
 ROOT = "/api/v1"
 POLL_S = 0.2

@@ -11,15 +11,12 @@ from tauscope.cli.terminal import output, plain, table
 from tauscope.errors import StoreError, TauscopeError
 from tauscope.report.quantities import ABSENT
 from tauscope.report.table import Table
-from tauscope.server.http.assembly import open_services
-from tauscope.server.http.services import Services
+from tauscope.server.http.services import Services, open_services
 from tauscope.server.http.settings import Settings, default_data_folder
-from tauscope.server.schedules.entries import FiringEntry
-from tauscope.server.schedules.repository import ScheduleRepository
+from tauscope.server.schedules.repository import FiringEntry, ScheduleRepository
 from tauscope.server.schedules.scheduler import new_boot
-from tauscope.server.store.folder_lock import FolderLock
+from tauscope.server.store.data_folder import FolderLock, site_identifier
 from tauscope.server.store.items import utc_now
-from tauscope.server.store.site import site_identifier
 
 POLL_S = 0.5
 """How often the end is looked for [s]."""
@@ -105,7 +102,7 @@ def _fresh(services: Services, number: int) -> Callable[[], FiringEntry]:
 
     def look() -> FiringEntry:
         services.index.sync()
-        return services.schedules.book.firing(number)
+        return services.schedules.repository.firing(number)
 
     return look
 

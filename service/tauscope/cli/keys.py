@@ -6,7 +6,7 @@ from pathlib import Path
 
 import typer
 
-from tauscope.server.auth.audit.log import AuditLog
+from tauscope.server.auth.audit_log import AuditLog
 from tauscope.server.auth.keys import ApiKey, KeyFile, utc_now
 from tauscope.server.auth.scopes import parse_scope
 from tauscope.server.http.settings import default_data_folder

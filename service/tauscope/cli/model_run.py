@@ -8,9 +8,8 @@ from tauscope.cli.terminal import output, plain, table
 from tauscope.errors import StoreError
 from tauscope.report.quantities import ABSENT, counted, significant
 from tauscope.report.table import Table
-from tauscope.server.history.model_entries import ModelEntry
-from tauscope.server.history.model_history import ModelHistory
-from tauscope.server.history.parameter_trends import parameter_trends
+from tauscope.server.history.model_history import ModelEntry, ModelHistory
+from tauscope.server.history.trend import parameter_trends
 
 
 def list_models(robot: str, data: Path | None, database: str | None, limit: int) -> None:

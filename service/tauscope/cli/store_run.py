@@ -14,13 +14,11 @@ from tauscope.server.history.indexer import Indexer, open_index
 from tauscope.server.history.model_history import ModelHistory
 from tauscope.server.history.retention import RetentionRule, plan_removal, remove
 from tauscope.server.http.settings import default_data_folder
+from tauscope.server.store.data_folder import FOLDERS, RECORDINGS, FolderLock, item_stores, site_identifier
 from tauscope.server.store.database.database import FILE_NAME, Database
 from tauscope.server.store.database.index import Index
-from tauscope.server.store.folder_lock import FolderLock
 from tauscope.server.store.items import utc_now
-from tauscope.server.store.layout import FOLDERS, RECORDINGS, item_stores
 from tauscope.server.store.recordings import RecordingStore
-from tauscope.server.store.site import site_identifier
 
 _OWN_FILES = "its state, its order or its result"
 

@@ -252,7 +252,7 @@ def _crossing(motions: Dataset, structure: ModelStructure, parameters: Array, re
     frequency = np.linspace(0.0, motions.cutoff_hz or 0.0, SPECTRUM_POINTS + 1)[1:]
     measured, unexplained = np.zeros(SPECTRUM_POINTS), np.zeros(SPECTRUM_POINTS)
     for prepared in motions:
-        (predicted,) = prepared.predicted_torque(structure, parameters[None])
+        (predicted,) = prepared.predict_torque(structure, parameters[None])
         modelled = prepared.motion.band.reduce(predicted) / residual_std[:, None]
         torque = prepared.reduced_torque / residual_std[:, None]
         rate = prepared.motion.band.rate_hz

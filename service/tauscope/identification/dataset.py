@@ -86,7 +86,7 @@ class PreparedMotion:
             others.append(own @ terms)
         return np.stack(outward) + motion.band.reduce(np.stack(others))
 
-    def predicted_torque(self, structure: ModelStructure, candidates: Array) -> Array:
+    def predict_torque(self, structure: ModelStructure, candidates: Array) -> Array:
         """Model torque at the recorded rate, before any filter, of several parameter sets at once.
 
         Parameters

@@ -101,7 +101,7 @@ def evaluate(
     """
     sums = [_Sums(structure.robot.joint_count) for _ in candidates]
     for prepared in motions:
-        predicted = prepared.predicted_torque(structure, np.stack(candidates))
+        predicted = prepared.predict_torque(structure, np.stack(candidates))
         for torque, total in zip(predicted, sums, strict=True):
             total.add(prepared, torque)
     return tuple(total.statistics() for total in sums)

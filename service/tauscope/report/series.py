@@ -55,7 +55,7 @@ def torque_series(identification: Identification, recording: Recording) -> Torqu
         time=motion.time,
         velocity=motion.velocity,
         measured=np.where(motion.measured[0], motion.torque[0], np.nan),
-        predicted=longest.predicted_torque(identification.structure, identification.parameters[None])[0].T,
+        predicted=longest.predict_torque(identification.structure, identification.parameters[None])[0].T,
     )
 
 

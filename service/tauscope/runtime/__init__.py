@@ -5,20 +5,16 @@ start, what became of runs whose process is gone.
 """
 
 from tauscope.runtime.backends import BACKENDS, Connection, make_backend
-from tauscope.runtime.guard import Guard
-from tauscope.runtime.guard_limits import GuardLimits, guard_limits
+from tauscope.runtime.guard import Guard, GuardLimits, GuardViolationError, Rule, Violation, guard_limits
 from tauscope.runtime.in_process import run_trajectory
-from tauscope.runtime.options import RunOptions
-from tauscope.runtime.order import BackendOrder, RunOrder, read_order, write_order
+from tauscope.runtime.options import BackendOrder, RunOptions, RunOrder, read_order, write_order
 from tauscope.runtime.plan import Plan, make_plan
 from tauscope.runtime.progress import Report
 from tauscope.runtime.record import RecordingFiles, RunProblem, RunRecord, read_record
 from tauscope.runtime.recovery import recover_run, recover_runs
 from tauscope.runtime.run_process import RunProcess
-from tauscope.runtime.states import TRANSITIONS, RunState, after_stop, may_follow
-from tauscope.runtime.stop_request import ManualStop, StopRequest, StopSource
+from tauscope.runtime.states import TRANSITIONS, ManualStop, RunState, StopRequest, StopSource, after_stop, may_follow
 from tauscope.runtime.timing import Timing
-from tauscope.runtime.violation import GuardViolationError, Rule, Violation
 
 __all__ = [
     "BACKENDS",

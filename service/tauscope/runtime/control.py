@@ -16,12 +16,19 @@ from tauscope.errors import AcquisitionError, TauscopeError
 from tauscope.robot import read_robot
 from tauscope.runtime.backends import BACKENDS, BackendFactory, make_backend
 from tauscope.runtime.in_process import open_recorder
-from tauscope.runtime.order import RunOrder, read_order
+from tauscope.runtime.options import RunOrder, read_order
+from tauscope.runtime.processes import RunLock
 from tauscope.runtime.progress import end_event
-from tauscope.runtime.record import STOP_FILE, ProcessName, RunProblem, RunRecord, read_record
-from tauscope.runtime.record_keeper import FLUSH_S, RecordKeeper
+from tauscope.runtime.record import (
+    FLUSH_S,
+    STOP_FILE,
+    ProcessName,
+    RecordKeeper,
+    RunProblem,
+    RunRecord,
+    read_record,
+)
 from tauscope.runtime.run import Run
-from tauscope.runtime.run_lock import RunLock
 from tauscope.runtime.states import RunState
 from tauscope.runtime.stop_listener import StopListener
 from tauscope.runtime.task import OpenRecorder, RunTask, Surroundings

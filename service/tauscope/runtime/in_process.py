@@ -8,12 +8,12 @@ from tauscope.errors import AcquisitionError
 from tauscope.recording.journal_rows import JournalHeader
 from tauscope.robot import Robot
 from tauscope.runtime.backends import Connection
-from tauscope.runtime.options import RunOptions
+from tauscope.runtime.options import ORDER_FILE, RunOptions
 from tauscope.runtime.progress import Report
-from tauscope.runtime.record import ORDER_FILE, RUN_FILE, RunRecord, new_record, write_record
+from tauscope.runtime.record import RUN_FILE, RunRecord, new_record, write_record
 from tauscope.runtime.recorder import DirectRecorder, Recorder, RecorderProcess
 from tauscope.runtime.run import Run
-from tauscope.runtime.stop_request import ManualStop, Stops
+from tauscope.runtime.states import ManualStop, Stops
 from tauscope.runtime.task import RunTask, Surroundings
 from tauscope.trajectory import Trajectory
 

@@ -7,13 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauscope.recording.journal_rows import journal_row_type
-from tauscope.runtime.guard import Guard
+from tauscope.runtime.guard import Guard, GuardViolationError
 from tauscope.runtime.plan import Plan
 from tauscope.runtime.recorder import Recorder
-from tauscope.runtime.stop_request import Stops, raise_if_requested
+from tauscope.runtime.states import Stops, raise_if_requested
 from tauscope.runtime.timing import Metronome
 from tauscope.runtime.torque_control import TorqueControl
-from tauscope.runtime.violation import GuardViolationError
 from tauscope_drivers import ArmState, Backend, ControlMode, Setpoint
 
 Array = NDArray[np.float64]

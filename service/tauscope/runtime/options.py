@@ -1,14 +1,23 @@
-"""How a run is to be made, as a caller states it; everything has a default."""
+"""The order of a run as one JSON file: robot, trajectory, backend, and options, which all have defaults."""
 
 from collections.abc import Sequence
-from typing import Annotated, Any
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, FiniteFloat
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
 from tauscope.errors import AcquisitionError
+from tauscope.files import write_atomically
 from tauscope.robot import Joint
-from tauscope.runtime.stored import StoredModel
+from tauscope.robot.messages import one_line
 from tauscope_drivers import Capabilities, ControlMode, StopPolicy
+
+
+class StoredModel(BaseModel):
+    """Base of what runs keep as JSON: no type is converted, no key is overlooked."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
 
 DEFAULT_RATE_HZ = 500.0
 """Cycles a second where nothing is stated and the bus allows as many."""
@@ -53,7 +62,7 @@ class RunOptions(StoredModel, strict=False):
     )
 
 
-def cycle_rate_hz(options: RunOptions, capabilities: Capabilities) -> float:
+def choose_rate_hz(options: RunOptions, capabilities: Capabilities) -> float:
     """Cycles a second of a run.
 
     Raises
@@ -111,3 +120,55 @@ def _stated_policy(joints: Sequence[Joint]) -> StopPolicy:
         words = " and ".join(f"{policy} ({name})" for policy, name in stated.items())
         raise AcquisitionError(f"the robot file's drives ask for different stop policies, {words}; let them agree")
     return next(iter(stated), StopPolicy.HOLD)
+
+
+ORDER_FILE = "order.json"
+
+
+class BackendOrder(StoredModel):
+    """Which backend, and its own settings."""
+
+    name: str = Field(default="sim", description="sim, dynamixel or canopen")
+    settings: dict[str, Any] = Field(
+        default_factory=dict, description="the backend's own; for sim: time (virtual, real), scenario, start"
+    )
+
+
+class RunOrder(StoredModel):
+    """One run."""
+
+    form: Literal["tauscope.order/1"] = Field(default="tauscope.order/1", description="name and version of this form")
+    robot: str = Field(description="path of the robot file")
+    trajectory: str = Field(description="path of the trajectory file")
+    backend: BackendOrder = Field(default_factory=BackendOrder, description="what moves the arm")
+    options: RunOptions = Field(default_factory=RunOptions, description="how the run is to be made")
+
+
+def write_order(folder: Path, order: RunOrder) -> None:
+    """Write ``order.json``.
+
+    Raises
+    ------
+    OSError
+        the disk does not take it
+    """
+    write_atomically(folder / ORDER_FILE, order.model_dump_json(indent=1).encode())
+
+
+def read_order(folder: Path) -> RunOrder:
+    """Read ``order.json``.
+
+    Raises
+    ------
+    AcquisitionError
+        there is none, or it is not valid
+    """
+    path = folder / ORDER_FILE
+    try:
+        return RunOrder.model_validate_json(path.read_bytes())
+    except OSError as error:
+        raise AcquisitionError(f"{path}: cannot be read ({error.strerror or error})") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"]) or "document"
+        raise AcquisitionError(one_line(f"{path}: {place}: {first['msg']}; correct the order")) from None

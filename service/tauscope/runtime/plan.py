@@ -1,22 +1,78 @@
-"""What a run will play, worked out before the arm is under power: every target of every cycle, and the limits."""
+"""The plan of a run, made before the arm is under power: targets and model torque of every cycle, and limits."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tauscope.dynamics import friction_torque, inverse_dynamics, mass_matrix
 from tauscope.errors import AcquisitionError
 from tauscope.recording.journal_rows import Phase
 from tauscope.robot import Robot
-from tauscope.runtime.feed_forward import predicted_torque
-from tauscope.runtime.guard_limits import GuardLimits, guard_limits
-from tauscope.runtime.options import RunOptions, cycle_rate_hz
+from tauscope.runtime.guard import GuardLimits, guard_limits
+from tauscope.runtime.options import RunOptions, choose_rate_hz
 from tauscope.trajectory.limits import motion_limits
 from tauscope.trajectory.segments import MoveSegment
 from tauscope.trajectory.trajectory import Trajectory, ramp
 from tauscope_drivers import Capabilities, ControlMode
 
 Array = NDArray[np.float64]
+
+_MOST_POSTURES = 100_000
+
+
+def predict_torque(robot: Robot, position: Array, velocity: Array, acceleration: Array) -> Array | None:
+    """Joint torque of the model, τ = H(q) q̈ + h(q, q̇) + c(q) + τ_f(q̇); None where the robot file has no model.
+
+    Friction is left out where its coefficients or its shape are not stated.
+
+    Parameters
+    ----------
+    position, velocity, acceleration : (N, n) float64
+        the motion [rad or m, and per s, per s²]
+
+    Returns
+    -------
+    (N, n) float64 or None
+        [Nm or N]
+    """
+    parameters = _parameters(robot)
+    if parameters is None:
+        return None
+    torque = inverse_dynamics(robot, parameters, position, velocity, acceleration)
+    for j, coefficients in enumerate(robot.model.friction or ()):
+        shape = robot.joints[j].friction_shape
+        if shape.k_v is not None and shape.delta is not None:
+            torque[:, j] += friction_torque(coefficients, shape, np.ascontiguousarray(velocity[:, j]))
+    return torque
+
+
+def compute_inertia(robot: Robot, position: Array) -> tuple[Array, int] | None:
+    """Joint-space inertia H along a motion; None where the robot file has no model.
+
+    Parameters
+    ----------
+    position : (N, n) float64
+        the motion [rad or m]
+
+    Returns
+    -------
+    (K, n, n) float64 and int, or None
+        H at every s-th posture, and s: so many that memory stays small [kg m², kg m, kg]
+    """
+    parameters = _parameters(robot)
+    if parameters is None:
+        return None
+    stride = -(-len(position) // _MOST_POSTURES)
+    return mass_matrix(robot, parameters, position[::stride]), stride
+
+
+def _parameters(robot: Robot) -> Array | None:
+    """Θ of the model's links."""
+    if robot.model.links is None:
+        return None
+    return np.concatenate([link.to_vector() for link in robot.model.links])
+
 
 MOST_CYCLES = 4_000_000
 """A longer run must be a mistake: it is more than two hours at 500 cycles a second."""
@@ -88,7 +144,7 @@ def make_plan(
         the motion does not fit the arm or its limits, or the arm stands outside them
     """
     _require_fitting(robot, trajectory, start, capabilities)
-    rate_hz = cycle_rate_hz(options, capabilities)
+    rate_hz = choose_rate_hz(options, capabilities)
     if trajectory.duration_s * rate_hz > MOST_CYCLES:
         raise AcquisitionError(
             f"the motion lasts {trajectory.duration_s:.4g} s; at {rate_hz:g} cycles a second at most "
@@ -169,5 +225,5 @@ def _feed_forward(
 ) -> Array:
     """What the model predicts, cut to the torque limits: a model may be wrong, the arm must not pay for it."""
     wanted = options.mode is ControlMode.TORQUE or (options.feed_forward and capabilities.takes_feed_forward)
-    torque = predicted_torque(robot, *motion) if wanted else None
+    torque = predict_torque(robot, *motion) if wanted else None
     return np.zeros_like(motion[0]) if torque is None else np.clip(torque, -limits.torque, limits.torque)

@@ -66,7 +66,6 @@ class ProgressReporter:
     """Reports at most every `INTERVAL_S` of the machine's time, whatever clock the run keeps."""
 
     def __init__(self, report: Report) -> None:
-        """Report to someone."""
         self._report = report
         self._last = time.monotonic()
         self._last_cycle = 0

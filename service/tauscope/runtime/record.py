@@ -1,6 +1,7 @@
-"""What is known of a run: its state, how it came to it, and what it left behind. Kept as ``run.json``."""
+"""The record of a run, kept as ``run.json``: its state, its transitions, and the files that it left."""
 
 import os
+import threading
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Literal
@@ -9,15 +10,13 @@ from pydantic import AwareDatetime, Field, ValidationError
 
 from tauscope.errors import AcquisitionError
 from tauscope.files import write_atomically
-from tauscope.runtime.real_time import RealTime
-from tauscope.runtime.spawning import process_start
+from tauscope.runtime.guard import Violation
+from tauscope.runtime.options import StoredModel
+from tauscope.runtime.processes import read_process_start
 from tauscope.runtime.states import RunState, may_follow
-from tauscope.runtime.stored import StoredModel
-from tauscope.runtime.timing import Timing
-from tauscope.runtime.violation import Violation
+from tauscope.runtime.timing import RealTime, Timing
 
 RUN_FILE = "run.json"
-ORDER_FILE = "order.json"
 JOURNAL_FILE = "journal.mcap"
 STOP_FILE = "stop"
 LOG_FILE = "control.log"
@@ -34,12 +33,12 @@ class ProcessName(StoredModel):
     @staticmethod
     def of(pid: int) -> "ProcessName":
         """The name of a living process."""
-        return ProcessName(pid=pid, start=process_start(pid))
+        return ProcessName(pid=pid, start=read_process_start(pid))
 
     @property
     def is_alive(self) -> bool:
         """Whether it still runs, or is stopped and might."""
-        start = process_start(self.pid)
+        start = read_process_start(self.pid)
         return start is not None and self.start in (None, start)
 
 
@@ -179,3 +178,64 @@ def read_record(folder: Path) -> RunRecord:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"]) or "document"
         raise AcquisitionError(f"{path}: is not a run's record ({place}: {first['msg']})") from None
+
+
+FLUSH_S = 5.0
+"""Time that the disk may take for the last record."""
+
+
+class RecordKeeper:
+    """Writes the newest record; records that are overtaken while the disk is busy are left out."""
+
+    def __init__(self, folder: Path) -> None:
+        """Start the thread."""
+        self._folder = folder
+        self._newest: RunRecord | None = None
+        self._problem: str | None = None
+        self._is_closed = False
+        self._changed = threading.Condition()
+        # A daemon: a thread that the disk holds up must not hold up the end of the process.
+        self._thread = threading.Thread(target=self._work, name="run-record", daemon=True)
+        self._thread.start()
+
+    def keep(self, record: RunRecord) -> None:
+        """Have a record written; returns at once."""
+        with self._changed:
+            self._newest = record
+            self._changed.notify_all()
+
+    def close(self, patience_s: float = FLUSH_S) -> str | None:
+        """Wait for the last record to reach the disk.
+
+        Parameters
+        ----------
+        patience_s : float
+            how long [s]
+
+        Returns
+        -------
+        str or None
+            why it did not, None where it did
+        """
+        with self._changed:
+            self._is_closed = True
+            self._changed.notify_all()
+        self._thread.join(patience_s)
+        if self._thread.is_alive():
+            return (
+                f"{self._folder}: the run's record was not written within {patience_s:g} s: the disk does not take it"
+            )
+        return self._problem
+
+    def _work(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._newest is not None or self._is_closed)
+                record, self._newest = self._newest, None
+            if record is None:
+                return
+            try:
+                write_record(self._folder, record)
+                self._problem = None
+            except OSError as error:
+                self._problem = f"{self._folder}: the run's record cannot be written ({error.strerror or error})"

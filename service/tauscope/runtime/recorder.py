@@ -9,18 +9,23 @@ import sys
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tauscope.errors import AcquisitionError
+from tauscope.errors import AcquisitionError, RecordingError
+from tauscope.recording import write_recording
 from tauscope.recording.journal import JournalWriter
 from tauscope.recording.journal_process import FRAME, HEADER, ROW, event_frame, frame
+from tauscope.recording.journal_reading import journal_recording, read_journal
 from tauscope.recording.journal_rows import JournalHeader, journal_row_type
-from tauscope.runtime.spawning import child_environment
-from tauscope.runtime.stop_request import Stops, raise_if_requested
+from tauscope.robot.messages import one_line
+from tauscope.runtime.processes import child_environment
+from tauscope.runtime.record import JOURNAL_FILE, RECORDING_STEM, RecordingFiles
+from tauscope.runtime.states import Stops, raise_if_requested
 
 PIPE_BYTES = 2**20
 """Room between loop and writer: some seconds of cycles."""
@@ -236,3 +241,34 @@ def _last_answer(said: bytes) -> dict[str, Any]:
 
 def _cannot_open(path: Path, reason: str | None) -> AcquisitionError:
     return AcquisitionError(f"{path}: the journal cannot be created ({reason or 'unknown reason'}); nothing has moved")
+
+
+UNKNOWN_LOSS = -1
+"""Number of lost rows where the process that counted them is gone."""
+
+
+def save_recording(folder: Path, *, is_whole: bool, lost_rows: int) -> RecordingFiles:
+    """Write what a journal holds of the motion as CSV, and as Parquet where pyarrow is installed."""
+    remarks: list[str] = []
+    files: list[str] = []
+    samples = 0
+    try:
+        journal = read_journal(folder / JOURNAL_FILE)
+        if journal.damage is not None:
+            remarks.append(f"{JOURNAL_FILE}: {journal.damage}; {len(journal.rows)} cycles came back")
+        recording = journal_recording(journal, str(folder / JOURNAL_FILE))
+        samples = len(recording)
+        for suffix in (".csv", ".parquet") if find_spec("pyarrow") else (".csv",):
+            name = RECORDING_STEM + suffix
+            write_recording(recording, folder / name, overwrite=True)
+            files.append(name)
+    except RecordingError as error:
+        remarks.append(str(error))
+    except (OSError, MemoryError) as error:
+        remarks.append(one_line(f"the recording's files cannot be made ({str(error) or 'out of memory'})"))
+    if lost_rows > 0:
+        remarks.append(f"{lost_rows} cycles were lost because the journal's disk was behind")
+    partial = not is_whole or lost_rows != 0 or bool(remarks)
+    return RecordingFiles(
+        samples=samples, partial=partial, lost_rows=lost_rows, files=tuple(files), remarks=tuple(remarks)
+    )

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from tauscope.errors import AcquisitionError
 from tauscope.recording.journal_process import wait_for_writer
+from tauscope.runtime.processes import wait_for_lock
 from tauscope.runtime.record import (
     JOURNAL_FILE,
     LOG_FILE,
@@ -18,8 +19,7 @@ from tauscope.runtime.record import (
     read_record,
     write_record,
 )
-from tauscope.runtime.recording_files import UNKNOWN_LOSS, save_recording
-from tauscope.runtime.run_lock import wait_until_free
+from tauscope.runtime.recorder import UNKNOWN_LOSS, save_recording
 from tauscope.runtime.states import RunState
 
 INTERRUPTED = "interrupted"
@@ -90,7 +90,7 @@ def recover_run(
     for control in (record.control, read_process(folder)):
         if control is not None:
             _see_to_its_end(control, patience_s)
-    lock = wait_until_free(folder, patience_s)
+    lock = wait_for_lock(folder, patience_s)
     if lock is None:
         raise AcquisitionError(f"{folder}: its control process does not end; restart the machine and look at the arm")
     try:

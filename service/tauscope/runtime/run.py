@@ -8,22 +8,17 @@ from typing import Any
 from tauscope.errors import AcquisitionError, TauscopeError
 from tauscope.recording.journal_rows import Phase
 from tauscope.robot.messages import one_line
-from tauscope.runtime.guard import Guard
+from tauscope.runtime.guard import Guard, GuardViolationError
 from tauscope.runtime.loop import Cycles, GuardedArm
 from tauscope.runtime.options import chosen_stop_policy
 from tauscope.runtime.plan import Plan
-from tauscope.runtime.preparation import journal_header, prepare
 from tauscope.runtime.progress import ProgressReporter, end_event, state_event
-from tauscope.runtime.real_time import SIMULATED_TIME, real_time
 from tauscope.runtime.record import JOURNAL_FILE, RunProblem, RunRecord, Transition
-from tauscope.runtime.recorder import Recorder
-from tauscope.runtime.recording_files import save_recording
-from tauscope.runtime.states import RunState
-from tauscope.runtime.stop_request import StopAskedError, raise_if_requested
-from tauscope.runtime.task import RunTask, Surroundings
-from tauscope.runtime.timing import Metronome
+from tauscope.runtime.recorder import Recorder, save_recording
+from tauscope.runtime.states import RunState, StopAskedError, raise_if_requested
+from tauscope.runtime.task import RunTask, Surroundings, journal_header, prepare
+from tauscope.runtime.timing import SIMULATED_TIME, Metronome, real_time
 from tauscope.runtime.torque_control import torque_control
-from tauscope.runtime.violation import GuardViolationError
 from tauscope_drivers import Backend, ControlMode, DriverError
 
 INTERNAL = "internal"

@@ -16,11 +16,11 @@ from typing import Any
 from tauscope.errors import AcquisitionError
 from tauscope.robot import Robot
 from tauscope.runtime.in_process import prepare_folder
-from tauscope.runtime.order import RunOrder, write_order
+from tauscope.runtime.options import RunOrder, write_order
+from tauscope.runtime.processes import child_environment
 from tauscope.runtime.progress import Report
 from tauscope.runtime.record import LOG_FILE, STOP_FILE, RunRecord, new_record, read_record, write_process, write_record
 from tauscope.runtime.recovery import recover_run
-from tauscope.runtime.spawning import child_environment
 from tauscope.runtime.stop_listener import BEAT, STOP
 
 BEATS_A_HEARTBEAT = 5

@@ -1,7 +1,9 @@
-"""The states of a run, and the ways from one to another."""
+"""The states of a run, the transitions between them, and the requests that stop it."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from enum import StrEnum
+from typing import Protocol
 
 
 class RunState(StrEnum):
@@ -50,3 +52,90 @@ def may_follow(before: RunState, after: RunState) -> bool:
 def after_stop(state: RunState) -> RunState:
     """Where a request to stop leads: legal in every state, and without effect on a run that stops or has ended."""
     return state if state is RunState.STOPPING or state.is_end else RunState.STOPPING
+
+
+class StopSource(StrEnum):
+    """Who wants the run to stop."""
+
+    OPERATOR = "operator"
+    """a byte on the pipe, the stop file, or a signal"""
+    OWNER_GONE = "owner-gone"
+    """the process that started the run has died, or is silent while the arm runs in real time"""
+
+
+@dataclass(frozen=True)
+class StopRequest:
+    """One request."""
+
+    source: StopSource
+    detail: str
+
+    @property
+    def end(self) -> RunState:
+        """The state in which the run ends for it."""
+        return RunState.STOPPED if self.source is StopSource.OPERATOR else RunState.INTERRUPTED
+
+
+class StopAskedError(Exception):
+    """Breaks a run out of whatever it is doing because it was asked to stop."""
+
+    def __init__(self, request: StopRequest) -> None:
+        super().__init__(request.detail)
+        self.request = request
+
+
+class Stops(Protocol):
+    """Where a run looks for requests to stop."""
+
+    @property
+    def requested(self) -> StopRequest | None:
+        """The first request, None where there is none."""
+        ...
+
+    def enter_real_time(self) -> None:
+        """The arm moves by the wall clock: apply the limits of real time from here on."""
+        ...
+
+    def acknowledge(self) -> None:
+        """The run has begun to stop."""
+        ...
+
+    def done(self) -> None:
+        """The arm is stopped, or nothing more can be done for it: nobody breaks into the run any more."""
+        ...
+
+
+class ManualStop:
+    """A request by a call, from any thread."""
+
+    def __init__(self) -> None:
+        self.requested: StopRequest | None = None
+        self.acknowledged = False
+
+    def request(self, detail: str = "asked to stop", source: StopSource = StopSource.OPERATOR) -> None:
+        """Ask; the first request counts."""
+        if self.requested is None:
+            self.requested = StopRequest(source, detail)
+
+    def enter_real_time(self) -> None:
+        """A caller in this process has no limits."""
+
+    def acknowledge(self) -> None:
+        """The run has begun to stop."""
+        self.acknowledged = True
+
+    def done(self) -> None:
+        """The arm is stopped."""
+
+
+def raise_if_requested(stops: Stops) -> None:
+    """Break out of a run that was asked to stop.
+
+    Raises
+    ------
+    StopAskedError
+        there is one
+    """
+    if stops.requested is not None:
+        stops.acknowledge()
+        raise StopAskedError(stops.requested)

@@ -16,7 +16,7 @@ import time
 from pathlib import Path
 from types import FrameType
 
-from tauscope.runtime.stop_request import StopAskedError, StopRequest, StopSource
+from tauscope.runtime.states import StopAskedError, StopRequest, StopSource
 
 BEAT, STOP = b".", b"s"
 """What an owner writes to its run's pipe: it is alive; the run has to stop."""

@@ -5,8 +5,7 @@ from numpy.typing import NDArray
 
 from tauscope.errors import AcquisitionError
 from tauscope.robot import Robot
-from tauscope.runtime.feed_forward import inertia_along
-from tauscope.runtime.plan import Plan
+from tauscope.runtime.plan import Plan, compute_inertia
 from tauscope_drivers import ArmState
 
 Array = NDArray[np.float64]
@@ -79,7 +78,7 @@ def torque_control(robot: Robot, plan: Plan, bandwidth_rad_s: float) -> TorqueCo
     AcquisitionError
         the robot file has no model to take the gains from, or the rate is too low
     """
-    found = inertia_along(robot, plan.position)
+    found = compute_inertia(robot, plan.position)
     if found is None:
         raise AcquisitionError(
             f"{robot.name}: torque mode takes its gains from the robot file's model, which is missing; "

@@ -129,7 +129,7 @@ def problem_answer(problem: Problem, headers: Mapping[str, str] | None = None) -
     return Response(content, problem.status, dict(headers or {}), media_type=MEDIA_TYPE)
 
 
-def answer_code(request: Request, code: str, detail: str) -> Response:
+def make_code_answer(request: Request, code: str, detail: str) -> Response:
     """The answer to a request that ends in a problem."""
     return problem_answer(make_problem(code, detail, request.url.path))
 
@@ -147,10 +147,10 @@ def field_errors(details: Sequence[Any], *, within: str = "") -> list[FieldError
 def invalid_request(error: ValidationError, *, within: str) -> ProblemError:
     """The problem of data that do not fit their model."""
     fields = field_errors(error.errors(include_url=False, include_context=False, include_input=False), within=within)
-    return ProblemError("invalid-request", summarised(fields), errors=fields)
+    return ProblemError("invalid-request", summarise(fields), errors=fields)
 
 
-def summarised(fields: Sequence[FieldError]) -> str:
+def summarise(fields: Sequence[FieldError]) -> str:
     """One line on the fields in question."""
     more = f" (the first of {len(fields)} errors)" if len(fields) > 1 else ""
     return f"{fields[0].field}: {fields[0].message}{more}"

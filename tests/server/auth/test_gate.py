@@ -14,9 +14,8 @@ from server.http.motions import ROBOT, move_document
 from server.http.problem_check import assert_problem
 from server.queue.controls import HandControls
 from server.queue.executors import InlineExecutor
-from tauscope.server.auth.key_ring import LOOK_S
-from tauscope.server.auth.keys import KeyFile
-from tauscope.server.auth.rate_limit import RateLimit
+from tauscope.server.auth.gate import RateLimit
+from tauscope.server.auth.keys import CHECK_S, KeyFile
 from tauscope.server.auth.scopes import Scope
 from tauscope.server.http import Settings, create_app
 from tauscope.server.http.services import Services
@@ -146,7 +145,7 @@ def test_a_revoked_key_is_refused_while_the_service_runs(
     services: Services = app.state.services
     services.access.ring.look()
     assert_problem(client.get(RUNS), "unauthorized", 401)
-    assert LOOK_S <= 1.0
+    assert CHECK_S <= 1.0
 
 
 def test_a_key_may_not_call_without_end_but_may_always_stop(

@@ -10,9 +10,8 @@ from pathlib import Path
 import pytest
 
 from tauscope.errors import TauscopeError
-from tauscope.server.auth.key_ring import LOCAL, Caller, KeyRing
-from tauscope.server.auth.keys import KEY_FILE, KeyFile, matching_key
-from tauscope.server.auth.rate_limit import MOST_CALLERS, RateLimit
+from tauscope.server.auth.gate import MOST_CALLERS, RateLimit
+from tauscope.server.auth.keys import KEY_FILE, LOCAL, Caller, KeyFile, KeyRing, match_key
 from tauscope.server.auth.scopes import Scope
 
 NOW = datetime(2026, 11, 22, tzinfo=UTC)
@@ -40,11 +39,11 @@ def test_a_key_is_found_by_its_whole_text_only(tmp_path: Path) -> None:
     key, text = file.add("ann", Scope.READ, NOW, None)
     other, _ = file.add("bob", Scope.READ, NOW, None)
     keys = file.read()
-    assert matching_key(keys, text) == key
+    assert match_key(keys, text) == key
     wrong = ["", "_", "__", text[:-1], text + "x", text.upper(), text.replace("tsk_", "tsx_"), f"tsk_{key.id}_",
              key.hash, text.replace(key.id, other.id), f"tsk_{key.id}_{key.hash}", "\ud800", "é" * 50]  # fmt: skip
-    assert [matching_key(keys, each) for each in wrong] == [None] * len(wrong)
-    assert matching_key((), text) is None
+    assert [match_key(keys, each) for each in wrong] == [None] * len(wrong)
+    assert match_key((), text) is None
 
 
 @pytest.mark.parametrize("name", ["", "  ", "a\nb", "x" * 101, "ann"])

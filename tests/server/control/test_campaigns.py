@@ -26,10 +26,8 @@ from tauscope.server.queue.diagnosis_workspace import DiagnosisWorkspace
 from tauscope.server.queue.excitation_order import ExcitationDesignOptions
 from tauscope.server.queue.excitation_workspace import ExcitationWorkspace
 from tauscope.server.queue.identification_workspace import IdentificationWorkspace
-from tauscope.server.queue.queue import JobQueue
-from tauscope.server.queue.queued_job import JobKind
-from tauscope.server.queue.record import JobProblem, JobRecord
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.queue import JobKind, JobQueue
+from tauscope.server.queue.record import JobProblem, JobRecord, JobState
 from tauscope.server.queue.workspace import Workspace
 from tauscope.server.store.items import ItemStore
 from tauscope.server.store.recordings import RecordingStore
@@ -71,25 +69,25 @@ class Bench:
         self.claims = DeviceClaims(4)
         items = ItemStore(folder / "runs", "run")
         self.runs = RunManager(items, self.recordings, start, self.claims, lambda: True)
-        shop = CampaignDependencies(
+        dependencies = CampaignDependencies(
             self.jobs, self.excitations, self.identifications, self.diagnoses, self.runs, self.recordings
         )
-        self.desk = CampaignManager(ItemStore(folder / "campaigns", "campaign"), shop)
+        self.manager = CampaignManager(ItemStore(folder / "campaigns", "campaign"), dependencies)
 
     def submit(self, **changes: object) -> str:
-        staged = self.desk.items.stage()
+        staged = self.manager.items.stage()
         workspace = CampaignWorkspace(staged)
         workspace.prepare()
         (workspace.robot / "arm.yaml").write_text("name: arm\n", encoding="utf-8")
         order = CampaignOrder(robot_file="arm.yaml", robot_name="arm", backend=BackendChoice(name="sim"))
         workspace.write_order(order.model_copy(update=changes))
         try:
-            return self.desk.submit(staged)
+            return self.manager.submit(staged)
         finally:
-            self.desk.items.discard(staged)
+            self.manager.items.discard(staged)
 
     def workspace(self, campaign: str) -> CampaignWorkspace:
-        return CampaignWorkspace(self.desk.items.folder(campaign))
+        return CampaignWorkspace(self.manager.items.folder(campaign))
 
     def record(self, campaign: str) -> JobRecord:
         record = self.workspace(campaign).read_record()
@@ -97,7 +95,7 @@ class Bench:
         return record
 
     def ended(self, campaign: str) -> JobRecord:
-        wait_until(lambda: self.desk._led.find(campaign) is None)
+        wait_until(lambda: self.manager._threads.find(campaign) is None)
         return self.record(campaign)
 
     def steps(self, campaign: str) -> list[str]:
@@ -146,7 +144,7 @@ def test_a_campaign_from_its_beginning_to_its_end(tmp_path: Path) -> None:
 
 
 def test_a_full_disk_delays_a_campaigns_end_and_not_the_arm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(campaign_runner, "ROOM_POLL_S", 0.01)
+    monkeypatch.setattr(campaign_runner, "RETRY_S", 0.01)
     is_full, was_refused = threading.Event(), threading.Event()
     is_full.set()
     write = CampaignWorkspace.write_record
@@ -258,14 +256,14 @@ def test_stop_while_the_motion_is_designed(tmp_path: Path) -> None:
     bench = Bench(tmp_path, executor=executor)
     campaign = bench.submit()
     wait_until(lambda: bench.workspace(campaign).read_made().held_out_excitation is not None)
-    assert bench.desk.stop(campaign)
+    assert bench.manager.stop(campaign)
     assert bench.ended(campaign).state is JobState.CANCELLED
     made = bench.workspace(campaign).read_made()
     for identifier in (made.excitation, made.held_out_excitation):
         record = Workspace(bench.excitations.items.folder(identifier or "")).read_record()
         assert record is not None
         assert record.state is JobState.CANCELLED
-    assert not bench.desk.stop(campaign)
+    assert not bench.manager.stop(campaign)
 
 
 def test_stop_while_the_arm_moves_stops_the_arm_at_once(tmp_path: Path) -> None:
@@ -278,10 +276,10 @@ def test_stop_while_the_arm_moves_stops_the_arm_at_once(tmp_path: Path) -> None:
     done = threading.Event()
 
     def stop() -> None:
-        bench.desk.stop(campaign)
+        bench.manager.stop(campaign)
         done.set()
 
-    with bench.jobs._lock, bench.desk._lock, bench.desk._led._lock, bench.runs._lock, bench.claims._lock:
+    with bench.jobs._lock, bench.manager._lock, bench.manager._threads._lock, bench.runs._lock, bench.claims._lock:
         threading.Thread(target=stop).start()
         assert done.wait(20.0)
         assert control.stops == 1
@@ -300,8 +298,8 @@ def test_what_was_measured_before_a_restart_is_analysed_after_it(is_closed: bool
             executor.run()
     wait_until(lambda: earlier.workspace(campaign).read_made().identification is not None)
     if is_closed:
-        earlier.desk.stop_all()
-        earlier.desk.close()
+        earlier.manager.begin_close()
+        earlier.manager.close()
         earlier.jobs.close()
     assert earlier.record(campaign).state is JobState.RUNNING
     first = earlier.workspace(campaign).read_made().identification
@@ -309,7 +307,7 @@ def test_what_was_measured_before_a_restart_is_analysed_after_it(is_closed: bool
     assert later.ended(campaign).state is JobState.SUCCEEDED
     assert later.workspace(campaign).read_made().identification == first  # the same job, gone on with: not a second one
     assert controls.started == []
-    earlier.desk.close()
+    earlier.manager.close()
 
 
 @pytest.mark.parametrize("is_closed", [True, False])
@@ -319,7 +317,7 @@ def test_what_was_not_measured_before_a_restart_never_moves_by_itself(is_closed:
     campaign = earlier.submit()
     wait_until(lambda: earlier.workspace(campaign).read_made().held_out_excitation is not None)
     if is_closed:
-        earlier.desk.close()
+        earlier.manager.close()
     shutil.copytree(tmp_path / "earlier", tmp_path / "later")  # a service that is dead does not go on with its own
     later = Bench(tmp_path / "later", controls)
     assert later.ended(campaign).state is JobState.INTERRUPTED
@@ -327,18 +325,18 @@ def test_what_was_not_measured_before_a_restart_never_moves_by_itself(is_closed:
     events = later.workspace(campaign).events.last()
     assert events is not None
     assert events["kind"] == "ended"
-    earlier.desk.close()
+    earlier.manager.close()
 
 
 def test_removing(tmp_path: Path) -> None:
     executor = ManualExecutor()
     bench = Bench(tmp_path, executor=executor)
     campaign = bench.submit()
-    assert not bench.desk.remove(campaign)
-    bench.desk.stop(campaign)
+    assert not bench.manager.remove(campaign)
+    bench.manager.stop(campaign)
     bench.ended(campaign)
-    assert bench.desk.remove(campaign)
-    assert bench.desk.items.identifiers() == []
+    assert bench.manager.remove(campaign)
+    assert bench.manager.items.identifiers() == []
 
 
 def test_a_damaged_record_of_what_was_made_is_nothing(tmp_path: Path) -> None:

@@ -6,9 +6,7 @@ from pathlib import Path
 import pytest
 
 from tauscope.server.control.device_claims import BusyError, DeviceClaims
-from tauscope.server.control.lease import Lease
-from tauscope.server.control.lease_errors import LeasedError, LeaseLostError, LeaseNeededError, NotArmedError
-from tauscope.server.control.leases import Leases
+from tauscope.server.control.leases import Lease, LeasedError, LeaseLostError, LeaseNeededError, Leases, NotArmedError
 
 ARM, OTHER = "arm on sim", "other on sim"
 
@@ -60,7 +58,7 @@ def test_it_lasts_as_long_as_there_are_signs_of_life_and_no_longer(
         clock.now += 9.999
         assert leases.renew(ARM, lease.token, "a") is lease
     clock.now += 10.0
-    assert leases.end_of(lease) == "no sign of life for 10 s"
+    assert leases.find_end_reason(lease) == "no sign of life for 10 s"
     assert ended == [(lease.number, "no sign of life for 10 s")]
     with pytest.raises(LeaseLostError, match="nobody has it"):
         leases.renew(ARM, lease.token, "a")
@@ -110,9 +108,9 @@ def test_an_arm_is_taken_by_whoever_may(leases: Leases, ended: list[tuple[int, s
     lease = leases.acquire(ARM, "Ann", "a", 10.0)
     leases.arm(ARM, lease.token, "a", armed=True)
     permit = leases.permit(ARM, lease.token, "a", is_needed=True)
-    assert permit.end() is None
+    assert permit.find_end_reason() is None
     taken = leases.acquire(ARM, "Eve", "e", 10.0, take=True)
-    assert permit.end() == "lease 1 of Ann ended: Eve took the arm"
+    assert permit.find_end_reason() == "lease 1 of Ann ended: Eve took the arm"
     assert ended == [(1, "Eve took the arm")]
     assert not taken.is_armed
 
@@ -140,15 +138,15 @@ def test_motion_by_a_lease_wants_it_armed_and_ends_with_it(leases: Leases, clock
         leases.permit(ARM, lease.token, "a", is_needed=False)
     leases.arm(ARM, lease.token, "a", armed=True)
     permit = leases.permit(ARM, lease.token, "a", is_needed=True)
-    assert permit.end() is None
-    permit.stopped()
-    assert permit.end() == "lease 1 of Ann was disarmed"
+    assert permit.find_end_reason() is None
+    permit.disarm()
+    assert permit.find_end_reason() == "lease 1 of Ann was disarmed"
     with pytest.raises(NotArmedError):
         permit.require()
     leases.arm(ARM, lease.token, "a", armed=True)
     permit.require()
     clock.now += 10.0
-    assert permit.end() == "lease 1 of Ann ended: no sign of life for 10 s"
+    assert permit.find_end_reason() == "lease 1 of Ann ended: no sign of life for 10 s"
     with pytest.raises(LeaseLostError):
         permit.require()
 
@@ -160,7 +158,7 @@ def test_a_stop_of_everything_disarms_everything(leases: Leases) -> None:
         leases.arm(device, lease.token, "a", armed=True)
         permits.append(leases.permit(device, lease.token, "a", is_needed=True))
     leases.disarm_all()
-    assert all(permit.end() is not None for permit in permits)
+    assert all(permit.find_end_reason() is not None for permit in permits)
     assert len(leases.active()) == 2
 
 

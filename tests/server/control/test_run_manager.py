@@ -20,7 +20,7 @@ from tauscope.server.store.recordings import RecordingStore
 
 
 class Bench:
-    """A desk whose control processes the test moves."""
+    """A manager whose control processes the test moves."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -28,14 +28,14 @@ class Bench:
         self.claims = DeviceClaims(2)
         self.alive = True
         self.recordings = RecordingStore(folder / "recordings")
-        self.desk = self.open()
+        self.manager = self.open()
 
     def open(self) -> RunManager:
         items = ItemStore(self.folder / "runs", "run")
         return RunManager(items, self.recordings, self.controls, self.claims, lambda: self.alive)
 
     def submit(self, motion: Motion = ready_motion, device: str = "arm on sim", holder: str | None = None) -> str:
-        staged = self.desk.items.stage()
+        staged = self.manager.items.stage()
         workspace = RunWorkspace(staged)
         workspace.prepare()
         (workspace.trajectories / "trajectory.json").touch()
@@ -44,12 +44,12 @@ class Bench:
             RunRequestRecord(robot_file="arm.yaml", robot_name="arm", backend=backend, device=device)
         )
         try:
-            return self.desk.submit(staged, motion, holder)
+            return self.manager.submit(staged, motion, holder)
         finally:
-            self.desk.items.discard(staged)
+            self.manager.items.discard(staged)
 
     def workspace(self, run: str) -> RunWorkspace:
-        return RunWorkspace(self.desk.items.folder(run))
+        return RunWorkspace(self.manager.items.folder(run))
 
     def state(self, run: str) -> RunState:
         record = self.workspace(run).read_run()
@@ -57,7 +57,7 @@ class Bench:
         return record.state
 
     def ended(self, run: str) -> RunState:
-        wait_until(lambda: self.desk.live(run) is None)
+        wait_until(lambda: self.manager.live(run) is None)
         return self.state(run)
 
     def told(self, run: str) -> list[str | float | None]:
@@ -76,7 +76,7 @@ def test_a_run_from_its_beginning_to_its_end(bench: Bench) -> None:
     control = bench.controls.next()
     control.go(RunState.RUNNING)
     control.progress(40.0)
-    live = bench.desk.live(run)
+    live = bench.manager.live(run)
     assert live is not None
     assert (live.state, live.percent, live.figures["missed_periods"]) == (RunState.RUNNING, 40.0, 3)
     control.finish()
@@ -94,7 +94,7 @@ def test_an_arm_has_one_run_at_a_time_and_others_have_theirs(bench: Bench) -> No
     other = bench.submit(device="other arm")
     with pytest.raises(BusyError, match="2 arms move already"):
         bench.submit(device="third arm")
-    assert sorted(bench.desk.items.identifiers()) == sorted([first, other])
+    assert sorted(bench.manager.items.identifiers()) == sorted([first, other])
     for number in (1, 2):
         bench.controls.next(number).finish()
     bench.ended(first)
@@ -124,15 +124,15 @@ def test_stop_reaches_the_control_process_in_every_state(state: RunState, bench:
     control = bench.controls.next()
     control.go(state)
     for _ in range(3):
-        live = bench.desk.stop(run)
+        live = bench.manager.stop(run)
         assert live is not None
         assert live.state is state
     assert control.stops == 3
     control.go(RunState.STOPPING)
-    assert bench.desk.stop(run) is not None
+    assert bench.manager.stop(run) is not None
     control.finish(RunState.STOPPED)
     assert bench.ended(run) is RunState.STOPPED
-    assert bench.desk.stop(run) is None
+    assert bench.manager.stop(run) is None
 
 
 def wait_for_stop(_: RunWorkspace, stop: threading.Event) -> bool:
@@ -144,7 +144,7 @@ def wait_for_stop(_: RunWorkspace, stop: threading.Event) -> bool:
 def test_stop_before_there_is_a_motion(bench: Bench) -> None:
     run = bench.submit(wait_for_stop)
     assert bench.state(run) is RunState.CREATED
-    bench.desk.stop(run)
+    bench.manager.stop(run)
     assert bench.ended(run) is RunState.STOPPED
     assert bench.controls.started == []
     assert bench.told(run) == ["stopped"]
@@ -159,10 +159,10 @@ def test_stop_while_the_control_process_is_being_started(bench: Bench) -> None:
         assert go_on.wait(20.0)
         return start(workspace, report)  # type: ignore[arg-type]
 
-    bench.desk._start = slowly  # type: ignore[assignment]
+    bench.manager._start = slowly  # type: ignore[assignment]
     run = bench.submit()
     assert starting.wait(20.0)
-    bench.desk.stop(run)
+    bench.manager.stop(run)
     go_on.set()
     control = bench.controls.next()
     assert control.when_stopped()
@@ -176,10 +176,10 @@ def test_stop_needs_no_lock_of_the_desk_nor_of_the_claims(bench: Bench) -> None:
     done = threading.Event()
 
     def stop() -> None:
-        bench.desk.stop(run)
+        bench.manager.stop(run)
         done.set()
 
-    with bench.desk._lock, bench.desk._led._lock, bench.claims._lock:
+    with bench.manager._lock, bench.manager._threads._lock, bench.claims._lock:
         threading.Thread(target=stop).start()
         assert done.wait(20.0)
         assert control.stops == 1
@@ -209,7 +209,7 @@ def test_what_keeps_a_run_from_beginning(place: str, failure: Exception, code: s
     assert problem.code == code
     assert detail in problem.detail
     following = bench.submit(wait_for_stop)  # the arm is free again
-    bench.desk.stop(following)
+    bench.manager.stop(following)
     bench.ended(following)
 
 
@@ -261,17 +261,17 @@ def test_a_recording_that_a_full_disk_did_not_take_is_kept_afterwards(
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patched:
-        patched.setattr("tauscope.server.store.recording_hashes.write_atomically", full)
+        patched.setattr("tauscope.server.store.recordings.write_atomically", full)
         run = bench.submit()
         bench.controls.next().finish()
         assert bench.ended(run) is RunState.FINISHED
         assert not bench.recordings.holds(run_recording_name(run))
         with pytest.raises(OSError, match="No space"):
-            bench.desk.settle()
+            bench.manager.settle()
     if then == "restart":
         bench.open()
     else:
-        bench.desk.settle()
+        bench.manager.settle()
     assert bench.recordings.path(run_recording_name(run)).read_text(encoding="utf-8") == CSV
     assert bench.told(run)[-1] == "finished"
 
@@ -279,13 +279,13 @@ def test_a_recording_that_a_full_disk_did_not_take_is_kept_afterwards(
 def test_removing(bench: Bench) -> None:
     run = bench.submit()
     control = bench.controls.next()
-    assert not bench.desk.remove(run)
+    assert not bench.manager.remove(run)
     control.finish()
     bench.ended(run)
-    assert bench.desk.remove(run)
+    assert bench.manager.remove(run)
     assert bench.recordings.holds(run_recording_name(run))
     with pytest.raises(NotFoundError):
-        bench.desk.remove(run)
+        bench.manager.remove(run)
 
 
 def test_closing_stops_every_run_and_takes_no_further_one(bench: Bench) -> None:
@@ -300,7 +300,7 @@ def test_closing_stops_every_run_and_takes_no_further_one(bench: Bench) -> None:
 
     thread = threading.Thread(target=obey)
     thread.start()
-    bench.desk.close()
+    bench.manager.close()
     thread.join(20.0)
     assert [bench.state(run) for run in runs] == [RunState.STOPPED, RunState.STOPPED]
     with pytest.raises(BusyError, match="the service is ending"):
@@ -313,7 +313,7 @@ def test_a_run_of_an_earlier_service_that_never_began_is_interrupted(bench: Benc
     assert bench.state(run) is RunState.INTERRUPTED
     assert later.live(run) is None
     assert bench.told(run)[-1] == "interrupted"
-    bench.desk.stop(run)
+    bench.manager.stop(run)
 
 
 @pytest.mark.parametrize("loss", ["the end was not told", "the recording was not kept"])

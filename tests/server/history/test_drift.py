@@ -6,21 +6,21 @@ from datetime import timedelta
 import pytest
 
 from identified import identified
-from tauscope.server.history import (
+from tauscope.server.history.drift import (
     Drift,
-    ModelPolicy,
-    drift_between,
-    drift_words,
+    compute_drift,
+    describe_drift,
+    duration_words,
+    extract_parameters,
+    find_largest_by_joint,
     is_beyond,
-    largest_by_joint,
-    named_parameters,
 )
-from tauscope.server.history.words import duration_words
+from tauscope.server.history.gates import ModelPolicy
 
 
 def drifts(before: dict[str, float], after: dict[str, float], **changes: float) -> dict[str, Drift]:
-    pair = (named_parameters(identified(given, **changes)) for given in (before, after))
-    return {drift.name: drift for drift in drift_between(*pair)}
+    pair = (extract_parameters(identified(given, **changes)) for given in (before, after))
+    return {drift.name: drift for drift in compute_drift(*pair)}
 
 
 def test_a_difference_in_joint_standard_errors() -> None:
@@ -60,35 +60,35 @@ def test_only_what_is_large_and_sure_is_told(after: float, std: float, beyond: b
 def test_what_the_recordings_do_not_tell_is_not_compared() -> None:
     silent = identified(friction__0__std={"stiction": 0.01, "viscous": None}, base_parameters__0__std=None)
     unknown = identified(friction__0__identifiable={"viscous": False})
-    names = {parameter.name for parameter in named_parameters(silent)}
+    names = {parameter.name for parameter in extract_parameters(silent)}
     assert "viscous shoulder" not in names
     assert "stiction shoulder" in names
     assert identified().base_parameters[0].name not in names
-    assert "viscous shoulder" not in {parameter.name for parameter in named_parameters(unknown)}
+    assert "viscous shoulder" not in {parameter.name for parameter in extract_parameters(unknown)}
     assert "viscous shoulder" not in {
-        drift.name for drift in drift_between(named_parameters(identified()), named_parameters(silent))
+        drift.name for drift in compute_drift(extract_parameters(identified()), extract_parameters(silent))
     }
 
 
 def test_the_most_significant_change_of_a_joint() -> None:
     found = drifts({"viscous": 0.5, "stiction": 1.0}, {"viscous": 0.4, "stiction": 1.1}, friction__0__std__viscous=1e-3)
-    assert largest_by_joint(list(found.values()))["shoulder"].name == "viscous shoulder"
+    assert find_largest_by_joint(list(found.values()))["shoulder"].name == "viscous shoulder"
 
 
 def test_a_base_parameter_belongs_to_the_joint_that_moves_its_first_link() -> None:
     document = identified(joints=["a", "b", "c"], base_parameters__0__terms={"Iyy3": 1.0, "m1": 2.0})
-    assert named_parameters(document)[0].joint == "c"
+    assert extract_parameters(document)[0].joint == "c"
 
 
 def test_a_drift_in_words() -> None:
     found = drifts({"viscous": 0.5}, {"viscous": 0.7}, friction__0__std__viscous=0.01)["viscous shoulder"]
     words = "shoulder: viscous friction +40 % in 6 weeks (0.5 → 0.7, 14 standard errors)"
-    assert drift_words(found, timedelta(weeks=6)) == words
+    assert describe_drift(found, timedelta(weeks=6)) == words
     given = {"stiction": 1.0, "stribeck": 0.0}
     offset = drifts({**given, "offset": 0.01}, {**given, "offset": 0.6}, friction__0__std__offset=0.01)[
         "offset shoulder"
     ]
-    assert drift_words(offset, timedelta(days=1)).startswith("shoulder: torque offset in 24 hours (0.01 → 0.6, ")
+    assert describe_drift(offset, timedelta(days=1)).startswith("shoulder: torque offset in 24 hours (0.01 → 0.6, ")
 
 
 @pytest.mark.parametrize(

@@ -6,11 +6,10 @@ import pytest
 
 from identified import NOON, candidate, identified
 from tauscope.errors import StoreError
-from tauscope.server.history.drift_monitor import DriftMonitor
 from tauscope.server.history.model_history import ModelHistory
+from tauscope.server.history.model_registry import DriftMonitor
 from tauscope.server.store.database.database import Database
-from tauscope.server.store.database.facts import ItemMetadata
-from tauscope.server.store.database.index import Index
+from tauscope.server.store.database.index import Index, ItemMetadata
 
 
 @pytest.fixture

@@ -6,8 +6,7 @@ import pytest
 
 from identified import identified
 from tauscope.identification.result import InertiaEntry, LinkEntry
-from tauscope.server.history import ModelPolicy, check_gates, passes
-from tauscope.server.history.gates import is_physical
+from tauscope.server.history.gates import ModelPolicy, check_gates, is_physical, passes
 
 POLICY = ModelPolicy()
 

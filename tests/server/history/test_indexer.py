@@ -12,13 +12,11 @@ from snapshots import SNAPSHOTS, unpacked
 from tauscope.errors import StoreError
 from tauscope.server.history.indexer import ChangedItem, Indexer, open_index
 from tauscope.server.queue.housekeeping import Housekeeping
-from tauscope.server.queue.record import JobRecord
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.record import JobRecord, JobState
 from tauscope.server.queue.workspace import Workspace
+from tauscope.server.store.data_folder import RECORDINGS, item_stores
 from tauscope.server.store.database.database import Database
-from tauscope.server.store.database.facts import ItemEntry, ItemQuery
-from tauscope.server.store.database.index import Index
-from tauscope.server.store.layout import RECORDINGS, item_stores
+from tauscope.server.store.database.index import Index, ItemEntry, ItemQuery
 from tauscope.server.store.recordings import RecordingStore
 
 WAYS_TO_END = {
@@ -168,7 +166,7 @@ def test_any_damage_is_shown_never_raised(file: str, content: bytes, data: Path,
 
 @pytest.fixture
 def locked(data: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Indexer, sqlite3.Connection]]:
-    monkeypatch.setattr("tauscope.server.store.database.engine.PATIENCE_S", 0.02)
+    monkeypatch.setattr("tauscope.server.store.database.database.TIMEOUT_S", 0.02)
     database = Database(data / "tauscope.db")
     other = sqlite3.connect(data / "tauscope.db", isolation_level=None)
     yield opened(data, database), other

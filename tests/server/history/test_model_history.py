@@ -11,13 +11,11 @@ from sqlalchemy.exc import IntegrityError
 from identified import NOON, candidate, identified
 from tauscope.errors import NotFoundError
 from tauscope.identification import IdentificationDocument
-from tauscope.server.history import ModelPolicy
-from tauscope.server.history.model_entries import ModelEntry
-from tauscope.server.history.model_history import ModelHistory
+from tauscope.server.history.gates import ModelPolicy
+from tauscope.server.history.model_history import ModelEntry, ModelHistory
 from tauscope.server.store.database.database import Database
-from tauscope.server.store.database.facts import ItemMetadata
-from tauscope.server.store.database.index import Index
-from tauscope.server.store.database.model_tables import Model, ModelChoice
+from tauscope.server.store.database.index import Index, ItemMetadata
+from tauscope.server.store.database.tables import Model, ModelChoice
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from starlette.testclient import TestClient
 from server.conftest import IDENTIFICATIONS, RECORDINGS, connected
 from server.queue.executors import ManualExecutor
 from tauscope.server.http import Settings, create_app
-from tauscope.server.store.names import is_file_name
+from tauscope.server.store.files import is_file_name
 
 
 @pytest.fixture(scope="module")

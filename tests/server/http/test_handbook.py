@@ -12,7 +12,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from shared_data import REPOSITORY
-from tauscope.server.http.handbook import chapters, rendered
+from tauscope.server.http.pages import load_chapters, render_chapter
 from tauscope.server.problems import KINDS, TYPE_PREFIX
 
 
@@ -49,7 +49,7 @@ def test_the_type_of_a_problem_is_the_address_of_its_page(code: str, client: Tes
 
 def test_every_page_is_shown_and_every_link_on_it_leads_somewhere(client: TestClient) -> None:
     written = {f"{file.parent.name}/{file.stem}" for file in sources()} - {"errors/README", "how-to/README"}
-    assert set(chapters()) == written
+    assert set(load_chapters()) == written
     listed = Links(client.get("/docs").text).found
     for path in sorted(written):
         assert f"/docs/{path}" in listed
@@ -63,7 +63,7 @@ def test_every_page_is_shown_and_every_link_on_it_leads_somewhere(client: TestCl
 
 def test_markup_stays_text_and_links_elsewhere_become_words() -> None:
     text = "# `x`\n<script>1</script> [a](b.md) [c](../how-to/d.md#e) [f](https://x.example) ![g](i.png)"
-    page = rendered(text, "errors/x", {"errors/b": 0, "how-to/d": 0})
+    page = render_chapter(text, "errors/x", {"errors/b": 0, "how-to/d": 0})
     assert page.title == "x"
     assert Links(page.html).found == ["/docs/errors/b", "/docs/how-to/d#e"]
     assert "&lt;script&gt;" in page.html
@@ -85,7 +85,7 @@ def test_they_come_with_the_installed_package(tmp_path: Path) -> None:
     (wheel,) = tmp_path.glob("*.whl")
     zipfile.ZipFile(wheel).extractall(tmp_path / "installed")
     assert not {"docs", "tests"} & {entry.name for entry in (tmp_path / "installed").iterdir()}
-    tell = "from tauscope.server.http.handbook import chapters; print(*chapters())"
+    tell = "from tauscope.server.http.pages import load_chapters; print(*load_chapters())"
     told = subprocess.run(
         [sys.executable, "-c", tell],
         cwd=tmp_path / "installed",
@@ -94,4 +94,4 @@ def test_they_come_with_the_installed_package(tmp_path: Path) -> None:
         capture_output=True,
         text=True,
     )
-    assert told.stdout.split() == list(chapters())
+    assert told.stdout.split() == list(load_chapters())

@@ -76,7 +76,7 @@ def test_a_query_that_means_nothing(query: dict[str, Any], client: TestClient) -
 def test_a_locked_database_delays_the_search_and_nothing_else(
     settings: Settings, monkeypatch: pytest.MonkeyPatch, paper_robot: bytes
 ) -> None:
-    monkeypatch.setattr("tauscope.server.store.database.engine.PATIENCE_S", 0.02)
+    monkeypatch.setattr("tauscope.server.store.database.database.TIMEOUT_S", 0.02)
     with connected(create_app(settings, InlineExecutor())) as client:
         other = sqlite3.connect(settings.data_folder / FILE_NAME, isolation_level=None)
         other.execute("BEGIN IMMEDIATE")

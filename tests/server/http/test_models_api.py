@@ -91,8 +91,8 @@ def test_an_order_that_names_an_unknown_robot_holds_up_no_service(
     keeper, damaged = services.models, models(paper)[0]["id"]
     order = services.identifications.items.folder(damaged) / "order.json"
     order.write_text(order.read_text().replace(f'"{ROBOT}"', '"paper-aro"'))
-    monkeypatch.setattr(keeper.history, "unjudged", lambda _site: [damaged])
-    assert keeper.consider_new() == keeper.consider_new() == []
+    monkeypatch.setattr(keeper.history, "list_unjudged", lambda _site: [damaged])
+    assert keeper.judge_new() == keeper.judge_new() == []
     (told,) = [each.getMessage() for each in caplog.records if each.levelname == "WARNING"]
     assert damaged in told
     assert "paper-aro" in told

@@ -9,8 +9,8 @@ from tauscope.effects import catalogue
 from tauscope.robot.robot import JointType
 from tauscope.runtime import RunState
 from tauscope.server.page.router import STATIC, assets
-from tauscope.server.queue.states import JobState
-from tauscope.server.store.layout import FOLDERS
+from tauscope.server.queue.record import JobState
+from tauscope.server.store.data_folder import FOLDERS
 
 PART = re.compile(r"\{\d+\}")
 VARIABLES = {"velocity", "position", "load", "acceleration", "time", "temperature", "motor_position"}

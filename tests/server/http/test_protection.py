@@ -15,8 +15,8 @@ from tauscope.errors import TauscopeError
 from tauscope.server.auth.keys import KeyFile
 from tauscope.server.auth.scopes import Scope
 from tauscope.server.http import Settings, create_app, default_data_folder, serve
-from tauscope.server.http.assembly import require_data_folder
 from tauscope.server.http.protection import HEADERS
+from tauscope.server.http.services import require_data_folder
 from tauscope.server.store.items import ItemStore
 
 

@@ -19,10 +19,8 @@ from server.queue.executors import InlineExecutor
 from tauscope.server.auth.scopes import Scope
 from tauscope.server.control.run_manager import RunManager
 from tauscope.server.http import Settings, create_app
-from tauscope.server.http.idempotency.answers import LIFE_S, KeptAnswer
-from tauscope.server.http.idempotency.fingerprint import Fingerprint
-from tauscope.server.http.idempotency.on_disk import AnswersOnDisk
-from tauscope.server.http.idempotency.passing import MOST, PassingAnswers
+from tauscope.server.http.repeated_answers import LIFE_S, MOST, KeptAnswer, MemoryAnswers, StoredAnswers
+from tauscope.server.http.repeated_requests import Fingerprint
 from tauscope.server.http.services import Services
 
 RUNS, LEASES = "/api/v1/runs", "/api/v1/leases"
@@ -148,13 +146,13 @@ def test_keys_that_are_none(key: str, client: TestClient) -> None:
 
 def test_answers_are_forgotten_after_a_day(settings: Settings) -> None:
     folder, now = settings.data_folder / "answers", [0.0]
-    store = AnswersOnDisk(folder, clock=lambda: now[0])
+    store = StoredAnswers(folder, clock=lambda: now[0])
     assert store.begin("a")
     store.finish("a", KeptAnswer(fingerprint="f", status=202, headers=(("x", "y"),), body=""))
     now[0] = (folder / "a").stat().st_mtime + LIFE_S - 1.0
-    assert not AnswersOnDisk(folder, clock=lambda: now[0]).begin("a")
+    assert not StoredAnswers(folder, clock=lambda: now[0]).begin("a")
     now[0] += 2.0
-    assert AnswersOnDisk(folder, clock=lambda: now[0]).begin("a")
+    assert StoredAnswers(folder, clock=lambda: now[0]).begin("a")
 
 
 @given(body=st.binary(max_size=200), cuts=st.lists(st.integers(0, 400), max_size=6))
@@ -173,7 +171,7 @@ def test_the_fingerprint_does_not_depend_on_the_pieces_nor_on_the_boundary(body:
 def test_services_hold_the_store(app: FastAPI) -> None:
     with connected(app):
         services: Services = app.state.services
-        assert isinstance(services.answers, AnswersOnDisk)
+        assert isinstance(services.answers, StoredAnswers)
 
 
 def test_a_lease_is_taken_once_and_its_secret_is_on_no_disk(settings: Settings) -> None:
@@ -192,7 +190,7 @@ def test_a_lease_is_taken_once_and_its_secret_is_on_no_disk(settings: Settings) 
 
 def test_passing_answers_age_and_are_never_too_many() -> None:
     now = 0.0
-    answers = PassingAnswers(lambda: now)
+    answers = MemoryAnswers(lambda: now)
     kept = KeptAnswer(fingerprint="", status=201, headers=(), body="")
     for number in range(MOST + 1):
         assert answers.begin(str(number))

@@ -13,7 +13,7 @@ from server.queue.executors import InlineExecutor, ManualExecutor
 from server.queue.waiting import wait_until
 from snapshots import SNAPSHOTS, unpacked
 from tauscope.cli.program import main
-from tauscope.server.auth.audit.log import AuditLog
+from tauscope.server.auth.audit_log import AuditLog
 from tauscope.server.http import Settings, create_app
 
 ITEMS = "/api/v1/items"
@@ -26,7 +26,7 @@ def data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     with connected(create_app(Settings(data_folder=folder), ManualExecutor())) as client:
         answer = client.post(IDENTIFICATIONS, json={"robot": ROBOT, "recordings": ["wednesday.csv"]})
         assert answer.status_code == 202, answer.text
-    monkeypatch.setattr("tauscope.server.http.assembly.PRUNING_S", 0.05)
+    monkeypatch.setattr("tauscope.server.http.services.PRUNING_S", 0.05)
     return folder
 
 

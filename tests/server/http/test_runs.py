@@ -20,7 +20,7 @@ from tauscope.server.control.run_workspace import RunWorkspace
 from tauscope.server.http import Settings, create_app
 from tauscope.server.http.jobs import events as event_routes
 from tauscope.server.queue.excitation_workspace import ExcitationWorkspace
-from tauscope.server.store.incoming import KeptFile
+from tauscope.server.store.files import KeptFile
 from tauscope.server.store.recordings import RecordingStore, StoredRecording
 
 RUNS, EXCITATIONS = "/api/v1/runs", "/api/v1/excitations"
@@ -168,7 +168,7 @@ def test_stop_works_while_everything_else_is_stuck(
             thread.start()
         for _ in range(40):  # as many as there are threads for routes
             assert stuck.acquire(timeout=60.0)
-        with services.jobs._lock, services.runs._lock, services.runs._led._lock, services.runs.claims._lock:
+        with services.jobs._lock, services.runs._lock, services.runs._threads._lock, services.runs.claims._lock:
             stop = client.post(answer["links"]["stop"])
         assert (stop.status_code, stop.json()["state"]) == (202, "running")
         assert control.stops == 1

@@ -3,9 +3,8 @@
 from concurrent.futures import Executor
 from pathlib import Path
 
-from tauscope.server.queue.queue import JobQueue
-from tauscope.server.queue.queued_job import JobKind, Work
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.queue import JobKind, JobQueue, Work
+from tauscope.server.queue.record import JobState
 from tauscope.server.queue.workspace import Workspace
 from tauscope.server.store.items import ItemStore
 

@@ -19,17 +19,15 @@ from patience import eventually
 from server.queue.paper_files import PAPER_ROBOT, write_recording
 from server.queue.waiting import wait_until
 from tauscope.errors import StoreError
-from tauscope.server.queue.cluster_executor import SCHEDULER, ClusterAwayError, ClusterExecutor
-from tauscope.server.queue.executors import open_executor
+from tauscope.server.queue.cluster_executor import SCHEDULER, ClusterExecutor, ClusterUnavailableError
+from tauscope.server.queue.executors import WorkerPool, open_executor
 from tauscope.server.queue.identification_order import IdentificationOrder, OrderedRecording
 from tauscope.server.queue.identification_work import run_identification
 from tauscope.server.queue.identification_workspace import IdentificationWorkspace
-from tauscope.server.queue.queue import JobQueue
-from tauscope.server.queue.queued_job import JobKind
-from tauscope.server.queue.states import JobState
-from tauscope.server.queue.worker_pool import WorkerPool
+from tauscope.server.queue.queue import JobKind, JobQueue
+from tauscope.server.queue.record import JobState
 from tauscope.server.queue.workspace import Workspace
-from tauscope.server.store.incoming import hash_file
+from tauscope.server.store.files import hash_file
 from tauscope.server.store.items import ItemStore
 
 if TYPE_CHECKING:
@@ -73,7 +71,7 @@ def test_without_a_cluster_it_is_processes_of_our_own(monkeypatch: pytest.Monkey
 @pytest.mark.filterwarnings("ignore")
 def test_a_scheduler_that_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed", reason="needs tauscope[fleet]")
-    monkeypatch.setattr("tauscope.server.queue.cluster_executor.PATIENCE_S", 0.2)
+    monkeypatch.setattr("tauscope.server.queue.cluster_executor.TIMEOUT_S", 0.2)
     monkeypatch.setenv(SCHEDULER, "tcp://127.0.0.1:1")
     with pytest.raises(StoreError, match=r"DASK_SCHEDULER_ADDRESS=tcp://127\.0\.0\.1:1: does not answer"):
         open_executor(1)
@@ -142,7 +140,7 @@ class TestASchedulerThatDies:
     def test_its_jobs_are_done_when_it_is_back(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         """It is away for so long that Dask's own client gives up for good."""
         pytest.importorskip("distributed", reason="needs tauscope[fleet]")
-        monkeypatch.setattr("tauscope.server.queue.cluster_executor.PATIENCE_S", 3)
+        monkeypatch.setattr("tauscope.server.queue.cluster_executor.TIMEOUT_S", 3)
         port = str(free_port())
         address = f"tcp://127.0.0.1:{port}"
         scheduler = ("scheduler", "--host", "127.0.0.1", "--port", port)
@@ -161,7 +159,7 @@ class TestASchedulerThatDies:
                 assert eventually((items.folder(running) / "begun").exists, 60)
             assert eventually(lambda: executor._client.status == "closed", 60)
             assert not queue.can_work()
-            with pytest.raises(ClusterAwayError):
+            with pytest.raises(ClusterUnavailableError):
                 executor.submit(divide, 1)
             added = queue.submit(kind, items.stage())
             assert {state(items, job) for job in (running, waiting, added)} == {"queued"}
@@ -178,7 +176,7 @@ class TestASchedulerThatDies:
     @pytest.mark.parametrize("is_given_up", [False, True], ids=["a moment ago", "given up by Dask"])
     def test_it_is_left_in_good_order_all_the_same(self, is_given_up: bool, monkeypatch: pytest.MonkeyPatch) -> None:
         pytest.importorskip("distributed", reason="needs tauscope[fleet]")
-        monkeypatch.setattr("tauscope.server.queue.cluster_executor.PATIENCE_S", 3)
+        monkeypatch.setattr("tauscope.server.queue.cluster_executor.TIMEOUT_S", 3)
         port = str(free_port())
         address = f"tcp://127.0.0.1:{port}"
         with dask("scheduler", "--host", "127.0.0.1", "--port", port):
@@ -193,8 +191,8 @@ class TestASchedulerThatDies:
 
     def test_reaching_for_it_again_and_again_leaves_nothing_behind(self, monkeypatch: pytest.MonkeyPatch) -> None:
         pytest.importorskip("distributed", reason="needs tauscope[fleet]")
-        monkeypatch.setattr("tauscope.server.queue.cluster_executor.PATIENCE_S", 1)
-        monkeypatch.setattr("tauscope.server.queue.cluster_executor.LOOK_S", 0.01)
+        monkeypatch.setattr("tauscope.server.queue.cluster_executor.TIMEOUT_S", 1)
+        monkeypatch.setattr("tauscope.server.queue.cluster_executor.CHECK_S", 0.01)
         before = set(threading.enumerate())
         failures: list[OSError] = []
         open_client = ClusterExecutor._open_client

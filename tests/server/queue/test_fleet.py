@@ -11,9 +11,9 @@ import pytest
 
 from server.queue.executors import InlineExecutor, ManualExecutor
 from tauscope.errors import RecordingError
-from tauscope.server.queue.cluster_executor import ClusterAwayError
+from tauscope.server.queue.cluster_executor import ClusterUnavailableError
+from tauscope.server.queue.executors import WorkerPool
 from tauscope.server.queue.fleet import AWAY, LOST, FleetEntry, FleetResult, analyse_fleet, read_manifest
-from tauscope.server.queue.worker_pool import WorkerPool
 
 HEADER = "name,robot,recordings,held_out\n"
 
@@ -96,7 +96,7 @@ def test_a_cluster_that_is_away_loses_no_row(most: int, error: str | None) -> No
         def submit(self, fn, /, *args, **kwargs):
             if self.refused < most:
                 self.refused += 1
-                raise ClusterAwayError("the scheduler is gone")
+                raise ClusterUnavailableError("the scheduler is gone")
             return super().submit(fn, *args, **kwargs)
 
     found = list(analyse_fleet(entries(9), succeed, Path(), Away(), 2))

@@ -12,7 +12,7 @@ from tauscope.server.queue import identification_work as work_module
 from tauscope.server.queue.identification_order import IdentificationOptions, IdentificationOrder, OrderedRecording
 from tauscope.server.queue.identification_work import run_identification
 from tauscope.server.queue.identification_workspace import IdentificationWorkspace
-from tauscope.server.store.incoming import hash_file
+from tauscope.server.store.files import hash_file
 
 OPTIONS = IdentificationOptions(cutoff_hz=None)
 

@@ -10,10 +10,8 @@ import pytest
 from server.queue.executors import InlineExecutor, ManualExecutor
 from server.queue.one_kind import make_queue, problem_of, state_of, succeed
 from tauscope.errors import NotFoundError
-from tauscope.server.queue.queue import JobQueue, QueueFullError
-from tauscope.server.queue.queued_job import JobKind, Work
-from tauscope.server.queue.record import JobProblem
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.queue import JobKind, JobQueue, QueueFullError, Work
+from tauscope.server.queue.record import JobProblem, JobState
 from tauscope.server.queue.workspace import Workspace
 from tauscope.server.store.items import ItemStore
 

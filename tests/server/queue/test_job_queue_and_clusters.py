@@ -4,9 +4,8 @@ import pytest
 
 from server.queue.executors import ManualExecutor
 from server.queue.one_kind import make_queue, problem_of, state_of, succeed
-from tauscope.server.queue.cluster_executor import ClusterAwayError
-from tauscope.server.queue.queue import JobQueue
-from tauscope.server.queue.queued_job import MOST_ATTEMPTS, JobKind
+from tauscope.server.queue.cluster_executor import ClusterUnavailableError
+from tauscope.server.queue.queue import MOST_ATTEMPTS, JobKind, JobQueue
 from tauscope.server.store.items import ItemStore
 
 
@@ -15,7 +14,7 @@ def test_a_job_that_was_lost_with_its_cluster_is_done_again_before_the_others(
 ) -> None:
     queue = make_queue(items, executor)
     lost, following = queue.submit(items.stage()), queue.submit(items.stage())
-    executor.fail(ClusterAwayError("the scheduler is gone"))
+    executor.fail(ClusterUnavailableError("the scheduler is gone"))
     assert (state_of(items, lost), state_of(items, following)) == ("running", "queued")
     executor.run()
     assert state_of(items, lost) == "succeeded"
@@ -26,7 +25,7 @@ def test_a_job_that_was_lost_with_its_cluster_is_done_again_before_the_others(
 def test_a_job_that_takes_its_cluster_along_is_not_done_for_ever(items: ItemStore, executor: ManualExecutor) -> None:
     job = make_queue(items, executor).submit(items.stage())
     for _ in range(MOST_ATTEMPTS):
-        executor.fail(ClusterAwayError("the scheduler is gone"))
+        executor.fail(ClusterUnavailableError("the scheduler is gone"))
     assert executor.tasks == []
     assert (state_of(items, job), problem_of(items, job)) == ("failed", "worker-lost")
 
@@ -37,7 +36,7 @@ def test_a_job_that_was_cancelled_while_its_cluster_went_stays_cancelled(
     queue = make_queue(items, executor)
     job = queue.submit(items.stage())
     queue.cancel_or_remove(job)
-    executor.fail(ClusterAwayError("the scheduler is gone"))
+    executor.fail(ClusterUnavailableError("the scheduler is gone"))
     assert executor.tasks == []
     assert state_of(items, job) == "cancelled"
 
@@ -49,7 +48,7 @@ def test_jobs_wait_for_a_cluster_that_is_away(is_known: bool, items: ItemStore, 
     class Away(ManualExecutor):
         def submit(self, fn, /, *args, **kwargs):
             there[0] = False
-            raise ClusterAwayError("the scheduler is gone")
+            raise ClusterUnavailableError("the scheduler is gone")
 
     gone, kind = Away(), JobKind(items, succeed)
     queue = JobQueue([kind], gone, slots=1, most_waiting=2, is_there=lambda: there[0])

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from shared_data import REPOSITORY
-from tauscope.server.queue.worker_pool import WorkerPool
+from tauscope.server.queue.executors import WorkerPool
 
 
 @pytest.fixture
@@ -52,7 +52,7 @@ def test_shutting_down_at_once_ends_work_in_the_middle(tmp_path: Path) -> None:
 
 SERVICE = """
 import os, signal
-from tauscope.server.queue.worker_pool import WorkerPool
+from tauscope.server.queue.executors import WorkerPool
 if __name__ == "__main__":
     pool = WorkerPool(1)
     print(pool.submit(os.getpid).result(60), flush=True)

@@ -20,8 +20,7 @@ from tauscope.server.history.model_history import ModelHistory
 from tauscope.server.store.backup import restore_backup, write_backup
 from tauscope.server.store.database.database import FILE_NAME, Database
 from tauscope.server.store.database.dump import dump_lines
-from tauscope.server.store.database.facts import ItemMetadata
-from tauscope.server.store.database.index import Index
+from tauscope.server.store.database.index import Index, ItemMetadata
 
 
 @pytest.fixture

@@ -13,11 +13,8 @@ from sqlalchemy import inspect, select, text
 from sqlalchemy.exc import IntegrityError
 
 from tauscope.errors import StoreError
-from tauscope.server.store.database.base import Base
-from tauscope.server.store.database.database import Database
-from tauscope.server.store.database.engine import open_engine
-from tauscope.server.store.database.migrate import present_revision, revisions, upgrade
-from tauscope.server.store.database.tables import Item, Robot, Site
+from tauscope.server.store.database.database import Database, open_engine, present_revision, revisions, upgrade
+from tauscope.server.store.database.tables import Base, Item, Robot, Site
 
 NOON = datetime(2026, 11, 3, 12, 0, 0, 250_000, tzinfo=UTC)
 
@@ -170,7 +167,7 @@ def test_a_damaged_file_is_said_to_be_so_and_left_alone(content: bytes, tmp_path
 
 
 def test_a_locked_database_is_said_to_be_locked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tauscope.server.store.database.engine.PATIENCE_S", 0.05)
+    monkeypatch.setattr("tauscope.server.store.database.database.TIMEOUT_S", 0.05)
     path = tmp_path / "tauscope.db"
     database = Database(path)
     other = sqlite3.connect(path, isolation_level=None)

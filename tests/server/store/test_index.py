@@ -6,8 +6,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from tauscope.server.store.database.database import Database
-from tauscope.server.store.database.facts import FileMetadata, ItemMetadata, ItemQuery, RecordingRole
-from tauscope.server.store.database.index import Index
+from tauscope.server.store.database.index import FileMetadata, Index, ItemMetadata, ItemQuery, RecordingRole
 from tauscope.server.store.database.tables import Recording
 from tauscope.server.store.recordings import StoredRecording
 

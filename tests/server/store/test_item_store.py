@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from tauscope.errors import NotFoundError, TauscopeError
-from tauscope.server.store.folder_lock import FolderLock
+from tauscope.server.store.data_folder import FolderLock
 from tauscope.server.store.items import ItemStore
 
 

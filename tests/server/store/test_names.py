@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tauscope.server.store.names import FILE_NAME_PATTERN, is_file_name, is_identifier, new_identifier
+from tauscope.server.store.files import FILE_NAME_PATTERN, is_file_name, is_identifier, new_identifier
 
 
 @pytest.mark.parametrize("name", ["a.csv", "log 2026-11-03 b.csv", "_x", "run+1=2@home.mcap", "7"])

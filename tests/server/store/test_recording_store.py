@@ -7,9 +7,8 @@ from pathlib import Path
 import pytest
 
 from tauscope.errors import LimitExceededError, NotFoundError, RecordingError
-from tauscope.server.store.incoming import IncomingFile, KeptFile
-from tauscope.server.store.recording_hashes import RecordingHashes
-from tauscope.server.store.recordings import NameTakenError, RecordingStore
+from tauscope.server.store.files import IncomingFile, KeptFile
+from tauscope.server.store.recordings import NameTakenError, RecordingHashes, RecordingStore
 
 
 @pytest.fixture
@@ -150,7 +149,7 @@ def test_a_full_disk_keeps_no_recording_of_which_nothing_is_known(
     arrived = arrive(store, "a.csv", b"content")
     store.keep(arrive(store, "b.csv", b"before"))
     with monkeypatch.context() as patched:
-        patched.setattr("tauscope.server.store.recording_hashes.write_atomically", full)
+        patched.setattr("tauscope.server.store.recordings.write_atomically", full)
         with pytest.raises(OSError, match="No space"):
             store.keep(arrived)
         os.utime(store.path("b.csv"))

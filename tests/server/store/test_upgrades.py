@@ -13,17 +13,15 @@ import sqlalchemy as sa
 from sqlalchemy import Engine, MetaData
 
 from shared_data import REPOSITORY
-from tauscope.server.store.database.database import Database
-from tauscope.server.store.database.engine import open_engine
-from tauscope.server.store.database.migrate import present_revision, revisions, upgrade
+from tauscope.server.store.database.database import Database, open_engine, present_revision, revisions, upgrade
 
 NOON = datetime(2026, 11, 3, 12, 0, 0, 250_000, tzinfo=UTC)
 KILLED_AT_STATEMENT = """
 import os, signal, sys
 from pathlib import Path
 from sqlalchemy import event
-from tauscope.server.store.database.engine import open_engine
-from tauscope.server.store.database.migrate import upgrade
+from tauscope.server.store.database.database import open_engine
+from tauscope.server.store.database.database import upgrade
 
 address, last = sys.argv[1], int(sys.argv[2])
 engine = open_engine(address if "://" in address else Path(address))

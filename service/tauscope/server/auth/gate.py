@@ -1,6 +1,9 @@
 """What every request passes before its route: who calls, whether they may, and not too often."""
 
 import math
+import time
+from collections import OrderedDict
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import cast
 
@@ -8,11 +11,46 @@ from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Send
 from starlette.types import Scope as AsgiScope
 
-from tauscope.server.auth.audit.log import AuditTrail
-from tauscope.server.auth.key_ring import LOCAL, Caller, KeyRing
-from tauscope.server.auth.rate_limit import RateLimit
-from tauscope.server.auth.scopes import is_stop, needed_scope
+from tauscope.server.auth.audit_log import AuditTrail
+from tauscope.server.auth.keys import LOCAL, Caller, KeyRing
+from tauscope.server.auth.scopes import find_needed_scope, is_stop
 from tauscope.server.problems import make_problem, problem_answer
+
+MOST_CALLERS = 10_000
+"""Callers that are remembered; the one that was silent longest is forgotten first."""
+
+
+class RateLimit:
+    """Token buckets. Used by the event loop only, so that it needs no lock."""
+
+    def __init__(self, per_second: float, burst: float, clock: Callable[[], float] = time.monotonic) -> None:
+        """Begin with full buckets.
+
+        Parameters
+        ----------
+        per_second : float
+            how often a caller may call in the long run [1/s]
+        """
+        self._rate, self._burst, self._clock = per_second, burst, clock
+        self._buckets: OrderedDict[str, tuple[float, float]] = OrderedDict()
+
+    def take(self, caller: str) -> float:
+        """Count a call.
+
+        Returns
+        -------
+        float
+            0 where the call may pass; else the time after which the next one may [s]
+        """
+        now = self._clock()
+        tokens, then = self._buckets.pop(caller, (self._burst, now))
+        tokens = min(self._burst, tokens + (now - then) * self._rate)
+        wait = 0.0 if tokens >= 1.0 else (1.0 - tokens) / self._rate
+        self._buckets[caller] = (tokens if wait else tokens - 1.0, now)
+        if len(self._buckets) > MOST_CALLERS:
+            self._buckets.popitem(last=False)
+        return wait
+
 
 CALLER = "tauscope.caller"
 """Where the request's ASGI scope holds its `Caller`."""
@@ -44,7 +82,6 @@ class Gate:
     """Lets a request pass that comes with a key of the scope that it needs."""
 
     def __init__(self, app: ASGIApp) -> None:
-        """Wrap an application."""
         self.app = app
 
     async def __call__(self, scope: AsgiScope, receive: Receive, send: Send) -> None:
@@ -60,7 +97,7 @@ class Gate:
         return await self.app(scope, receive, send)
 
 
-def caller_of(scope: AsgiScope) -> Caller:
+def find_caller(scope: AsgiScope) -> Caller:
     """Who makes a request."""
     return cast(Caller, scope.get(CALLER, LOCAL))
 
@@ -68,7 +105,7 @@ def caller_of(scope: AsgiScope) -> Caller:
 def _admit(access: Access, scope: AsgiScope) -> Caller | _Refusal:
     """Who calls, or why they may not."""
     method, path = scope["method"], scope["path"]
-    needed = needed_scope(method, path)
+    needed = find_needed_scope(method, path)
     if needed is None:
         return LOCAL
     stops = is_stop(method, path)

@@ -65,7 +65,7 @@ _RULES: tuple[tuple[str, re.Pattern[str], Scope], ...] = tuple(
 )
 
 
-def needed_scope(method: str, path: str) -> Scope | None:
+def find_needed_scope(method: str, path: str) -> Scope | None:
     """The scope that a request needs; None for what anybody may read: pages, the interface's description, health."""
     is_reading = method in ("GET", "HEAD", "OPTIONS")
     if not path.startswith("/api/") and path != "/metrics":

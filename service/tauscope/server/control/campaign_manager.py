@@ -1,43 +1,33 @@
-"""All campaigns: taken, led in threads of their own, stopped at once; after a restart only analysis goes on."""
+"""The campaign manager: it starts, stops and removes campaigns; after a restart only their analysis continues."""
 
-import threading
 from pathlib import Path
 
 from tauscope.errors import TauscopeError
 from tauscope.server.control.campaign_runner import CampaignDependencies, CampaignRunner
 from tauscope.server.control.campaign_workspace import CampaignWorkspace
 from tauscope.server.control.device_claims import BusyError
-from tauscope.server.control.permits import FREE, Permit
-from tauscope.server.control.supervised_threads import SupervisedThreads
+from tauscope.server.control.leases import FREE, Permit
+from tauscope.server.control.supervised_threads import Manager
 from tauscope.server.queue.queue import INTERRUPTED
-from tauscope.server.queue.record import JobRecord
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.record import JobRecord, JobState
 from tauscope.server.store.items import ItemStore, staged_identifier
 
-PATIENCE_S = 15.0
-"""How long a campaign may take to stop when the service ends [s]."""
 
+class CampaignManager(Manager[CampaignRunner]):
+    """The active campaigns, and the folders of all campaigns."""
 
-class CampaignManager:
-    """Campaigns that go on, and the folders of all campaigns. Every method may be called from any thread."""
+    def __init__(self, items: ItemStore, dependencies: CampaignDependencies) -> None:
+        """Continue the analysis of unfinished campaigns whose motions were all recorded.
 
-    def __init__(self, items: ItemStore, shop: CampaignDependencies) -> None:
-        """Open the desk.
-
-        Of the campaigns that an earlier service left unfinished, those whose motions had all been recorded go on with
-        the identification; the others become `interrupted`: nothing moves by itself.
+        The others become `interrupted`: nothing moves by itself.
         """
-        self.items = items
-        self._shop = shop
-        self._lock = threading.Lock()
-        self._led: SupervisedThreads[CampaignRunner] = SupervisedThreads()
-        self._is_closed = False
-        items.tidy()
+        super().__init__(items)
+        self._dependencies = dependencies
         for identifier in items.identifiers():
-            self._take_up(CampaignWorkspace(items.folder(identifier)))
+            self._resume(CampaignWorkspace(items.folder(identifier)))
 
     def submit(self, staged: Path, permit: Permit = FREE) -> str:
-        """Take a campaign; it begins at once, and has the arm until its motions are done.
+        """Start a campaign; it claims the arm until its motions are done.
 
         Raises
         ------
@@ -54,19 +44,18 @@ class CampaignManager:
         with self._lock:
             if self._is_closed:
                 raise BusyError("the service is ending; hand the campaign in when it is up again")
-            self._shop.runs.claims.take(*claim)
+            self._dependencies.runs.claims.take(*claim)
             try:
                 permit.require()
                 workspace.write_record(JobRecord(state=JobState.QUEUED, created=self.items.clock()))
                 identifier = self.items.publish(staged)
             except BaseException:
-                self._shop.runs.claims.release(*claim)
+                self._dependencies.runs.claims.release(*claim)
                 raise
             workspace = CampaignWorkspace(self.items.folder(identifier))
-            leader = CampaignRunner(
-                workspace, order, self._shop, lambda: self._shop.runs.claims.release(*claim), permit
-            )
-            self._led.begin(identifier, leader, lambda: None)
+            claims = self._dependencies.runs.claims
+            runner = CampaignRunner(workspace, order, self._dependencies, lambda: claims.release(*claim), permit)
+            self._threads.start(identifier, runner)
         return identifier
 
     def stop(self, identifier: str) -> JobState | None:
@@ -77,54 +66,20 @@ class CampaignManager:
         JobState or None
             where the campaign stood; None where nothing of it goes on
         """
-        leader = self._led.find(identifier)
-        if leader is None:
+        runner = self._threads.find(identifier)
+        if runner is None:
             return None
-        state = leader.state
-        leader.stop()
+        state = runner.state
+        runner.stop()
         return state
 
-    def remove(self, identifier: str) -> bool:
-        """Remove a campaign that has ended; what it made stays.
-
-        Returns
-        -------
-        bool
-            False where the campaign goes on
-
-        Raises
-        ------
-        NotFoundError
-            if there is no such campaign
-        """
-        if self._led.find(identifier) is not None:
-            return False
-        self.items.remove(identifier)
-        return True
-
-    def stop_every(self) -> list[str]:
-        """Stop every campaign that goes on, and go on taking further ones; takes no lock. Their identifiers."""
-        return [identifier for identifier in self._led.identifiers() if self.stop(identifier) is not None]
-
-    def stop_all(self) -> None:
-        """Stop every campaign and take no further ones; returns at once."""
-        self._is_closed = True
-        for leader in self._led.leaders():
-            leader.interrupt()
-
-    def close(self) -> None:
-        """Stop every campaign, and wait until all have ended or patience has."""
-        with self._lock:
-            self.stop_all()
-        self._led.join(PATIENCE_S)
-
-    def _take_up(self, workspace: CampaignWorkspace) -> None:
-        """What becomes of a campaign of an earlier service."""
+    def _resume(self, workspace: CampaignWorkspace) -> None:
+        """Continue or end a campaign of an earlier service."""
         record, order = workspace.read_record(), workspace.read_order()
         if record is None or record.state.is_end:
             workspace.tell_lost_end()
         elif order is not None and workspace.read_made().recordings:
-            leader = CampaignRunner(workspace, order, self._shop, lambda: None)
-            self._led.begin(workspace.folder.name, leader, lambda: None)
+            runner = CampaignRunner(workspace, order, self._dependencies, lambda: None)
+            self._threads.start(workspace.folder.name, runner)
         else:
             workspace.write_record(record.moved(JobState.INTERRUPTED, self.items.clock(), INTERRUPTED))

@@ -1,4 +1,4 @@
-"""Leads one campaign: design, run, held-out run, identification, each step a job or a run of its own."""
+"""The runner of one campaign: design, run, held-out run, identification and diagnosis, one job or run each."""
 
 import logging
 import threading
@@ -12,8 +12,8 @@ from tauscope.runtime.record import RunRecord
 from tauscope.runtime.states import RunState
 from tauscope.server.control.campaign_order import CampaignOrder
 from tauscope.server.control.campaign_workspace import CampaignWorkspace
+from tauscope.server.control.leases import FREE, Permit
 from tauscope.server.control.motions import StepFailedError, require_succeeded, wait_for_end
-from tauscope.server.control.permits import FREE, Permit
 from tauscope.server.control.run_manager import RunManager, run_recording_name
 from tauscope.server.control.run_order import RunRequestRecord
 from tauscope.server.control.run_submission import hand_in_run
@@ -24,10 +24,8 @@ from tauscope.server.queue.excitation_order import ExcitationDesignOptions
 from tauscope.server.queue.excitation_submission import hand_in_excitation
 from tauscope.server.queue.excitation_workspace import ExcitationWorkspace
 from tauscope.server.queue.identification_submission import hand_in_identification
-from tauscope.server.queue.queue import CANCELLED, INTERNAL, INTERRUPTED, JobQueue, QueueFullError
-from tauscope.server.queue.queued_job import JobKind
-from tauscope.server.queue.record import JobProblem
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.queue import CANCELLED, INTERNAL, INTERRUPTED, JobKind, JobQueue, QueueFullError
+from tauscope.server.queue.record import JobProblem, JobState
 from tauscope.server.queue.work import StoppedError
 from tauscope.server.queue.workspace import Workspace
 from tauscope.server.store.recordings import RecordingStore
@@ -37,7 +35,7 @@ _log = logging.getLogger("tauscope.jobs")
 POLL_S = 0.2
 """How often the progress of a run is told [s]."""
 
-ROOM_POLL_S = 0.5
+RETRY_S = 0.5
 """How often a queue, or a disk, that is full is asked again [s]."""
 
 
@@ -60,20 +58,19 @@ class CampaignRunner:
         self,
         workspace: CampaignWorkspace,
         order: CampaignOrder,
-        shop: CampaignDependencies,
+        dependencies: CampaignDependencies,
         release_arm: Callable[[], None],
         permit: Permit = FREE,
     ) -> None:
-        """Prepare; nothing happens before `lead`."""
         self.state = JobState.QUEUED
         self._workspace = workspace
         self._order = order
-        self._shop = shop
+        self._dependencies = dependencies
         self._release_arm = release_arm
         self._permit = permit
         self._robot = (order.robot_file, order.robot_name)
-        self._run: str | None = None
-        self._stop_asked = threading.Event()
+        self._run_identifier: str | None = None
+        self._stop_requested = threading.Event()
         self._is_closing = False
 
     @property
@@ -83,33 +80,33 @@ class CampaignRunner:
 
     def stop(self) -> None:
         """Stop the campaign, in whatever step it is; the arm has to be armed again before it moves again."""
-        self._permit.stopped()
-        self._stop_asked.set()
+        self._permit.disarm()
+        self._stop_requested.set()
         # Whoever begins a run looks at the flag after it has told us of the run.
-        run = self._run
+        run = self._run_identifier
         if run is not None:
-            self._shop.runs.stop(run)
+            self._dependencies.runs.stop(run)
 
     def interrupt(self) -> None:
         """Stop because the service ends: what is left of the analysis is done after the next start."""
         self._is_closing = True
         self.stop()
 
-    def lead(self) -> None:
+    def run(self) -> None:
         """Take the campaign to its end; never raises."""
         self._move(JobState.RUNNING)
         try:
-            end = self._taken_to_its_end()
+            end = self._run_to_end()
         finally:
             self._release_arm()
         # a disk that is full now may take it later; else it becomes `interrupted` with the next start
         while end is not None and not self._move(*end) and not self._is_closing:
-            threading.Event().wait(ROOM_POLL_S)
+            threading.Event().wait(RETRY_S)
 
-    def _taken_to_its_end(self) -> tuple[JobState, JobProblem | None] | None:
+    def _run_to_end(self) -> tuple[JobState, JobProblem | None] | None:
         """How it ended; None where it goes on after the next start."""
         try:
-            self._go()
+            self._run_steps()
         except StoppedError:
             if self._is_closing and self._workspace.read_made().recordings:
                 return None  # the job that is in the queue goes on then, too
@@ -126,7 +123,7 @@ class CampaignRunner:
             return JobState.FAILED, INTERNAL
         return JobState.SUCCEEDED, None
 
-    def _go(self) -> None:
+    def _run_steps(self) -> None:
         """Every step that is not done yet, one after the other."""
         made, order = self._workspace.read_made(), self._order
         if not made.recordings:
@@ -134,16 +131,16 @@ class CampaignRunner:
             excitation = self._design(order.excitation, "excitation")
             held_out_options = order.held_out_options()
             held_out = held_out_options and self._design(held_out_options, "held_out_excitation")
-            self._wait(ExcitationWorkspace, self._shop.excitations, excitation, "excitation")
+            self._wait(ExcitationWorkspace, self._dependencies.excitations, excitation, "excitation")
             self._begin("run the motion")
             recordings = (self._run_motion(excitation, "run"),)
             judges: tuple[str, ...] = ()
             if held_out:
                 self._begin("design the held-out motion")
-                self._wait(ExcitationWorkspace, self._shop.excitations, held_out, "excitation")
+                self._wait(ExcitationWorkspace, self._dependencies.excitations, held_out, "excitation")
                 self._begin("run the held-out motion")
                 judges = (self._run_motion(held_out, "held_out_run"),)
-            self._note(recordings=recordings, held_out=judges)
+            self._record(recordings=recordings, held_out=judges)
         self._release_arm()
         self._begin("identify")
         self._identify()
@@ -153,30 +150,30 @@ class CampaignRunner:
 
     def _design(self, options: ExcitationDesignOptions, link: str) -> str:
         """Have a motion designed; returns at once."""
-        jobs, kind, folder = self._shop.jobs, self._shop.excitations, self._workspace.robot
-        identifier = self._when_there_is_room(lambda: hand_in_excitation(jobs, kind, folder, self._robot, options))
-        self._note(**{link: identifier})
+        jobs, kind, folder = self._dependencies.jobs, self._dependencies.excitations, self._workspace.robot
+        identifier = self._submit_with_retry(lambda: hand_in_excitation(jobs, kind, folder, self._robot, options))
+        self._record(**{link: identifier})
         return identifier
 
-    def _when_there_is_room(self, hand_in: Callable[[], str]) -> str:
+    def _submit_with_retry(self, hand_in: Callable[[], str]) -> str:
         """Hand a job in, as soon as the queue takes one."""
         while True:
             try:
                 return hand_in()
             except QueueFullError:
-                if self._stop_asked.wait(ROOM_POLL_S):
+                if self._stop_requested.wait(RETRY_S):
                     raise StoppedError from None
 
     def _wait(self, workspace: type[Workspace], kind: JobKind, identifier: str, noun: str) -> None:
         """Wait for a job to succeed."""
-        record = wait_for_end(workspace(kind.items.folder(identifier)), self._stop_asked)
+        record = wait_for_end(workspace(kind.items.folder(identifier)), self._stop_requested)
         if record is None:
             raise StoppedError
         require_succeeded(record, f"{noun} {identifier}")
 
     def _run_motion(self, excitation: str, link: str) -> str:
         """Run a motion to its end; the name of its recording."""
-        order, shop = self._order, self._shop
+        order, dependencies = self._order, self._dependencies
         request = RunRequestRecord(
             robot_file=order.robot_file,
             robot_name=order.robot_name,
@@ -186,24 +183,26 @@ class CampaignRunner:
             campaign=self._workspace.folder.name,
             options=order.run,
         )
-        motion = ExcitationWorkspace(shop.excitations.items.folder(excitation))
-        self._run = hand_in_run(shop.runs, self._workspace.robot, request, motion, self.holder, self._permit)
-        self._note(**{link: self._run})
-        if self._stop_asked.is_set():
-            shop.runs.stop(self._run)
-        self._follow(self._run)
-        record = RunWorkspace(shop.runs.items.folder(self._run)).read_run()
+        motion = ExcitationWorkspace(dependencies.excitations.items.folder(excitation))
+        self._run_identifier = hand_in_run(
+            dependencies.runs, self._workspace.robot, request, motion, self.holder, self._permit
+        )
+        self._record(**{link: self._run_identifier})
+        if self._stop_requested.is_set():
+            dependencies.runs.stop(self._run_identifier)
+        self._follow(self._run_identifier)
+        record = RunWorkspace(dependencies.runs.items.folder(self._run_identifier)).read_run()
         if record is None or record.state is not RunState.FINISHED:
-            if self._stop_asked.is_set():
+            if self._stop_requested.is_set():
                 raise StoppedError
-            raise StepFailedError(_run_problem(self._run, record))
-        name, self._run = run_recording_name(self._run), None
+            raise StepFailedError(_run_problem(self._run_identifier, record))
+        name, self._run_identifier = run_recording_name(self._run_identifier), None
         return name
 
     def _follow(self, run: str) -> None:
         """Tell the progress of a run until it is over."""
         told = None
-        while (live := self._shop.runs.live(run)) is not None:
+        while (live := self._dependencies.runs.live(run)) is not None:
             if live.percent is not None and live.percent != told:
                 told = live.percent
                 self._workspace.write_progress(told, {"run": run, "state": live.state.value})
@@ -211,12 +210,12 @@ class CampaignRunner:
 
     def _identify(self) -> None:
         """From the recordings to the model."""
-        made, shop = self._workspace.read_made(), self._shop
-        identifier = self._handed_in(shop.identifications, made.identification) or self._when_there_is_room(
+        made, dependencies = self._workspace.read_made(), self._dependencies
+        identifier = self._find_submitted(dependencies.identifications, made.identification) or self._submit_with_retry(
             lambda: hand_in_identification(
-                shop.jobs,
-                shop.identifications,
-                shop.recordings,
+                dependencies.jobs,
+                dependencies.identifications,
+                dependencies.recordings,
                 self._workspace.robot,
                 self._robot,
                 train=made.recordings,
@@ -224,17 +223,17 @@ class CampaignRunner:
                 options=self._order.identification,
             )
         )
-        self._note(identification=identifier)
-        self._wait(Workspace, shop.identifications, identifier, "identification")
+        self._record(identification=identifier)
+        self._wait(Workspace, dependencies.identifications, identifier, "identification")
 
     def _diagnose(self, options: DiagnosisOptions) -> None:
         """From the same recordings to what the model leaves out."""
-        made, shop = self._workspace.read_made(), self._shop
-        identifier = self._handed_in(shop.diagnoses, made.diagnosis) or self._when_there_is_room(
+        made, dependencies = self._workspace.read_made(), self._dependencies
+        identifier = self._find_submitted(dependencies.diagnoses, made.diagnosis) or self._submit_with_retry(
             lambda: hand_in_diagnosis(
-                shop.jobs,
-                shop.diagnoses,
-                shop.recordings,
+                dependencies.jobs,
+                dependencies.diagnoses,
+                dependencies.recordings,
                 self._workspace.robot,
                 self._robot,
                 train=made.recordings,
@@ -242,38 +241,38 @@ class CampaignRunner:
                 options=options,
             )
         )
-        self._note(diagnosis=identifier)
-        self._wait(Workspace, shop.diagnoses, identifier, "diagnosis")
+        self._record(diagnosis=identifier)
+        self._wait(Workspace, dependencies.diagnoses, identifier, "diagnosis")
 
-    def _handed_in(self, kind: JobKind, identifier: str | None) -> str | None:
+    def _find_submitted(self, kind: JobKind, identifier: str | None) -> str | None:
         """The job that this campaign handed in before the service was started again, where that one counts still."""
         try:
             record = None if identifier is None else Workspace(kind.items.folder(identifier)).read_record()
         except NotFoundError:
             return None
-        given_up = (JobState.CANCELLED, JobState.INTERRUPTED)
-        return None if record is None or record.state in given_up else identifier
+        requeue = (JobState.CANCELLED, JobState.INTERRUPTED)
+        return None if record is None or record.state in requeue else identifier
 
     def _begin(self, step: str) -> None:
         """Tell a step, unless nobody wants to know any more."""
-        if self._stop_asked.is_set():
+        if self._stop_requested.is_set():
             raise StoppedError
         self._workspace.write_step(step)
 
-    def _note(self, **made: object) -> None:
+    def _record(self, **made: object) -> None:
         """Keep what was made."""
         self._workspace.write_made(self._workspace.read_made().model_copy(update=made))
 
     def _cancel_jobs(self) -> None:
         """Nobody waits for what is still designed, identified or diagnosed."""
-        made, shop = self._workspace.read_made(), self._shop
-        jobs = [(shop.excitations, made.excitation), (shop.excitations, made.held_out_excitation)]
-        jobs += [(shop.identifications, made.identification), (shop.diagnoses, made.diagnosis)]
+        made, dependencies = self._workspace.read_made(), self._dependencies
+        jobs = [(dependencies.excitations, made.excitation), (dependencies.excitations, made.held_out_excitation)]
+        jobs += [(dependencies.identifications, made.identification), (dependencies.diagnoses, made.diagnosis)]
         for kind, identifier in jobs:
             # one that a full disk does not let be cancelled is done for nobody
             with suppress(NotFoundError, OSError):
                 if identifier is not None:
-                    shop.jobs.cancel(kind, identifier)
+                    dependencies.jobs.cancel(kind, identifier)
 
     def _move(self, state: JobState, problem: JobProblem | None = None) -> bool:
         """Write the campaign's new state, if it may follow the present one; False where the disk does not take it."""

@@ -14,7 +14,6 @@ class DeviceClaims:
     """Arms and their holders; every method may be called from any thread and returns at once."""
 
     def __init__(self, most: int) -> None:
-        """Begin with no arm held."""
         self._most = most
         self._lock = threading.Lock()
         self._holders: dict[str, str] = {}

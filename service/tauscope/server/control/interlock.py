@@ -7,11 +7,11 @@ from pathlib import Path
 from tauscope.robot.messages import one_line
 
 FOLDER = "interlocks"
-PATIENCE_S = 10.0
+TIMEOUT_S = 10.0
 """How long the program may take [s]."""
 
 
-def objection(data_folder: Path, name: str, robot: str, device: str) -> str | None:
+def find_objection(data_folder: Path, name: str, robot: str, device: str) -> str | None:
     """Ask whether an arm is free. Whatever goes wrong with asking counts as no.
 
     Only programs in the folder are called, never a command that came over the network.
@@ -29,13 +29,13 @@ def objection(data_folder: Path, name: str, robot: str, device: str) -> str | No
         done = subprocess.run(  # noqa: S603 - the operator's own program, without a shell
             [str(path), robot, device],
             capture_output=True,
-            timeout=PATIENCE_S,
+            timeout=TIMEOUT_S,
             check=False,
             stdin=subprocess.DEVNULL,
             cwd=data_folder,
         )
     except subprocess.TimeoutExpired:
-        return f"interlock {name}: did not answer within {PATIENCE_S:g} s"
+        return f"interlock {name}: did not answer within {TIMEOUT_S:g} s"
     except OSError as error:
         return f"interlock {name}: cannot be called ({error.strerror or error})"
     if done.returncode == 0:

@@ -1,8 +1,7 @@
-"""Who controls which arm: exclusive leases that end by themselves unless they are renewed, numbered for fencing.
+"""Who controls which arm: exclusive leases that expire unless renewed, numbered for fencing, and permits to move.
 
-Whether a lease holds is a comparison of the clock with its end, made by whoever asks: no thread has to be alive for a
-lease to expire. Its number is higher than that of every lease before it, also after a restart, so that the word of a
-former holder is never taken for that of the present one.
+A lease holds while the clock is before its end; no thread has to be alive for it to expire. Its number is higher than
+that of every lease before it, also after a restart, so that a former holder is never taken for the present one.
 """
 
 import hmac
@@ -10,15 +9,162 @@ import secrets
 import threading
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
+from typing_extensions import override
+
+from tauscope.errors import AcquisitionError
+from tauscope.files import write_atomically
 from tauscope.robot.messages import one_line
 from tauscope.server.control.device_claims import DeviceClaims
-from tauscope.server.control.lease import Lease
-from tauscope.server.control.lease_errors import LeasedError, LeaseLostError, LeaseNeededError
-from tauscope.server.control.lease_numbers import next_number
-from tauscope.server.control.lease_permits import LeasePermit, UnleasedPermit
-from tauscope.server.control.permits import Permit
+
+
+class Permit(Protocol):
+    """Somebody's leave to move one arm. Every method takes no lock, touches no disk and returns at once."""
+
+    def require(self) -> None:
+        """Refuse a motion that may not begin.
+
+        Raises
+        ------
+        LeaseError
+            if it may not
+        """
+        ...
+
+    def find_end_reason(self) -> str | None:
+        """Why the motion may not go on; None while it may."""
+        ...
+
+    def disarm(self) -> None:
+        """Somebody stopped the arm: before it moves again, it has to be armed again."""
+        ...
+
+
+class FreePermit:
+    """Leave to move an arm that nobody has a lease of, where no lease is asked for."""
+
+    def require(self) -> None:
+        """Nothing to refuse."""
+
+    def find_end_reason(self) -> str | None:
+        """The motion may go on."""
+        return None
+
+    def disarm(self) -> None:
+        """Nothing to take back."""
+
+
+FREE = FreePermit()
+"""Leave that is never taken back."""
+
+
+class LeaseError(AcquisitionError):
+    """Something about the lease of an arm."""
+
+
+class LeasedError(LeaseError):
+    """Somebody else has the lease of the arm."""
+
+
+class LeaseNeededError(LeaseError):
+    """The arm moves for whoever has its lease, and none was shown."""
+
+
+class LeaseLostError(LeaseError):
+    """The lease that was shown is not the present one: it expired, was released, or somebody took the arm."""
+
+
+class NotArmedError(LeaseError):
+    """The lease is good, but nobody has armed it."""
+
+
+LONGEST_TTL_S = 60.0
+"""Longest time for which a lease may be given without a sign of life [s]."""
+
+
+@dataclass(eq=False)
+class Lease:
+    """One lease.
+
+    Attributes are replaced one at a time and never need a lock to be read.
+
+    ttl_s : float
+        how long it lasts without a sign of life [s]
+    ends : float
+        when it ends, on the clock of `Leases` [s]
+    """
+
+    id: str
+    number: int
+    device: str
+    holder: str
+    owner: str
+    ttl_s: float
+    secret: str
+    ends: float
+    is_armed: bool = False
+    lost: str | None = None
+
+    @property
+    def token(self) -> str:
+        """What its holder shows."""
+        return f"{self.number}-{self.secret}"
+
+
+def next_number(counter: Path) -> int:
+    """A number above all before, kept before it is used."""
+    try:
+        last = int(counter.read_text(encoding="ascii"))
+    except FileNotFoundError:
+        last = 0
+    except (OSError, ValueError):
+        # The seconds of our era are more than any number that was counted one by one.
+        last = int(time.time())
+    write_atomically(counter, str(last + 1).encode())
+    return last + 1
+
+
+class LeasePermit:
+    """Leave by a lease that was shown."""
+
+    def __init__(self, lease: Lease, find_end_reason: Callable[[Lease], str | None]) -> None:
+        self._lease, self._end_of = lease, find_end_reason
+
+    def require(self) -> None:
+        """Refuse what its end would stop at once."""
+        lost = self._end_of(self._lease)
+        if lost is not None:
+            raise LeaseLostError(one_line(f"{self._lease.device}: lease {self._lease.number} ended: {lost}"))
+        if not self._lease.is_armed:
+            hint = f"POST /api/v1/leases/{self._lease.id}/arm first"
+            raise NotArmedError(one_line(f"{self._lease.device}: its lease is not armed; {hint}"))
+
+    def find_end_reason(self) -> str | None:
+        """Why the motion has to end."""
+        lost = self._end_of(self._lease)
+        if lost is not None:
+            return f"lease {self._lease.number} of {self._lease.holder} ended: {lost}"
+        return None if self._lease.is_armed else f"lease {self._lease.number} of {self._lease.holder} was disarmed"
+
+    def disarm(self) -> None:
+        """A stop disarms."""
+        self._lease.is_armed = False
+
+
+class UnleasedPermit(FreePermit):
+    """Permit for one motion, by the claim of the arm alone; the arm cannot be leased while it lasts."""
+
+    def __init__(self, device: str, require_unleased: Callable[[str], None]) -> None:
+        self._device, self._require_unleased = device, require_unleased
+
+    @override
+    def require(self) -> None:
+        """Refuse an arm that is leased."""
+        self._require_unleased(self._device)
+
 
 LeaseEnd = Callable[[Lease, str], None]
 """Told that a lease has ended, and why; called by whoever notices, so that it must return at once."""
@@ -35,7 +181,6 @@ class Leases:
         clock: Callable[[], float] = time.monotonic,
         on_end: LeaseEnd | None = None,
     ) -> None:
-        """Begin with no lease."""
         self._claims, self._counter, self._clock = claims, counter, clock
         self._on_end = on_end or (lambda _lease, _why: None)
         self._lock = threading.Lock()
@@ -43,7 +188,7 @@ class Leases:
 
     def active(self) -> list[Lease]:
         """Leases that hold, the newest first."""
-        leases = [lease for lease in self._active.values() if self.end_of(lease) is None]
+        leases = [lease for lease in self._active.values() if self.find_end_reason(lease) is None]
         return sorted(leases, key=lambda lease: -lease.number)
 
     def seconds_left(self, lease: Lease) -> float:
@@ -163,7 +308,7 @@ class Leases:
             if there is no such leave
         """
         if token is not None:
-            permit: Permit = LeasePermit(self.require(device, token, owner), self.end_of)
+            permit: Permit = LeasePermit(self.require(device, token, owner), self.find_end_reason)
         elif is_needed:
             hint = "POST /api/v1/leases, arm the lease, and send its token as header Lease-Token"
             raise LeaseNeededError(one_line(f"{device}: moves for whoever has its lease; {hint}"))
@@ -172,7 +317,7 @@ class Leases:
         permit.require()
         return permit
 
-    def end_of(self, lease: Lease) -> str | None:
+    def find_end_reason(self, lease: Lease) -> str | None:
         """Why a lease does not hold; None while it does. Takes no lock."""
         if lease.lost is None and self._clock() >= lease.ends:
             self._finish(lease, f"no sign of life for {lease.ttl_s:g} s")
@@ -193,7 +338,7 @@ class Leases:
     def _present(self, device: str) -> Lease | None:
         """The lease that holds for an arm."""
         lease = self._active.get(device)
-        return None if lease is None or self.end_of(lease) is not None else lease
+        return None if lease is None or self.find_end_reason(lease) is not None else lease
 
     def _finish(self, lease: Lease, why: str) -> None:
         """A lease ends, once."""

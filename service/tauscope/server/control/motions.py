@@ -8,10 +8,8 @@ from dataclasses import dataclass
 from tauscope.errors import AcquisitionError
 from tauscope.server.control.run_workspace import RunWorkspace
 from tauscope.server.queue.excitation_workspace import ExcitationWorkspace
-from tauscope.server.queue.queue import JobQueue
-from tauscope.server.queue.queued_job import JobKind
-from tauscope.server.queue.record import JobProblem, JobRecord
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.queue import JobKind, JobQueue
+from tauscope.server.queue.record import JobProblem, JobRecord, JobState
 from tauscope.server.queue.workspace import Workspace
 
 Motion = Callable[[RunWorkspace, threading.Event], bool]

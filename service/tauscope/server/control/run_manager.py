@@ -1,30 +1,26 @@
-"""All runs: taken, led in threads of their own, stopped at once, and found interrupted after a restart."""
+"""The run manager: it starts, stops and removes runs, and stores their recordings."""
 
 import logging
-import threading
 from collections.abc import Callable
 from pathlib import Path
 
 from tauscope.errors import TauscopeError
 from tauscope.runtime.record import RunRecord
 from tauscope.server.control.device_claims import BusyError, DeviceClaims
+from tauscope.server.control.leases import FREE, Permit
 from tauscope.server.control.motions import Motion
-from tauscope.server.control.permits import FREE, Permit
 from tauscope.server.control.run_supervisor import Live, RunSupervisor, StartControl
 from tauscope.server.control.run_workspace import RunWorkspace
-from tauscope.server.control.supervised_threads import SupervisedThreads
-from tauscope.server.store.incoming import KeptFile, hash_file
+from tauscope.server.control.supervised_threads import Manager
+from tauscope.server.store.files import KeptFile, hash_file
 from tauscope.server.store.items import ItemStore, staged_identifier
 from tauscope.server.store.recordings import RecordingStore
 
 _log = logging.getLogger("tauscope.jobs")
 
-PATIENCE_S = 15.0
-"""How long a run may take to stop when the service ends; its control process outlasts it where need be [s]."""
 
-
-class RunManager:
-    """Runs that go on, and the folders of all runs. Every method may be called from any thread."""
+class RunManager(Manager[RunSupervisor]):
+    """The active runs, and the folders of all runs."""
 
     def __init__(
         self,
@@ -35,23 +31,19 @@ class RunManager:
         is_alive: Callable[[], bool],
         on_end: Callable[[RunRecord], None] = lambda _record: None,
     ) -> None:
-        """Open the desk; runs that an earlier service left unfinished become `interrupted`."""
-        self.items = items
+        """Mark the unfinished runs of an earlier service as `interrupted`."""
+        super().__init__(items)
         self.claims = claims
         self._recordings = recordings
         self._start = start
         self._is_alive = is_alive
         self._on_end = on_end
-        self._lock = threading.Lock()
-        self._led: SupervisedThreads[RunSupervisor] = SupervisedThreads()
-        self._is_closed = False
-        self._unkept: dict[str, RunWorkspace] = {}
-        items.tidy()
+        self._pending: dict[str, RunWorkspace] = {}
         for identifier in items.identifiers():
             self._end(RunWorkspace(items.folder(identifier)), None)
 
     def submit(self, staged: Path, motion: Motion, holder: str | None = None, permit: Permit = FREE) -> str:
-        """Take a run; it begins at once.
+        """Start a run.
 
         Parameters
         ----------
@@ -84,8 +76,8 @@ class RunManager:
                 self._release(claim)
                 raise
             workspace = RunWorkspace(self.items.folder(identifier))
-            leader = RunSupervisor(workspace, self._start, motion, self._is_alive, permit)
-            self._led.begin(identifier, leader, lambda: self._end_led(workspace, claim))
+            supervisor = RunSupervisor(workspace, self._start, motion, self._is_alive, permit)
+            self._threads.start(identifier, supervisor, lambda: self._end_supervised(workspace, claim))
         return identifier
 
     def stop(self, identifier: str) -> Live | None:
@@ -96,38 +88,20 @@ class RunManager:
         Live or None
             where the run stood; None where it does not go on
         """
-        leader = self._led.find(identifier)
-        if leader is None:
+        supervisor = self._threads.find(identifier)
+        if supervisor is None:
             return None
-        leader.stop()
-        return leader.live
+        supervisor.stop()
+        return supervisor.live
 
     def live(self, identifier: str) -> Live | None:
-        """What is known of a run that goes on; None of any other."""
-        leader = self._led.find(identifier)
-        return None if leader is None else leader.live
+        """The status of an active run; None for any other."""
+        supervisor = self._threads.find(identifier)
+        return None if supervisor is None else supervisor.live
 
-    def remove(self, identifier: str) -> bool:
-        """Remove a run that has ended, with all its files; what is kept among the recordings stays.
-
-        Returns
-        -------
-        bool
-            False where the run goes on
-
-        Raises
-        ------
-        NotFoundError
-            if there is no such run
-        """
-        if self._led.find(identifier) is not None:
-            return False
-        self.items.remove(identifier)
-        return True
-
-    def lives(self) -> list[Live]:
-        """What is known of each run that goes on."""
-        return [leader.live for leader in self._led.leaders()]
+    def list_live(self) -> list[Live]:
+        """The status of each active run."""
+        return [supervisor.live for supervisor in self._threads.supervisors()]
 
     def settle(self) -> None:
         """Keep the recordings that a full disk did not take; to be called again and again.
@@ -137,26 +111,10 @@ class RunManager:
         OSError
             if the disk is in the way still
         """
-        for workspace in list(self._unkept.values()):
+        for workspace in list(self._pending.values()):
             self._conclude(workspace)
 
-    def stop_every(self) -> list[str]:
-        """Stop every run that goes on, and go on taking further ones; takes no lock. The runs' identifiers."""
-        return [identifier for identifier in self._led.identifiers() if self.stop(identifier) is not None]
-
-    def stop_all(self) -> None:
-        """Stop every run and take no further ones; returns at once."""
-        self._is_closed = True
-        for leader in self._led.leaders():
-            leader.stop()
-
-    def close(self) -> None:
-        """Stop every run, and wait until all have ended or patience has."""
-        with self._lock:
-            self.stop_all()
-        self._led.join(PATIENCE_S)
-
-    def _end_led(self, workspace: RunWorkspace, claim: tuple[str, str] | None) -> None:
+    def _end_supervised(self, workspace: RunWorkspace, claim: tuple[str, str] | None) -> None:
         """Put everything in its place, and tell whoever counts."""
         self._end(workspace, claim)
         record = workspace.read_run()
@@ -182,15 +140,15 @@ class RunManager:
         """Keep the recording of a run that has ended among the recordings, and tell the end; done once."""
         identifier = workspace.folder.name
         if workspace.has_told_end():
-            self._unkept.pop(identifier, None)
+            self._pending.pop(identifier, None)
             return
-        self._unkept[identifier] = workspace
+        self._pending[identifier] = workspace
         try:
             self._keep_recording(workspace)
         except TauscopeError:
             _log.exception("the recording of run %s could not be kept", identifier)
         workspace.tell_end()
-        self._unkept.pop(identifier, None)
+        self._pending.pop(identifier, None)
 
     def _keep_recording(self, workspace: RunWorkspace) -> None:
         """Give the CSV of a run a name among the recordings; both names share the bytes on the disk."""

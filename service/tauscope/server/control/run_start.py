@@ -7,7 +7,7 @@ from typing import Any
 
 from tauscope.errors import AcquisitionError
 from tauscope.robot import read_robot
-from tauscope.runtime.order import BackendOrder, RunOrder
+from tauscope.runtime.options import BackendOrder, RunOrder
 from tauscope.runtime.progress import Report
 from tauscope.runtime.run_process import RunProcess
 from tauscope.server.control.run_order import BackendChoice

@@ -3,8 +3,8 @@
 import shutil
 from pathlib import Path
 
+from tauscope.server.control.leases import Permit
 from tauscope.server.control.motions import ready_motion, take_trajectory
-from tauscope.server.control.permits import Permit
 from tauscope.server.control.run_manager import RunManager
 from tauscope.server.control.run_order import RunRequestRecord
 from tauscope.server.control.run_workspace import RunWorkspace

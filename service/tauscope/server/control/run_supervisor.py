@@ -1,4 +1,4 @@
-"""Leads one run from its beginning to its end: waits for its motion, starts its control process, tells what happens."""
+"""The supervisor of one run: it waits for the motion, starts the control process, and reports its events."""
 
 import logging
 import threading
@@ -11,10 +11,10 @@ from tauscope.errors import TauscopeError
 from tauscope.runtime.progress import Report
 from tauscope.runtime.record import RunProblem, RunRecord
 from tauscope.runtime.states import RunState
+from tauscope.server.control.leases import FREE, Permit
 from tauscope.server.control.motions import Motion, StepFailedError
-from tauscope.server.control.permits import FREE, Permit
 from tauscope.server.control.run_workspace import RunWorkspace
-from tauscope.server.queue.events import StateEvent
+from tauscope.server.queue.record import StateEvent
 
 _log = logging.getLogger("tauscope.jobs")
 
@@ -79,7 +79,6 @@ class RunSupervisor:
         is_alive: Callable[[], bool],
         permit: Permit = FREE,
     ) -> None:
-        """Prepare; nothing happens before `lead`."""
         self.live = Live(RunState.CREATED, None, {})
         self._workspace = workspace
         self._start = start
@@ -87,28 +86,32 @@ class RunSupervisor:
         self._is_alive = is_alive
         self._permit = permit
         self._control: ControlProcess | None = None
-        self._stop_asked = threading.Event()
+        self._stop_requested = threading.Event()
 
     def stop(self) -> None:
         """Stop the run, in whatever state it is; the arm has to be armed again before it moves again."""
-        self._permit.stopped()
+        self._permit.disarm()
         self._halt()
 
+    def interrupt(self) -> None:
+        """Stop because the service ends."""
+        self.stop()
+
     def _halt(self) -> None:
-        """Stop the run, whoever wants it."""
-        self._stop_asked.set()
+        """Stop without disarming."""
+        self._stop_requested.set()
         # Whoever starts the control process looks at the flag after it has told us of the process.
         control = self._control
         if control is not None:
             control.stop()
 
-    def lead(self) -> None:
+    def run(self) -> None:
         """Take the run to its end; never raises."""
         try:
-            if self._motion(self._workspace, self._stop_asked):
-                if not self._stop_asked.is_set():
+            if self._motion(self._workspace, self._stop_requested):
+                if not self._stop_requested.is_set():
                     self._permit.require()
-                self._run()
+                self._supervise()
             else:
                 self._end(RunState.STOPPED)
         except StepFailedError as error:
@@ -119,18 +122,18 @@ class RunSupervisor:
             _log.exception("run %s failed for an unforeseen reason", self._workspace.folder.name)
             self._end(RunState.FAILED, "internal", "the run met a fault of Tauscope's own; the service's log says more")
 
-    def _run(self) -> None:
+    def _supervise(self) -> None:
         """Start the control process, and stay with it until it has ended."""
-        self._control = control = self._start(self._workspace, self._take)
-        if self._stop_asked.is_set():
+        self._control = control = self._start(self._workspace, self._handle_event)
+        if self._stop_requested.is_set():
             control.stop()
         request = self._workspace.read_request()
         beat_s = BEAT_S if request is None else min(BEAT_S, request.options.heartbeat_s / BEATS_A_HEARTBEAT)
         has_ended = False
         while not has_ended:
             # Two ways to the same end: the run is asked to stop, and hears nothing of its owner any more.
-            if (lost := self._permit.end()) is not None:
-                self._lose(lost)
+            if (lost := self._permit.find_end_reason()) is not None:
+                self._stop_without_permit(lost)
             elif self._is_alive():
                 control.beat()
             try:
@@ -139,21 +142,21 @@ class RunSupervisor:
             except TimeoutError:
                 continue
 
-    def _lose(self, why: str) -> None:
+    def _stop_without_permit(self, why: str) -> None:
         """The leave to move has ended: stop, and say why; nothing is new where somebody has stopped the run already."""
-        if not self._stop_asked.is_set():
+        if not self._stop_requested.is_set():
             self._halt()
             _log.info("run %s is stopped: %s", self._workspace.folder.name, why)
-            self._tell(f"stop: {why}")
+            self._report_step(f"stop: {why}")
 
-    def _tell(self, step: str) -> None:
+    def _report_step(self, step: str) -> None:
         """Tell a step; a disk that takes none holds nothing up."""
         try:
             self._workspace.write_step(step)
         except OSError:
             _log.exception("a step of run %s could not be written", self._workspace.folder.name)
 
-    def _take(self, event: Mapping[str, Any]) -> None:
+    def _handle_event(self, event: Mapping[str, Any]) -> None:
         """Tell what the control process said."""
         state = RunState(event["state"])
         if event["event"] == "state":

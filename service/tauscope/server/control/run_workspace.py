@@ -17,10 +17,8 @@ from tauscope.runtime.record import (
 from tauscope.runtime.recovery import recover_run
 from tauscope.runtime.states import RunState
 from tauscope.server.control.run_order import RunRequestRecord
-from tauscope.server.queue.events import EndedEvent
 from tauscope.server.queue.job_folder import JobFolder
-from tauscope.server.queue.messages import without_folders
-from tauscope.server.queue.record import JobProblem
+from tauscope.server.queue.record import EndedEvent, JobProblem, without_folders
 from tauscope.server.queue.stored import read_stored, write_stored
 
 

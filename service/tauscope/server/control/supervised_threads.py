@@ -1,79 +1,128 @@
-"""Work that a thread of this process leads, as runs and campaigns are; each can be stopped at any time."""
+"""Threads that supervise runs and campaigns, and the part that the managers of both share."""
 
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
+from tauscope.server.store.items import ItemStore
+
+CLOSE_TIMEOUT_S = 15.0
+"""How long a run or a campaign may take to stop when the service ends [s]. Its control process may last longer."""
+
 
 class Supervisor(Protocol):
-    """Leads one piece of work."""
+    """Supervises one run or one campaign."""
 
-    def lead(self) -> None:
-        """Take it to its end; never raises."""
+    def run(self) -> None:
+        """Supervise to the end; never raises."""
         ...
 
     def stop(self) -> None:
-        """Stop it, whatever it is doing; takes no lock, waits for nothing, may be called any number of times."""
+        """Stop, in any state; takes no lock, returns at once, may be called repeatedly."""
+        ...
+
+    def interrupt(self) -> None:
+        """Stop because the service ends; as `stop` otherwise."""
         ...
 
 
-L = TypeVar("L", bound=Supervisor)
+S = TypeVar("S", bound=Supervisor)
 
 
 @dataclass(frozen=True, eq=False)
-class _Supervised(Generic[L]):
-    """A piece of work that goes on, and the thread that leads it."""
-
-    leader: L
+class _Supervised(Generic[S]):
+    supervisor: S
     thread: threading.Thread
 
 
-class SupervisedThreads(Generic[L]):
-    """Everything that goes on, by identifier. Reading it takes no lock: nobody who is stuck can hold up a stop."""
+class SupervisedThreads(Generic[S]):
+    """The active supervisors by identifier. Reading takes no lock, so that a stuck thread cannot delay a stop."""
 
     def __init__(self) -> None:
-        """Begin with nothing."""
         self._lock = threading.Lock()
-        # Replaced as a whole, never changed: whoever reads it sees one state of affairs.
-        self._active: Mapping[str, _Supervised[L]] = {}
+        # Replaced as a whole, never changed: each reader sees one consistent state.
+        self._active: Mapping[str, _Supervised[S]] = {}
 
-    def begin(self, identifier: str, leader: L, then: Callable[[], None]) -> None:
-        """Lead some work in a thread of its own."""
+    def start(self, identifier: str, supervisor: S, then: Callable[[], None] = lambda: None) -> None:
+        """Run a supervisor in a thread of its own, and call `then` after it."""
 
         def run() -> None:
             try:
-                leader.lead()
+                supervisor.run()
                 then()
             finally:
                 with self._lock:
-                    self._active = {name: led for name, led in self._active.items() if name != identifier}
+                    self._active = {name: entry for name, entry in self._active.items() if name != identifier}
 
-        thread = threading.Thread(target=run, name=f"lead-{identifier}", daemon=True)
+        thread = threading.Thread(target=run, name=f"supervise-{identifier}", daemon=True)
         with self._lock:
-            self._active = {**self._active, identifier: _Supervised(leader, thread)}
+            self._active = {**self._active, identifier: _Supervised(supervisor, thread)}
         thread.start()
 
-    def find(self, identifier: str) -> L | None:
-        """Who leads some work; None where it does not go on."""
-        led = self._active.get(identifier)
-        return None if led is None else led.leader
+    def find(self, identifier: str) -> S | None:
+        """The supervisor of an active run or campaign, or None."""
+        entry = self._active.get(identifier)
+        return None if entry is None else entry.supervisor
 
     def identifiers(self) -> tuple[str, ...]:
-        """What goes on now."""
+        """Identifiers of all that is active."""
         return tuple(self._active)
 
-    def leaders(self) -> tuple[L, ...]:
-        """Who leads what goes on now."""
-        return tuple(led.leader for led in self._active.values())
+    def supervisors(self) -> tuple[S, ...]:
+        """Supervisors of all that is active."""
+        return tuple(entry.supervisor for entry in self._active.values())
 
-    def join(self, patience_s: float) -> None:
-        """Wait until everything has ended, or patience has.
+    def join(self, timeout_s: float) -> None:
+        """Wait until all threads have ended, for at most `timeout_s` each [s]."""
+        for entry in self._active.values():
+            entry.thread.join(timeout_s)
 
-        Parameters
-        ----------
-        patience_s : float
-            for each piece of work [s]
+
+class Manager(Generic[S]):
+    """Active items and the folders of all items of a kind. Every method may be called from any thread."""
+
+    def __init__(self, items: ItemStore) -> None:
+        self.items = items
+        self._lock = threading.Lock()
+        self._threads: SupervisedThreads[S] = SupervisedThreads()
+        self._is_closed = False
+        items.tidy()
+
+    def remove(self, identifier: str) -> bool:
+        """Remove an item that has ended, with all its files; its recordings stay.
+
+        Returns
+        -------
+        bool
+            False where the item is active
+
+        Raises
+        ------
+        NotFoundError
+            if there is no such item
         """
-        for led in self._active.values():
-            led.thread.join(patience_s)
+        if self._threads.find(identifier) is not None:
+            return False
+        self.items.remove(identifier)
+        return True
+
+    def stop_all(self) -> list[str]:
+        """Stop all that is active, and accept further items; takes no lock. Returns the identifiers."""
+        active = [(identifier, self._threads.find(identifier)) for identifier in self._threads.identifiers()]
+        for _, supervisor in active:
+            if supervisor is not None:
+                supervisor.stop()
+        return [identifier for identifier, supervisor in active if supervisor is not None]
+
+    def begin_close(self) -> None:
+        """Stop all that is active and accept no further items; returns at once."""
+        self._is_closed = True
+        for supervisor in self._threads.supervisors():
+            supervisor.interrupt()
+
+    def close(self) -> None:
+        """Stop all that is active, and wait for its end for at most `CLOSE_TIMEOUT_S`."""
+        with self._lock:
+            self.begin_close()
+        self._threads.join(CLOSE_TIMEOUT_S)

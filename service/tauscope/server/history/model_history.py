@@ -1,6 +1,9 @@
 """The history of models: every identification is judged once, and at most one model of a robot is active."""
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from datetime import datetime
+from typing import Any
 
 from sqlalchemy import select
 from sqlalchemy.orm import Session, aliased, undefer
@@ -8,22 +11,50 @@ from sqlalchemy.orm import Session, aliased, undefer
 from tauscope.errors import NotFoundError
 from tauscope.identification import IdentificationDocument
 from tauscope.robot.messages import nearest, one_line, shown
-from tauscope.server.history import Gate, ModelPolicy
-from tauscope.server.history.model_entries import ModelEntry, ModelEventEntry
+from tauscope.server.history.gates import Gate, ModelPolicy
 from tauscope.server.history.model_judgement import Candidate, choose, judge
 from tauscope.server.store.database.database import Database
-from tauscope.server.store.database.model_tables import Model, ModelEvent, RobotPolicy
-from tauscope.server.store.database.tables import Item, Robot
+from tauscope.server.store.database.tables import Item, Model, ModelEvent, Robot, RobotPolicy
+
+
+@dataclass(frozen=True)
+class ModelEntry:
+    """A model of a robot."""
+
+    identifier: str
+    site: str
+    robot: str
+    created: datetime
+    considered: datetime
+    source: str
+    state: str
+    gates: tuple[Gate, ...]
+    is_reference: bool
+
+
+@dataclass(frozen=True)
+class ModelEventEntry:
+    """Something about a robot that people should know."""
+
+    number: int
+    robot: str
+    kind: str
+    parameter: str
+    text: str
+    details: Mapping[str, Any]
+    raised: datetime
+    last_seen: datetime
+    closed: datetime | None
+    note: str | None
 
 
 class ModelHistory:
     """Models of every robot. Every method is one short transaction, and may be called from any thread."""
 
     def __init__(self, database: Database) -> None:
-        """Look at the history."""
         self._database = database
 
-    def unjudged(self, site: str) -> list[str]:
+    def list_unjudged(self, site: str) -> list[str]:
         """Identifications that succeeded and were not judged yet, the oldest first."""
         judged = select(Model.identifier).where(Model.site == site)
         query = (
@@ -65,7 +96,7 @@ class ModelHistory:
             choose(session, model, role, reason, now)
             return _entry(model)
 
-    def relied_upon(self) -> frozenset[str]:
+    def list_protected(self) -> frozenset[str]:
         """Identifiers of the models that are active, or that drift is counted from."""
         with self._database.reading() as session:
             return frozenset(session.scalars(select(Model.identifier).where(Model.is_active | Model.is_reference)))

@@ -10,19 +10,9 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session, undefer
 
 from tauscope.identification import IdentificationDocument
-from tauscope.server.history import (
-    Drift,
-    Gate,
-    ModelPolicy,
-    check_gates,
-    drift_between,
-    drift_words,
-    is_beyond,
-    named_parameters,
-    passes,
-)
-from tauscope.server.store.database.model_tables import Model, ModelChoice, ModelEvent
-from tauscope.server.store.database.tables import Robot
+from tauscope.server.history.drift import Drift, compute_drift, describe_drift, extract_parameters, is_beyond
+from tauscope.server.history.gates import Gate, ModelPolicy, check_gates, passes
+from tauscope.server.store.database.tables import Model, ModelChoice, ModelEvent, Robot
 
 
 @dataclass(frozen=True)
@@ -43,7 +33,7 @@ class Candidate:
 
 def judge(session: Session, robot: Robot, candidate: Candidate, policy: ModelPolicy, now: datetime) -> Model:
     """Judge an identification, and write down what came of it."""
-    document = _parsed(candidate.result)
+    document = _parse(candidate.result)
     active, reference = _current(session, robot, is_active=True), _current(session, robot, is_active=False)
     model = Model(
         robot=robot,
@@ -60,14 +50,14 @@ def judge(session: Session, robot: Robot, candidate: Candidate, policy: ModelPol
     )
     session.add(model)
     if document is not None:
-        gates = (*check_gates(document, policy, _document(active)), *_place_gates(candidate, active))
+        gates = (*check_gates(document, policy, _document(active)), *_check_place(candidate, active))
         model.gates, model.state = [asdict(gate) for gate in gates], "refused"
         if passes(gates):
             choose(session, model, "active", "all gates passed", now)
             if reference is None:
                 choose(session, model, "reference", "the first model that passed", now)
             else:
-                _tell_drift(session, reference, model, document, policy, now)
+                _raise_drift_events(session, reference, model, document, policy, now)
     return model
 
 
@@ -90,12 +80,12 @@ def choose(session: Session, model: Model, role: str, reason: str, now: datetime
     session.add(ModelChoice(robot_id=model.robot_id, model_id=model.id, role=role, at=now, reason=reason))
 
 
-def compared(before: IdentificationDocument, after: IdentificationDocument) -> tuple[Drift, ...]:
+def compare_models(before: IdentificationDocument, after: IdentificationDocument) -> tuple[Drift, ...]:
     """The change of every parameter that two models tell."""
-    return drift_between(named_parameters(before), named_parameters(after))
+    return compute_drift(extract_parameters(before), extract_parameters(after))
 
 
-def _place_gates(candidate: Candidate, active: Model | None) -> Sequence[Gate]:
+def _check_place(candidate: Candidate, active: Model | None) -> Sequence[Gate]:
     """A model takes the place of an older one of the same arm only."""
     if active is None:
         return ()
@@ -108,7 +98,7 @@ def _place_gates(candidate: Candidate, active: Model | None) -> Sequence[Gate]:
     return gates
 
 
-def _tell_drift(
+def _raise_drift_events(
     session: Session,
     reference: Model,
     model: Model,
@@ -122,7 +112,7 @@ def _tell_drift(
         return
     elapsed = max(model.created - reference.created, timedelta(0))
     present = {event.parameter: event for event in session.scalars(_open_drifts(model.robot_id))}
-    for drift in compared(before, document):
+    for drift in compare_models(before, document):
         if not is_beyond(drift, policy):
             continue
         details = {**asdict(drift), "reference": reference.identifier, "model": model.identifier}
@@ -132,7 +122,7 @@ def _tell_drift(
                 robot_id=model.robot_id, kind="drift", parameter=drift.name, raised=now, text="", details={}
             )
             session.add(event)
-        event.text, event.details, event.last_seen = drift_words(drift, elapsed), details, now
+        event.text, event.details, event.last_seen = describe_drift(drift, elapsed), details, now
 
 
 def _open_drifts(robot_id: int):
@@ -153,7 +143,7 @@ def _document(model: Model | None) -> IdentificationDocument | None:
     return None if model is None or model.document is None else IdentificationDocument.model_validate(model.document)
 
 
-def _parsed(result: bytes | None) -> IdentificationDocument | None:
+def _parse(result: bytes | None) -> IdentificationDocument | None:
     """The document of a result; None where it is none."""
     try:
         return None if result is None else IdentificationDocument.model_validate_json(result)

@@ -1,16 +1,18 @@
-"""Sees to it that every identification that succeeds is judged, once, whoever handed it in."""
+"""The model registry: it judges each new identification once, and monitors the drift of active models."""
 
 import logging
+from collections import Counter
 from collections.abc import Mapping
+from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from sqlalchemy.exc import IntegrityError
 
 from tauscope.errors import NotFoundError
 from tauscope.server.control.run_workspace import RunWorkspace
-from tauscope.server.history.model_entries import ModelEntry
-from tauscope.server.history.model_history import ModelHistory
-from tauscope.server.history.model_judgement import Candidate
+from tauscope.server.history.drift import Drift
+from tauscope.server.history.model_history import ModelEntry, ModelHistory
+from tauscope.server.history.model_judgement import Candidate, compare_models
 from tauscope.server.queue.identification_order import IdentificationOrder
 from tauscope.server.queue.identification_workspace import IdentificationWorkspace
 from tauscope.server.store.items import ItemStore
@@ -22,14 +24,13 @@ class ModelRegistry:
     """Brings identifications before the history of models, in the order in which they were handed in."""
 
     def __init__(self, history: ModelHistory, site: str, items: Mapping[str, ItemStore]) -> None:
-        """Prepare; nothing is judged yet."""
         self.history = history
         self._site = site
         self._identifications = items["identification"]
         self._runs = items["run"]
-        self._strange: set[str] = set()
+        self._failed: set[str] = set()
 
-    def consider_new(self) -> list[ModelEntry]:
+    def judge_new(self) -> list[ModelEntry]:
         """Judge every identification in the index that was not judged yet.
 
         Raises
@@ -37,7 +38,7 @@ class ModelRegistry:
         StoreError
             if the database does not answer; the next call goes on where this one ended
         """
-        return [entry for identifier in self.history.unjudged(self._site) if (entry := self._consider(identifier))]
+        return [entry for identifier in self.history.list_unjudged(self._site) if (entry := self._consider(identifier))]
 
     def _consider(self, identifier: str) -> ModelEntry | None:
         """Judge one identification; None where it was removed or judged meanwhile, or names an unknown robot."""
@@ -61,9 +62,9 @@ class ModelRegistry:
         except IntegrityError:
             return None
         except NotFoundError as error:  # the order was damaged; one such identification holds up no service
-            if identifier not in self._strange:
+            if identifier not in self._failed:
                 _log.warning("identification %s is not judged, its order may be damaged: %s", identifier, error)
-            self._strange.add(identifier)
+            self._failed.add(identifier)
             return None
         _log.info("model %s of %s is %s", identifier, entry.robot, entry.state)
         return entry
@@ -83,3 +84,50 @@ class ModelRegistry:
         except NotFoundError:
             return None
         return None if request is None else request.backend.name
+
+
+_MOST_EVENTS = 10_000
+
+
+@dataclass(frozen=True)
+class RobotDrift:
+    """The active model of a robot against the one that drift is counted from."""
+
+    active: str
+    reference: str
+    drifts: tuple[Drift, ...]
+    open_events: int
+
+
+class DriftMonitor:
+    """Looks at the history now and then; models are read again only where others became active or the reference."""
+
+    def __init__(self, history: ModelHistory, site: str) -> None:
+        self._history, self._site = history, site
+        self.robots: Mapping[str, RobotDrift] = {}
+
+    def look(self) -> None:
+        """Bring what is known up to date.
+
+        Raises
+        ------
+        StoreError
+            if the database does not answer; what was known before stays
+        """
+        pairs = self._history.active_and_reference(self._site)
+        told = self._history.events(None, only_open=True, limit=_MOST_EVENTS) if pairs else []
+        events = Counter(event.robot for event in told if event.kind == "drift")
+        known = self.robots
+        self.robots = {
+            robot: RobotDrift(*pair, self._drifts(known.get(robot), *pair), events[robot])
+            for robot, pair in pairs.items()
+        }
+
+    def _drifts(self, known: RobotDrift | None, active: str, reference: str) -> tuple[Drift, ...]:
+        """The change between two models."""
+        if known is not None and (known.active, known.reference) == (active, reference):
+            return known.drifts
+        try:
+            return compare_models(self._history.document(reference), self._history.document(active))
+        except NotFoundError:  # it was removed a moment ago
+            return ()

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 
 from tauscope.errors import NotFoundError
-from tauscope.server.history.indexer import Indexer
-from tauscope.server.history.item_metadata import DAMAGED
+from tauscope.server.history.indexer import DAMAGED, Indexer
 from tauscope.server.history.model_history import ModelHistory
-from tauscope.server.store.database.facts import ItemEntry, ItemQuery
+from tauscope.server.store.database.index import ItemEntry, ItemQuery
 from tauscope.server.store.items import utc_now
 from tauscope.server.store.recordings import RecordingStore
 
@@ -33,7 +32,7 @@ class Removal:
 
 
 def plan_removal(
-    keeper: Indexer, history: ModelHistory, recordings: RecordingStore, rule: RetentionRule, now: datetime
+    indexer: Indexer, history: ModelHistory, recordings: RecordingStore, rule: RetentionRule, now: datetime
 ) -> Removal:
     """What a rule lets go.
 
@@ -45,20 +44,20 @@ def plan_removal(
     StoreError
         if the database does not answer
     """
-    keeper.sync(thorough=True)
-    relied_upon = history.relied_upon()
+    indexer.sync(thorough=True)
+    list_protected = history.list_protected()
     going = [
         entry
-        for entry in keeper.index.search(ItemQuery(site=keeper.index.site, limit=_ALL))
+        for entry in indexer.index.search(ItemQuery(site=indexer.index.site, limit=_ALL))
         if entry.kind in rule.kinds
         and entry.ended is not None
         and entry.ended < now - rule.older_than
         and entry.state != DAMAGED
-        and not (entry.kind == "identification" and entry.identifier in relied_upon)
+        and not (entry.kind == "identification" and entry.identifier in list_protected)
     ]
     names: tuple[str, ...] = ()
     if rule.recordings:
-        used = keeper.index.recordings_used(except_by={(entry.kind, entry.identifier) for entry in going})
+        used = indexer.index.list_used_recordings(except_by={(entry.kind, entry.identifier) for entry in going})
         old = (entry for entry in recordings.entries() if entry.modified < now - rule.older_than)
         names = tuple(entry.name for entry in old if entry.name not in used)
     return Removal(tuple(going), names)
@@ -68,7 +67,7 @@ def remove(
     removal: Removal,
     removers: Mapping[str, Callable[[str], object]],
     recordings: RecordingStore,
-    keeper: Indexer,
+    indexer: Indexer,
 ) -> Removal:
     """Remove what was planned; what somebody else removed meanwhile is left out.
 
@@ -79,7 +78,7 @@ def remove(
     """
     items = tuple(entry for entry in removal.items if _is_gone(removers[entry.kind], entry.identifier))
     names = tuple(name for name in removal.recordings if _is_gone(recordings.remove, name))
-    keeper.sync(thorough=True)
+    indexer.sync(thorough=True)
     return Removal(items, names)
 
 
@@ -98,14 +97,13 @@ class RetentionSweeper:
     def __init__(
         self,
         rule: RetentionRule,
-        keeper: Indexer,
+        indexer: Indexer,
         history: ModelHistory,
         recordings: RecordingStore,
         removers: Mapping[str, Callable[[str], object]],
         on_removed: Callable[[str, str], None],
     ) -> None:
-        """Prepare; nothing goes before `tidy`."""
-        self._rule, self._keeper, self._history = rule, keeper, history
+        self._rule, self._indexer, self._history = rule, indexer, history
         self._recordings, self._removers, self._on_removed = recordings, removers, on_removed
 
     def tidy(self) -> None:
@@ -118,8 +116,8 @@ class RetentionSweeper:
         OSError
             if something cannot be removed
         """
-        plan = plan_removal(self._keeper, self._history, self._recordings, self._rule, utc_now())
-        gone = remove(plan, self._removers, self._recordings, self._keeper)
+        plan = plan_removal(self._indexer, self._history, self._recordings, self._rule, utc_now())
+        gone = remove(plan, self._removers, self._recordings, self._indexer)
         for entry in gone.items:
             self._on_removed(entry.kind, entry.identifier)
         for name in gone.recordings:

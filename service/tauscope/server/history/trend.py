@@ -7,6 +7,10 @@ from datetime import datetime
 
 import numpy as np
 
+from tauscope.identification import IdentificationDocument
+from tauscope.server.history.drift import extract_parameters
+from tauscope.server.history.model_history import ModelEntry
+
 WEEK_S = 7 * 86400.0
 
 
@@ -45,7 +49,7 @@ class Trend:
         return self.slope / self.slope_std
 
 
-def trend_of(points: Sequence[TrendPoint]) -> Trend | None:
+def fit_trend(points: Sequence[TrendPoint]) -> Trend | None:
     """The line through all points, by weighted least squares.
 
     Returns
@@ -68,3 +72,37 @@ def trend_of(points: Sequence[TrendPoint]) -> Trend | None:
     scatter = math.sqrt(float(np.sum(weight * residual**2)) / (len(points) - 2))
     slope_std = max(1.0, scatter) / math.sqrt(spread)
     return Trend(len(points), slope, slope_std, scatter, slope * float(np.ptp(time)))
+
+
+@dataclass(frozen=True)
+class ParameterTrend:
+    """One parameter over time.
+
+    points : tuple of (str, TrendPoint)
+        identifier of each model, and what it says; the oldest first
+    """
+
+    name: str
+    joint: str
+    points: tuple[tuple[str, TrendPoint], ...]
+    line: Trend | None
+
+
+def parameter_trends(models: Sequence[tuple[ModelEntry, IdentificationDocument]]) -> list[ParameterTrend]:
+    """Every parameter that the newest model tells, over all models that tell it.
+
+    Parameters
+    ----------
+    models : sequence of (ModelEntry, IdentificationDocument)
+        every model that was ever active, the oldest first
+    """
+    told = [(entry, {each.name: each for each in extract_parameters(document)}) for entry, document in models]
+    trends = []
+    for name, newest in told[-1][1].items() if told else ():
+        points = tuple(
+            (entry.identifier, TrendPoint(entry.created, parameters[name].value, parameters[name].std))
+            for entry, parameters in told
+            if name in parameters
+        )
+        trends.append(ParameterTrend(name, newest.joint, points, fit_trend([point for _, point in points])))
+    return trends

@@ -1,9 +1,12 @@
-"""JSON bodies: of one media type, of bounded size, strict."""
+"""JSON bodies, of one media type, bounded and strict; and files that are sent as they lie on the disk."""
 
 import json
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, TypeVar
 
 from fastapi import Request
+from fastapi.responses import FileResponse
 from pydantic import BaseModel, ValidationError
 
 from tauscope.errors import LimitExceededError
@@ -71,3 +74,12 @@ def to_json_text(value: Any) -> str | None:
     except (ValueError, RecursionError):
         return None
     return text
+
+
+_MEDIA_TYPES: Mapping[str, str] = {".csv": "text/csv", ".json": "application/json"}
+
+
+def file_answer(path: Path, name: str) -> FileResponse:
+    """The answer that sends a file, to be saved under a name and never shown as a page."""
+    media_type = _MEDIA_TYPES.get(Path(name).suffix.lower(), "application/octet-stream")
+    return FileResponse(path, media_type=media_type, filename=name)

@@ -14,8 +14,7 @@ from starlette.concurrency import run_in_threadpool
 from tauscope.errors import LimitExceededError
 from tauscope.robot.messages import one_line, shown
 from tauscope.server.problems import ProblemError
-from tauscope.server.store.incoming import IncomingFile, KeptFile
-from tauscope.server.store.names import FILE_NAME_RULE, is_file_name
+from tauscope.server.store.files import FILE_NAME_RULE, IncomingFile, KeptFile, is_file_name
 
 if TYPE_CHECKING:
     from python_multipart.multipart import MultipartCallbacks

@@ -11,8 +11,15 @@ from starlette.requests import ClientDisconnect
 from tauscope.errors import TauscopeError
 from tauscope.files import is_disk_full
 from tauscope.server.control.device_claims import BusyError
-from tauscope.server.control.lease_errors import LeasedError, LeaseLostError, LeaseNeededError, NotArmedError
-from tauscope.server.problems import ProblemError, answer_code, field_errors, make_problem, problem_answer, summarised
+from tauscope.server.control.leases import LeasedError, LeaseLostError, LeaseNeededError, NotArmedError
+from tauscope.server.problems import (
+    ProblemError,
+    field_errors,
+    make_code_answer,
+    make_problem,
+    problem_answer,
+    summarise,
+)
 from tauscope.server.queue.queue import QueueFullError
 from tauscope.server.store.recordings import NameTakenError
 
@@ -43,16 +50,16 @@ async def _tauscope_error(request: Request, error: Exception) -> Response:
     if isinstance(error, BusyError):
         return problem_answer(make_problem("busy", str(error), request.url.path), {"Retry-After": "10"})
     if isinstance(error, NameTakenError):
-        return answer_code(request, "name-taken", str(error))
+        return make_code_answer(request, "name-taken", str(error))
     code = _OF_LEASE.get(type(error)) or (error.code if isinstance(error, TauscopeError) else "internal")
-    return answer_code(request, code, str(error))
+    return make_code_answer(request, code, str(error))
 
 
 async def _validation_error(request: Request, error: Exception) -> Response:
     """Path or query parameters that are not as documented."""
     assert isinstance(error, RequestValidationError)  # noqa: S101 - Starlette looks handlers up by type
     fields = field_errors(error.errors())
-    return problem_answer(make_problem("invalid-request", summarised(fields), request.url.path, fields))
+    return problem_answer(make_problem("invalid-request", summarise(fields), request.url.path, fields))
 
 
 async def _http_exception(request: Request, error: Exception) -> Response:
@@ -72,7 +79,9 @@ async def _system_error(request: Request, error: Exception) -> Response:
     """A full disk is said; any other failure of the system is a fault to look into."""
     if isinstance(error, OSError) and is_disk_full(error):
         _log.error("the disk is full")
-        return answer_code(request, "storage-full", "the service's disk is full; remove recordings or identifications")
+        return make_code_answer(
+            request, "storage-full", "the service's disk is full; remove recordings or identifications"
+        )
     raise error
 
 

@@ -1,13 +1,70 @@
-"""What stands before every route: host and origin checks, safe headers, no tracebacks."""
+"""Middleware before every route: request log, safe headers, host and origin, body size, and concurrent readers."""
 
+import asyncio
 import logging
+import time
+import uuid
 from collections.abc import Callable, Mapping
+from typing import cast
 from urllib.parse import urlsplit
 
+import anyio
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from tauscope.errors import LimitExceededError
+from tauscope.server.auth.gate import find_caller
+from tauscope.server.http.metrics import Metrics
 from tauscope.server.problems import make_problem, problem_answer
+
+_request_log = logging.getLogger("tauscope.requests")
+
+REQUEST_ID = "X-Request-Id"
+
+
+class RequestLog:
+    """Counts, times and logs requests."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request."""
+        if scope["type"] != "http":
+            return await self.app(scope, receive, send)
+        number, began, status, answered = uuid.uuid4().hex, time.monotonic(), 500, None
+
+        async def send_observed(message: Message) -> None:
+            nonlocal status, answered
+            if message["type"] == "http.response.start":
+                status, answered = message["status"], time.monotonic()
+                MutableHeaders(scope=message)[REQUEST_ID] = number
+            await send(message)
+
+        try:
+            await self.app(scope, receive, send_observed)
+        finally:
+            seconds = (answered or time.monotonic()) - began
+            metrics = cast(Metrics, scope["app"].state.services.metrics)
+            route = _pattern(scope)
+            metrics.requests.labels(scope["method"], route, str(status)).inc()
+            metrics.request_seconds.labels(scope["method"], route).observe(seconds)
+            details = {"request": number, "method": scope["method"], "path": scope["path"], "status": status}
+            _request_log.info(
+                "answered", extra={**details, "seconds": round(seconds, 4), "caller": find_caller(scope).name}
+            )
+
+
+def _pattern(scope: Scope) -> str:
+    """The path with its parameters' names in place of their values, of which there may be any number."""
+    if scope.get("route") is None:
+        return "none"
+    path = scope["path"]
+    for name, value in reversed(scope.get("path_params", {}).items()):
+        before, _, after = path.rpartition(f"/{value}")
+        path = f"{before}/{{{name}}}{after}"
+    return path
+
 
 _log = logging.getLogger("tauscope.api")
 
@@ -25,11 +82,10 @@ HEADERS: Mapping[str, str] = {
 }
 
 
-class SafeAnswers:
+class ResponseProtection:
     """Adds the headers of every answer, and turns an unforeseen exception into a problem without internals."""
 
     def __init__(self, app: ASGIApp) -> None:
-        """Wrap an application."""
         self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -58,11 +114,10 @@ class SafeAnswers:
             await answer(scope, receive, send_safely)
 
 
-class KnownCallers:
+class OriginCheck:
     """Turns away requests for other host names (DNS rebinding) and those that a page of another origin makes."""
 
     def __init__(self, app: ASGIApp, answers_for: Callable[[str | None], bool]) -> None:
-        """Wrap an application."""
         self.app = app
         self.answers_for = answers_for
 
@@ -92,3 +147,142 @@ def _host_name(address: str) -> str | None:
         return None if has_junk or (parts.port is not None and parts.port < 0) else parts.hostname
     except ValueError:
         return None
+
+
+LONGEST_WAIT_S = 30.0
+"""How long a client that has its answer may go on sending."""
+
+
+class BodyLimit:
+    """Ends a request whose body is larger than allowed, by its own word or by count, with problem `limit-exceeded`.
+
+    Whenever a request is answered before its body was read, the rest is read and dropped: else a client that is still
+    sending would see a broken connection in place of the answer.
+    """
+
+    def __init__(self, app: ASGIApp, limit: int) -> None:
+        """Limit bodies to `limit` [bytes]."""
+        self.app = app
+        self.limit = limit
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request, as far as its body is not too large."""
+        if scope["type"] != "http":
+            return await self.app(scope, receive, send)
+        body = _CountedBody(Headers(scope=scope), receive, self.limit)
+
+        async def send_unless_exceeded(message: Message) -> None:
+            # Whatever the application makes of the broken body, the client is told what broke it.
+            if not body.is_exceeded:
+                await self._send(message, body, send)
+
+        if not body.is_exceeded:
+            try:
+                await self.app(scope, body.receive, send_unless_exceeded)
+            except LimitExceededError:
+                if not body.is_exceeded:
+                    raise
+        if body.is_exceeded:
+            detail = f"the body is larger than the {self.limit} bytes accepted here; send fewer or shorter recordings"
+            answer = problem_answer(make_problem("limit-exceeded", detail, scope["path"]), {"Connection": "close"})
+            await send({"type": "http.response.start", "status": answer.status_code, "headers": answer.raw_headers})
+            await self._send({"type": "http.response.body", "body": answer.body}, body, send)
+
+    async def _send(self, message: Message, body: "_CountedBody", send: Send) -> None:
+        """Send a part of an answer; before the answer ends, the request's body does."""
+        if message["type"] == "http.response.body" and not message.get("more_body", False) and body.is_pending:
+            await send({**message, "more_body": True})
+            with anyio.move_on_after(LONGEST_WAIT_S):
+                await body.swallow()
+            message = {"type": "http.response.body", "body": b""}
+        await send(message)
+
+
+class _CountedBody:
+    """The body of a request on its way to the application."""
+
+    def __init__(self, headers: Headers, receive: Receive, limit: int) -> None:
+        self._receive = receive
+        self._limit = limit
+        self._count = 0
+        announced = headers.get("content-length", "")
+        length = int(announced) if announced.isdecimal() else 0
+        self.is_exceeded = length > limit
+        # A client that waits for leave to send its body does not send it after an answer.
+        self.is_pending = (length > 0 or "transfer-encoding" in headers) and "expect" not in headers
+
+    async def receive(self) -> Message:
+        """The next part, unless it is one too many."""
+        message = await self._next()
+        if self._count > self._limit:
+            self.is_exceeded = True
+            raise LimitExceededError("the body is too large")
+        return message
+
+    async def swallow(self) -> None:
+        """Read on until the body ends, the client is gone, or as much again as is allowed has come."""
+        while self.is_pending and self._count <= 2 * self._limit:
+            await self._next()
+
+    async def _next(self) -> Message:
+        """The next part, counted."""
+        message = await self._receive()
+        self._count += len(message.get("body", b""))
+        self.is_pending = self.is_pending and bool(message.get("more_body", False))
+        return message
+
+
+READERS = 2
+"""Reading requests at a time: more threads of one interpreter read no faster."""
+
+SLOT_TIMEOUT_S = 0.5
+"""A reader that a disk or a lock holds up loses its slot after this time [s]."""
+
+_READING = ("GET", "HEAD")
+_PROBES = ("/healthz", "/readyz")
+"""Probes have a slot of their own: a supervisor that gets no answer restarts the service, which stops its arms."""
+
+
+class ConcurrencyLimiter:
+    """Admits a few reading requests at a time, first come first served; all other requests pass at once.
+
+    A slot is free again when the answer begins: a stream of events keeps no other request waiting.
+    """
+
+    def __init__(self, app: ASGIApp, readers: int = READERS, slot_timeout_s: float = SLOT_TIMEOUT_S) -> None:
+        """Admit `readers` at a time; one that is stuck keeps its slot for `slot_timeout_s` [s]."""
+        self.app = app
+        self._slots, self._probes = asyncio.Semaphore(readers), asyncio.Semaphore(1)
+        self._slot_timeout_s = slot_timeout_s
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request when a slot is free."""
+        if scope["type"] != "http" or scope["method"] not in _READING:
+            return await self.app(scope, receive, send)
+        slots = self._probes if scope["path"] in _PROBES else self._slots
+        await slots.acquire()
+        slot = _Slot(slots, self._slot_timeout_s)
+
+        async def send_and_free_slot(message: Message) -> None:
+            slot.end()
+            await send(message)
+
+        try:
+            await self.app(scope, receive, send_and_free_slot)
+        finally:
+            slot.end()
+
+
+class _Slot:
+    """One reader's slot; ends once, however often that is said."""
+
+    def __init__(self, slots: asyncio.Semaphore, longest_s: float) -> None:
+        self._slots, self._has_ended = slots, False
+        self._timer = asyncio.get_running_loop().call_later(longest_s, self.end)
+
+    def end(self) -> None:
+        """Let the next one in."""
+        if not self._has_ended:
+            self._has_ended = True
+            self._timer.cancel()
+            self._slots.release()

@@ -1,20 +1,64 @@
-"""The application behind a socket."""
+"""The application behind a socket, and its logs as JSON."""
 
 import gc
+import logging
+import re
 import socket
 import ssl
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, MutableMapping
+from typing import Any, TextIO
 
+import structlog
 import uvicorn
 from fastapi import FastAPI
 from uvicorn.config import LOGGING_CONFIG
 
 from tauscope.errors import TauscopeError
 from tauscope.server.http.app import create_app
-from tauscope.server.http.assembly import require_data_folder
-from tauscope.server.http.operations.logs import log_as_json
-from tauscope.server.http.services import Services
+from tauscope.server.http.services import Services, require_data_folder
 from tauscope.server.http.settings import Settings
+
+_SECRET = re.compile(r"tsk_[0-9a-f]{8}_[\w-]+|(?i:bearer)\s+\S+|\b\d+-[A-Za-z0-9_-]{22}\b")
+_HIDDEN = "[hidden]"
+
+
+def log_as_json(level: int = logging.INFO, stream: TextIO | None = None) -> None:
+    """Have everything that this process logs written as JSON."""
+    shared = [
+        structlog.stdlib.add_log_level,
+        structlog.stdlib.add_logger_name,
+        structlog.stdlib.ExtraAdder(),
+        structlog.processors.TimeStamper(fmt="iso", utc=True),
+    ]
+    formatter = structlog.stdlib.ProcessorFormatter(
+        foreign_pre_chain=shared,
+        processors=[
+            structlog.stdlib.ProcessorFormatter.remove_processors_meta,
+            structlog.processors.format_exc_info,
+            hide_secrets,
+            structlog.processors.JSONRenderer(ensure_ascii=False, default=str),
+        ],
+    )
+    handler = logging.StreamHandler(stream or sys.stderr)
+    handler.setFormatter(formatter)
+    root = logging.getLogger()
+    root.handlers[:] = [handler]
+    root.setLevel(logging.WARNING)
+    logging.getLogger("tauscope").setLevel(level)
+    logging.getLogger("uvicorn.error").setLevel(logging.INFO)
+
+
+def hide_secrets(_logger: Any, _method: str, event: MutableMapping[str, Any]) -> MutableMapping[str, Any]:
+    """An event without anything that looks like a key or a token."""
+    event.pop("color_message", None)  # uvicorn's, for terminals
+    for name, value in event.items():
+        if isinstance(value, str):
+            event[name] = _SECRET.sub(_HIDDEN, value)
+        elif not isinstance(value, int | float | bool | None):
+            event[name] = _SECRET.sub(_HIDDEN, str(value))
+    return event
+
 
 GRACE_S = 5
 """How long open requests may take when the service is asked to stop."""
@@ -29,11 +73,11 @@ def serve(settings: Settings, announce: Callable[[str], None]) -> None:
         if the address cannot be had, others could reach it and there is no API key, or another service works with the
         data folder; or the certificate cannot be used
     """
-    _require_certificate(settings)
+    _check_certificate(settings)
     require_data_folder(settings)
     if settings.log_format == "json":
         log_as_json()
-    with _listening(settings) as listener:
+    with _listen(settings) as listener:
         app = create_app(settings)
         config = uvicorn.Config(
             app,
@@ -73,7 +117,7 @@ class _Server(uvicorn.Server):
         await super().shutdown(sockets)
 
 
-def _require_certificate(settings: Settings) -> None:
+def _check_certificate(settings: Settings) -> None:
     """Refuse a certificate without key, or files that are neither."""
     if (settings.tls_certificate is None) != (settings.tls_key is None):
         raise TauscopeError("TLS: certificate and key belong together; give --tls-certificate and --tls-key")
@@ -86,7 +130,7 @@ def _require_certificate(settings: Settings) -> None:
         raise TauscopeError(f"{settings.tls_certificate}: no usable certificate with its key ({reason})") from None
 
 
-def _listening(settings: Settings) -> socket.socket:
+def _listen(settings: Settings) -> socket.socket:
     """A socket that listens at the address."""
     family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
     # With the protocol named, answers are sent at once (TCP_NODELAY); asyncio would let them wait for each other else.

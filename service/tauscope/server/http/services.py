@@ -1,27 +1,51 @@
-"""What the routes work with, made once an application."""
+"""The services that the routes use: opened with the data folder, and closed in order."""
 
+import shutil
 import threading
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from datetime import timedelta
+from functools import partial
 from typing import Annotated, cast
 
 from anyio import CapacityLimiter
 from fastapi import Depends, Request
 
-from tauscope.server.auth.audit.log import AuditTrail
-from tauscope.server.auth.gate import Access
+from tauscope.errors import TauscopeError
+from tauscope.server.auth.audit_log import AuditLog, AuditTrail
+from tauscope.server.auth.gate import Access, RateLimit
+from tauscope.server.auth.keys import KeyFile, KeyRing
 from tauscope.server.control.campaign_manager import CampaignManager
-from tauscope.server.control.leases import Leases
+from tauscope.server.control.campaign_runner import CampaignDependencies
+from tauscope.server.control.device_claims import DeviceClaims
+from tauscope.server.control.leases import Lease, Leases
 from tauscope.server.control.run_manager import RunManager
-from tauscope.server.history.indexer import Indexer
-from tauscope.server.history.model_registry import ModelRegistry
+from tauscope.server.control.run_start import start_control
+from tauscope.server.control.run_supervisor import StartControl
+from tauscope.server.history.indexer import Indexer, open_index
+from tauscope.server.history.model_history import ModelHistory
+from tauscope.server.history.model_registry import DriftMonitor, ModelRegistry
+from tauscope.server.history.retention import RetentionRule, RetentionSweeper
 from tauscope.server.http.heartbeat import Heartbeat
-from tauscope.server.http.idempotency.answers import Answers
-from tauscope.server.http.operations.metrics import Metrics
+from tauscope.server.http.metrics import Metrics, TimedExecutor
+from tauscope.server.http.repeated_answers import Answers, MemoryAnswers, StoredAnswers
 from tauscope.server.http.settings import Settings
-from tauscope.server.queue.queue import JobQueue
-from tauscope.server.queue.queued_job import JobKind
-from tauscope.server.schedules.scheduler import Scheduler
+from tauscope.server.queue.cluster_executor import ClusterExecutor
+from tauscope.server.queue.diagnosis_work import run_diagnosis
+from tauscope.server.queue.excitation_work import run_excitation
+from tauscope.server.queue.executors import WorkerPool, open_executor
+from tauscope.server.queue.housekeeping import Housekeeping
+from tauscope.server.queue.identification_work import run_identification
+from tauscope.server.queue.queue import JobKind, JobQueue
+from tauscope.server.schedules.repeater import Repeater
+from tauscope.server.schedules.repository import ScheduleRepository
+from tauscope.server.schedules.scheduler import Scheduler, new_boot
+from tauscope.server.store.data_folder import FOLDERS, FolderLock, item_stores, site_identifier
+from tauscope.server.store.database.database import Database
+from tauscope.server.store.database.index import Index
+from tauscope.server.store.items import ItemStore
 from tauscope.server.store.recordings import RecordingStore
 
 
@@ -44,7 +68,7 @@ class Services:
     answers: Answers
     lease_answers: Answers
     metrics: Metrics
-    pulse: Heartbeat
+    heartbeat: Heartbeat
     index: Indexer
     models: ModelRegistry
     schedules: Scheduler
@@ -54,8 +78,8 @@ class Services:
     def begin_to_close(self) -> None:
         """Stop every arm, and let go of whoever follows events; returns at once."""
         self.closing.set()
-        self.campaigns.stop_all()
-        self.runs.stop_all()
+        self.campaigns.begin_close()
+        self.runs.begin_close()
 
 
 async def _services_of(request: Request) -> Services:
@@ -65,3 +89,196 @@ async def _services_of(request: Request) -> Services:
 
 ServicesDep = Annotated[Services, Depends(_services_of)]
 """The services, as an argument of a route."""
+
+
+PRUNING_S = 3600.0
+"""How often what is old is removed, where the operator asked for it [s]."""
+
+REQUESTS_PER_S = 200.0
+"""How often a key may call in the long run, where the operator says nothing [1/s]."""
+
+
+@contextmanager
+def open_services(
+    settings: Settings, executor: Executor | None = None, start: StartControl | None = None
+) -> Iterator[Services]:
+    """Take the data folder, and end all work on leaving: first what moves, then the rest.
+
+    Raises
+    ------
+    TauscopeError
+        if another service works with the data folder, or its database cannot be used
+    """
+    settings.data_folder.mkdir(parents=True, exist_ok=True)
+    access = _open_access(settings)
+    lock = FolderLock(settings.data_folder)
+    try:
+        site, database = site_identifier(settings.data_folder), Database(settings.database_address)
+    except BaseException:
+        lock.release()
+        raise
+    services = _assemble(_Ground(settings, access, database, site), executor, start)
+    drift = DriftMonitor(services.models.history, site)
+    _watch(services, drift)
+    housekeeping = Housekeeping(
+        [services.jobs.settle, services.runs.settle, services.index.sync, services.models.judge_new, drift.look]
+    )
+    clock = Housekeeping([services.schedules.tick])  # apart: an interlock may take its time
+    housekeeping.start()
+    pruning = Housekeeping(_retention(services), PRUNING_S)
+    pruning.start()
+    if settings.fires_schedules:
+        clock.start()
+    try:
+        with services.audit.writing():
+            services.audit.note("service", "began")
+            try:
+                with services.access.ring.watched():
+                    yield services
+            finally:
+                services.begin_to_close()
+                clock.close()
+                pruning.close()
+                services.runs.close()
+                services.campaigns.close()
+                services.audit.note("service", "ended")
+    finally:
+        services.jobs.close()
+        services.checks.shutdown(wait=True, cancel_futures=True)
+        housekeeping.close()
+        database.close()
+        lock.release()
+
+
+@dataclass(frozen=True, eq=False)
+class _Ground:
+    """What everything else stands on."""
+
+    settings: Settings
+    access: Access
+    database: Database
+    site: str
+
+
+def _assemble(ground: _Ground, executor: Executor | None, start: StartControl | None) -> Services:
+    """Everything that the routes work with; nothing of it moves yet, and unfinished analysis goes on."""
+    settings, database, site = ground.settings, ground.database, ground.site
+    items, metrics, heartbeat = item_stores(settings.data_folder), Metrics(), Heartbeat()
+    recordings = RecordingStore(settings.recordings_folder)
+    recordings.tidy()
+    identifications, diagnoses, excitations = kinds = _kinds(settings, items)
+    pool = executor or open_executor(settings.workers)
+    timed, most = TimedExecutor(pool, metrics.job_seconds), settings.max_waiting
+    if isinstance(pool, ClusterExecutor):  # it comes and goes, and so do its workers
+        jobs = JobQueue(kinds, timed, slots=lambda: pool.width, most_waiting=most, is_there=pool.is_there)
+    else:
+        jobs = JobQueue(kinds, timed, slots=settings.workers, most_waiting=most)
+    audit = AuditTrail(AuditLog(settings.data_folder))
+    claims = DeviceClaims(settings.max_arms)
+    leases = Leases(claims, settings.data_folder / "lease-number", on_end=partial(_note_end, audit))
+    start = start or partial(start_control, sim_socket=settings.sim_socket)
+    runs = RunManager(items["run"], recordings, start, claims, heartbeat.is_alive, metrics.run_ended)
+    dependencies = CampaignDependencies(jobs, excitations, identifications, diagnoses, runs, recordings)
+    campaigns = CampaignManager(items["campaign"], dependencies)
+    models = ModelRegistry(ModelHistory(database), site, items)
+    index = open_index(Index(database, site), items, recordings, settings.data_folder.name)
+    models.judge_new()
+    # What a schedule moves has no lease: it waits for its next time where somebody has one.
+    repeater = Repeater(dependencies, campaigns, partial(leases.permit, token=None, owner="schedule", is_needed=False))
+    return Services(
+        settings=settings,
+        recordings=recordings,
+        identifications=identifications,
+        diagnoses=diagnoses,
+        excitations=excitations,
+        jobs=jobs,
+        runs=runs,
+        campaigns=campaigns,
+        checks=executor or WorkerPool(1),
+        access=ground.access,
+        leases=leases,
+        audit=audit,
+        answers=StoredAnswers(settings.data_folder / "idempotency"),
+        lease_answers=MemoryAnswers(),
+        metrics=metrics,
+        heartbeat=heartbeat,
+        index=index,
+        models=models,
+        schedules=Scheduler(ScheduleRepository(database, site, new_boot()), repeater, settings.data_folder),
+    )
+
+
+def _kinds(settings: Settings, items: Mapping[str, ItemStore]) -> tuple[JobKind, JobKind, JobKind]:
+    """Identifications, diagnoses and designed motions."""
+    where = {"server_recordings": settings.recordings_folder}
+    return (
+        JobKind(items["identification"], partial(run_identification, **where)),
+        JobKind(items["diagnosis"], partial(run_diagnosis, **where)),
+        JobKind(items["excitation"], run_excitation),
+    )
+
+
+def _retention(services: Services) -> list[Callable[[], object]]:
+    """What removes old items; nothing where the operator did not ask for it."""
+    settings, jobs = services.settings, services.jobs
+    if settings.prune_older_than_days is None:
+        return []
+    kinds = frozenset(settings.prune_kinds or FOLDERS)
+    rule = RetentionRule(timedelta(days=settings.prune_older_than_days), kinds, settings.prune_recordings)
+    removers: dict[str, Callable[[str], object]] = {
+        "identification": partial(jobs.cancel_or_remove, services.identifications),
+        "diagnosis": partial(jobs.cancel_or_remove, services.diagnoses),
+        "excitation": partial(jobs.cancel_or_remove, services.excitations),
+        "run": services.runs.remove,
+        "campaign": services.campaigns.remove,
+    }
+
+    def note(kind: str, name: str) -> None:
+        services.audit.note("service", "pruned", subject=name, kind=kind)
+
+    history = services.models.history
+    return [RetentionSweeper(rule, services.index, history, services.recordings, removers, note).tidy]
+
+
+def _watch(services: Services, drift: DriftMonitor) -> None:
+    """Numbers that are asked for when somebody looks at the metrics."""
+    metrics, folder = services.metrics, services.settings.data_folder
+    metrics.loops.live = services.runs.list_live
+    metrics.watch_drift(drift)
+    metrics.watch("tauscope_jobs_waiting", "Jobs that wait", services.jobs.waiting)
+    metrics.watch("tauscope_leases", "Leases that hold", lambda: len(services.leases.active()))
+    metrics.watch("tauscope_audit_lost", "Entries that the audit log did not take", lambda: services.audit.lost)
+    metrics.watch("tauscope_disk_free_bytes", "Room in the data folder", lambda: shutil.disk_usage(folder).free)
+
+
+def _note_end(audit: AuditTrail, lease: Lease, why: str) -> None:
+    """A lease has ended."""
+    audit.note("service", "lease ended", subject=lease.id, device=lease.device, holder=lease.holder, reason=why)
+
+
+def _open_access(settings: Settings) -> Access:
+    """The keys of the data folder; strangers find no service without keys at an address that they can reach."""
+    ring = KeyRing(KeyFile(settings.data_folder), is_required=not settings.is_local)
+    if not settings.is_local and not ring.has_valid_key():
+        hint = "make a key first (tauscope key add), or listen at 127.0.0.1"
+        raise TauscopeError(f"host {settings.host!r}: others could reach it, and there is no valid API key; {hint}")
+    rate = settings.requests_per_s or REQUESTS_PER_S
+    return Access(ring, RateLimit(rate, 2.0 * rate), limits_local=settings.requests_per_s is not None)
+
+
+def require_data_folder(settings: Settings) -> None:
+    """Make the data folder, and refuse one that cannot be worked with.
+
+    Raises
+    ------
+    TauscopeError
+        if it cannot be made or written to, another service works with it, or it has no key where one is needed
+    """
+    folder = settings.data_folder
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        FolderLock(folder).release()
+        _open_access(settings)
+    except OSError as error:
+        text = f"{folder}: cannot be used as data folder ({error.strerror}); name a folder that can be written to"
+        raise TauscopeError(text) from None

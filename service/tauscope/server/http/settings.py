@@ -7,8 +7,8 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, SecretStr
 
+from tauscope.server.store.data_folder import FOLDERS, RECORDINGS
 from tauscope.server.store.database.database import FILE_NAME
-from tauscope.server.store.layout import FOLDERS, RECORDINGS
 
 MEBIBYTE = 2**20
 

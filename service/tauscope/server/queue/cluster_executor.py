@@ -1,5 +1,6 @@
-"""A Dask cluster as an executor: it may be away for a while, and whoever works with it goes on when it is back."""
+"""A Dask cluster as an executor; it reconnects by itself after the scheduler was away."""
 
+import asyncio
 import logging
 import threading
 from collections.abc import Callable
@@ -7,10 +8,58 @@ from concurrent.futures import BrokenExecutor, Executor, Future
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from tauscope.errors import StoreError
-from tauscope.server.queue.loop_thread import LoopThread
 
 if TYPE_CHECKING:
     from distributed import Client
+    from tornado.ioloop import IOLoop
+
+
+class LoopThread:
+    """One event loop for every client that reaches for a cluster, one after the other.
+
+    Dask gives each client a loop of its own otherwise, and one that does not reach its scheduler leaves it running:
+    a thread more with every attempt.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._loop: IOLoop | None = None
+        self._stopping = asyncio.Event()
+
+    def open(self) -> "IOLoop":
+        """The running loop, started where it is not.
+
+        Raises
+        ------
+        ImportError
+            if Dask is not installed
+        """
+        if self._loop is None:
+            from tornado.ioloop import IOLoop
+
+            loop: Future[IOLoop] = Future()
+
+            async def run() -> None:
+                loop.set_result(IOLoop.current())
+                await self._stopping.wait()
+
+            self._thread = threading.Thread(target=lambda: asyncio.run(run()), name=self._name, daemon=True)
+            self._thread.start()
+            self._loop = loop.result()
+        return self._loop
+
+    def stop(self, within_s: float) -> None:
+        """End the thread, with whatever its clients still had under way.
+
+        Parameters
+        ----------
+        within_s : float
+            how long to wait for its end [s]
+        """
+        if self._loop is not None:
+            self._loop.add_callback(self._stopping.set)
+            self._thread.join(within_s)
+
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
@@ -20,14 +69,14 @@ _log = logging.getLogger("tauscope.jobs")
 SCHEDULER = "DASK_SCHEDULER_ADDRESS"
 """Environment variable that names the scheduler of a Dask cluster, as in ``tcp://scheduler:8786``."""
 
-PATIENCE_S = 10
+TIMEOUT_S = 10
 """How long a scheduler may take to answer [s]."""
 
-LOOK_S = 1.0
+CHECK_S = 1.0
 """How often the scheduler is looked at: whether it is there, and how many workers it has [s]."""
 
 
-class ClusterAwayError(BrokenExecutor):
+class ClusterUnavailableError(BrokenExecutor):
     """The scheduler was lost, with whatever it had in hand. Nothing is said against the task: it can be done again."""
 
 
@@ -35,7 +84,7 @@ class ClusterExecutor(Executor):
     """A Dask cluster; a task whose worker dies again and again ends with BrokenExecutor, as in a pool of processes.
 
     Dask's own client gives up for good where the scheduler is away for longer than it waits. A thread reaches the
-    scheduler again then, as often as it takes; meanwhile `is_there` says no, and tasks end with `ClusterAwayError`.
+    scheduler again then; meanwhile `is_there` is false, tasks end with `ClusterUnavailableError`.
     """
 
     def __init__(self, address: str, wait_s: float = 0.0) -> None:
@@ -61,7 +110,7 @@ class ClusterExecutor(Executor):
             self._executor = _executor_of(self._client)
             self._look()
         except (ImportError, OSError, ValueError) as error:
-            self._loop.stop(PATIENCE_S)
+            self._loop.stop(TIMEOUT_S)
             raise _not_reached(address, error) from None
         self._watcher = threading.Thread(target=self._watch, name="cluster", daemon=True)
         self._watcher.start()
@@ -82,7 +131,7 @@ class ClusterExecutor(Executor):
 
         Raises
         ------
-        ClusterAwayError
+        ClusterUnavailableError
             if the scheduler is away
         RuntimeError
             after `shutdown`
@@ -96,7 +145,7 @@ class ClusterExecutor(Executor):
         except Exception as error:
             if self.is_there():
                 raise
-            raise ClusterAwayError(f"{self._address}: is away") from error
+            raise ClusterUnavailableError(f"{self._address}: is away") from error
         outer: Future[Result] = Future()
         outer.add_done_callback(lambda done: inner.cancel() if done.cancelled() else None)
         inner.add_done_callback(lambda done: self._hand_on(done, outer))
@@ -105,7 +154,7 @@ class ClusterExecutor(Executor):
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """Leave the cluster."""
         self._closing.set()
-        self._watcher.join(2 * PATIENCE_S)
+        self._watcher.join(2 * TIMEOUT_S)
         try:
             self._executor.shutdown(wait=wait and not cancel_futures and self.is_there())
             self._client.close()
@@ -113,17 +162,17 @@ class ClusterExecutor(Executor):
             if self.is_there():
                 raise
         finally:
-            self._loop.stop(PATIENCE_S)
+            self._loop.stop(TIMEOUT_S)
 
     def _open_client(self) -> "Client":
         """A connection of its own; raises what Dask raises."""
         from distributed import Client
 
-        return Client(self._address, self._loop.open(), timeout=PATIENCE_S, set_as_default=False)
+        return Client(self._address, self._loop.open(), timeout=TIMEOUT_S, set_as_default=False)
 
     def _watch(self) -> None:
         """Look at the scheduler until it is left."""
-        while not self._closing.wait(LOOK_S):
+        while not self._closing.wait(CHECK_S):
             try:
                 self._look()
             except Exception:  # whatever Dask raises of a scheduler that goes and comes: the next look tells
@@ -139,7 +188,7 @@ class ClusterExecutor(Executor):
         if self.is_there():
             # `Client.nthreads` asks the same, and waits for ever where the scheduler is lost meanwhile.
             scheduler: Any = self._client.scheduler
-            threads: Any = self._client.sync(scheduler.ncores, callback_timeout=PATIENCE_S)
+            threads: Any = self._client.sync(scheduler.ncores, callback_timeout=TIMEOUT_S)
             self._width = max(1, sum(threads.values()))
             self._there.set()
         else:
@@ -155,7 +204,7 @@ class ClusterExecutor(Executor):
             if self._closing.is_set():
                 outer.cancel()
             else:
-                outer.set_exception(ClusterAwayError(f"{self._address}: was lost"))
+                outer.set_exception(ClusterUnavailableError(f"{self._address}: was lost"))
             return
         error = inner.exception()
         if isinstance(error, KilledWorker):

@@ -7,8 +7,7 @@ from pathlib import Path
 from tauscope.server.queue.diagnosis_order import DiagnosisOptions, DiagnosisOrder
 from tauscope.server.queue.diagnosis_workspace import DiagnosisWorkspace
 from tauscope.server.queue.identification_submission import ordered_on_server
-from tauscope.server.queue.queue import JobQueue
-from tauscope.server.queue.queued_job import JobKind
+from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.store.recordings import RecordingStore
 
 

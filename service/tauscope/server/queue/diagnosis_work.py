@@ -19,7 +19,7 @@ from tauscope.server.queue.identification_order import OrderedRecording
 from tauscope.server.queue.job_provenance import job_provenance
 from tauscope.server.queue.record import JobProblem
 from tauscope.server.queue.work import begin_step, do_work
-from tauscope.server.store.incoming import hash_file
+from tauscope.server.store.files import hash_file
 from tauscope.trajectory import trajectory_json
 
 

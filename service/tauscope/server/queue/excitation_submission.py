@@ -5,8 +5,7 @@ from pathlib import Path
 
 from tauscope.server.queue.excitation_order import ExcitationDesignOptions, ExcitationOrder
 from tauscope.server.queue.excitation_workspace import ExcitationWorkspace
-from tauscope.server.queue.queue import JobQueue
-from tauscope.server.queue.queued_job import JobKind
+from tauscope.server.queue.queue import JobKind, JobQueue
 
 
 def hand_in_excitation(

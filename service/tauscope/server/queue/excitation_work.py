@@ -9,8 +9,7 @@ from tauscope.excitation import OptimiserProgress, design_excitation, excitation
 from tauscope.files import write_atomically
 from tauscope.robot import read_robot
 from tauscope.server.queue.excitation_workspace import ExcitationWorkspace
-from tauscope.server.queue.messages import without_folders
-from tauscope.server.queue.record import JobProblem
+from tauscope.server.queue.record import JobProblem, without_folders
 from tauscope.server.queue.work import begin_step, do_work, require_wanted
 from tauscope.trajectory import parse_trajectory_json, read_trajectory, trajectory_json
 from tauscope.trajectory.csv_format import trajectory_csv

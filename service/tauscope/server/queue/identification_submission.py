@@ -6,8 +6,7 @@ from pathlib import Path
 
 from tauscope.server.queue.identification_order import IdentificationOptions, IdentificationOrder, OrderedRecording
 from tauscope.server.queue.identification_workspace import IdentificationWorkspace
-from tauscope.server.queue.queue import JobQueue
-from tauscope.server.queue.queued_job import JobKind
+from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.store.recordings import RecordingStore
 
 

@@ -18,10 +18,9 @@ from tauscope.robot import Robot, read_robot
 from tauscope.server.queue.identification_order import IdentificationOrder, OrderedRecording
 from tauscope.server.queue.identification_workspace import IdentificationWorkspace
 from tauscope.server.queue.job_provenance import job_provenance
-from tauscope.server.queue.messages import without_folders
-from tauscope.server.queue.record import JobProblem
+from tauscope.server.queue.record import JobProblem, without_folders
 from tauscope.server.queue.work import begin_step, do_work
-from tauscope.server.store.incoming import hash_file
+from tauscope.server.store.files import hash_file
 
 
 def run_identification(folder: Path, server_recordings: Path) -> JobProblem | None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pydantic import JsonValue
 
-from tauscope.server.queue.events import JobEvent, ProgressEvent, StepEvent
+from tauscope.server.queue.record import JobEvent, ProgressEvent, StepEvent
 from tauscope.server.store.event_log import EventLog
 
 _log = logging.getLogger("tauscope.jobs")
@@ -17,7 +17,6 @@ class JobFolder:
     """Step, events and the wish to stop."""
 
     def __init__(self, folder: Path) -> None:
-        """Look at a folder; nothing is opened yet."""
         self.folder = folder
         self.events = EventLog(folder / "events.jsonl")
         self._progress = folder / "progress"

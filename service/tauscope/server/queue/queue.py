@@ -1,4 +1,4 @@
-"""The queue of jobs: one after the other into an executor; what a restart leaves unfinished is done again."""
+"""The job queue: jobs run one after the other in an executor, and again after a restart that left them unfinished."""
 
 import logging
 import threading
@@ -9,13 +9,105 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tauscope.errors import LimitExceededError, NotFoundError
-from tauscope.server.queue.cluster_executor import ClusterAwayError
-from tauscope.server.queue.queued_job import MOST_ATTEMPTS, JobKind, QueuedJob
-from tauscope.server.queue.record import JobProblem, JobRecord
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.cluster_executor import ClusterUnavailableError
+from tauscope.server.queue.record import JobProblem, JobRecord, JobState
 from tauscope.server.queue.workspace import Workspace
+from tauscope.server.store.items import ItemStore
+
+Work = Callable[[Path], JobProblem | None]
+"""Does the job of a folder; returns why it failed. It may run in another process."""
 
 _log = logging.getLogger("tauscope.jobs")
+
+MOST_ATTEMPTS = 3
+"""How often the work of a job is begun whose service was killed meanwhile: it may be what brought the service down."""
+
+TOO_OFTEN = JobProblem(
+    code="interrupted",
+    detail=f"the service ended {MOST_ATTEMPTS} times in the middle of this job; look into its log, and hand less in",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class JobKind:
+    """A kind of job: where its folders lie and what is done with them."""
+
+    items: ItemStore
+    work: Work
+
+
+@dataclass(frozen=True)
+class QueuedJob:
+    """A job that has not ended."""
+
+    kind: JobKind
+    identifier: str
+
+    @property
+    def folder(self) -> Path:
+        """Of the job; raises NotFoundError where it is gone."""
+        return self.kind.items.folder(self.identifier)
+
+    def attempts(self) -> int:
+        """How often the work was begun and not given up in good order; 0 where nobody can tell."""
+        try:
+            record = Workspace(self.folder).read_record()
+        except NotFoundError:
+            return 0
+        return 0 if record is None else record.attempts
+
+    def move(self, state: JobState, problem: JobProblem | None = None) -> bool:
+        """Write a new state, if it may follow the present one.
+
+        An earlier attempt may have written it and failed after that, as on a disk that became full in between.
+
+        Returns
+        -------
+        bool
+            whether the job is in that state now; False where it may not be, its record is damaged, or it is gone
+
+        Raises
+        ------
+        OSError
+            if the disk does not take it
+        """
+        try:
+            workspace = Workspace(self.folder)
+        except NotFoundError:
+            return False
+        record = workspace.read_record()
+        if record is not None and record.state is state:
+            workspace.tell_lost_end()
+            return True
+        if record is None or not record.may_become(state):
+            return False
+        workspace.write_record(record.moved(state, self.kind.items.clock(), problem))
+        return True
+
+    def resume(self) -> JobRecord | None:
+        """Have the job wait, if an earlier service left it unfinished; None where it has ended, or ends here."""
+        workspace = Workspace(self.folder)
+        record = workspace.read_record()
+        if record is None or record.state.is_end:
+            workspace.tell_lost_end()
+            return None
+        if record.attempts >= MOST_ATTEMPTS:
+            self.move(JobState.INTERRUPTED, TOO_OFTEN)
+            return None
+        if record.state is not JobState.QUEUED:
+            workspace.write_record(record.moved(JobState.QUEUED, self.kind.items.clock()))
+        return record
+
+    def requeue(self) -> None:
+        """Have the job wait, because its work is ended with the service, or could not begin."""
+        try:
+            workspace = Workspace(self.folder)
+            record = workspace.read_record()
+            if record is not None and record.may_become(JobState.QUEUED):
+                workspace.write_record(record.requeue(self.kind.items.clock()))
+        except (NotFoundError, OSError):
+            _log.exception("the state of job %s could not be written", self.identifier)
+
 
 INTERRUPTED = JobProblem(code="interrupted", detail="the service ended before this job did; hand it in again")
 CANCELLED = JobProblem(code="cancelled", detail="the job was cancelled on request")
@@ -67,7 +159,7 @@ class JobQueue:
         for kind in kinds:
             kind.items.tidy()
         jobs = [QueuedJob(kind, identifier) for kind in kinds for identifier in kind.items.identifiers()]
-        unfinished = [(record.created, job) for job in jobs if (record := job.take_up()) is not None]
+        unfinished = [(record.created, job) for job in jobs if (record := job.resume()) is not None]
         with self._lock:
             self._waiting.extend(job for _, job in sorted(unfinished, key=lambda pair: pair[0]))
             self._go_on()
@@ -165,7 +257,7 @@ class JobQueue:
             self._is_closed = True
             self._waiting.clear()
             for job in self._running:
-                job.give_up()
+                job.requeue()
         self._executor.shutdown(wait=True, cancel_futures=True)
 
     def _pass_over(self, job: QueuedJob) -> None:
@@ -197,8 +289,8 @@ class JobQueue:
             future = self._executor.submit(job.kind.work, job.folder)
         except NotFoundError:
             return
-        except ClusterAwayError:  # it went a moment ago
-            job.give_up()
+        except ClusterUnavailableError:  # it went a moment ago
+            job.requeue()
             self._waiting.appendleft(job)
             return
         except (BrokenExecutor, RuntimeError, OSError):
@@ -229,11 +321,11 @@ class JobQueue:
         """How a job ended by what came of its work."""
         try:
             problem = self._problem_of(job, future)
-        except ClusterAwayError as error:
+        except ClusterUnavailableError as error:
             return self._end_of_lost(job, error)
         return _End(JobState.SUCCEEDED if problem is None else JobState.FAILED, problem)
 
-    def _end_of_lost(self, job: QueuedJob, error: ClusterAwayError) -> _End:
+    def _end_of_lost(self, job: QueuedJob, error: ClusterUnavailableError) -> _End:
         """A job that was lost with its cluster waits again, unless that happened too often: it may be the cause."""
         if job.attempts() >= MOST_ATTEMPTS:
             _log.error("job %s: lost with its cluster %d times", job.identifier, MOST_ATTEMPTS)
@@ -242,10 +334,10 @@ class JobQueue:
         return _End(JobState.QUEUED, None)
 
     def _problem_of(self, job: QueuedJob, future: "Future[JobProblem | None]") -> JobProblem | None:
-        """Why the work of a job has no result; None where it has one. Raises ClusterAwayError."""
+        """Why the work of a job has no result; None where it has one. Raises ClusterUnavailableError."""
         try:
             return future.result()
-        except ClusterAwayError:
+        except ClusterUnavailableError:
             raise
         except CancelledError:
             return INTERRUPTED

@@ -1,12 +1,56 @@
-"""What is kept of a job beside its input and output: its state, its times, and the problem that it ended in."""
+"""The record of a job: its states, times and problem, and the events that it reports."""
 
+from collections.abc import Mapping
 from datetime import datetime
-from typing import Literal
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
-from pydantic import AwareDatetime, Field
+from pydantic import AwareDatetime, Field, JsonValue, TypeAdapter, ValidationError
 
-from tauscope.server.queue.states import JobState, may_follow
 from tauscope.server.queue.stored import StoredModel
+
+
+def without_folders(text: str, *folders: Path) -> str:
+    """A message that calls files by their names alone, and says nothing of the server's folders."""
+    for folder in folders:
+        text = text.replace(f"{folder}/", "")
+    return text
+
+
+class JobState(StrEnum):
+    """Where a job stands; four of the six are ends."""
+
+    QUEUED = "queued"
+    RUNNING = "running"
+    SUCCEEDED = "succeeded"
+    FAILED = "failed"
+    CANCELLED = "cancelled"
+    INTERRUPTED = "interrupted"
+
+    @property
+    def is_end(self) -> bool:
+        """Whether nothing will happen to the job any more."""
+        return not TRANSITIONS[self]
+
+
+TRANSITIONS: Mapping[JobState, frozenset[JobState]] = {
+    JobState.QUEUED: frozenset({JobState.RUNNING, JobState.CANCELLED, JobState.INTERRUPTED}),
+    JobState.RUNNING: frozenset(
+        {JobState.QUEUED, JobState.SUCCEEDED, JobState.FAILED, JobState.CANCELLED, JobState.INTERRUPTED}
+    ),
+    JobState.SUCCEEDED: frozenset(),
+    JobState.FAILED: frozenset(),
+    JobState.CANCELLED: frozenset(),
+    JobState.INTERRUPTED: frozenset(),
+}
+"""For each state, the states that may follow. A job goes back to `queued` where the service ended before it did, and is
+`interrupted` where that happens again and again, or where it moves an arm."""
+
+
+def may_follow(before: JobState, after: JobState) -> bool:
+    """Whether a job may go from one state to another."""
+    return after in TRANSITIONS[before]
 
 
 class JobProblem(StoredModel):
@@ -48,6 +92,54 @@ class JobRecord(StoredModel):
             changes = {"started": None}
         return self.model_copy(update={"state": state, "problem": problem, **changes})
 
-    def given_up(self, now: datetime) -> "JobRecord":
+    def requeue(self, now: datetime) -> "JobRecord":
         """The record of a job that waits again because the service ends in good order: that counts as no attempt."""
         return self.moved(JobState.QUEUED, now).model_copy(update={"attempts": max(0, self.attempts - 1)})
+
+
+class StateEvent(StoredModel):
+    """The job came into another state."""
+
+    kind: Literal["state"] = Field(default="state", description="kind of the event")
+    time: AwareDatetime = Field(description="when it happened, UTC")
+    state: str = Field(description="the state, one that is no end")
+
+
+class StepEvent(StoredModel):
+    """Another step of the work began."""
+
+    kind: Literal["step"] = Field(default="step", description="kind of the event")
+    time: AwareDatetime = Field(description="when it happened, UTC")
+    step: str = Field(description="what is being done, in a few words")
+
+
+class ProgressEvent(StoredModel):
+    """The work came on."""
+
+    kind: Literal["progress"] = Field(default="progress", description="kind of the event")
+    time: AwareDatetime = Field(description="when it happened, UTC")
+    percent: float | None = Field(default=None, description="how much is done, where that is known")
+    figures: dict[str, JsonValue] = Field(default={}, description="what is measured meanwhile, by name")
+
+
+class EndedEvent(StoredModel):
+    """The job reached its end; nothing follows."""
+
+    kind: Literal["ended"] = Field(default="ended", description="kind of the event")
+    time: AwareDatetime = Field(description="when it happened, UTC")
+    state: str = Field(description="the end state")
+    problem: JobProblem | None = Field(default=None, description="why it did not succeed")
+
+
+JobEvent = Annotated[StateEvent | StepEvent | ProgressEvent | EndedEvent, Field(discriminator="kind")]
+"""Any of the four."""
+
+_EVENTS: TypeAdapter[JobEvent] = TypeAdapter(JobEvent)
+
+
+def parse_event(content: Mapping[str, Any]) -> JobEvent | None:
+    """The event of a line; None where it is none that we know."""
+    try:
+        return _EVENTS.validate_python(content, strict=False)
+    except ValidationError:
+        return None

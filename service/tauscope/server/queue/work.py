@@ -5,8 +5,7 @@ from pathlib import Path
 
 from tauscope.errors import TauscopeError
 from tauscope.files import is_disk_full
-from tauscope.server.queue.messages import without_folders
-from tauscope.server.queue.record import JobProblem
+from tauscope.server.queue.record import JobProblem, without_folders
 from tauscope.server.queue.workspace import Workspace
 
 STORAGE_FULL = JobProblem(

@@ -2,9 +2,8 @@
 
 from pathlib import Path
 
-from tauscope.server.queue.events import EndedEvent, StateEvent
 from tauscope.server.queue.job_folder import JobFolder
-from tauscope.server.queue.record import JobRecord
+from tauscope.server.queue.record import EndedEvent, JobRecord, StateEvent
 from tauscope.server.queue.stored import read_stored, write_stored
 
 

@@ -1,6 +1,7 @@
-"""Starting what a schedule repeats: a campaign, or an analysis of the newest recordings."""
+"""The repeater: it starts what a schedule repeats, and makes schedules from items that were done once."""
 
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 from fnmatch import fnmatchcase
@@ -12,7 +13,7 @@ from tauscope.server.control.campaign_manager import CampaignManager
 from tauscope.server.control.campaign_order import CampaignOrder
 from tauscope.server.control.campaign_runner import CampaignDependencies
 from tauscope.server.control.campaign_workspace import CampaignWorkspace
-from tauscope.server.control.permits import FREE, Permit
+from tauscope.server.control.leases import FREE, Permit
 from tauscope.server.queue.diagnosis_order import DiagnosisOrder
 from tauscope.server.queue.diagnosis_workspace import DiagnosisWorkspace
 from tauscope.server.queue.identification_order import IdentificationOrder, OrderedRecording
@@ -21,7 +22,7 @@ from tauscope.server.queue.identification_workspace import IdentificationWorkspa
 from tauscope.server.queue.stored import StoredModel
 from tauscope.server.queue.workspace import Workspace
 from tauscope.server.schedules.definition import RecordingChoice, ScheduleDefinition
-from tauscope.server.schedules.entries import ScheduleEntry
+from tauscope.server.schedules.repository import ScheduleEntry
 from tauscope.server.store.items import ItemStore
 from tauscope.server.store.recordings import RecordingStore
 
@@ -34,9 +35,9 @@ class NothingToDoError(TauscopeError):
 
 @dataclass(frozen=True, eq=False)
 class Repeater:
-    """Starts what schedules repeat."""
+    """Starts the campaigns and analyses of schedules."""
 
-    shop: CampaignDependencies
+    dependencies: CampaignDependencies
     campaigns: CampaignManager
     permit_for: Callable[[str], Permit] = field(default_factory=lambda: lambda _device: FREE)
 
@@ -59,10 +60,8 @@ class Repeater:
         if definition.kind == "campaign":
             return "campaign", self._campaign(entry)
         assert definition.recordings is not None  # noqa: S101 - checked by the definition
-        train, held_out = newest_recordings(self.shop.recordings, definition.recordings, since)
-        if definition.kind == "identification":
-            return "identification", self._identification(entry, train, held_out)
-        return "diagnosis", self._diagnosis(entry, train, held_out)
+        train, held_out = newest_recordings(self.dependencies.recordings, definition.recordings, since)
+        return definition.kind, self._analyse(definition.kind, entry, {"recordings": train, "held_out": held_out})
 
     def goes_on(self, kind: str, identifier: str) -> bool:
         """Whether something that was started has not ended; what was removed has."""
@@ -75,7 +74,7 @@ class Repeater:
         """The folders of what is repeated."""
         if kind == "campaign":
             return self.campaigns.items
-        return (self.shop.identifications if kind == "identification" else self.shop.diagnoses).items
+        return (self.dependencies.identifications if kind == "identification" else self.dependencies.diagnoses).items
 
     def _campaign(self, entry: ScheduleEntry) -> str:
         """A campaign like the one that the schedule was made from."""
@@ -91,37 +90,24 @@ class Repeater:
         finally:
             items.discard(staged)
 
-    def _identification(
-        self, entry: ScheduleEntry, train: tuple[OrderedRecording, ...], held_out: tuple[OrderedRecording, ...]
-    ) -> str:
-        """An identification from other recordings."""
-        kind = self.shop.identifications
-        staged = kind.items.stage()
+    def _analyse(self, kind: str, entry: ScheduleEntry, recordings: Mapping[str, tuple[OrderedRecording, ...]]) -> str:
+        """Submit an identification or a diagnosis of other recordings."""
+        dependencies = self.dependencies
+        job_kind = dependencies.identifications if kind == "identification" else dependencies.diagnoses
+        staged = job_kind.items.stage()
         try:
-            workspace = IdentificationWorkspace(staged)
-            workspace.prepare()
+            if kind == "identification":
+                workspace, order = IdentificationWorkspace(staged), _order(entry, IdentificationOrder)
+                workspace.prepare()
+                workspace.write_order(order.model_copy(update=recordings))
+            else:
+                workspace, order = DiagnosisWorkspace(staged), _order(entry, DiagnosisOrder)
+                workspace.prepare()
+                workspace.write_order(order.model_copy(update=recordings))
             write_robot(workspace.robot, entry)
-            changes = {"recordings": train, "held_out": held_out}
-            workspace.write_order(_order(entry, IdentificationOrder).model_copy(update=changes))
-            return self.shop.jobs.submit(kind, staged)
+            return dependencies.jobs.submit(job_kind, staged)
         finally:
-            kind.items.discard(staged)
-
-    def _diagnosis(
-        self, entry: ScheduleEntry, train: tuple[OrderedRecording, ...], held_out: tuple[OrderedRecording, ...]
-    ) -> str:
-        """A diagnosis of other recordings."""
-        kind = self.shop.diagnoses
-        staged = kind.items.stage()
-        try:
-            workspace = DiagnosisWorkspace(staged)
-            workspace.prepare()
-            write_robot(workspace.robot, entry)
-            changes = {"recordings": train, "held_out": held_out}
-            workspace.write_order(_order(entry, DiagnosisOrder).model_copy(update=changes))
-            return self.shop.jobs.submit(kind, staged)
-        finally:
-            kind.items.discard(staged)
+            job_kind.items.discard(staged)
 
 
 def newest_recordings(
@@ -154,3 +140,46 @@ def write_robot(folder: Path, entry: ScheduleEntry) -> None:
 def _order(entry: ScheduleEntry, kind: type[Order]) -> Order:
     """The order that is repeated."""
     return kind.model_validate(dict(entry.order), strict=False)
+
+
+_WORKSPACES = {
+    "campaign": CampaignWorkspace,
+    "identification": IdentificationWorkspace,
+    "diagnosis": DiagnosisWorkspace,
+}
+
+
+def make_schedule(
+    name: str, like: str, definition: ScheduleDefinition, repeater: Repeater, site: str | None, now: datetime
+) -> ScheduleEntry:
+    """A schedule that repeats an item of this site.
+
+    Parameters
+    ----------
+    site : str or None
+        of the data folder whose service does it; None for whichever comes first
+
+    Raises
+    ------
+    NotFoundError
+        if there is no such item, or its files are damaged
+    """
+    workspace = _WORKSPACES[definition.kind](repeater.items(definition.kind).folder(like))
+    order = workspace.read_order()
+    if order is None:
+        raise NotFoundError(f"{definition.kind} {like}: its order is missing or damaged; name another one")
+    plain = json.loads(order.model_dump_json(exclude={"recordings", "held_out", "simulated"} & _lists(definition)))
+    if definition.kind != "campaign":
+        plain["recordings"] = []
+    try:
+        files = {path.name: path.read_text(encoding="utf-8") for path in sorted(workspace.robot.iterdir())}
+    except (OSError, UnicodeDecodeError):
+        text = f"{definition.kind} {like}: its robot file is missing or damaged; name another one"
+        raise NotFoundError(text) from None
+    due = definition.next_after(now, now)
+    return ScheduleEntry(name, site, definition.model_dump(mode="json"), plain, files, now, due)
+
+
+def _lists(definition: ScheduleDefinition) -> set[str]:
+    """Fields of an order that name recordings: a campaign's `held_out` is a motion."""
+    return set() if definition.kind == "campaign" else {"recordings", "held_out", "simulated"}

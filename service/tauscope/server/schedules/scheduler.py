@@ -1,4 +1,4 @@
-"""Does what is due: each firing once, with a definite end, and never again by itself."""
+"""The scheduler: each firing happens once, has a definite end, and is never repeated by itself."""
 
 import logging
 from collections.abc import Callable
@@ -7,15 +7,14 @@ from pathlib import Path
 
 from tauscope.errors import TauscopeError
 from tauscope.server.control.device_claims import BusyError
-from tauscope.server.control.interlock import objection
-from tauscope.server.control.lease_errors import LeasedError
+from tauscope.server.control.interlock import find_objection
+from tauscope.server.control.leases import LeasedError
 from tauscope.server.control.run_order import BackendChoice
-from tauscope.server.queue.messages import without_folders
 from tauscope.server.queue.queue import QueueFullError
+from tauscope.server.queue.record import without_folders
 from tauscope.server.schedules.definition import ScheduleDefinition
-from tauscope.server.schedules.entries import FiringEntry, ScheduleEntry
 from tauscope.server.schedules.repeater import NothingToDoError, Repeater
-from tauscope.server.schedules.repository import ScheduleRepository
+from tauscope.server.schedules.repository import FiringEntry, ScheduleEntry, ScheduleRepository
 from tauscope.server.store.items import utc_now
 
 _log = logging.getLogger("tauscope.jobs")
@@ -25,18 +24,22 @@ _Outcome = tuple[str, str | None, tuple[str, str] | None]
 
 
 class Scheduler:
-    """Looks at the book again and again; a firing that is missed, or not possible, is written down as such."""
+    """Fires due schedules; a firing that is missed, or not possible, is recorded as such."""
 
     def __init__(
-        self, book: ScheduleRepository, repeater: Repeater, data_folder: Path, clock: Callable[[], datetime] = utc_now
+        self,
+        repository: ScheduleRepository,
+        repeater: Repeater,
+        data_folder: Path,
+        clock: Callable[[], datetime] = utc_now,
     ) -> None:
         """Prepare. Firings that an earlier start left undecided become `interrupted`: nothing is repeated."""
-        self.book = book
+        self.repository = repository
         self.repeater = repeater
         self._data_folder = data_folder
         self._clock = clock
         self._unwritten: dict[int, _Outcome] = {}
-        book.interrupt_claims()
+        repository.interrupt_claims()
 
     def tick(self) -> None:
         """Do what is due, and what was asked for.
@@ -46,13 +49,13 @@ class Scheduler:
         StoreError
             if the database does not answer
         """
-        self._write_down()
-        while (asked := self.book.claim_asked(self._clock())) is not None:
+        self._write_outcomes()
+        while (asked := self.repository.claim_asked(self._clock())) is not None:
             self._fire(*asked, lateness=None)
-        for entry in self.book.due(self._clock()):
+        for entry in self.repository.due(self._clock()):
             now = self._clock()
-            due, definition = entry.next_due, parse_schedule(entry)
-            number = self.book.claim(entry, definition.next_after(now, entry.created), now)
+            due, definition = entry.next_due, read_definition(entry)
+            number = self.repository.claim(entry, definition.next_after(now, entry.created), now)
             if number is not None and due is not None:
                 self._fire(number, entry, lateness=now - due)
 
@@ -64,28 +67,28 @@ class Scheduler:
         NotFoundError
             if there is no such schedule
         """
-        number = self.book.ask(name, self._clock())
-        claimed = self.book.claim_asked(self._clock(), number)
+        number = self.repository.ask(name, self._clock())
+        claimed = self.repository.claim_asked(self._clock(), number)
         if claimed is not None:
             self._fire(*claimed, lateness=None)
-        return self.book.firing(number)
+        return self.repository.firing(number)
 
     def _fire(self, number: int, entry: ScheduleEntry, lateness: timedelta | None) -> None:
         """Start what a schedule repeats, or write down why not."""
         try:
-            outcome = self._outcome(entry, parse_schedule(entry), lateness)
+            outcome = self._outcome(entry, read_definition(entry), lateness)
         except Exception as error:
             _log.exception("schedule %s failed for an unforeseen reason", entry.name)
             outcome = "failed", f"a fault of Tauscope's own ({type(error).__name__}); see the log", None
         self._unwritten[number] = outcome
         state, reason, _ = outcome
         _log.info("schedule %s: %s%s", entry.name, state, "" if reason is None else f" ({reason})")
-        self._write_down()
+        self._write_outcomes()
 
-    def _write_down(self) -> None:
+    def _write_outcomes(self) -> None:
         """Give firings their ends; what the database does not take now it is given with the next tick."""
         for number, outcome in list(self._unwritten.items()):
-            self.book.finish(number, *outcome)
+            self.repository.finish(number, *outcome)
             self._unwritten.pop(number, None)
 
     def _outcome(self, entry: ScheduleEntry, definition: ScheduleDefinition, lateness: timedelta | None) -> _Outcome:
@@ -93,7 +96,7 @@ class Scheduler:
         if lateness is not None and self._is_too_late(entry, definition, lateness):
             minutes = lateness.total_seconds() / 60
             return "missed", f"no service looked at it until {minutes:.0f} minutes later; it is due again", None
-        reason = self._hindrance(entry, definition)
+        reason = self._find_obstacle(entry, definition)
         if reason is not None:
             return "skipped", reason, None
         try:
@@ -111,33 +114,33 @@ class Scheduler:
         latest = definition.next_after(now - grace, entry.created)
         return latest is None or latest > now
 
-    def _hindrance(self, entry: ScheduleEntry, definition: ScheduleDefinition) -> str | None:
+    def _find_obstacle(self, entry: ScheduleEntry, definition: ScheduleDefinition) -> str | None:
         """Why nothing may be started now."""
         window = definition.window
         if window is not None and not definition.is_open(self._clock()):
             days = ", ".join(window.days)
             return f"outside of its window, {window.start} to {window.end} ({definition.timezone}) on {days}"
-        for firing in self.book.firings(entry.name, 10):
+        for firing in self.repository.firings(entry.name, 10):
             if firing.item is not None and self._goes_on(firing, *firing.item):
                 return f"what was started last, {firing.item[0]} {firing.item[1]}, still goes on"
         if definition.interlock is None:
             return None
         robot = str(entry.order.get("robot_name"))
         backend = BackendChoice.model_validate(entry.order.get("backend") or {}, strict=False)
-        return objection(self._data_folder, definition.interlock, robot, backend.device(robot))
+        return find_objection(self._data_folder, definition.interlock, robot, backend.device(robot))
 
     def _goes_on(self, firing: FiringEntry, kind: str, identifier: str) -> bool:
         """Whether what was started has not ended; of another site only the index knows."""
-        if firing.site == self.book.site:
+        if firing.site == self.repository.site:
             return self.repeater.goes_on(kind, identifier)
         return firing.item_state is not None and not firing.is_final
 
     def _last_start(self, entry: ScheduleEntry) -> datetime | None:
         """When it was started last."""
-        return next((each.due for each in self.book.firings(entry.name, 100) if each.state == "started"), None)
+        return next((each.due for each in self.repository.firings(entry.name, 100) if each.state == "started"), None)
 
 
-def parse_schedule(entry: ScheduleEntry) -> ScheduleDefinition:
+def read_definition(entry: ScheduleEntry) -> ScheduleDefinition:
     """When a schedule is due."""
     return ScheduleDefinition.model_validate(dict(entry.definition), strict=False)
 

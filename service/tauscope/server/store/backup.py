@@ -18,9 +18,8 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from tauscope.errors import StoreError
 from tauscope.files import sync_folder
-from tauscope.server.store.database.database import FILE_NAME, Database
+from tauscope.server.store.database.database import FILE_NAME, Database, open_engine
 from tauscope.server.store.database.dump import dump_lines, load_lines
-from tauscope.server.store.database.engine import open_engine
 
 FORM = "tauscope.backup/1"
 _DATABASE, _MANIFEST, _DATA = "database.jsonl", "manifest.json", "data"

@@ -32,7 +32,6 @@ class EventLog:
     """
 
     def __init__(self, path: Path) -> None:
-        """Look at a log; nothing is opened yet, and a file that is not there is an empty log."""
         self.path = path
 
     def append(self, content: Mapping[str, Any]) -> None:
@@ -76,7 +75,6 @@ class LogFollower:
     """Reads a log from where it last ended; holds no file open between two readings."""
 
     def __init__(self, path: Path, after: int) -> None:
-        """Begin behind a line."""
         self._path = path
         self._after = after
         self._number = 0

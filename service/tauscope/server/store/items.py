@@ -8,7 +8,7 @@ from pathlib import Path
 from tauscope.errors import NotFoundError
 from tauscope.files import sync_folder
 from tauscope.robot.messages import one_line, shown
-from tauscope.server.store.names import is_identifier, new_identifier
+from tauscope.server.store.files import is_identifier, new_identifier
 
 _STAGED = ".staged-"
 _REMOVED = ".removed-"

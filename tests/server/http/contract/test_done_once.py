@@ -16,7 +16,7 @@ from server.queue.controls import finish_at_once
 from server.queue.executors import InlineExecutor
 from snapshots import SNAPSHOTS, unpacked
 from tauscope.server.http import Settings, create_app
-from tauscope.server.http.idempotency.repeatable import is_repeatable
+from tauscope.server.http.repeated_requests import is_repeatable
 
 V1 = "/api/v1"
 STOPS_AGAIN = "a second stop is welcome"

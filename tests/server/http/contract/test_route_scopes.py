@@ -16,7 +16,7 @@ from server.http.problem_check import assert_problem
 from server.http.write_openapi import COMMITTED
 from server.queue.controls import finish_at_once
 from server.queue.executors import InlineExecutor
-from tauscope.server.auth.scopes import Scope, needed_scope
+from tauscope.server.auth.scopes import Scope, find_needed_scope
 from tauscope.server.http import Settings, create_app
 
 READ, ANALYSE, MOVE, ADMIN = Scope.READ, Scope.ANALYSE, Scope.MOVE, Scope.ADMIN
@@ -124,12 +124,12 @@ def test_who_may_do_what(operation: str, key: Scope | None, service: tuple[FastA
      "POST /api/v1/runs/x/stop/", "POST /api/v1/Runs"],
 )  # fmt: skip
 def test_what_nobody_has_placed_needs_the_highest_scope(request_line: str) -> None:
-    assert needed_scope(*request_line.split(" ")) is ADMIN
+    assert find_needed_scope(*request_line.split(" ")) is ADMIN
 
 
 @pytest.mark.parametrize("path", ["/api/v1/nothing", "/api/", "/api/v2/runs", "/metrics"])
 def test_what_nobody_has_placed_is_not_read_without_a_key(path: str) -> None:
-    assert needed_scope("GET", path) is READ
+    assert find_needed_scope("GET", path) is READ
 
 
 def test_the_document_says_which_scope_is_needed() -> None:

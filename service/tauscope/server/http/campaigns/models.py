@@ -17,7 +17,7 @@ from tauscope.server.models import AnswerModel
 from tauscope.server.queue.diagnosis_order import DiagnosisOptions
 from tauscope.server.queue.excitation_order import ExcitationDesignOptions
 from tauscope.server.queue.identification_order import IdentificationOptions
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.record import JobState
 
 
 class CampaignRequest(RobotRequest):

@@ -18,7 +18,7 @@ from tauscope.server.http.campaigns.submission import submit_campaign
 from tauscope.server.http.jobs.events import add_events_route
 from tauscope.server.http.jobs.routes import ENDINGS, MOTION, SUBMISSION, Identifier, Limit, collection
 from tauscope.server.http.jobs.submission import request_body
-from tauscope.server.http.leases.holding import LeaseToken
+from tauscope.server.http.leases.router import LeaseToken
 from tauscope.server.http.robots.of_job import add_robot_route
 from tauscope.server.http.services import Services, ServicesDep
 from tauscope.server.problems import ProblemError, problem_responses

@@ -21,7 +21,7 @@ from tauscope.server.http.identifications.status import find_identification, fin
 from tauscope.server.http.jobs.answers import damaged_fields, job_fields, require_document, require_success
 from tauscope.server.http.runs.status import find_run
 from tauscope.server.http.services import Services
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.record import JobState
 from tauscope.server.queue.workspace import Workspace
 
 WAITING, GONE = "waiting", "gone"

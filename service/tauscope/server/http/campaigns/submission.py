@@ -8,7 +8,7 @@ from tauscope.server.control.campaign_workspace import CampaignWorkspace
 from tauscope.server.http.backends import chosen_backend
 from tauscope.server.http.campaigns.models import CampaignRequest
 from tauscope.server.http.jobs.submission import Received, keep_robot, receive_request
-from tauscope.server.http.leases.holding import permit_of
+from tauscope.server.http.leases.router import permit_of
 from tauscope.server.http.robots.files import read_received_robot
 from tauscope.server.http.services import Services
 

@@ -4,7 +4,7 @@ from tauscope.server.http.diagnoses.models import DiagnosisAnswer, DiagnosisLink
 from tauscope.server.http.jobs.answers import damaged_fields, job_fields, require_success
 from tauscope.server.http.services import Services
 from tauscope.server.queue.diagnosis_workspace import DiagnosisWorkspace
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.record import JobState
 
 
 def find_diagnosis(services: Services, identifier: str) -> DiagnosisWorkspace:

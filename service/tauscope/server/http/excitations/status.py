@@ -4,7 +4,7 @@ from tauscope.server.http.excitations.models import ExcitationAnswer, Excitation
 from tauscope.server.http.jobs.answers import damaged_fields, job_fields, require_success
 from tauscope.server.http.services import Services
 from tauscope.server.queue.excitation_workspace import ExcitationWorkspace
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.record import JobState
 
 
 def find_excitation(services: Services, identifier: str) -> ExcitationWorkspace:

@@ -10,7 +10,7 @@ from tauscope.server.http.jobs.submission import RobotRequest
 from tauscope.server.http.robots.models import EXAMPLE_ROBOT
 from tauscope.server.models import AnswerModel
 from tauscope.server.queue.identification_order import IdentificationOptions, OrderedRecording
-from tauscope.server.store.names import FILE_NAME_PATTERN, FILE_NAME_RULE, is_file_name
+from tauscope.server.store.files import FILE_NAME_PATTERN, FILE_NAME_RULE, is_file_name
 
 
 def _file_name(value: str) -> str:

@@ -7,7 +7,7 @@ from tauscope.server.http.identifications.models import IdentificationAnswer, Li
 from tauscope.server.http.jobs.answers import damaged_fields, job_fields, require_success
 from tauscope.server.http.services import Services
 from tauscope.server.queue.identification_workspace import IdentificationWorkspace
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.record import JobState
 
 
 def find_identification(services: Services, identifier: str) -> IdentificationWorkspace:

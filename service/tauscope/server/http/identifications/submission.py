@@ -15,7 +15,7 @@ from tauscope.server.http.services import Services
 from tauscope.server.problems import ProblemError
 from tauscope.server.queue.identification_order import IdentificationOrder, OrderedRecording
 from tauscope.server.queue.identification_workspace import IdentificationWorkspace
-from tauscope.server.store.incoming import KeptFile
+from tauscope.server.store.files import KeptFile
 from tauscope.server.store.recordings import RecordingStore
 
 _Received = Received[IdentificationRequest]

@@ -8,7 +8,7 @@ from pydantic import BaseModel
 from tauscope.server.http.jobs.routes import Identifier, Limit, collection
 from tauscope.server.http.services import Services, ServicesDep
 from tauscope.server.problems import problem_responses
-from tauscope.server.queue.queued_job import JobKind
+from tauscope.server.queue.queue import JobKind
 
 Describe = Callable[[Services, str, str], BaseModel]
 

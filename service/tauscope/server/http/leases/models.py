@@ -5,7 +5,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from tauscope.server.control.lease import LONGEST_TTL_S
+from tauscope.server.control.leases import LONGEST_TTL_S
 from tauscope.server.models import AnswerModel, StrictModel
 
 

@@ -1,20 +1,18 @@
-"""Routes about leases, and the stop of everything."""
+"""Routes of leases, the lease that comes with a request, and the stop of everything."""
 
 from datetime import UTC, datetime
 from typing import Annotated
 
-from fastapi import APIRouter, Path, Request, Response
+from fastapi import APIRouter, Header, Path, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from tauscope.errors import NotFoundError
 from tauscope.robot.messages import one_line, shown
-from tauscope.server.auth.gate import caller_of
+from tauscope.server.auth.gate import find_caller
 from tauscope.server.auth.scopes import Scope
-from tauscope.server.control.lease import Lease
-from tauscope.server.control.lease_errors import LeaseLostError
+from tauscope.server.control.leases import Lease, LeaseLostError, Permit
 from tauscope.server.control.run_order import BackendChoice
 from tauscope.server.http.documents import JSON, media_type, read_document, refuse_media_type
-from tauscope.server.http.leases.holding import LeaseToken, owner_of
 from tauscope.server.http.leases.models import (
     EXAMPLES,
     LeaseAnswer,
@@ -26,6 +24,35 @@ from tauscope.server.http.leases.models import (
 from tauscope.server.http.openapi import json_body
 from tauscope.server.http.services import Services, ServicesDep
 from tauscope.server.problems import ProblemError, problem_responses
+
+LEASE_TOKEN = "Lease-Token"  # noqa: S105 - name of a header
+
+LeaseToken = Annotated[
+    str | None,
+    Header(
+        alias=LEASE_TOKEN,
+        max_length=200,
+        description="token of the arm's lease; a service without API keys asks for none unless somebody has a lease",
+    ),
+]
+
+
+def find_owner(request: Request) -> str:
+    """Whose a lease is that this request takes or uses."""
+    return find_caller(request.scope).key or "local"
+
+
+def permit_of(request: Request, services: Services, device: str) -> Permit:
+    """Leave to move an arm, by the lease that comes with a request.
+
+    Raises
+    ------
+    LeaseError
+        if there is no such leave
+    """
+    is_needed = services.settings.require_lease or find_caller(request.scope).key is not None
+    return services.leases.permit(device, request.headers.get(LEASE_TOKEN), find_owner(request), is_needed=is_needed)
+
 
 router = APIRouter(prefix="/leases", tags=["leases"], responses=problem_responses("invalid-request"))
 stop_router = APIRouter(tags=["runs"])
@@ -53,13 +80,13 @@ async def take_lease(request: Request, response: Response, services: ServicesDep
     if media_type(request) != JSON:
         raise refuse_media_type(request, JSON)
     wanted = await read_document(request, LeaseRequest, services.settings.max_document_bytes)
-    caller = caller_of(request.scope)
+    caller = find_caller(request.scope)
     if wanted.take and not caller.scope.includes(Scope.ADMIN):
         raise ProblemError("forbidden", f"taking an arm needs a key of scope admin; the one of {caller.name} has less")
     device = BackendChoice(name=wanted.backend or services.settings.backend).device(wanted.robot)
     holder = one_line(wanted.holder) or caller.name
     lease = await run_in_threadpool(
-        services.leases.acquire, device, holder, owner_of(request), wanted.ttl_s, take=wanted.take
+        services.leases.acquire, device, holder, find_owner(request), wanted.ttl_s, take=wanted.take
     )
     answer = _answer(services, lease, request.url.path, token=lease.token)
     response.headers["Location"] = answer.links.self_
@@ -84,14 +111,14 @@ async def get_lease(request: Request, identifier: Identifier, services: Services
 @router.post("/{identifier}/heartbeat", summary="Keep a lease", responses=_HELD, openapi_extra=_NO_BODY)
 async def keep_lease(request: Request, identifier: Identifier, services: ServicesDep, token: LeaseToken) -> LeaseAnswer:
     """A sign of life: the lease lasts for its whole time again. One that has ended is not brought back."""
-    lease = services.leases.renew(_device(services, identifier), token or "", owner_of(request))
+    lease = services.leases.renew(_device(services, identifier), token or "", find_owner(request))
     return _answer(services, lease, request.url.path.rsplit("/", 2)[0])
 
 
 @router.post("/{identifier}/arm", summary="Arm a lease", responses=_HELD, openapi_extra=_NO_BODY)
 async def arm_lease(request: Request, identifier: Identifier, services: ServicesDep, token: LeaseToken) -> LeaseAnswer:
     """From now on the arm moves when a run or a campaign is handed in with the lease. Every stop disarms."""
-    lease = services.leases.arm(_device(services, identifier), token or "", owner_of(request), armed=True)
+    lease = services.leases.arm(_device(services, identifier), token or "", find_owner(request), armed=True)
     return _answer(services, lease, request.url.path.rsplit("/", 2)[0])
 
 
@@ -100,21 +127,21 @@ async def disarm_lease(
     request: Request, identifier: Identifier, services: ServicesDep, token: LeaseToken
 ) -> LeaseAnswer:
     """What moves by the lease stops; the arm is kept."""
-    lease = services.leases.arm(_device(services, identifier), token or "", owner_of(request), armed=False)
+    lease = services.leases.arm(_device(services, identifier), token or "", find_owner(request), armed=False)
     return _answer(services, lease, request.url.path.rsplit("/", 2)[0])
 
 
 @router.delete("/{identifier}", status_code=204, summary="Give an arm back", responses=_HELD)
 async def release_lease(request: Request, identifier: Identifier, services: ServicesDep, token: LeaseToken) -> None:
     """What moves by the lease stops. A lease that does not hold any more changes nothing for the present one."""
-    services.leases.release(_device(services, identifier), token or "", owner_of(request))
+    services.leases.release(_device(services, identifier), token or "", find_owner(request))
 
 
 @stop_router.post("/stop", status_code=202, summary="Stop every arm", openapi_extra=_NO_BODY)
 async def stop_everything(services: ServicesDep) -> StopAllAnswer:
     """Stops all runs and campaigns and disarms all leases; needs no lease and no body, and waits for nothing."""
     services.leases.disarm_all()
-    campaigns, runs = services.campaigns.stop_every(), services.runs.stop_every()
+    campaigns, runs = services.campaigns.stop_all(), services.runs.stop_all()
     return StopAllAnswer(runs=runs, campaigns=campaigns, time=datetime.now(UTC))
 
 

@@ -9,15 +9,13 @@ from fastapi import APIRouter, Path, Query, Request, Response
 from fastapi.responses import FileResponse
 from starlette.concurrency import run_in_threadpool
 
-from tauscope.server.http.documents import media_type, refuse_media_type
-from tauscope.server.http.downloads import file_answer
+from tauscope.server.http.documents import file_answer, media_type, refuse_media_type
 from tauscope.server.http.form import FORM, PartRule, receive_form
 from tauscope.server.http.openapi import binary_part, form_body
 from tauscope.server.http.recordings.models import RecordingAnswer, RecordingListAnswer, RecordingReportAnswer
 from tauscope.server.http.services import ServicesDep
 from tauscope.server.problems import ProblemError, problem_responses
-from tauscope.server.queue.check_work import check_kept_recording
-from tauscope.server.queue.samples_work import read_kept_samples
+from tauscope.server.queue.recording_work import check_kept_recording, read_kept_samples
 from tauscope.server.store.recordings import StoredRecording
 
 router = APIRouter(prefix="/recordings", tags=["recordings"], responses=problem_responses("invalid-request"))

@@ -14,7 +14,7 @@ from tauscope.robot.urdf_xml import LARGEST_URDF
 from tauscope.robot.yaml_text import read_yaml
 from tauscope.server.http.documents import to_json_text
 from tauscope.server.http.form import PartRule
-from tauscope.server.queue.messages import without_folders
+from tauscope.server.queue.record import without_folders
 
 INLINE_NAME = "robot.json"
 """File name of a robot that came as JSON; YAML readers read JSON."""

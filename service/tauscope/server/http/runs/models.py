@@ -7,9 +7,8 @@ from pydantic import Field, JsonValue, model_validator
 from pydantic_core import PydanticCustomError
 
 from tauscope.runtime.options import RunOptions
-from tauscope.runtime.real_time import RealTime
 from tauscope.runtime.states import RunState
-from tauscope.runtime.timing import Timing
+from tauscope.runtime.timing import RealTime, Timing
 from tauscope.server.control.run_order import BackendChoice
 from tauscope.server.http.backends import BackendRequest
 from tauscope.server.http.jobs.submission import RobotRequest

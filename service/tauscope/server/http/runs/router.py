@@ -7,11 +7,11 @@ from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import FileResponse
 from starlette.concurrency import run_in_threadpool
 
-from tauscope.server.http.downloads import file_answer
+from tauscope.server.http.documents import file_answer
 from tauscope.server.http.jobs.events import add_events_route
 from tauscope.server.http.jobs.routes import MOTION, SUBMISSION, Identifier, Limit, collection
 from tauscope.server.http.jobs.submission import request_body
-from tauscope.server.http.leases.holding import LeaseToken
+from tauscope.server.http.leases.router import LeaseToken
 from tauscope.server.http.openapi import binary_part
 from tauscope.server.http.robots.of_job import add_robot_route
 from tauscope.server.http.runs.models import EXAMPLES, RecordingFormat, RunAnswer, RunListAnswer, RunRequest, StopAnswer

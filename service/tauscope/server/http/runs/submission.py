@@ -10,8 +10,8 @@ from starlette.concurrency import run_in_threadpool
 from tauscope.errors import ExcitationError
 from tauscope.robot import Robot
 from tauscope.runtime.options import RunOptions
+from tauscope.server.control.leases import Permit
 from tauscope.server.control.motions import DesignedMotion, Motion, ready_motion, take_trajectory
-from tauscope.server.control.permits import Permit
 from tauscope.server.control.run_order import BackendChoice, RunRequestRecord
 from tauscope.server.control.run_workspace import RunWorkspace
 from tauscope.server.http.backends import chosen_backend
@@ -19,7 +19,7 @@ from tauscope.server.http.documents import to_json_text
 from tauscope.server.http.excitations.status import finished_excitation
 from tauscope.server.http.form import PartRule
 from tauscope.server.http.jobs.submission import Received, keep_robot, receive_request
-from tauscope.server.http.leases.holding import permit_of
+from tauscope.server.http.leases.router import permit_of
 from tauscope.server.http.robots.files import read_received_robot
 from tauscope.server.http.runs.models import RunRequest
 from tauscope.server.http.services import Services

@@ -1,18 +1,127 @@
-"""A database that is up to date: short transactions, and failures in our own words."""
+"""The database: SQLite beside the data, or PostgreSQL shared by services; opened, migrated, read and written."""
 
+import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
-from sqlalchemy import Engine
-from sqlalchemy.exc import DBAPIError, IntegrityError
+from alembic import command
+from alembic.config import Config
+from alembic.runtime.migration import MigrationContext
+from alembic.script import ScriptDirectory
+from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url, text
+from sqlalchemy.exc import ArgumentError, DBAPIError, IntegrityError
 from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from sqlalchemy.orm import Session
 
 from tauscope.errors import StoreError
 from tauscope.robot.messages import one_line
-from tauscope.server.store.database.engine import WRITES, open_engine, shown_address
-from tauscope.server.store.database.migrate import upgrade
+
+TIMEOUT_S = 5
+"""How long a write waits for another one, and a connection for its server [s]."""
+
+WRITES = "tauscope_writes"
+"""Execution option of a connection that will write: SQLite then takes its lock at the beginning.
+
+A transaction that only later turns out to write could not wait for the lock, because what it has read is old by then.
+"""
+
+
+def open_engine(address: Path | str) -> Engine:
+    """An engine; nothing is connected yet.
+
+    Raises
+    ------
+    StoreError
+        if it is no URL, or one of another kind of database
+    """
+    url = URL.create("sqlite", database=str(address)) if isinstance(address, Path) else _parsed(address)
+    if url.get_backend_name() == "sqlite":
+        engine = create_engine(url, connect_args={"timeout": TIMEOUT_S})
+        event.listen(engine, "connect", _prepare_sqlite)
+        event.listen(engine, "begin", _begin_sqlite)
+        return engine
+    options = f"-c lock_timeout={TIMEOUT_S}s"
+    return create_engine(
+        url.set(drivername="postgresql+psycopg"),
+        pool_pre_ping=True,
+        connect_args={"connect_timeout": TIMEOUT_S, "options": options},
+    )
+
+
+def shown_address(engine: Engine) -> str:
+    """What messages call a database: its file, or its URL without the password."""
+    url = engine.url
+    return str(url.database) if url.get_backend_name() == "sqlite" else url.render_as_string(hide_password=True)
+
+
+def _parsed(text: str) -> URL:
+    """The URL of a text; only the two kinds that are tested are taken."""
+    hint = "write postgresql://user@host/name, or leave it out for SQLite in the data folder"
+    try:
+        url = make_url(text)
+    except ArgumentError:
+        # The text may hold a password: it is not repeated.
+        raise StoreError(f"the address of the database is no URL; {hint}") from None
+    if url.get_backend_name() not in ("postgresql", "sqlite"):
+        raise StoreError(f"{url.get_backend_name()}: no kind of database that Tauscope knows; {hint}")
+    return url
+
+
+def _prepare_sqlite(connection: sqlite3.Connection, _record: Any) -> None:
+    """Readers never wait for the writer, nothing that was committed is lost, and references hold."""
+    connection.isolation_level = None  # transactions are begun below; Python's own begin too late for DDL
+    for pragma in ("journal_mode = WAL", "synchronous = FULL", "foreign_keys = ON"):
+        connection.execute(f"PRAGMA {pragma}")
+
+
+def _begin_sqlite(connection: Connection) -> None:
+    """Begin a transaction."""
+    writes = connection.get_execution_options().get(WRITES, False)
+    connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
+
+
+_ADVISORY_LOCK = 7_283_462_001
+"""Any number that nobody else uses in the same PostgreSQL database: two services do not migrate at a time."""
+
+
+def upgrade(engine: Engine, target: str = "head") -> None:
+    """Bring the tables to this program's form; nothing happens where they have it.
+
+    Raises
+    ------
+    StoreError
+        if the tables have a form that this program does not know
+    """
+    with engine.execution_options(**{WRITES: True}).begin() as connection:
+        if connection.dialect.name == "postgresql":
+            connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": _ADVISORY_LOCK})
+        present = present_revision(connection)
+        if present is not None and present not in revisions():
+            hint = "use the Tauscope that wrote it, or restore a backup of before"
+            raise StoreError(f"{shown_address(engine)}: was written by a newer Tauscope (form {present}); {hint}")
+        command.upgrade(_configuration(connection), target)
+
+
+def present_revision(connection: Connection) -> str | None:
+    """The form that the tables of a database have; None where there are none."""
+    return MigrationContext.configure(connection).get_current_revision()
+
+
+def revisions() -> list[str]:
+    """All forms that this program knows, the oldest first."""
+    scripts = ScriptDirectory.from_config(_configuration(None))
+    return [script.revision for script in scripts.walk_revisions()][::-1]
+
+
+def _configuration(connection: Connection | None) -> Config:
+    """Where Alembic finds the steps, and the connection that it takes them on."""
+    configuration = Config()
+    configuration.set_main_option("script_location", "tauscope.server.store.database:migrations")
+    configuration.attributes["connection"] = connection
+    return configuration
+
 
 FILE_NAME = "tauscope.db"
 """Of the SQLite database in a data folder."""

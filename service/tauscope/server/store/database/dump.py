@@ -8,8 +8,7 @@ from typing import Any
 from sqlalchemy import Column, Connection, DateTime, Engine, MetaData, Table, insert, select, text
 
 from tauscope.errors import StoreError
-from tauscope.server.store.database.engine import WRITES, shown_address
-from tauscope.server.store.database.migrate import present_revision, revisions, upgrade
+from tauscope.server.store.database.database import WRITES, present_revision, revisions, shown_address, upgrade
 
 _FORM = "alembic_version"
 

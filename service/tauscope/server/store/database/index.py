@@ -1,15 +1,99 @@
-"""Reading and writing the index: what lies in the folder of one site, and the search over all sites."""
+"""The index of items, recordings and robots in the database, and the plain data that it takes and gives out."""
 
 from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field
 from datetime import datetime
 
 from sqlalchemy import delete, select, update
 from sqlalchemy.orm import Session
 
 from tauscope.server.store.database.database import Database
-from tauscope.server.store.database.facts import FileMetadata, ItemEntry, ItemMetadata, ItemQuery, RobotEntry
 from tauscope.server.store.database.tables import ITEM_CLASSES, Artefact, Item, Recording, RecordingUse, Robot, Site
 from tauscope.server.store.recordings import StoredRecording
+
+
+@dataclass(frozen=True)
+class FileMetadata:
+    """A file of an item.
+
+    sha256 : str
+        of its bytes, in hexadecimal
+    """
+
+    path: str
+    size: int
+    sha256: str
+
+
+@dataclass(frozen=True)
+class RecordingRole:
+    """A recording that an item works with."""
+
+    role: str
+    name: str
+    origin: str
+    sha256: str
+
+
+@dataclass(frozen=True)
+class ItemMetadata:
+    """An item as its folder shows it.
+
+    problem : (str, str) or None
+        code and detail: why it has no result
+    """
+
+    kind: str
+    identifier: str
+    state: str
+    is_final: bool
+    stamp: str
+    created: datetime
+    ended: datetime | None = None
+    robot: str | None = None
+    problem: tuple[str, str] | None = None
+    figures: Mapping[str, str | float | None] = field(default_factory=dict)
+    recordings: tuple[RecordingRole, ...] = ()
+    artefacts: tuple[FileMetadata, ...] = ()
+
+
+@dataclass(frozen=True)
+class ItemEntry:
+    """An item as a search finds it."""
+
+    kind: str
+    identifier: str
+    site: str
+    state: str
+    created: datetime
+    ended: datetime | None
+    robot: str | None
+    problem_code: str | None
+    problem_detail: str | None
+    figures: Mapping[str, str | float | None]
+
+
+@dataclass(frozen=True)
+class ItemQuery:
+    """What is searched for; None where anything will do."""
+
+    kind: str | None = None
+    state: str | None = None
+    robot: str | None = None
+    site: str | None = None
+    recording_sha256: str | None = None
+    before: datetime | None = None
+    limit: int = 100
+
+
+@dataclass(frozen=True)
+class RobotEntry:
+    """A robot that items are about."""
+
+    name: str
+    first_seen: datetime
+    last_seen: datetime
+
 
 FIGURES: Mapping[str, tuple[str, ...]] = {
     "run": ("backend",),
@@ -23,7 +107,6 @@ class Index:
     """The part of the index that one data folder fills, and the search over all of it."""
 
     def __init__(self, database: Database, site: str) -> None:
-        """Look at the index."""
         self._database = database
         self.site = site
 
@@ -109,7 +192,7 @@ class Index:
                     session.add(row)
                 row.size, row.modified, row.sha256 = entry.size, entry.modified, entry.sha256
 
-    def recordings_used(self, except_by: Collection[tuple[str, str]] = ()) -> frozenset[str]:
+    def list_used_recordings(self, except_by: Collection[tuple[str, str]] = ()) -> frozenset[str]:
         """Names of the recordings on the server that items of this site were made from or judged by.
 
         Parameters

@@ -1,14 +1,62 @@
-"""The index of what is kept: every item of every data folder, its robot, its files and its recordings.
+"""The tables of the database: the index of all items, the models of each robot, and the schedules.
 
-The folders are the truth; these tables are made from them, and made again where they are missing.
+The folders are the truth; the index is made from them, and made again where it is missing.
 """
 
-from datetime import datetime
+from datetime import UTC, datetime
+from typing import Any, ClassVar
 
-from sqlalchemy import BigInteger, ForeignKey, Index, UniqueConstraint
-from sqlalchemy.orm import Mapped, mapped_column, relationship
+from sqlalchemy import JSON, BigInteger, DateTime, Dialect, ForeignKey, Index, MetaData, UniqueConstraint, text
+from sqlalchemy.dialects.postgresql import JSONB
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column, relationship
+from sqlalchemy.types import TypeDecorator
 
-from tauscope.server.store.database.base import Base
+PLAIN = JSON().with_variant(JSONB(), "postgresql")
+"""Plain data: what JSON can hold."""
+
+
+class Moment(TypeDecorator[datetime]):
+    """A moment in UTC; SQLite knows no time zones, so it keeps the bare UTC time."""
+
+    impl = DateTime(timezone=True)
+    cache_ok = True
+
+    def process_bind_param(self, value: datetime | None, dialect: Dialect) -> Any:
+        """The moment as it is kept.
+
+        Raises
+        ------
+        ValueError
+            for a time without time zone: it could be any moment
+        """
+        if value is None:
+            return None
+        if value.tzinfo is None:
+            raise ValueError(f"{value} has no time zone")
+        moment = value.astimezone(UTC)
+        return moment.replace(tzinfo=None) if dialect.name == "sqlite" else moment
+
+    def process_result_value(self, value: Any, dialect: Dialect) -> datetime | None:
+        """The moment as it is given out, in UTC."""
+        if value is None:
+            return None
+        return value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)
+
+
+_NAMES = {
+    "ix": "ix_%(table_name)s_%(column_0_N_name)s",
+    "uq": "uq_%(table_name)s_%(column_0_N_name)s",
+    "ck": "ck_%(table_name)s_%(constraint_name)s",
+    "fk": "fk_%(table_name)s_%(column_0_name)s",
+    "pk": "pk_%(table_name)s",
+}
+
+
+class Base(DeclarativeBase):
+    """Base of every table; `type_annotation_map` says how Python's types are kept."""
+
+    metadata = MetaData(naming_convention=_NAMES)
+    type_annotation_map: ClassVar[dict[Any, Any]] = {datetime: Moment, dict[str, Any]: PLAIN, list[Any]: PLAIN}
 
 
 class Site(Base):
@@ -157,3 +205,135 @@ class Recording(Base):
     size: Mapped[int] = mapped_column(BigInteger)
     modified: Mapped[datetime]
     sha256: Mapped[str | None]
+
+
+_ACTIVE, _REFERENCE, _OPEN = text("is_active"), text("is_reference"), text("closed IS NULL")
+
+
+class Model(Base):
+    """An identification that was judged: `identifier` of it, of which `site`, about which robot (`robot_id`, `robot`).
+
+    `id` is of this database alone. `created` is when the identification was handed in, `considered` when it was judged;
+    `source` says what was measured: ``arm``, ``simulated`` or ``uploaded``. `state` is ``active``, ``kept`` (it was
+    active), ``refused`` or ``unreadable``; `gates` are what it had to show. `is_active` marks the model in use,
+    `is_reference` the one that drift is counted from: one of each for a robot. `document` is the identification.
+    """
+
+    __tablename__ = "models"
+    __table_args__ = (
+        UniqueConstraint("site", "identifier"),
+        Index("uq_models_active", "robot_id", unique=True, sqlite_where=_ACTIVE, postgresql_where=_ACTIVE),
+        Index("uq_models_reference", "robot_id", unique=True, sqlite_where=_REFERENCE, postgresql_where=_REFERENCE),
+        Index(None, "robot_id", "created"),
+    )
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    robot_id: Mapped[int] = mapped_column(ForeignKey("robots.id"))
+    site: Mapped[str] = mapped_column(ForeignKey("sites.identifier"))
+    identifier: Mapped[str] = mapped_column(index=True)
+    created: Mapped[datetime]
+    considered: Mapped[datetime]
+    source: Mapped[str]
+    state: Mapped[str]
+    gates: Mapped[list[Any]]
+    is_active: Mapped[bool]
+    is_reference: Mapped[bool]
+    document: Mapped[dict[str, Any] | None] = mapped_column(deferred=True)
+    robot: Mapped[Robot] = relationship(lazy="joined")
+
+
+class ModelChoice(Base):
+    """That a model (`model_id`) of a robot (`robot_id`) was made active or the reference: `role` says which.
+
+    `id` is of this database alone; `at` is when, `reason` why.
+    """
+
+    __tablename__ = "model_choices"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    robot_id: Mapped[int] = mapped_column(ForeignKey("robots.id"), index=True)
+    model_id: Mapped[int] = mapped_column(ForeignKey("models.id"))
+    role: Mapped[str]
+    at: Mapped[datetime]
+    reason: Mapped[str]
+
+
+class ModelEvent(Base):
+    """Something about a robot (`robot_id`, `robot`) that people should know: `kind` of it and one line of `text`.
+
+    `id` numbers the events. A drift has a `parameter`, and `details` with its figures; `raised` is when it was seen
+    first, `last_seen` when last, `closed` when somebody took note and `note` what they wrote.
+    """
+
+    __tablename__ = "model_events"
+    __table_args__ = (
+        Index(
+            "uq_model_events_open", "robot_id", "kind", "parameter", unique=True, sqlite_where=_OPEN,
+            postgresql_where=_OPEN,
+        ),
+    )  # fmt: skip
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    robot_id: Mapped[int] = mapped_column(ForeignKey("robots.id"))
+    kind: Mapped[str]
+    parameter: Mapped[str]
+    text: Mapped[str]
+    details: Mapped[dict[str, Any]]
+    raised: Mapped[datetime]
+    last_seen: Mapped[datetime]
+    closed: Mapped[datetime | None]
+    note: Mapped[str | None]
+    robot: Mapped[Robot] = relationship(lazy="joined")
+
+
+class RobotPolicy(Base):
+    """The bounds that were set for a robot (`robot_id`): `document` of a model policy."""
+
+    __tablename__ = "robot_policies"
+
+    robot_id: Mapped[int] = mapped_column(ForeignKey("robots.id"), primary_key=True)
+    document: Mapped[dict[str, Any]]
+
+
+class Schedule(Base):
+    """Work that is repeated: its `name`, its `definition`, the `order` of each repetition and the robot's `files`.
+
+    `id` is of this database alone. `site` is the data folder whose service does it; whichever comes first where it is
+    null. `next_due` is when it is due next, null while it is not enabled. `created` is when it was set up first.
+    """
+
+    __tablename__ = "schedules"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    name: Mapped[str] = mapped_column(unique=True)
+    site: Mapped[str | None]
+    definition: Mapped[dict[str, Any]]
+    order: Mapped[dict[str, Any]]
+    files: Mapped[dict[str, Any]]
+    created: Mapped[datetime]
+    next_due: Mapped[datetime | None] = mapped_column(index=True)
+
+
+class Firing(Base):
+    """One time that a schedule (`schedule_id`, `schedule`) was due: by the clock, or asked for (`is_asked`).
+
+    `id` numbers the firings. `due` is when, `claimed` when a service took it on, which `site` and which start of it
+    (`boot`). `state` is ``asked``, ``claimed``, ``started``, ``skipped``, ``missed``, ``failed``, ``interrupted`` or
+    ``withdrawn``, `reason` why nothing was started. `item_kind` and `item_identifier` are what was started.
+    """
+
+    __tablename__ = "firings"
+    __table_args__ = (UniqueConstraint("schedule_id", "due", "is_asked"), Index(None, "state"))
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    schedule_id: Mapped[int] = mapped_column(ForeignKey("schedules.id", ondelete="CASCADE"))
+    due: Mapped[datetime]
+    is_asked: Mapped[bool]
+    claimed: Mapped[datetime | None]
+    site: Mapped[str | None]
+    boot: Mapped[str | None]
+    state: Mapped[str]
+    reason: Mapped[str | None]
+    item_kind: Mapped[str | None]
+    item_identifier: Mapped[str | None]
+    schedule: Mapped[Schedule] = relationship(lazy="joined")

@@ -1,8 +1,8 @@
-"""Called by Alembic: takes the steps on the connection that `tauscope.server.store.database.migrate` gives."""
+"""Called by Alembic: takes the steps on the connection that `tauscope.server.store.database.database` gives."""
 
 from alembic import context
 
-from tauscope.server.store.database.base import Base
+from tauscope.server.store.database.tables import Base
 
 if hasattr(context, "config"):  # there is one only while Alembic runs this file
     context.configure(

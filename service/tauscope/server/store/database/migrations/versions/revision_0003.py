@@ -3,7 +3,7 @@
 import sqlalchemy as sa
 from alembic import op
 
-from tauscope.server.store.database.types import PLAIN
+from tauscope.server.store.database.tables import PLAIN
 
 revision = "0003"
 down_revision = "0002"

@@ -1,0 +1,355 @@
+"""Models over HTTP: their history, gates, trends, policies and events."""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from datetime import UTC, datetime
+from typing import Annotated, Any, Literal, TypeVar
+
+from fastapi import APIRouter, Path, Query, Request, Response
+from pydantic import Field
+from starlette.concurrency import run_in_threadpool
+
+from tauscope.errors import NotFoundError
+from tauscope.identification import IdentificationDocument
+from tauscope.server.history.drift import find_largest_by_joint
+from tauscope.server.history.gates import ModelPolicy
+from tauscope.server.history.model_history import ModelEntry
+from tauscope.server.history.model_judgement import compare_models
+from tauscope.server.history.trend import parameter_trends
+from tauscope.server.http.documents import JSON, media_type, read_document, refuse_media_type
+from tauscope.server.http.jobs.routes import Identifier, Limit, collection
+from tauscope.server.http.openapi import Examples, json_body
+from tauscope.server.http.services import Services, ServicesDep
+from tauscope.server.models import AnswerModel, StrictModel
+from tauscope.server.problems import problem_responses
+
+
+class ReasonRequest(StrictModel):
+    """Why somebody decides something; kept with the decision."""
+
+    reason: Annotated[str, Field(min_length=1, max_length=1000)] = Field(
+        description="one line", examples=["gear oil changed on 3 November"]
+    )
+
+
+class GateAnswer(AnswerModel):
+    """A condition for becoming the active model."""
+
+    name: str = Field(description="held_out, consistency, excitation, structure, newer or source")
+    passed: bool = Field(description="whether it is met")
+    reason: str = Field(description="what was found, what is allowed, and what to do where it is not met")
+
+
+class ModelLinksAnswer(AnswerModel):
+    """Where to go on from a model."""
+
+    self_: str = Field(alias="self", description="the model")
+    document: str = Field(description="what it says: the identification's document")
+
+
+class ModelAnswer(AnswerModel):
+    """A model of a robot: an identification that was judged."""
+
+    id: str = Field(description="identifier of the identification", examples=["20261103T101502Z-1f2e3d4c"])
+    site: str = Field(description="identifier of the data folder that holds the identification")
+    robot: str = Field(description="name of the robot")
+    created: datetime = Field(description="when the identification was handed in, UTC")
+    considered: datetime = Field(description="when it was judged, UTC")
+    source: Literal["arm", "simulated", "uploaded"] = Field(description="what was measured")
+    state: Literal["active", "kept", "refused", "unreadable"] = Field(
+        description="active: in use; kept: was in use; refused: did not pass a gate; unreadable: its result is damaged"
+    )
+    is_reference: bool = Field(description="whether drift is counted from this model")
+    gates: tuple[GateAnswer, ...] = Field(description="what it had to show")
+    links: ModelLinksAnswer = Field(description="where to go on")
+
+
+class ModelListAnswer(AnswerModel):
+    """Models of a robot."""
+
+    models: list[ModelAnswer] = Field(description="the newest first")
+
+
+class DriftAnswer(AnswerModel):
+    """The change of a parameter."""
+
+    name: str = Field(description="of the parameter", examples=["viscous joint3"])
+    joint: str = Field(description="that it belongs to")
+    before: float = Field(description="in the model that it is compared with [SI]")
+    after: float = Field(description="in this model [SI]")
+    std: float = Field(description="standard error of the difference [SI]")
+    in_std: float = Field(description="difference in standard errors")
+    share: float = Field(description="difference in parts of the earlier value")
+
+
+class ComparisonAnswer(AnswerModel):
+    """One model compared with another."""
+
+    before: str = Field(description="identifier of the model that it is compared with")
+    after: str = Field(description="identifier of this model")
+    parameters: list[DriftAnswer] = Field(description="every parameter that both tell")
+    joints: dict[str, DriftAnswer] = Field(description="for each joint its most significant change")
+
+
+class TrendPointAnswer(AnswerModel):
+    """A parameter in one model."""
+
+    time: datetime = Field(description="when its identification was handed in, UTC")
+    value: float = Field(description="estimate [SI]")
+    std: float = Field(description="its standard error [SI]")
+    model: str = Field(description="identifier of the model")
+
+
+class LineAnswer(AnswerModel):
+    """The straight line through the points."""
+
+    count: int = Field(description="number of points")
+    slope: float = Field(description="change a week [SI]")
+    slope_std: float = Field(description="its standard error, scatter of the points included [SI]")
+    scatter: float = Field(description="1 where the points scatter as their standard errors say")
+    change: float = Field(description="of the line from the first point to the last [SI]")
+    in_std: float = Field(description="slope in its standard errors")
+
+
+class ParameterTrendAnswer(AnswerModel):
+    """A parameter over time."""
+
+    name: str = Field(description="of the parameter")
+    joint: str = Field(description="that it belongs to")
+    points: list[TrendPointAnswer] = Field(description="in every model that was ever active, the oldest first")
+    line: LineAnswer | None = Field(description="null before there are three points")
+
+
+class TrendAnswer(AnswerModel):
+    """Every parameter of a robot over time."""
+
+    robot: str = Field(description="name of the robot")
+    parameters: list[ParameterTrendAnswer] = Field(description="in the order of the newest model")
+
+
+class EventAnswer(AnswerModel):
+    """Something about a robot that people should know."""
+
+    number: int = Field(description="of the event")
+    robot: str = Field(description="name of the robot")
+    kind: str = Field(description="drift", examples=["drift"])
+    parameter: str = Field(description="that drifted")
+    text: str = Field(
+        description="one line",
+        examples=["joint3: viscous friction +40 % in 6 weeks (0.5 → 0.7, 12 standard errors)"],
+    )
+    raised: datetime = Field(description="when it was seen first, UTC")
+    last_seen: datetime = Field(description="when it was seen last, UTC")
+    closed: datetime | None = Field(description="when somebody took note, UTC")
+    note: str | None = Field(description="what they wrote")
+
+
+class EventListAnswer(AnswerModel):
+    """What people should know."""
+
+    events: list[EventAnswer] = Field(description="the newest first")
+
+
+def make_model_answer(entry: ModelEntry, collection: str) -> ModelAnswer:
+    """The answer that holds a model."""
+    here = f"{collection}/{entry.identifier}"
+    return ModelAnswer(
+        id=entry.identifier,
+        site=entry.site,
+        robot=entry.robot,
+        created=entry.created,
+        considered=entry.considered,
+        source=entry.source,  # pyright: ignore[reportArgumentType] - checked by the model
+        state=entry.state,  # pyright: ignore[reportArgumentType]
+        is_reference=entry.is_reference,
+        gates=tuple(GateAnswer.model_validate(gate) for gate in entry.gates),
+        links=ModelLinksAnswer(self=here, document=f"{here}/document"),
+    )
+
+
+def comparison_answer(
+    before: str, earlier: IdentificationDocument, after: str, later: IdentificationDocument
+) -> ComparisonAnswer:
+    """The answer that compares two models."""
+    drifts = compare_models(earlier, later)
+    return ComparisonAnswer(
+        before=before,
+        after=after,
+        parameters=[DriftAnswer.model_validate(drift) for drift in drifts],
+        joints={joint: DriftAnswer.model_validate(drift) for joint, drift in find_largest_by_joint(drifts).items()},
+    )
+
+
+def trend_answer(robot: str, models: Sequence[tuple[ModelEntry, IdentificationDocument]]) -> TrendAnswer:
+    """The answer that shows a robot's parameters over time.
+
+    Parameters
+    ----------
+    models : sequence of (ModelEntry, IdentificationDocument)
+        every model that was ever active, the oldest first
+    """
+    parameters = []
+    for trend in parameter_trends(models):
+        points = [TrendPointAnswer(**asdict(point), model=model) for model, point in trend.points]
+        line = None if trend.line is None else LineAnswer.model_validate(trend.line)
+        parameters.append(ParameterTrendAnswer(name=trend.name, joint=trend.joint, points=points, line=line))
+    return TrendAnswer(robot=robot, parameters=parameters)
+
+
+router = APIRouter(tags=["models"], responses=problem_responses("invalid-request", "store"))
+
+RobotName = Annotated[str, Query(alias="robot", min_length=1, max_length=1000, description="name of the robot")]
+AnyRobot = Annotated[
+    str | None, Query(alias="robot", max_length=1000, description="name of the robot; any where absent")
+]
+Number = Annotated[int, Path(ge=1, le=2**31 - 1, description="number of the event")]
+
+Body = TypeVar("Body", ReasonRequest, ModelPolicy)
+
+_REASON = {"why": ("Why", {"reason": "gear oil changed on 3 November"})}
+_BODY_PROBLEMS = ("bad-request", "limit-exceeded", "media-type", "not-found")
+
+
+def _body(kind: type[StrictModel] | type[ModelPolicy], examples: Examples) -> dict[str, Any]:
+    """A JSON body, for the OpenAPI document."""
+    return {"requestBody": {"required": True, "content": json_body(kind, examples)}}
+
+
+@router.get("/models", summary="List models")
+def list_models(request: Request, services: ServicesDep, robot: AnyRobot = None, limit: Limit = 100) -> ModelListAnswer:
+    """Every identification that was judged: the active one of each robot, those that were, those that were refused."""
+    _bring_up_to_date(services)
+    entries = services.models.history.models(robot, limit)
+    return ModelListAnswer(models=[make_model_answer(entry, request.url.path) for entry in entries])
+
+
+@router.get("/models/{identifier}", summary="Look a model up", responses=problem_responses("not-found"))
+def get_model(request: Request, identifier: Identifier, services: ServicesDep) -> ModelAnswer:
+    """Its state and the gates that it had to pass; the identifier is the identification's."""
+    _bring_up_to_date(services)
+    return make_model_answer(services.models.history.find(identifier), collection(request, 1))
+
+
+@router.get(
+    "/models/{identifier}/document",
+    summary="Fetch what a model says",
+    response_class=Response,
+    responses={
+        200: {"model": IdentificationDocument, "description": "the identification's document"},
+        **problem_responses("not-found"),
+    },
+)
+def get_model_document(identifier: Identifier, services: ServicesDep) -> Response:
+    """Kept with the history, also where the identification itself was removed."""
+    content = services.models.history.document(identifier).model_dump_json(by_alias=True)
+    return Response(content, media_type="application/json")
+
+
+@router.get("/models/{identifier}/drift", summary="Compare a model", responses=problem_responses("not-found"))
+def get_model_drift(
+    identifier: Identifier,
+    services: ServicesDep,
+    since: Annotated[str | None, Query(max_length=100, description="identifier of the model before it")] = None,
+) -> ComparisonAnswer:
+    """The change of every parameter, in joint standard errors; since the reference where no other model is named."""
+    history = services.models.history
+    after, robot = history.document(identifier), history.find(identifier).robot
+    before = since or next((each.identifier for each in history.models(robot, 10_000) if each.is_reference), None)
+    if before is None:
+        raise NotFoundError("no model of this robot has passed yet, so there is no reference; name one with since")
+    return comparison_answer(before, history.document(before), identifier, after)
+
+
+@router.post(
+    "/models/{identifier}/activate",
+    summary="Make a model the active one",
+    responses=problem_responses(*_BODY_PROBLEMS),
+    openapi_extra=_body(ReasonRequest, _REASON),
+)
+async def activate_model(request: Request, identifier: Identifier, services: ServicesDep) -> ModelAnswer:
+    """Also one that was refused; the one before is kept. The reason is kept with the choice."""
+    return await _choose(request, identifier, services, "active")
+
+
+@router.post(
+    "/models/{identifier}/make-reference",
+    summary="Count drift from a model",
+    responses=problem_responses(*_BODY_PROBLEMS),
+    openapi_extra=_body(ReasonRequest, _REASON),
+)
+async def make_reference(request: Request, identifier: Identifier, services: ServicesDep) -> ModelAnswer:
+    """After maintenance, say; drifts that are open are closed."""
+    return await _choose(request, identifier, services, "reference")
+
+
+@router.get("/trend", summary="Follow the parameters of a robot", responses=problem_responses("not-found"))
+def get_trend(services: ServicesDep, robot: RobotName) -> TrendAnswer:
+    """Every parameter in every model that was ever active, and the straight line through it."""
+    _bring_up_to_date(services)
+    return trend_answer(robot, services.models.history.documents(robot))
+
+
+@router.get("/model-policy", summary="Look up the bounds of a robot", responses=problem_responses("not-found"))
+def get_policy(services: ServicesDep, robot: RobotName) -> ModelPolicy:
+    """By which its new models are judged, and beyond which a drift is told."""
+    return services.models.history.policy(robot)
+
+
+@router.put(
+    "/model-policy",
+    summary="Set the bounds of a robot",
+    responses=problem_responses(*_BODY_PROBLEMS),
+    openapi_extra=_body(ModelPolicy, {"drift": ("Tell smaller changes", {"drift_share": 0.1, "drift_std": 5.0})}),
+)
+async def set_policy(request: Request, services: ServicesDep, robot: RobotName) -> ModelPolicy:
+    """They hold for models that are judged from now on; what is left out takes its default."""
+    policy = await _read(request, ModelPolicy, services)
+    await run_in_threadpool(services.models.history.set_policy, robot, policy)
+    return policy
+
+
+@router.get("/events", summary="Read what people should know")
+def list_events(
+    services: ServicesDep,
+    robot: AnyRobot = None,
+    only_open: Annotated[bool, Query(alias="open", description="only what nobody has taken note of")] = False,
+    limit: Limit = 100,
+) -> EventListAnswer:
+    """Parameters that have drifted beyond the bounds; one event for each, brought up to date while it is open."""
+    _bring_up_to_date(services)
+    events = services.models.history.events(robot, only_open=only_open, limit=limit)
+    return EventListAnswer(events=[EventAnswer.model_validate(event) for event in events])
+
+
+@router.post(
+    "/events/{number}/acknowledge",
+    summary="Take note of an event",
+    responses=problem_responses(*_BODY_PROBLEMS),
+    openapi_extra=_body(ReasonRequest, _REASON),
+)
+async def acknowledge_event(request: Request, number: Number, services: ServicesDep) -> EventAnswer:
+    """It is closed; another one is raised when the parameter is found beyond its bounds again."""
+    body = await _read(request, ReasonRequest, services)
+    history, now = services.models.history, datetime.now(UTC)
+    return EventAnswer.model_validate(await run_in_threadpool(history.acknowledge, number, body.reason, now))
+
+
+async def _choose(request: Request, identifier: str, services: Services, role: str) -> ModelAnswer:
+    """Carry out a choice between models."""
+    body = await _read(request, ReasonRequest, services)
+    history, now = services.models.history, datetime.now(UTC)
+    entry = await run_in_threadpool(history.activate, identifier, role, body.reason, now)
+    return make_model_answer(entry, collection(request, 2))
+
+
+async def _read(request: Request, kind: type[Body], services: Services) -> Body:
+    """The JSON body of a request."""
+    if media_type(request) != JSON:
+        raise refuse_media_type(request, JSON)
+    return await read_document(request, kind, services.settings.max_document_bytes)
+
+
+def _bring_up_to_date(services: Services) -> None:
+    """What ended a moment ago counts already."""
+    services.index.sync()
+    services.models.judge_new()

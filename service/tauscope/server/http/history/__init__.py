@@ -1,1 +1,0 @@
-"""Models of each robot over time: which is active, what drifts, what people should know."""

@@ -1,1 +1,0 @@
-"""Requests that may be repeated: with the same Idempotency-Key nothing is done twice."""

@@ -1,0 +1,118 @@
+"""The index over HTTP: items and robots, searched."""
+
+from datetime import datetime
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Query
+from pydantic import AwareDatetime, Field
+
+from tauscope.server.http.jobs.routes import Limit
+from tauscope.server.http.services import ServicesDep
+from tauscope.server.models import AnswerModel
+from tauscope.server.problems import problem_responses
+from tauscope.server.store.data_folder import FOLDERS
+from tauscope.server.store.database.index import ItemEntry, ItemQuery
+
+
+class ItemAnswer(AnswerModel):
+    """Something that is kept, as a search finds it."""
+
+    kind: str = Field(description="excitation, run, identification, diagnosis or campaign", examples=["run"])
+    id: str = Field(description="identifier", examples=["20261103T101502Z-1f2e3d4c"])
+    site: str = Field(description="identifier of the data folder that holds it")
+    is_here: bool = Field(description="whether that is this service's own; only then `link` leads to it")
+    link: str | None = Field(description="path of its resource")
+    state: str = Field(description="where it stands; damaged: a file of it is missing, or is not what it was")
+    robot: str | None = Field(description="name of the robot")
+    created: datetime = Field(description="when it was handed in, UTC")
+    ended: datetime | None = Field(description="when it ended, UTC")
+    problem: str | None = Field(description="one line: why it has no result")
+    figures: dict[str, str | float | None] = Field(
+        description="of an identification relative_error and held_out_error, of a diagnosis verdict, of a run backend"
+    )
+
+
+class ItemListAnswer(AnswerModel):
+    """What a search found."""
+
+    items: list[ItemAnswer] = Field(description="the newest first")
+    before: datetime | None = Field(description="to be given as `before` for the next ones; null where there are none")
+
+
+class KnownRobotAnswer(AnswerModel):
+    """A robot that something is kept about."""
+
+    name: str = Field(description="as in its file")
+    first_seen: datetime = Field(description="when the first item about it was handed in, UTC")
+    last_seen: datetime = Field(description="when the last one was, UTC")
+
+
+class RobotListAnswer(AnswerModel):
+    """Robots that something is kept about."""
+
+    robots: list[KnownRobotAnswer] = Field(description="by name")
+
+
+router = APIRouter(tags=["items"], responses=problem_responses("invalid-request", "store"))
+
+Kind = Annotated[
+    Literal["excitation", "run", "identification", "diagnosis", "campaign"] | None, Query(description="kind of item")
+]
+State = Annotated[str | None, Query(max_length=40, description="where it stands", examples=["succeeded", "damaged"])]
+RobotName = Annotated[str | None, Query(max_length=1000, description="name of the robot")]
+Digest = Annotated[
+    str | None,
+    Query(pattern="^[0-9a-f]{64}$", description="sha256 of a recording that the item was made from or judged by"),
+]
+Before = Annotated[AwareDatetime | None, Query(description="handed in earlier than this moment")]
+
+
+@router.get("/items", summary="Search what is kept")
+def search_items(
+    services: ServicesDep,
+    *,
+    kind: Kind = None,
+    state: State = None,
+    robot: RobotName = None,
+    recording_sha256: Digest = None,
+    before: Before = None,
+    limit: Limit = 100,
+) -> ItemListAnswer:
+    """Excitations, runs, identifications, diagnoses and campaigns of every robot, damaged ones too.
+
+    Where several services share a database, those of all data folders are found.
+    """
+    services.index.sync()
+    query = ItemQuery(kind, state, robot, None, recording_sha256, before, limit)
+    found = [_answer(entry, services.index.index.site) for entry in services.index.index.search(query)]
+    return ItemListAnswer(items=found, before=_next(found, limit))
+
+
+@router.get("/robots", tags=["robots"], summary="List the robots")
+def list_robots(services: ServicesDep) -> RobotListAnswer:
+    """Every robot that something is or was kept about; its name is the one in its file."""
+    services.index.sync()
+    return RobotListAnswer(robots=[KnownRobotAnswer.model_validate(each) for each in services.index.index.robots()])
+
+
+def _next(found: list[ItemAnswer], limit: int) -> datetime | None:
+    """Where the next page begins."""
+    return found[-1].created if len(found) == limit else None
+
+
+def _answer(entry: ItemEntry, site: str) -> ItemAnswer:
+    """The answer that holds an item."""
+    is_here = entry.site == site
+    return ItemAnswer(
+        kind=entry.kind,
+        id=entry.identifier,
+        site=entry.site,
+        is_here=is_here,
+        link=f"/api/v1/{FOLDERS[entry.kind]}/{entry.identifier}" if is_here else None,
+        state=entry.state,
+        robot=entry.robot,
+        created=entry.created,
+        ended=entry.ended,
+        problem=entry.problem_detail,
+        figures=dict(entry.figures),
+    )

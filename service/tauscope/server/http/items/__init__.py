@@ -1,1 +1,0 @@
-"""The index: what is kept, searched."""

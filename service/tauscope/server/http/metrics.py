@@ -1,0 +1,183 @@
+"""Prometheus metrics: requests, jobs, runs, lateness of the control loops, and drift of models."""
+
+import threading
+import time
+from collections import Counter as Tally
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Executor, Future
+from typing import Any
+
+from prometheus_client import CollectorRegistry, Counter, Histogram, generate_latest
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
+from prometheus_client.registry import Collector
+
+from tauscope.runtime.record import RunRecord
+from tauscope.server.control.run_supervisor import Live
+from tauscope.server.history.model_registry import DriftMonitor
+
+CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
+
+_JOB_BUCKETS_S = (0.1, 0.5, 1, 5, 10, 30, 60, 120, 300, 600, 1800, 3600)
+
+
+class Metrics:
+    """All counters of one service; each application has its own registry."""
+
+    def __init__(self) -> None:
+        self.registry = CollectorRegistry()
+        self.loops = LoopTimes()
+        self.registry.register(self.loops)
+        self.requests = Counter(
+            "tauscope_requests", "Requests answered", ["method", "route", "status"], registry=self.registry
+        )
+        self.request_seconds = Histogram(
+            "tauscope_request_seconds", "Time until the answer began", ["method", "route"], registry=self.registry
+        )
+        self.job_seconds = Histogram(
+            "tauscope_job_seconds",
+            "Time in the executor, by kind of work and outcome",
+            ["kind", "outcome"],
+            buckets=_JOB_BUCKETS_S,
+            registry=self.registry,
+        )
+        self.runs = Counter(
+            "tauscope_runs_ended", "Runs by backend and end", ["backend", "end"], registry=self.registry
+        )
+
+    def run_ended(self, record: RunRecord) -> None:
+        """Count a run."""
+        self.runs.labels(record.backend, record.state.value).inc()
+        self.loops.add(record)
+
+    def watch_drift(self, drift: DriftMonitor) -> None:
+        """Have it told how models drift."""
+        self.registry.register(ModelDrift(drift))
+
+    def watch(self, name: str, text: str, value: Callable[[], float]) -> None:
+        """Have a number asked for whenever somebody looks."""
+        self.registry.register(_Watched(name, text, value))
+
+    def text(self) -> bytes:
+        """Everything, in Prometheus' text format."""
+        return generate_latest(self.registry)
+
+
+class LoopTimes(Collector):
+    """How late the cycles of the control loops were: whole runs when they have ended, and what goes on now."""
+
+    def __init__(self) -> None:
+        self.live: Callable[[], Iterable[Live]] = tuple
+        self._lock = threading.Lock()
+        self._late: dict[str, Tally[float]] = {}
+        self._missed: Tally[str] = Tally()
+        self._stale: Tally[str] = Tally()
+
+    def add(self, record: RunRecord) -> None:
+        """Count the cycles of a run that has ended."""
+        if record.timing is None:
+            return
+        with self._lock:
+            late = self._late.setdefault(record.backend, Tally())
+            for edge_us, count in record.timing.histogram_us:
+                late[float("inf") if edge_us is None else edge_us / 1e6] += count
+            self._missed[record.backend] += record.timing.missed_periods
+            self._stale[record.backend] += sum(record.timing.stale_samples)
+
+    def collect(self) -> Iterator[Metric]:
+        """Everything that is known of the loops."""
+        histogram = HistogramMetricFamily(
+            "tauscope_loop_lateness_seconds", "Lateness of control cycles behind their deadlines", labels=["backend"]
+        )
+        missed = CounterMetricFamily("tauscope_missed_periods", "Cycles left out for lateness", labels=["backend"])
+        stale = CounterMetricFamily("tauscope_stale_samples", "Readings that did not come in time", labels=["backend"])
+        with self._lock:
+            for backend, late in self._late.items():
+                histogram.add_metric([backend], _cumulative(late), None)
+                missed.add_metric([backend], self._missed[backend])
+                stale.add_metric([backend], self._stale[backend])
+        recent = GaugeMetricFamily(
+            "tauscope_loop_lateness_recent_seconds", "The same of the last second, the worst run's", labels=["quantile"]
+        )
+        lives = list(self.live())
+        figures = [live.figures.get("lateness_us") for live in lives]
+        for quantile in ("p50", "p99", "max"):
+            values = [each[quantile] * 1e-6 for each in figures if isinstance(each, dict) and quantile in each]
+            if values:
+                recent.add_metric([quantile], max(values))
+        moving = GaugeMetricFamily("tauscope_runs_active", "Runs that go on", labels=["state"])
+        for state, count in Tally(live.state.value for live in lives).items():
+            moving.add_metric([state], count)
+        yield from (histogram, missed, stale, recent, moving)
+
+
+class ModelDrift(Collector):
+    """How far each robot's active model is from the one that drift is counted from; a series a parameter."""
+
+    def __init__(self, watch: DriftMonitor) -> None:
+        self._watch = watch
+
+    def collect(self) -> Iterator[Metric]:
+        """Everything that is known of the models."""
+        labels = ["robot", "parameter"]
+        share = GaugeMetricFamily(
+            "tauscope_model_drift_ratio", "Change of a parameter since the reference, in parts of it", labels=labels
+        )
+        errors = GaugeMetricFamily(
+            "tauscope_model_drift_standard_errors", "The same change in its standard errors", labels=labels
+        )
+        events = GaugeMetricFamily(
+            "tauscope_model_drift_events", "Drifts beyond their bounds that nobody took note of", labels=["robot"]
+        )
+        for robot, found in self._watch.robots.items():
+            events.add_metric([robot], found.open_events)
+            for drift in found.drifts:
+                share.add_metric([robot, drift.name], drift.share)
+                errors.add_metric([robot, drift.name], drift.in_std)
+        yield from (share, errors, events)
+
+
+class TimedExecutor(Executor):
+    """An executor whose work is timed; what it does is another executor's."""
+
+    def __init__(self, executor: Executor, seconds: Histogram) -> None:
+        self._executor, self._seconds = executor, seconds
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> "Future[Any]":
+        """Have a function called."""
+        began = time.monotonic()
+        kind = getattr(getattr(fn, "func", fn), "__name__", "work").removeprefix("run_")
+        future = self._executor.submit(fn, *args, **kwargs)
+
+        def note(done: "Future[Any]") -> None:
+            has_failed = done.cancelled() or done.exception() is not None or done.result() is not None
+            self._seconds.labels(kind, "failed" if has_failed else "succeeded").observe(time.monotonic() - began)
+
+        future.add_done_callback(note)
+        return future
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End the work."""
+        self._executor.shutdown(wait=wait, cancel_futures=cancel_futures)
+
+
+class _Watched(Collector):
+    """A gauge whose value is asked for."""
+
+    def __init__(self, name: str, text: str, value: Callable[[], float]) -> None:
+        self._name, self._text, self._value = name, text, value
+
+    def collect(self) -> Iterator[Metric]:
+        try:
+            value = self._value()
+        except OSError:
+            value = float("nan")
+        yield GaugeMetricFamily(self._name, self._text, value=value)
+
+
+def _cumulative(counts: Tally[float]) -> list[tuple[str, float]]:
+    """Counts at or below each edge, as Prometheus wants them; the last edge is infinity."""
+    total, buckets = 0, []
+    for edge in sorted({*counts, float("inf")}):
+        total += counts[edge]
+        buckets.append(("+Inf" if edge == float("inf") else repr(edge), float(total)))
+    return buckets

@@ -1,0 +1,175 @@
+"""Repeated requests: a POST with an Idempotency-Key is done once, however often it comes, also across a crash."""
+
+import base64
+import hashlib
+import re
+from typing import cast
+
+from python_multipart.multipart import parse_options_header
+from starlette.concurrency import run_in_threadpool
+from starlette.datastructures import Headers
+from starlette.responses import Response
+from starlette.types import ASGIApp, Message, Receive, Send
+from starlette.types import Scope as AsgiScope
+
+from tauscope.server.auth.gate import find_caller
+from tauscope.server.http.repeated_answers import Answers, KeptAnswer, request_name
+from tauscope.server.http.services import Services
+from tauscope.server.problems import make_problem, problem_answer
+
+
+class Fingerprint:
+    """A hash of a body as it arrives. Clients draw a new boundary for every form: it is left out."""
+
+    def __init__(self, content_type: str) -> None:
+        media_type, options = parse_options_header(content_type)
+        self._boundary = options.get(b"boundary") or b""
+        self._hash = hashlib.sha256(media_type + b"\n")
+        self._held = b""
+
+    def add(self, piece: bytes) -> None:
+        """Take the next bytes."""
+        if not self._boundary:
+            self._hash.update(piece)
+            return
+        text = (self._held + piece).replace(self._boundary, b"")
+        # The last bytes may be the beginning of a boundary.
+        keep = min(len(text), len(self._boundary) - 1)
+        self._hash.update(text[: len(text) - keep])
+        self._held = text[len(text) - keep :]
+
+    def digest(self) -> str:
+        """The hash of everything so far, in hexadecimal."""
+        whole = self._hash.copy()
+        whole.update(self._held)
+        return whole.hexdigest()
+
+
+HEADER = "Idempotency-Key"
+
+LONGEST_KEY = 200
+"""Most characters of the header's value."""
+
+_LEASES = "/api/v1/leases"
+_REPEATABLE = re.compile(
+    r"/api/v1/(runs|campaigns|identifications|diagnoses|excitations|recordings|leases|schedules/[^/]+/run)"
+)
+_KEY = re.compile(rf"[\x21-\x7e]{{1,{LONGEST_KEY}}}")
+
+
+class IdempotentRequests:
+    """Answers a request that came before with the answer of then."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+        self._underway: set[str] = set()
+
+    async def __call__(self, scope: AsgiScope, receive: Receive, send: Send) -> None:
+        """Answer a request."""
+        key = Headers(scope=scope).get(HEADER) if scope["type"] == "http" else None
+        if key is None or scope["method"] != "POST" or not is_repeatable(scope["path"]):
+            return await self.app(scope, receive, send)
+        if not _KEY.fullmatch(key):
+            text = f"header {HEADER}: give 1 to {LONGEST_KEY} characters without blanks, for example a UUID"
+            return await problem_answer(make_problem("invalid-request", text, scope["path"]))(scope, receive, send)
+        store = _answers_of(scope)
+        name = request_name(find_caller(scope).key or "local", scope["path"], key)
+        is_underway = name in self._underway
+        try:
+            is_new = not is_underway and await run_in_threadpool(store.begin, name)
+        except OSError:
+            text = "the request could not be written down, so that it was not begun; make room on the disk"
+            return await problem_answer(make_problem("storage-full", text, scope["path"]))(scope, receive, send)
+        if not is_new:
+            return await (await _repeated(scope, receive, store, name, is_underway))(scope, receive, send)
+        self._underway.add(name)
+        try:
+            await self._answer_first(scope, receive, send, name)
+        finally:
+            self._underway.discard(name)
+
+    async def _answer_first(self, scope: AsgiScope, receive: Receive, send: Send, name: str) -> None:
+        """Answer a request that is new, and keep the answer before it is sent."""
+        store = _answers_of(scope)
+        fingerprint = Fingerprint(Headers(scope=scope).get("content-type", ""))
+        answer = _Captured()
+        await self.app(scope, _counted(receive, fingerprint), answer.take)
+        kept = None
+        # What was refused has done nothing, and may be corrected and sent again.
+        if not 400 <= answer.status < 500:
+            body = base64.b64encode(bytes(answer.body)).decode()
+            kept = KeptAnswer(
+                fingerprint=fingerprint.digest(), status=answer.status, headers=answer.header_texts(), body=body
+            )
+        await run_in_threadpool(store.finish, name, kept)
+        for message in answer.messages:
+            await send(message)
+
+
+def is_repeatable(path: str) -> bool:
+    """Whether a POST to a path creates or moves something, and is done once for an Idempotency-Key."""
+    return _REPEATABLE.fullmatch(path) is not None
+
+
+def _answers_of(scope: AsgiScope) -> Answers:
+    """Where the answers to a request are kept: a lease's secret never on the disk, it ends with the service anyway."""
+    services = cast(Services, scope["app"].state.services)
+    return services.lease_answers if scope["path"] == _LEASES else services.answers
+
+
+class _Captured:
+    """An answer that is not sent yet; those of repeatable requests are short."""
+
+    def __init__(self) -> None:
+        self.messages: list[Message] = []
+        self.status = 500
+        self.body = bytearray()
+        self._headers: list[tuple[bytes, bytes]] = []
+
+    async def take(self, message: Message) -> None:
+        """Take a part of it."""
+        self.messages.append(message)
+        if message["type"] == "http.response.start":
+            self.status, self._headers = message["status"], list(message["headers"])
+        elif message["type"] == "http.response.body":
+            self.body += message.get("body", b"")
+
+    def header_texts(self) -> tuple[tuple[str, str], ...]:
+        """Its headers as text."""
+        return tuple((name.decode("latin-1"), value.decode("latin-1")) for name, value in self._headers)
+
+
+def _counted(receive: Receive, fingerprint: Fingerprint) -> Receive:
+    """The body on its way to the application."""
+
+    async def received() -> Message:
+        message = await receive()
+        fingerprint.add(message.get("body", b"") or b"")
+        return message
+
+    return received
+
+
+async def _repeated(scope: AsgiScope, receive: Receive, store: Answers, name: str, is_underway: bool) -> Response:
+    """The answer to a request that came before."""
+    fingerprint = Fingerprint(Headers(scope=scope).get("content-type", ""))
+    more = True
+    while more:
+        message = await receive()
+        fingerprint.add(message.get("body", b"") or b"")
+        more = message["type"] == "http.request" and message.get("more_body", False)
+    kept = await run_in_threadpool(store.find, name)
+    if kept is None:
+        text = "the first request with this Idempotency-Key is still being answered; ask again"
+        if not is_underway:
+            text = "the service ended while it answered the first request with this Idempotency-Key; look into the list"
+            text += " whether it was done, and use a new key if not"
+        headers = {"Retry-After": "1"} if is_underway else {}
+        return problem_answer(make_problem("not-repeatable", text, scope["path"]), headers)
+    if kept.status < 500 and kept.fingerprint != fingerprint.digest():
+        text = "this Idempotency-Key was sent with another body before; use a new key for a new request"
+        return problem_answer(make_problem("key-reused", text, scope["path"]))
+    answer = Response(kept.content(), kept.status)
+    answer.raw_headers = [(k.encode("latin-1"), v.encode("latin-1")) for k, v in kept.headers]
+    answer.headers["Idempotency-Replayed"] = "true"
+    return answer

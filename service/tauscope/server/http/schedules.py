@@ -1,0 +1,208 @@
+"""Schedules over HTTP: set up, changed, run now, and their firings."""
+
+from datetime import UTC, datetime
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Path, Request
+from pydantic import Field
+from starlette.concurrency import run_in_threadpool
+
+from tauscope.server.http.documents import JSON, media_type, read_document, refuse_media_type
+from tauscope.server.http.history import ReasonRequest
+from tauscope.server.http.jobs.routes import Limit, collection
+from tauscope.server.http.openapi import json_body
+from tauscope.server.http.services import Services, ServicesDep
+from tauscope.server.models import AnswerModel, StrictModel
+from tauscope.server.problems import problem_responses
+from tauscope.server.schedules.definition import ScheduleDefinition
+from tauscope.server.schedules.repeater import make_schedule
+from tauscope.server.schedules.repository import FiringEntry, ScheduleEntry
+from tauscope.server.schedules.scheduler import read_definition
+from tauscope.server.store.data_folder import FOLDERS
+
+
+class ScheduleRequest(StrictModel):
+    """What is to be repeated, and when."""
+
+    like: Annotated[str, Field(max_length=100)] = Field(
+        description="identifier of a campaign, an identification or a diagnosis of this service: its robot and its"
+        " options are repeated",
+        examples=["20261103T101502Z-1f2e3d4c"],
+    )
+    anywhere: bool = Field(
+        default=False, description="whether any service of the same database may do it; else only this one"
+    )
+    definition: ScheduleDefinition = Field(description="when it is due")
+
+
+EXAMPLES: dict[str, tuple[str, Any]] = {
+    "nightly": (
+        "A campaign every weekday at two o'clock at night",
+        {
+            "like": "20261103T101502Z-1f2e3d4c",
+            "definition": {
+                "kind": "campaign",
+                "cron": "0 2 * * mon-fri",
+                "timezone": "Europe/Berlin",
+                "window": {"start": "22:00", "end": "05:00"},
+                "interlock": "cell3-free",
+            },
+        },
+    ),
+    "hourly": (
+        "An identification every hour in which there is a new recording",
+        {
+            "like": "20261103T101502Z-1f2e3d4c",
+            "definition": {"kind": "identification", "every_s": 3600, "recordings": {"pattern": "cell3-*.csv"}},
+        },
+    ),
+}
+
+
+class ScheduleAnswer(AnswerModel):
+    """A schedule."""
+
+    name: str = Field(description="of it")
+    site: str | None = Field(description="data folder whose service does it; null: whichever comes first")
+    robot: str | None = Field(description="name of the robot")
+    definition: ScheduleDefinition = Field(description="when it is due")
+    created: datetime = Field(description="when it was set up first, UTC")
+    next_due: datetime | None = Field(description="when it is due next, UTC; null while it is not enabled")
+    firings: str = Field(description="path of its firings")
+
+
+class ScheduleListAnswer(AnswerModel):
+    """All schedules."""
+
+    schedules: list[ScheduleAnswer] = Field(description="by name")
+
+
+class FiringAnswer(AnswerModel):
+    """One time that a schedule was due."""
+
+    number: int = Field(description="of the firing")
+    due: datetime = Field(description="when it was, UTC")
+    is_asked: bool = Field(description="whether somebody asked for it")
+    state: str = Field(
+        description="asked, claimed, started, skipped, missed, failed, interrupted or withdrawn; nothing is repeated"
+    )
+    reason: str | None = Field(description="why nothing was started")
+    item: str | None = Field(description="path of what was started, as on the service that started it")
+    item_state: str | None = Field(description="where that stands, as far as the index knows")
+
+
+class FiringListAnswer(AnswerModel):
+    """Firings of a schedule."""
+
+    firings: list[FiringAnswer] = Field(description="the newest first")
+
+
+router = APIRouter(prefix="/schedules", tags=["schedules"], responses=problem_responses("invalid-request", "store"))
+
+Name = Annotated[
+    str, Path(pattern="^[a-z0-9][a-z0-9-]{0,62}$", description="of the schedule", examples=["cell3-nightly"])
+]
+_BODY_PROBLEMS = ("bad-request", "limit-exceeded", "media-type", "not-found")
+
+
+@router.get("", summary="List schedules")
+def list_schedules(request: Request, services: ServicesDep) -> ScheduleListAnswer:
+    """Those of every service that shares the database."""
+    entries = services.schedules.repository.schedules()
+    return ScheduleListAnswer(schedules=[_answer(entry, request.url.path) for entry in entries])
+
+
+@router.put(
+    "/{name}",
+    summary="Set a schedule up, or change it",
+    responses=problem_responses(*_BODY_PROBLEMS),
+    openapi_extra={"requestBody": {"required": True, "content": json_body(ScheduleRequest, EXAMPLES)}},
+)
+async def put_schedule(request: Request, name: Name, services: ServicesDep) -> ScheduleAnswer:
+    """It repeats something that was done once. What is due while no service runs is made up for once, or passed over.
+
+    Nothing is started outside of its window, while what it started last goes on, while somebody else has the arm, or
+    where the interlock objects; such a firing is skipped, and never repeated by itself.
+    """
+    body = await _read(request, services)
+    return _answer(await run_in_threadpool(_put, name, body, services), collection(request, 1))
+
+
+@router.get("/{name}", summary="Look a schedule up", responses=problem_responses("not-found"))
+def get_schedule(request: Request, name: Name, services: ServicesDep) -> ScheduleAnswer:
+    """What is repeated, and when it is due next."""
+    return _answer(services.schedules.repository.find(name), collection(request, 1))
+
+
+@router.delete("/{name}", status_code=204, summary="Remove a schedule", responses=problem_responses("not-found"))
+def remove_schedule(name: Name, services: ServicesDep) -> None:
+    """Its firings are forgotten; what they started stays."""
+    services.schedules.repository.remove(name)
+
+
+@router.get("/{name}/firings", summary="List the firings of a schedule", responses=problem_responses("not-found"))
+def list_firings(name: Name, services: ServicesDep, limit: Limit = 100) -> FiringListAnswer:
+    """Every time that it was due, what was started, and why nothing was."""
+    services.index.sync()
+    return FiringListAnswer(firings=[_firing(each) for each in services.schedules.repository.firings(name, limit)])
+
+
+@router.post(
+    "/{name}/run",
+    status_code=202,
+    summary="Do what a schedule does now",
+    responses=problem_responses(*_BODY_PROBLEMS),
+    openapi_extra={
+        "requestBody": {"required": True, "content": json_body(ReasonRequest, {"why": ("Why", {"reason": "a test"})})}
+    },
+)
+async def run_schedule(request: Request, name: Name, services: ServicesDep) -> FiringAnswer:
+    """As if it were due: window, interlock and whatever goes on are looked at. The service of its site does it."""
+    if media_type(request) != JSON:
+        raise refuse_media_type(request, JSON)
+    await read_document(request, ReasonRequest, services.settings.max_document_bytes)
+    return _firing(await run_in_threadpool(services.schedules.fire_now, name))
+
+
+async def _read(request: Request, services: Services) -> ScheduleRequest:
+    """The JSON body of a request."""
+    if media_type(request) != JSON:
+        raise refuse_media_type(request, JSON)
+    return await read_document(request, ScheduleRequest, services.settings.max_document_bytes)
+
+
+def _put(name: str, body: ScheduleRequest, services: Services) -> ScheduleEntry:
+    """Set it up, and look it up again."""
+    scheduler = services.schedules
+    site = None if body.anywhere else scheduler.repository.site
+    scheduler.repository.put(
+        make_schedule(name, body.like, body.definition, scheduler.repeater, site, datetime.now(UTC))
+    )
+    return scheduler.repository.find(name)
+
+
+def _answer(entry: ScheduleEntry, path: str) -> ScheduleAnswer:
+    """The answer that holds a schedule."""
+    robot = entry.order.get("robot_name")
+    return ScheduleAnswer(
+        name=entry.name,
+        site=entry.site,
+        robot=robot if isinstance(robot, str) else None,
+        definition=read_definition(entry),
+        created=entry.created,
+        next_due=entry.next_due,
+        firings=f"{path}/{entry.name}/firings",
+    )
+
+
+def _firing(entry: FiringEntry) -> FiringAnswer:
+    """The answer that holds a firing."""
+    return FiringAnswer(
+        number=entry.number,
+        due=entry.due,
+        is_asked=entry.is_asked,
+        state=entry.state,
+        reason=entry.reason,
+        item=None if entry.item is None else f"/api/v1/{FOLDERS[entry.item[0]]}/{entry.item[1]}",
+        item_state=entry.item_state,
+    )

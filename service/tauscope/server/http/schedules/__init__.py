@@ -1,1 +1,0 @@
-"""What is repeated at set times."""

@@ -1,0 +1,118 @@
+"""Files that arrive: names that may become paths, and bytes that are written and hashed piece by piece."""
+
+import hashlib
+import os
+import re
+import secrets
+import tempfile
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from tauscope.errors import LimitExceededError
+
+FILE_NAME_PATTERN = r"^[A-Za-z0-9_][A-Za-z0-9_.+=@ -]{0,127}$"
+"""What a file name looks like, for JSON schemas; `is_file_name` is the rule itself."""
+
+FILE_NAME_RULE = "use at most 128 letters a-z, digits and _ . + = @ - or blanks, beginning with a letter, digit or _"
+
+_FILE_NAME = re.compile(FILE_NAME_PATTERN.removeprefix("^").removesuffix("$"))
+_IDENTIFIER = re.compile(r"[0-9]{8}T[0-9]{6}Z-[0-9a-f]{8}")
+
+
+def is_file_name(text: str) -> bool:
+    """Whether a text may name a file that is kept: never hidden, never a path, never ending in a blank or a dot."""
+    return _FILE_NAME.fullmatch(text) is not None and not text.endswith((" ", "."))
+
+
+def new_identifier(now: datetime) -> str:
+    """A new identifier; sorted as text, identifiers are sorted by the second of their creation."""
+    return f"{now.astimezone(UTC):%Y%m%dT%H%M%SZ}-{secrets.token_hex(4)}"
+
+
+def is_identifier(text: str) -> bool:
+    """Whether a text has the form of an identifier."""
+    return _IDENTIFIER.fullmatch(text) is not None
+
+
+def identifier_time(identifier: str) -> datetime:
+    """The second in which an identifier was made.
+
+    Raises
+    ------
+    ValueError
+        if it is none
+    """
+    return datetime.strptime(identifier[:16], "%Y%m%dT%H%M%SZ").replace(tzinfo=UTC)
+
+
+_PIECE = 2**20
+
+
+@dataclass(frozen=True)
+class KeptFile:
+    """A file that arrived as a whole.
+
+    sha256 : str
+        of its bytes, in hexadecimal
+    """
+
+    path: Path
+    name: str
+    size: int
+    sha256: str
+
+
+class IncomingFile:
+    """A file that is being written under a hidden name, until `finish` or `discard`."""
+
+    def __init__(self, folder: Path, name: str, limit: int) -> None:
+        """Begin an empty file.
+
+        Parameters
+        ----------
+        limit : int
+            largest size that is accepted [bytes]
+        """
+        descriptor, path = tempfile.mkstemp(dir=folder, prefix=".incoming-")
+        self._file = os.fdopen(descriptor, "wb")
+        self._hash = hashlib.sha256()
+        self.path = Path(path)
+        self.name = name
+        self.limit = limit
+        self.size = 0
+
+    def write(self, piece: bytes) -> None:
+        """Append some bytes.
+
+        Raises
+        ------
+        LimitExceededError
+            if the file grows beyond its limit; nothing more is written then
+        """
+        self.size += len(piece)
+        if self.size > self.limit:
+            raise LimitExceededError(f"{self.name}: is larger than the {self.limit} bytes accepted here; send less")
+        self._hash.update(piece)
+        self._file.write(piece)
+
+    def finish(self) -> KeptFile:
+        """Bring the bytes to the disk and close the file; it keeps its hidden name."""
+        self._file.flush()
+        os.fsync(self._file.fileno())
+        self._file.close()
+        return KeptFile(self.path, self.name, self.size, self._hash.hexdigest())
+
+    def discard(self) -> None:
+        """Close and remove the file; may be called twice."""
+        self._file.close()
+        self.path.unlink(missing_ok=True)
+
+
+def hash_file(path: Path) -> str:
+    """The sha256 of a file's bytes, in hexadecimal."""
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        while piece := file.read(_PIECE):
+            digest.update(piece)
+    return digest.hexdigest()
