@@ -1,6 +1,7 @@
 """``tauscope diagnose`` from the files to its document; the parser is the program's own."""
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -49,13 +50,36 @@ def run(*words: str) -> tuple[int, str]:
     return result.exit_code, result.output
 
 
-def test_the_document_is_written(files: list[str], tmp_path: Path) -> None:
-    out = tmp_path / "out.json"
-    status, _ = run(*files[:2], "--held-out", files[2], "--json", str(out))
-    assert status == 0
-    found = DiagnosisDocument.model_validate_json(out.read_text())
+@dataclass(frozen=True)
+class Written:
+    """One run of the command with every output."""
+
+    status: int
+    shown: str
+    out: dict[str, Path]
+
+
+@pytest.fixture(scope="module")
+def written_once(files: list[str], tmp_path_factory: pytest.TempPathFactory) -> Written:
+    folder = tmp_path_factory.mktemp("outputs")
+    names = ["out.json", "model.json", "code.py", "code.h", "scenario.yaml", "robot.yaml", "next.json", "page.html"]
+    out = {name: folder / name for name in names}
+    status, shown = run(
+        *files[:2],
+        *("--held-out", files[2], "--json", str(out["out.json"])),
+        *("--model", str(out["model.json"]), "--export", str(out["code.py"]), "--export", str(out["code.h"])),
+        *("--scenario", str(out["scenario.yaml"]), "--improved-robot", str(out["robot.yaml"])),
+        *("--next-trajectory", str(out["next.json"]), "--report", str(out["page.html"])),
+    )
+    return Written(status, shown, out)
+
+
+def test_the_document_is_written(written_once: Written) -> None:
+    assert written_once.status == 0, written_once.shown
+    text = written_once.out["out.json"].read_text()
+    found = DiagnosisDocument.model_validate_json(text)
     assert [(finding.effect, finding.joint) for finding in found.findings] == [("joint_spring", "joint1")]
-    assert json.loads(out.read_text())["schema"] == "tauscope.diagnosis/1"
+    assert json.loads(text)["schema"] == "tauscope.diagnosis/1"
 
 
 def test_a_terminal_shows_verdict_and_statement(files: list[str]) -> None:
@@ -65,16 +89,8 @@ def test_a_terminal_shows_verdict_and_statement(files: list[str]) -> None:
     assert "joint1: an elastic torque grows linearly with the angle" in shown
 
 
-def test_everything_that_can_be_written_is_written_and_read_again(files: list[str], tmp_path: Path) -> None:
-    names = ["model.json", "code.py", "code.h", "scenario.yaml", "robot.yaml", "next.json", "page.html"]
-    out = {name: tmp_path / name for name in names}
-    status, shown = run(
-        *files[:2],
-        *("--model", str(out["model.json"]), "--export", str(out["code.py"]), "--export", str(out["code.h"])),
-        *("--scenario", str(out["scenario.yaml"]), "--improved-robot", str(out["robot.yaml"])),
-        *("--next-trajectory", str(out["next.json"]), "--report", str(out["page.html"])),
-    )
-    assert status == 0, shown
+def test_everything_that_can_be_written_is_written_and_read_again(written_once: Written, files: list[str]) -> None:
+    out = written_once.out
     arm = read_robot(example_robot("paper_arm"))
     saved = read_model(out["model.json"], arm)
     assert [term.effect.id for term in saved.terms] == ["joint_spring"]
