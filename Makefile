@@ -15,7 +15,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo page prove test test-slow bench lint format lock clean
+.PHONY: help venv demo page prove test test-slow test-all bench lint format lock clean
 
 help: ## say what there is
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 20
@@ -39,16 +39,21 @@ page: $(INSTALLED) ## the page at http://127.0.0.1:8000 with what `make demo` ha
 	@test -d demo-output/service || { echo "nothing to show yet: run make demo first" >&2; exit 1; }
 	$(BIN)/tauscope serve --data demo-output/service
 
-# A file is one process's: its tests share what they have built.
-IN_TWO_PROCESSES := -n 2 --dist loadfile --no-loadscope-reorder
+# A file is one process's: its tests share what they have built. Quick tests often wait: a third process fills two cores.
+BY_FILE := --dist loadfile --no-loadscope-reorder
+SELECTED = $(if $(CHANGED),--changed-only)
+NONE_NEEDED = test $$? -eq 5 -a -n "$(CHANGED)"
 
 test: $(INSTALLED) ## the quick tests
-	$(BIN)/pytest $(IN_TWO_PROCESSES) $(PYTEST_FLAGS)
+	$(BIN)/pytest $(BY_FILE) -n 3 $(PYTEST_FLAGS)
 
 # The limit ends what hangs, and no test that a busy machine makes slow: one diagnosis of half a minute has taken five.
-test-slow: $(INSTALLED) ## the tests that take long or need something of the host
-	$(BIN)/pytest -m realtime --reruns 4 --only-rerun MachineStoodStill $(PYTEST_FLAGS)
-	$(BIN)/pytest $(IN_TWO_PROCESSES) --timeout 1800 -m "(slow or system) and not realtime" $(PYTEST_FLAGS)
+# Exit status 5: no test was selected, which is right where the change needs none.
+test-slow: $(INSTALLED) ## the tests that take long or need something of the host; CHANGED=1: those that the change needs
+	$(BIN)/pytest -m realtime --reruns 4 --only-rerun MachineStoodStill $(SELECTED) $(PYTEST_FLAGS) || $(NONE_NEEDED)
+	$(BIN)/pytest $(BY_FILE) -n 2 --timeout 1800 -m "(slow or system) and not realtime" $(SELECTED) $(PYTEST_FLAGS) || $(NONE_NEEDED)
+
+test-all: test test-slow ## every test
 
 bench: $(INSTALLED) ## time and memory; leave the machine alone meanwhile
 	@set -e; for script in tests/benchmarks/benchmark_*.py; do echo "== $$script"; $(BIN)/python $$script; done

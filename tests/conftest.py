@@ -9,7 +9,7 @@ from hypothesis import settings
 
 from shared_data import ABSENT, SHARED_DATA
 
-pytest_plugins = ["standstill", "closing_time"]
+pytest_plugins = ["standstill", "selection"]
 
 # Deadlines measure the machine, not the code; on CI the same examples are drawn on every run.
 settings.register_profile("ci", derandomize=True, deadline=None, print_blob=True)

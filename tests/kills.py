@@ -1,8 +1,6 @@
-"""How often a process is killed in each series, and which of the kills count; fewer where a machine has little time."""
+"""How often a process is killed in each series, and which of the kills count."""
 
-import math
 import os
-import time
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -13,9 +11,6 @@ from standstill import STANDSTILL_S, Onlooker
 T = TypeVar("T")
 
 KILLS = int(os.environ.get("TAUSCOPE_KILLS", "100"))
-SERIES_S = float(os.environ.get("TAUSCOPE_SERIES_S", math.inf))
-FEWEST = 5
-"""Kills that a series has in any case; it ends after `SERIES_S` where it has these."""
 
 
 def killed_often(kill: Callable[[], T | None], times: int = KILLS) -> list[T]:
@@ -25,7 +20,6 @@ def killed_often(kill: Callable[[], T | None], times: int = KILLS) -> list[T]:
     stand still with it: both are repeated, where they are not many.
     """
     said: list[T] = []
-    begin = time.monotonic()
     for _ in range(2 * times + 3):
         with Onlooker() as onlooker:
             try:
@@ -36,6 +30,6 @@ def killed_often(kill: Callable[[], T | None], times: int = KILLS) -> list[T]:
                 one = None
         if one is not None:
             said.append(one)
-        if len(said) == times or (len(said) >= FEWEST and time.monotonic() - begin > SERIES_S):
+        if len(said) == times:
             return said
     pytest.fail(f"only {len(said)} of {times} kills count: the machine is too busy")

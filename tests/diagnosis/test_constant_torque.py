@@ -30,7 +30,7 @@ def constant(arm: SimulatedArm, _: Array) -> Array:
     ("effect", "name"), [(one_way, "asymmetric_coulomb"), (constant, "torque_offset")], ids=["one way", "constant"]
 )
 def test_the_likelier_of_the_two_is_the_finding(effect: EffectTorque, name: str) -> None:
-    found = diagnose(stating_friction(), recordings((1, 2, 3), effect, np.random.default_rng(3)))
+    found = diagnose(stating_friction(), recordings((1, 2), effect, np.random.default_rng(3)))
     (finding,) = document(found).findings
     told = {finding.effect, *(each.partition("@")[0] for each in finding.equivalent)}
     assert name in told
@@ -50,5 +50,5 @@ def test_the_constant_of_a_spring_is_the_springs_own() -> None:
     def spring(arm: SimulatedArm, _: Array) -> Array:
         return at_joint(0, 0.6 * (arm.exact.exact.position[:, 0] - 0.8))
 
-    found = document(diagnose(stating_friction(), recordings((1, 2, 3), spring, np.random.default_rng(3))))
+    found = document(diagnose(stating_friction(), recordings((1, 2), spring, np.random.default_rng(3))))
     assert [(each.effect, each.joint) for each in found.findings] == [("joint_spring", "joint1")]

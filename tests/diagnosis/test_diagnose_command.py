@@ -1,6 +1,7 @@
 """``tauscope diagnose`` from the files to its document; the parser is the program's own."""
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -49,32 +50,47 @@ def run(*words: str) -> tuple[int, str]:
     return result.exit_code, result.output
 
 
-def test_the_document_is_written(files: list[str], tmp_path: Path) -> None:
-    out = tmp_path / "out.json"
-    status, _ = run(*files[:2], "--held-out", files[2], "--json", str(out))
-    assert status == 0
-    found = DiagnosisDocument.model_validate_json(out.read_text())
+@dataclass(frozen=True)
+class Written:
+    """One run of the command with every output."""
+
+    status: int
+    shown: str
+    out: dict[str, Path]
+
+
+@pytest.fixture(scope="module")
+def written_once(files: list[str], tmp_path_factory: pytest.TempPathFactory) -> Written:
+    folder = tmp_path_factory.mktemp("outputs")
+    names = ["out.json", "model.json", "code.py", "code.h", "scenario.yaml", "robot.yaml", "next.json", "page.html"]
+    out = {name: folder / name for name in names}
+    status, shown = run(
+        *files[:2],
+        *("--held-out", files[2], "--json", str(out["out.json"])),
+        *("--model", str(out["model.json"]), "--export", str(out["code.py"]), "--export", str(out["code.h"])),
+        *("--scenario", str(out["scenario.yaml"]), "--improved-robot", str(out["robot.yaml"])),
+        *("--next-trajectory", str(out["next.json"]), "--report", str(out["page.html"])),
+    )
+    return Written(status, shown, out)
+
+
+def test_the_document_is_written(written_once: Written) -> None:
+    assert written_once.status == 0, written_once.shown
+    text = written_once.out["out.json"].read_text()
+    found = DiagnosisDocument.model_validate_json(text)
     assert [(finding.effect, finding.joint) for finding in found.findings] == [("joint_spring", "joint1")]
-    assert json.loads(out.read_text())["schema"] == "tauscope.diagnosis/1"
+    assert json.loads(text)["schema"] == "tauscope.diagnosis/1"
 
 
 def test_a_terminal_shows_verdict_and_statement(files: list[str]) -> None:
-    status, shown = run(*files)
+    status, shown = run(*files[:2])
     assert status == 0
     assert "explained" in shown
     assert "joint1: an elastic torque grows linearly with the angle" in shown
 
 
-def test_everything_that_can_be_written_is_written_and_read_again(files: list[str], tmp_path: Path) -> None:
-    names = ["model.json", "code.py", "code.h", "scenario.yaml", "robot.yaml", "next.json", "page.html"]
-    out = {name: tmp_path / name for name in names}
-    status, shown = run(
-        *files[:2],
-        *("--model", str(out["model.json"]), "--export", str(out["code.py"]), "--export", str(out["code.h"])),
-        *("--scenario", str(out["scenario.yaml"]), "--improved-robot", str(out["robot.yaml"])),
-        *("--next-trajectory", str(out["next.json"]), "--report", str(out["page.html"])),
-    )
-    assert status == 0, shown
+def test_everything_that_can_be_written_is_written_and_read_again(written_once: Written, files: list[str]) -> None:
+    out = written_once.out
     arm = read_robot(example_robot("paper_arm"))
     saved = read_model(out["model.json"], arm)
     assert [term.effect.id for term in saved.terms] == ["joint_spring"]
@@ -100,7 +116,7 @@ def test_limits_that_allow_no_next_experiment_cost_nobody_the_diagnosis(
 
     monkeypatch.setattr("tauscope.cli.diagnose_run.planned_experiment", refused)
     out, motion = tmp_path / "out.json", tmp_path / "next.json"
-    status, shown = run(*files, "--json", str(out), "--next-trajectory", str(motion))
+    status, shown = run(*files[:2], "--json", str(out), "--next-trajectory", str(motion))
     assert status == 1
     assert DiagnosisDocument.model_validate_json(out.read_text()).findings
     assert not motion.exists()
@@ -122,7 +138,7 @@ def test_against_the_model_wrong_values_and_missing_structure_are_told_apart(fil
         text.replace("{stiction: 1.0, stribeck: -0.2, viscous: 0.277}", "{stiction: 1.0, stribeck: -0.2, viscous: 0.1}")
     )
     out = tmp_path / "out.json"
-    result = CliRunner().invoke(app, [str(robot), *files, "--against", "model", "--json", str(out)])
+    result = CliRunner().invoke(app, [str(robot), *files[:2], "--against", "model", "--json", str(out)])
     assert result.exit_code == 0
     found = DiagnosisDocument.model_validate_json(out.read_text())
     assert found.against == "model"
@@ -133,7 +149,7 @@ def test_against_the_model_wrong_values_and_missing_structure_are_told_apart(fil
 
 
 def test_against_something_that_is_no_file_is_wrong_usage(files: list[str]) -> None:
-    status, shown = run(*files, "--against", "nothing-of-this-name.csv")
+    status, shown = run(*files[:2], "--against", "nothing-of-this-name.csv")
     assert status == 2
     assert "nothing-of-this-name.csv" in shown
 

@@ -42,7 +42,7 @@ def pulled(arm: SimulatedArm, rigid: Array) -> Array:
 
 @cache
 def found(effect: EffectTorque = pulled) -> Diagnosis:
-    return diagnose(paper_robot(), recordings((1, 2, 3), effect, np.random.default_rng(4)))
+    return diagnose(paper_robot(), recordings((1, 2), effect, np.random.default_rng(4)))
 
 
 @cache
@@ -207,7 +207,7 @@ def test_the_simulated_motion_comes_closer_to_the_recorded_one(tmp_path: Path) -
     """Four seconds of the recorded torque: the scenario leaves less than half of the error in position."""
     from diagnosis.diagnosed_arm import motions
 
-    arm, rigid = motions((1, 2, 3))[0]
+    arm, rigid = motions((1, 2))[0]
     torque = arm.exact.torque_exact + pulled(arm, rigid)
     robot, scenario = tmp_path / "improved.yaml", tmp_path / "scenario.yaml"
     robot.write_text(improved_robot(found(), example_robot("paper_arm"), robot))

@@ -26,7 +26,7 @@ def scaled_teeth(arm: SimulatedArm, rigid: Array) -> Array:
 @pytest.fixture(scope="module")
 def diagnosis() -> Diagnosis:
     rng = np.random.default_rng(8)
-    return diagnose(paper_robot(), recordings((1, 2, 3), scaled_teeth, rng))
+    return diagnose(paper_robot(), recordings((1, 2), scaled_teeth, rng))
 
 
 def term(diagnosis: Diagnosis, effect: str, joint: int, *coefficients: float) -> Term:

@@ -1,6 +1,7 @@
 """Columns of the effects against references written out again, sample by sample where there is a state."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
@@ -144,16 +145,13 @@ def test_a_late_torque_is_the_shifted_torque_to_first_order() -> None:
     assert np.abs(error).max() < 0.1 * np.abs(found[:, smooth]).max()
 
 
-@pytest.mark.parametrize("joint", [None, 2])
-@pytest.mark.parametrize(("constant", "order"), [(0.004, 1), (0.05, 1), (0.01, 2)])
-def test_a_filtered_torque_follows_the_filter_s_equation(joint: int | None, constant: float, order: int) -> None:
-    lags = [each for each in possible_effects(context()) if isinstance(each, Lag) and each.joint == joint]
-    lag = next(each for each in lags if each.order == order)
-    chosen = slice(None) if joint is None else slice(joint, joint + 1)
-    torque = SIGNALS.torque[chosen]
+@cache
+def filtered_torque(constant: float, order: int) -> Array:
+    """Torque of every joint behind first-order filters, stepped until it repeats, (n, N)."""
+    torque = SIGNALS.torque
     fine = np.linspace(0.0, 1.0, STEPS, endpoint=False) + 0.5 / STEPS
     filtered, states = np.empty_like(torque), [torque[:, 0]] * order
-    for _ in range(4):  # period after period, until it repeats
+    for _ in range(4):  # period after period
         for k in range(torque.shape[1]):
             for part in fine:
                 passed = torque[:, k - 1] + part * (torque[:, k] - torque[:, k - 1])
@@ -161,6 +159,16 @@ def test_a_filtered_torque_follows_the_filter_s_equation(joint: int | None, cons
                     states[stage] = passed + (state - passed) * np.exp(-1.0 / (RATE * STEPS * constant))
                     passed = 0.5 * (state + states[stage])
             filtered[:, k] = states[-1]
+    return filtered
+
+
+@pytest.mark.parametrize("joint", [None, 2])
+@pytest.mark.parametrize(("constant", "order"), [(0.004, 1), (0.05, 1), (0.01, 2)])
+def test_a_filtered_torque_follows_the_filter_s_equation(joint: int | None, constant: float, order: int) -> None:
+    lags = [each for each in possible_effects(context()) if isinstance(each, Lag) and each.joint == joint]
+    lag = next(each for each in lags if each.order == order)
+    chosen = slice(None) if joint is None else slice(joint, joint + 1)
+    torque, filtered = SIGNALS.torque[chosen], filtered_torque(constant, order)[chosen]
     found = lag.columns(replace(SIGNALS, periodic=True), np.array([[constant]]))[0, 0]
     np.testing.assert_allclose(found, filtered - torque, atol=1e-3 * np.abs(filtered - torque).max())
     slow = np.abs(np.gradient(torque, axis=1)).max() * RATE  # settled at first where it does not repeat

@@ -19,7 +19,7 @@ from tauscope.runtime import RunOptions, RunState, make_backend, run_trajectory
 from tauscope.trajectory import FourierSegment, Trajectory
 from tauscope_sim.model import build_model
 
-PERIODS = 3
+PERIODS = 2
 
 ROOMY = JointLimits((-4.0, 4.0), 5.0, 40.0, 2000.0)
 """More than any of the motions needs."""

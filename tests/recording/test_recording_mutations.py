@@ -141,7 +141,7 @@ def is_plain(data: bytes) -> bool:
     return sorted(header.strip("\r").split(",")) == sorted(COLUMNS) and b"\0" not in data
 
 
-@settings(max_examples=300)
+@settings(max_examples=100)
 @given(mutated_csv())
 def test_mutated_csv(data):
     csv_is_read_right_or_refused(data)
@@ -188,7 +188,7 @@ def recovery_keeps_a_prefix(data: bytes) -> None:
             assert [file.name for file in Path(folder).iterdir()] == ["file.mcap"]
 
 
-@settings(max_examples=150)
+@settings(max_examples=100)
 @given(mutated_bytes(MCAP))
 def test_mutated_mcap(data):
     mcap_is_read_right_or_refused(data)
@@ -232,7 +232,7 @@ def sound_parquet() -> bytes:
         return path.read_bytes()
 
 
-@settings(max_examples=150)
+@settings(max_examples=100)
 @given(st.data())
 def test_mutated_parquet(data):
     read_in_a_folder("file.parquet", data.draw(mutated_bytes(sound_parquet())))
@@ -245,7 +245,7 @@ def test_many_mutated_parquet(data):
     read_in_a_folder("file.parquet", data.draw(mutated_bytes(sound_parquet())))
 
 
-@settings(max_examples=200)
+@settings(max_examples=100)
 @given(st.binary(max_size=300), st.sampled_from(["file.csv", "file.mcap", "file.parquet", "file.db3", "file"]))
 def test_any_bytes_at_all(data, name):
     assert read_in_a_folder(name, data).rows is None
@@ -254,7 +254,7 @@ def test_any_bytes_at_all(data, name):
 DATABASE = file_of(lambda path: write_database(path, messages(14)))
 
 
-@settings(max_examples=150)
+@settings(max_examples=100)
 @given(mutated_bytes(DATABASE))
 def test_mutated_database(data):
     read_in_a_folder("file.db3", data)

@@ -1,5 +1,6 @@
 """The service in this process: work is done at once, or when a test says so."""
 
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,10 +11,11 @@ from starlette.testclient import TestClient
 from databases import address, database, postgres
 from server.queue.executors import InlineExecutor, ManualExecutor
 from server.queue.paper_files import PAPER_ROBOT, write_recording
+from tauscope.report import diagnosis_report, identification_report
 from tauscope.server.http import Settings, create_app
 from tauscope.server.store.items import ItemStore
 
-__all__ = ["address", "database", "postgres"]
+__all__ = ["address", "database", "diagnosis_report", "identification_report", "postgres"]
 
 HOST = "http://127.0.0.1:8000"
 IDENTIFICATIONS = "/api/v1/identifications"
@@ -22,6 +24,21 @@ RECORDINGS = "/api/v1/recordings"
 
 def connected(app: FastAPI) -> TestClient:
     return TestClient(app, base_url=HOST, raise_server_exceptions=False)
+
+
+@pytest.fixture(autouse=True)
+def undrawn_figures(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reports have empty figures, unless a test asks for `drawn_figures`: Matplotlib takes a second per report."""
+    if "drawn_figures" in request.fixturenames:
+        return
+    for name, module in list(sys.modules.items()):
+        if name.startswith("tauscope.report.") and hasattr(module, "draw_svg"):
+            monkeypatch.setattr(module, "draw_svg", lambda *_: "<svg></svg>")
+
+
+@pytest.fixture
+def drawn_figures() -> None:
+    """Figures are drawn as a user's are."""
 
 
 @pytest.fixture
@@ -33,6 +50,19 @@ def settings(tmp_path: Path) -> Settings:
 def client(settings: Settings) -> Iterator[TestClient]:
     """Work is done within the request that hands it in."""
     with connected(create_app(settings, InlineExecutor())) as client:
+        yield client
+
+
+@pytest.fixture(scope="module")
+def module_settings(tmp_path_factory: pytest.TempPathFactory) -> Settings:
+    folder = tmp_path_factory.mktemp("service") / "data"
+    return Settings(data_folder=folder, max_upload_bytes=4 * 2**20, max_recordings=3, max_waiting=1)
+
+
+@pytest.fixture(scope="module")
+def module_client(module_settings: Settings) -> Iterator[TestClient]:
+    """One service for all tests of a module: for requests that change nothing or are refused."""
+    with connected(create_app(module_settings, InlineExecutor())) as client:
         yield client
 
 

@@ -140,12 +140,12 @@ def test_files_that_are_damaged(waiting_client: TestClient, executor: ManualExec
         ({"floor": 0.0}, "body.options.floor"),
     ],
 )
-def test_wishes_that_mean_nothing(options: dict[str, Any], field: str, client: TestClient) -> None:
-    answer = client.post(EXCITATIONS, json={"robot": ROBOT, "options": options})
+def test_wishes_that_mean_nothing(options: dict[str, Any], field: str, module_client: TestClient) -> None:
+    answer = module_client.post(EXCITATIONS, json={"robot": ROBOT, "options": options})
     problem = assert_problem(answer, "invalid-request", 422)
     assert any(error["field"].startswith(field) for error in problem["errors"])
 
 
-def test_what_is_not_there(client: TestClient) -> None:
+def test_what_is_not_there(module_client: TestClient) -> None:
     for below in ("", "/result", "/trajectory", "/events"):
-        assert_problem(client.get(f"{EXCITATIONS}/nothing{below}"), "not-found", 404)
+        assert_problem(module_client.get(f"{EXCITATIONS}/nothing{below}"), "not-found", 404)

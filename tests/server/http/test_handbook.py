@@ -32,6 +32,11 @@ def sources() -> list[Path]:
     return [file for name in ("errors", "how-to") for file in (REPOSITORY / "docs" / name).glob("*.md")]
 
 
+@pytest.fixture
+def client(module_client: TestClient) -> TestClient:
+    return module_client
+
+
 @pytest.mark.parametrize("code", sorted(KINDS))
 def test_the_type_of_a_problem_is_the_address_of_its_page(code: str, client: TestClient) -> None:
     answer = client.get(f"{TYPE_PREFIX}{code}")

@@ -22,6 +22,16 @@ def urdf_robot(file: str) -> dict[str, Any]:
     return {"name": "r", "kinematics": {"urdf": {"file": file, "base": "a", "tip": "b"}}}
 
 
+@pytest.fixture
+def settings(module_settings: Settings) -> Settings:
+    return module_settings
+
+
+@pytest.fixture
+def client(module_client: TestClient) -> TestClient:
+    return module_client
+
+
 @pytest.fixture(autouse=True)
 def nothing_is_kept(settings: Settings, client: TestClient) -> Any:
     yield

@@ -37,6 +37,7 @@ def form(request: dict[str, Any]) -> dict[str, str]:
     return {"request": json.dumps(request)}
 
 
+@pytest.mark.usefixtures("drawn_figures")
 def test_uploaded_files_all_the_way(client: TestClient, files: Files, paper_recordings: tuple[bytes, bytes]) -> None:
     files.append(("held_out", ("test.csv", paper_recordings[1])))
     accepted = client.post(IDENTIFICATIONS, files=files, data=form(QUICK))

@@ -99,14 +99,14 @@ def test_an_order_that_names_an_unknown_robot_holds_up_no_service(
 
 
 @pytest.mark.parametrize("path", [f"{MODELS}/x", f"{MODELS}/x/document", f"{MODELS}/x/drift", "/api/v1/trend?robot=x"])
-def test_what_is_not_there(path: str, client: TestClient) -> None:
-    assert_problem(client.get(path), "not-found", 404)
+def test_what_is_not_there(path: str, module_client: TestClient) -> None:
+    assert_problem(module_client.get(path), "not-found", 404)
 
 
 @pytest.mark.parametrize("path", [f"{MODELS}/x/activate", f"{MODELS}/x/make-reference", "/api/v1/events/1/acknowledge"])
-def test_decisions_need_a_reason_and_something_to_decide(path: str, client: TestClient) -> None:
-    assert_problem(client.post(path, json={"reason": "so"}), "not-found", 404)
-    assert_problem(client.post(path, json={}), "invalid-request", 422)
-    assert_problem(client.post(path, json={"reason": ""}), "invalid-request", 422)
-    assert_problem(client.post(path, content=b"reason"), "media-type", 415)
-    assert_problem(client.put("/api/v1/model-policy?robot=x", json={"drift_std": -1.0}), "invalid-request", 422)
+def test_decisions_need_a_reason_and_something_to_decide(path: str, module_client: TestClient) -> None:
+    assert_problem(module_client.post(path, json={"reason": "so"}), "not-found", 404)
+    assert_problem(module_client.post(path, json={}), "invalid-request", 422)
+    assert_problem(module_client.post(path, json={"reason": ""}), "invalid-request", 422)
+    assert_problem(module_client.post(path, content=b"reason"), "media-type", 415)
+    assert_problem(module_client.put("/api/v1/model-policy?robot=x", json={"drift_std": -1.0}), "invalid-request", 422)

@@ -12,6 +12,11 @@ def directives(policy: str) -> dict[str, list[str]]:
     return {words[0]: words[1:] for words in (part.split() for part in policy.split(";")) if words}
 
 
+@pytest.fixture
+def client(module_client: TestClient) -> TestClient:
+    return module_client
+
+
 def test_the_page_comes_with_a_policy_that_runs_nothing_but_its_own_files(client: TestClient) -> None:
     answer = client.get("/")
     assert answer.status_code == 200

@@ -20,6 +20,16 @@ from tauscope.server.http.services import require_data_folder
 from tauscope.server.store.items import ItemStore
 
 
+@pytest.fixture
+def settings(module_settings: Settings) -> Settings:
+    return module_settings
+
+
+@pytest.fixture
+def client(module_client: TestClient) -> TestClient:
+    return module_client
+
+
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.1:8000", "localhost", "LOCALHOST:1", "[::1]", "[::1]:8000"])
 def test_own_hosts(host: str, client: TestClient) -> None:
     assert client.get("/healthz", headers={"host": host}).status_code == 200

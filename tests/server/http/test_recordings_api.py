@@ -172,8 +172,10 @@ def test_an_upload_that_breaks_off_leaves_nothing(client: TestClient, settings: 
         ("application/json", b"{}", "media-type", 415),
     ],
 )
-def test_bodies_that_are_no_form(content_type: str, body: bytes, code: str, status: int, client: TestClient) -> None:
-    assert_problem(client.post(RECORDINGS, content=body, headers={"content-type": content_type}), code, status)
+def test_bodies_that_are_no_form(
+    content_type: str, body: bytes, code: str, status: int, module_client: TestClient
+) -> None:
+    assert_problem(module_client.post(RECORDINGS, content=body, headers={"content-type": content_type}), code, status)
 
 
 def test_an_upload_is_limited_by_its_own_word_and_by_count(client: TestClient, settings: Settings) -> None:
@@ -211,5 +213,5 @@ def test_a_recording_is_fetched_as_it_was_sent(name: str, kind: str, client: Tes
 
 
 @pytest.mark.parametrize("name", ["nothing.csv", ".sha256", "..", "%2e%2e%2f.lock"])
-def test_nothing_else_is_fetched(name: str, client: TestClient) -> None:
-    assert_problem(client.get(f"{RECORDINGS}/{name}/content"), "not-found", 404)
+def test_nothing_else_is_fetched(name: str, module_client: TestClient) -> None:
+    assert_problem(module_client.get(f"{RECORDINGS}/{name}/content"), "not-found", 404)

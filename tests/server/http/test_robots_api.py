@@ -17,6 +17,11 @@ URDF = (
 URDF_ROBOT = b"name: arm\nkinematics: {urdf: {file: arm.urdf, base: base, tip: tool}}\n"
 
 
+@pytest.fixture
+def client(module_client: TestClient) -> TestClient:
+    return module_client
+
+
 def test_a_robot_file_at_a_glance(client: TestClient, paper_robot: bytes) -> None:
     report = client.post(CHECK, files={"robot": ("arm.yaml", paper_robot)}).json()
     assert (report["name"], report["passed"]) == ("paper-arm", True)

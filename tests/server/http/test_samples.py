@@ -4,6 +4,7 @@ import json
 import re
 
 import numpy as np
+import pytest
 from starlette.testclient import TestClient
 
 from server.conftest import IDENTIFICATIONS, RECORDINGS
@@ -51,6 +52,7 @@ def test_a_recording_that_is_none_is_said_to_be(client: TestClient) -> None:
     assert client.get(f"{RECORDINGS}/other.csv/samples").status_code == 404
 
 
+@pytest.mark.usefixtures("drawn_figures")
 def test_an_identification_has_plots_a_report_and_its_robot(
     client: TestClient, paper_robot: bytes, paper_recordings: tuple[bytes, bytes]
 ) -> None:

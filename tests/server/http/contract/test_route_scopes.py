@@ -10,8 +10,8 @@ from fastapi import FastAPI
 from fastapi.routing import iter_route_contexts
 from starlette.testclient import TestClient
 
-from server.auth.keyed import client_with, make_keys
-from server.conftest import HOST
+from server.auth.keyed import make_keys
+from server.conftest import connected
 from server.http.problem_check import assert_problem
 from server.http.write_openapi import COMMITTED
 from server.queue.controls import finish_at_once
@@ -84,12 +84,17 @@ def expected_scope(operation: str) -> Scope | None:
 
 
 @pytest.fixture(scope="module")
-def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[FastAPI, dict[Scope, str]]]:
+def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[TestClient, dict[Scope, str]]]:
     settings = Settings(data_folder=tmp_path_factory.mktemp("service") / "data", requests_per_s=1e6)
     keys = make_keys(settings.data_folder)
     app = create_app(settings, InlineExecutor(), finish_at_once)
-    with TestClient(app, base_url=HOST):
-        yield app, keys
+    with connected(app) as client:
+        yield client, keys
+
+
+def application(client: TestClient) -> FastAPI:
+    assert isinstance(client.app, FastAPI)
+    return client.app
 
 
 def test_every_operation_that_changes_something_is_placed() -> None:
@@ -98,14 +103,15 @@ def test_every_operation_that_changes_something_is_placed() -> None:
 
 @pytest.mark.parametrize("key", [None, *Scope], ids=["none", *Scope])
 @pytest.mark.parametrize("operation", operations())
-def test_who_may_do_what(operation: str, key: Scope | None, service: tuple[FastAPI, dict[Scope, str]]) -> None:
-    app, keys = service
+def test_who_may_do_what(operation: str, key: Scope | None, service: tuple[TestClient, dict[Scope, str]]) -> None:
+    client, keys = service
+    access = application(client).state.services.access
     needed = expected_scope(operation)
     method, path = operation.split(" ")
     address = re.sub(r"\{format\}", "json", re.sub(r"\{(identifier|name|number|[a-z_]+)\}", "nothing", path))
-    app.state.services.access.failures.take("-")  # the bucket of an address of its own
-    app.state.services.access.failures._buckets.clear()
-    answer = client_with(app, None if key is None else keys[key]).request(method, address)
+    access.failures.take("-")  # the bucket of an address of its own
+    access.failures._buckets.clear()
+    answer = client.request(method, address, headers={} if key is None else {"authorization": f"Bearer {keys[key]}"})
     if needed is None or (key is not None and list(Scope).index(key) >= list(Scope).index(needed)):
         assert answer.status_code != 401
         assert "forbidden" not in answer.text
@@ -140,10 +146,10 @@ def test_the_document_says_which_scope_is_needed() -> None:
         assert stated == (expected_scope(operation) and str(expected_scope(operation)))
 
 
-def test_every_route_is_in_the_document_or_only_shows_something(service: tuple[FastAPI, dict[Scope, str]]) -> None:
+def test_every_route_is_in_the_document_or_only_shows_something(service: tuple[TestClient, dict[Scope, str]]) -> None:
     """What is in no document would be in none of these tests."""
-    app, _ = service
-    routes = list(iter_route_contexts(app.routes))
+    client, _ = service
+    routes = list(iter_route_contexts(application(client).routes))
     found = {f"{method} {route.path}" for route in routes for method in (route.methods or {"ANY"}) - {"HEAD"}}
     assert found - set(operations()) == UNDOCUMENTED
     assert set(operations()) <= found

@@ -1,0 +1,137 @@
+"""Which slow tests a change needs: `NEEDED` maps a path that changed to the tests that guard it.
+
+``pytest --changed-only`` compares the work tree with the merge base of the main branch, and runs what `NEEDED` names.
+Without a base, or after a change of a path that no entry names, it runs everything.
+"""
+
+import subprocess
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+
+EMULATORS = ("tests/drivers", "tests/hardware_emulated", "tests/sim_backend")
+KILLS = ("tests/runtime", "tests/hardware_emulated")
+SERVICE = ("tests/server", "tests/reliability", "tests/browser", "tests/client")
+QUICK_PROOF = ("tests/concealed",)
+
+NEEDED: dict[str, tuple[str, ...]] = {
+    # moving the arm
+    "drivers/": (*EMULATORS, *KILLS),
+    "service/tauscope/runtime/": (*KILLS, "tests/drivers", "tests/cli"),
+    "sim_backend/tauscope_sim/": (*EMULATORS, *KILLS, "tests/concealed/running"),
+    "sim_backend/tauscope_sim/effects/": ("tests/sim_backend", *QUICK_PROOF),
+    # from recordings to models and findings
+    "service/tauscope/robot/": ("tests/robot", "tests/identification", "tests/excitation"),
+    "service/tauscope/recording/": ("tests/recording", "tests/identification"),
+    "service/tauscope/dynamics/": ("tests/identification", "tests/diagnosis"),
+    "service/tauscope/trajectory/": ("tests/excitation", "tests/hardware_emulated"),
+    "service/tauscope/excitation/": ("tests/excitation", "tests/diagnosis/test_next_experiment.py"),
+    "service/tauscope/identification/": ("tests/identification", "tests/diagnosis", *QUICK_PROOF),
+    "service/tauscope/effects/": ("tests/diagnosis", *QUICK_PROOF),
+    "service/tauscope/diagnosis/": ("tests/diagnosis", "tests/report", *QUICK_PROOF),
+    "service/tauscope/export/": ("tests/identification", "tests/diagnosis/test_extended_model.py"),
+    "service/tauscope/report/": ("tests/report", "tests/browser/test_report_on_paper.py"),
+    # serving it
+    "service/tauscope/tasks/": ("tests/cli", "tests/server", "tests/hardware_emulated/test_canopen_campaign.py"),
+    "service/tauscope/cli/": ("tests/cli", "tests/hardware_emulated/test_canopen_commands.py"),
+    "service/tauscope/client/": ("tests/client", "tests/server"),
+    "service/tauscope/server/": SERVICE,
+    "service/tauscope/server/page/": ("tests/browser",),
+    "service/tauscope/server/history/": ("tests/server", "tests/browser/test_over_time.py"),
+    "service/tauscope/server/schedules/": ("tests/server",),
+    "deploy/": ("tests/deploy",),
+    # words
+    "docs/": ("tests/server/http/test_handbook.py",),
+    "typings/": (),
+    "README.md": (),
+    "CHANGELOG.md": (),
+    "CONTRIBUTING.md": (),
+    "LICENSE": (),
+}
+"""Path prefix to test files and folders; the longest prefix of a path decides. A quick test is never deselected."""
+
+OPTION = "--changed-only"
+MARKS = ("slow", "system", "realtime")
+
+
+def select_tests(changed: Iterable[str]) -> set[str] | None:
+    """Test files and folders that these changed paths need; None means all of them."""
+    selected: set[str] = set()
+    for path in changed:
+        prefix = max((each for each in NEEDED if path.startswith(each)), key=len, default=None)
+        parts = Path(path).parts
+        if prefix is not None:
+            selected.update(NEEDED[prefix])
+        elif parts[0] == "tests" and len(parts) > 2:
+            selected.add("/".join(parts[:2]))
+        else:
+            return None
+    return selected
+
+
+def is_selected(test_file: str, selected: set[str] | None) -> bool:
+    """Whether a test file, named from the repository's root, is one of these or lies in one of them."""
+    return selected is None or any(test_file == each or test_file.startswith(f"{each}/") for each in selected)
+
+
+def find_changes(repository: Path) -> list[str] | None:
+    """Paths that differ from the merge base with the main branch, files of no commit included; None without a base.
+
+    On the main branch itself the base is the commit before.
+    """
+    head = _git(repository, "rev-parse", "HEAD")
+    for main in ("origin/main", "main", "origin/master", "master"):
+        base = _git(repository, "merge-base", "HEAD", main)
+        if base and base == head:
+            base = _git(repository, "rev-parse", "--verify", "--quiet", "HEAD^1")
+        if base:
+            break
+    else:
+        return None
+    # Without --no-renames a moved file would be missing under its old name.
+    tracked = _git(repository, "diff", "--name-only", "--no-renames", base)
+    others = _git(repository, "ls-files", "--others", "--exclude-standard")
+    return None if tracked is None or others is None else [*tracked.splitlines(), *others.splitlines()]
+
+
+def _git(repository: Path, *words: str) -> str | None:
+    try:
+        done = subprocess.run(["git", *words], cwd=repository, check=False, capture_output=True, text=True)
+    except FileNotFoundError:
+        return None
+    return done.stdout.strip() if done.returncode == 0 else None
+
+
+@cache
+def _selected_here() -> set[str] | None:
+    changed = find_changes(REPOSITORY)
+    return None if changed is None else select_tests(changed)
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(OPTION, action="store_true", help="of the slow tests, run those that the change needs")
+
+
+def pytest_report_header(config: pytest.Config) -> str | None:
+    if not config.getoption(OPTION):
+        return None
+    selected = _selected_here()
+    return f"slow tests for this change: {'all' if selected is None else ', '.join(sorted(selected)) or 'none'}"
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if not config.getoption(OPTION):
+        return
+    selected = _selected_here()
+    kept, dropped = [], []
+    for item in items:
+        is_slow = any(item.get_closest_marker(mark) for mark in MARKS)
+        test_file = item.path.relative_to(REPOSITORY).as_posix()
+        (kept if not is_slow or is_selected(test_file, selected) else dropped).append(item)
+    if dropped:
+        config.hook.pytest_deselected(items=dropped)
+        items[:] = kept
