@@ -3,6 +3,11 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope_drivers.backend import ControlMode, DriveLimits
+
 
 class Severity(StrEnum):
     """How much a finding matters."""
@@ -34,6 +39,25 @@ class FoundDevice:
     bit_rate: int
     model: str
     firmware: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class FrameRequest:
+    """The run whose frames are asked for.
+
+    watchdog_s : float
+        time of silence after which the drives stop [s]
+    targets : (K, n) float64
+        positions of the first K cycles; the arm stands at the first of them [rad or m]
+    cycle_s : float or None
+        time between them, which drives are told; None where it is not known [s]
+    """
+
+    mode: ControlMode
+    limits: DriveLimits
+    watchdog_s: float
+    targets: NDArray[np.float64]
+    cycle_s: float | None = None
 
 
 @dataclass(frozen=True)

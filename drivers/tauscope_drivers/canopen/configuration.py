@@ -18,6 +18,7 @@ from tauscope_drivers.canopen.data_sheet.settings import settings_of
 from tauscope_drivers.canopen.data_sheet.text import DataSheetError
 from tauscope_drivers.canopen.interfaces import OWN_OPTIONS
 from tauscope_drivers.drive_block import (
+    DriveJoint,
     read_direction,
     read_positive,
     read_text,
@@ -31,15 +32,6 @@ from tauscope_drivers.errors import DriverError, DriverErrorKind
 _HIGHEST_NODE = 127
 _BUS_KEYS = ("interface", "channel", "bit_rate", "serial_baud", "options")
 _NODE_KEYS = ("node_id", "counts_per_turn", "zero_count", "direction", "rated_torque_nm", "eds")
-
-
-@dataclass(frozen=True)
-class DriveJoint:
-    """A joint as the driver sees it."""
-
-    name: str
-    gear_ratio: float
-    drive: Mapping[str, Any]
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@
 start, what became of runs whose process is gone.
 """
 
-from tauscope.runtime.backends import BACKENDS, Connection, make_backend
+from tauscope.runtime.drivers import Connection, driver_names, make_backend
 from tauscope.runtime.guard import Guard
 from tauscope.runtime.guard_limits import GuardLimits, guard_limits
 from tauscope.runtime.in_process import run_trajectory
@@ -21,7 +21,6 @@ from tauscope.runtime.timing import Timing
 from tauscope.runtime.violation import GuardViolationError, Rule, Violation
 
 __all__ = [
-    "BACKENDS",
     "TRANSITIONS",
     "BackendOrder",
     "Connection",
@@ -44,6 +43,7 @@ __all__ = [
     "Timing",
     "Violation",
     "after_stop",
+    "driver_names",
     "guard_limits",
     "make_backend",
     "make_plan",

@@ -8,6 +8,7 @@ from pydantic import Field, ValidationError
 from tauscope.errors import AcquisitionError
 from tauscope.files import write_atomically
 from tauscope.robot.messages import one_line
+from tauscope.runtime.drivers import DEFAULT_BACKEND
 from tauscope.runtime.options import RunOptions
 from tauscope.runtime.record import ORDER_FILE
 from tauscope.runtime.stored import StoredModel
@@ -16,10 +17,8 @@ from tauscope.runtime.stored import StoredModel
 class BackendOrder(StoredModel):
     """Which backend, and its own settings."""
 
-    name: str = Field(default="sim", description="sim, dynamixel or canopen")
-    settings: dict[str, Any] = Field(
-        default_factory=dict, description="the backend's own; for sim: time (virtual, real), scenario, start"
-    )
+    name: str = Field(default=DEFAULT_BACKEND, description="name of a driver")
+    settings: dict[str, Any] = Field(default_factory=dict, description="the driver's own options")
 
 
 class RunOrder(StoredModel):

@@ -7,7 +7,7 @@ from typing import Protocol
 
 from tauscope.recording.journal_rows import JournalHeader
 from tauscope.robot import Robot
-from tauscope.runtime.backends import Connection
+from tauscope.runtime.drivers import Connection
 from tauscope.runtime.options import RunOptions
 from tauscope.runtime.progress import Report
 from tauscope.runtime.record import RunRecord

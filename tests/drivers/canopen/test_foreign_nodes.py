@@ -14,7 +14,9 @@ import pytest
 
 from patience import eventually
 from tauscope_drivers import ControlMode, DriveLimits, Setpoint, StopPolicy
-from tauscope_drivers.canopen import CanopenArm, DriveJoint, scan_bus
+from tauscope_drivers.canopen.arm import CanopenArm
+from tauscope_drivers.canopen.doctor import scan_bus
+from tauscope_drivers.drive_block import DriveJoint
 from tauscope_sim.driver.virtual_clock import VirtualClock
 
 durand = pytest.importorskip("durand")
@@ -86,7 +88,7 @@ def drives(channel: str) -> Iterator[list[ForeignDrive]]:
 def joints_on(channel: str) -> list[DriveJoint]:
     bus = {"interface": "virtual", "channel": channel}
     blocks = [{"node_id": 4, "counts_per_turn": COUNTS, **bus}, {"node_id": 9, "counts_per_turn": COUNTS}]
-    return [DriveJoint(f"joint{number}", GEAR, block) for number, block in enumerate(blocks, 1)]
+    return [DriveJoint(f"joint{number}", block, gear_ratio=GEAR) for number, block in enumerate(blocks, 1)]
 
 
 @pytest.fixture

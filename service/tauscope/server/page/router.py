@@ -1,6 +1,7 @@
 """The page and its files."""
 
 import hashlib
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -11,6 +12,7 @@ from fastapi import APIRouter, Request, Response
 
 from tauscope.errors import NotFoundError
 from tauscope.robot.messages import one_line, shown
+from tauscope.runtime.drivers import driver_names, find_driver
 
 router = APIRouter(include_in_schema=False)
 
@@ -67,14 +69,21 @@ def _answer(request: Request, name: str) -> Response:
 
 @cache
 def assets() -> Mapping[str, Asset]:
-    """All files of the page by name: ours, and the plotting library's."""
+    """All files of the page by name: ours, the plotting library's, and the list of drivers."""
     package = distribution("uplot-python")
     paths = {path.name: path for path in sorted(STATIC.iterdir()) if path.suffix in MEDIA_TYPES}
     paths |= {name: Path(str(package.locate_file(file))) for name, file in PLOT_LIBRARY.items()}
-    return {name: _read(path) for name, path in paths.items()}
+    contents = {name: path.read_bytes() for name, path in paths.items()} | {"drivers.js": _drivers_script()}
+    return {name: _asset(name, content) for name, content in contents.items()}
 
 
-def _read(path: Path) -> Asset:
+def _drivers_script() -> bytes:
+    """The registered drivers as a module of the page: title by language, and whether each is a simulation."""
+    drivers = [find_driver(name) for name in driver_names()]
+    content = {one.name: {"titles": dict(one.titles), "is_simulated": one.is_simulated} for one in drivers}
+    return f"export const DRIVERS = {json.dumps(content, ensure_ascii=False)};\n".encode()
+
+
+def _asset(name: str, content: bytes) -> Asset:
     """A file with its tag."""
-    content = path.read_bytes()
-    return Asset(content, MEDIA_TYPES[path.suffix], f'"{hashlib.sha256(content).hexdigest()[:24]}"')
+    return Asset(content, MEDIA_TYPES[Path(name).suffix], f'"{hashlib.sha256(content).hexdigest()[:24]}"')

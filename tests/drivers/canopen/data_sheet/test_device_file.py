@@ -26,7 +26,7 @@ WHOLE = text_of(sections(VendorNumber="0x3A1", ProductNumber="", RevisionNumber=
 
 def configured(path: object, **block: Any) -> BusConfiguration:
     bus = {"interface": "nobody opens it", "channel": "none", "node_id": 5, "counts_per_turn": 4096}
-    return read_configuration([DriveJoint("elbow", 50.0, {**bus, "eds": path, **block})])
+    return read_configuration([DriveJoint("elbow", {**bus, "eds": path, **block}, gear_ratio=50.0)])
 
 
 def refusal(path: object, **block: Any) -> str:
