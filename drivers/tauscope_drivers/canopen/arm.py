@@ -100,7 +100,7 @@ class CanopenArm:
         )
 
     def connect(self) -> ArmState:
-        """Open the bus, make sure that every node is a drive, and read it by service data."""
+        """Open the bus, make sure that every node is a drive, and read it by SDO."""
         if self._session is not None:
             raise DriverError(DriverErrorKind.CANNOT_CONNECT, "the arm is connected already; disconnect it first")
         session = self._session = self._open()
@@ -110,7 +110,7 @@ class CanopenArm:
         except DriverError:
             self.disconnect()
             raise
-        return session.read_by_service_data()
+        return session.read_by_sdo()
 
     def acknowledge_faults(self) -> ArmState:
         """Reset drives in fault, once, and forget emergencies; a drive that holds goes on holding."""
@@ -145,7 +145,7 @@ class CanopenArm:
         for node in session.nodes:
             if write_settings(node):
                 node.identify()
-        state = session.read_by_service_data()
+        state = session.read_by_sdo()
         require_sensible(limits, state.position, [node.place for node in session.nodes])
         if state.faults:
             raise DriverError(DriverErrorKind.FAULT, f"{listed(state.faults)}; acknowledge it first", state.faults)
@@ -161,7 +161,7 @@ class CanopenArm:
             self.stop(stop_policy)
             raise
         for node in session.nodes:
-            node.leaps.limit = float(limits.velocity[node.joint - 1])
+            node.glitches.limit = float(limits.velocity[node.joint - 1])
         self._limiter = TargetLimiter(limits, place, session.settling_ns * 1e-9)
         self._runaway = RunawayWatch(limits) if mode is ControlMode.TORQUE else None
         return state
@@ -175,7 +175,7 @@ class CanopenArm:
         require_finite(setpoint, len(session.nodes))
         session.bus.drain()
         if any(node.error_code == HEARTBEAT_LOST for node in session.nodes):
-            return session.read_by_service_data()  # such a drive takes no process data any more
+            return session.read_by_sdo()  # such a drive takes no process data any more
         goal = Goal.OPERATION_ENABLED if session.caught is None else Goal.QUICK_STOP
         state = session.cycle(mode, goal, limiter.limited(setpoint, self.clock.now_ns()), session.answer_ns)
         if self._runaway is not None and session.caught is None:
@@ -192,7 +192,7 @@ class CanopenArm:
             return blind_state(self.clock.now_ns(), len(self._configuration.nodes))
         goal = POLICY_GOALS.get(policy, Goal.QUICK_STOP)
         for node in session.nodes:
-            node.leaps.limit = math.inf
+            node.glitches.limit = math.inf
         self._mode, self._limiter, self._runaway = None, None, None
         is_stopped = mode is not None and stop_in_cycle(session, mode, goal)
         silent = stop_one_by_one(session.nodes, goal, is_stopped=is_stopped)

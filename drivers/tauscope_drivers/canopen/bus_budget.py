@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 LARGEST_LOAD = 0.8
-"""Share of the bus that cyclic frames may take; the rest is for heartbeats, emergencies and service data."""
+"""Share of the bus that cyclic frames may take; the rest is for heartbeats, emergencies and SDOs."""
 
 ASCII_FRAME_BYTES = 22
 """Characters of an 8-byte frame in the serial-line CAN protocol (slcan): ``t`` + 3 + 1 + 16 + return."""

@@ -12,10 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from tauscope_drivers.backend import ControlMode
-from tauscope_drivers.canopen.data_sheet.device_file import DeviceFile, read_device_file
+from tauscope_drivers.canopen.data_sheet.device_file import DataSheetError, DeviceFile, read_device_file
 from tauscope_drivers.canopen.data_sheet.needs import require_needed, require_target
 from tauscope_drivers.canopen.data_sheet.settings import settings_of
-from tauscope_drivers.canopen.data_sheet.text import DataSheetError
 from tauscope_drivers.canopen.interfaces import OWN_OPTIONS
 from tauscope_drivers.drive_block import (
     DriveJoint,

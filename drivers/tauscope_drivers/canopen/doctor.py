@@ -170,7 +170,7 @@ _PACING_S = 0.0005
 def scan_bus(interface: str, channel: str, bit_rates: Sequence[int] | None = None) -> Iterator[FoundDevice]:
     """Every node that answers, one bit rate after the other.
 
-    Reads the device type (0x1000) by service data, then name and version of those that answered. At a wrong bit rate
+    Reads the device type (0x1000) by SDO, then name and version of those that answered. At a wrong bit rate
     this disturbs a bus that is in use: name the rate where anything moves.
 
     Parameters

@@ -81,7 +81,7 @@ class _PlannedDictionary:
 def plan_frames(joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator[PlannedFrame]:
     """Frames of a connection, of enabling, of some cycles and of a stop, for drives that answer as they should.
 
-    Service data is shown as expedited transfers, and of more than four bytes by its first frame alone; heartbeats,
+    An SDO is shown as an expedited transfer, and one of more than four bytes by its first frame alone; heartbeats,
     which are sent as time passes, are shown once.
 
     Parameters

@@ -1,14 +1,14 @@
-"""The drives of an arm on an open bus, and the ways to ask them: in a cycle of process data, or by service data."""
+"""The drives of an arm on an open bus, and the ways to ask them: in a cycle of process data, or by SDO."""
 
 import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from statistics import median
 
 import numpy as np
 
 from tauscope_drivers.backend import ControlMode
-from tauscope_drivers.canopen.answer_time import AnswerTime
 from tauscope_drivers.canopen.bus import SYNC_ID, CanBus
 from tauscope_drivers.canopen.bus_budget import CycleFrames, largest_rate_hz, rate_limit
 from tauscope_drivers.canopen.configuration import BusConfiguration
@@ -19,6 +19,29 @@ from tauscope_drivers.canopen.state_machine import Goal
 from tauscope_drivers.clock import Clock
 from tauscope_drivers.errors import Fault
 from tauscope_drivers.state import ArmState, Array, Setpoint
+
+REMEMBERED = 31
+"""Answers by which it is known what is usual: adapters take their time, each its own."""
+
+
+class AnswerTime:
+    """Compares how long each answer took with what is usual on this bus and adapter."""
+
+    def __init__(self) -> None:
+        """Nothing is known yet, and nothing is late."""
+        self._taken_ns: deque[int] = deque(maxlen=REMEMBERED)
+
+    def late_ns(self, taken_ns: int) -> int:
+        """How much later than usual an answer came [ns].
+
+        Parameters
+        ----------
+        taken_ns : int
+            from SYNC to the last frame of the answer [ns]
+        """
+        self._taken_ns.append(taken_ns)
+        return max(0, taken_ns - round(median(self._taken_ns)))
+
 
 CYCLE_FRAMES = CycleFrames((TARGET_PDOS[ControlMode.POSITION].size,), (STATE_PDO.size, MOTION_PDO.size))
 
@@ -108,7 +131,7 @@ class Session:
         self.bus.beat()
         return replace(self.observe(stamp), late_ns=self.answer_time.late_ns(answered - stamp))
 
-    def read_by_service_data(self) -> ArmState:
+    def read_by_sdo(self) -> ArmState:
         """The arm as it stands, outside the cycle."""
         for node in self.nodes:
             node.read_now()

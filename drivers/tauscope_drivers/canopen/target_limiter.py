@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauscope_drivers.backend import DriveLimits
-from tauscope_drivers.cycle_grid import CycleGrid
+from tauscope_drivers.clock import CycleGrid
 from tauscope_drivers.limits import SPEED_MARGIN
 from tauscope_drivers.state import Setpoint
 

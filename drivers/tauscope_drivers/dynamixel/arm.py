@@ -9,12 +9,19 @@ from numpy.typing import NDArray
 from tauscope_drivers.backend import Capabilities, ControlMode, DriveLimits, StopPolicy
 from tauscope_drivers.clock import Clock, MonotonicClock
 from tauscope_drivers.drive_block import DriveJoint
-from tauscope_drivers.dynamixel.bounds import Bounds, goals_of
 from tauscope_drivers.dynamixel.bus import ServoBus
-from tauscope_drivers.dynamixel.bus_budget import BusTiming, CycleTraffic, largest_part, largest_rate_hz, require_rate
+from tauscope_drivers.dynamixel.bus_budget import (
+    BusTiming,
+    CycleTraffic,
+    found_budget,
+    has_room_for_speeds,
+    largest_part,
+    largest_rate_hz,
+    planned_budget,
+    require_rate,
+)
 from tauscope_drivers.dynamixel.configuration import read_configuration
-from tauscope_drivers.dynamixel.cycle_budget import found_budget, has_room_for_speeds, planned_budget
-from tauscope_drivers.dynamixel.enabling import enable_servos
+from tauscope_drivers.dynamixel.enabling import Bounds, enable_servos, goals_of
 from tauscope_drivers.dynamixel.faults import lost_bus_fault, silent_servo_fault
 from tauscope_drivers.dynamixel.group import GroupReading
 from tauscope_drivers.dynamixel.models import WATCHDOG_MOST, WATCHDOG_STEP_S

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from tauscope_drivers.backend import ControlMode, DriveLimits
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.dynamixel import packets
-from tauscope_drivers.dynamixel.bounds import Bounds, goals_of
+from tauscope_drivers.dynamixel.bus_budget import has_room_for_speeds, planned_budget
 from tauscope_drivers.dynamixel.configuration import read_configuration
 from tauscope_drivers.dynamixel.control_table import Block, Item, encode_items
-from tauscope_drivers.dynamixel.cycle_budget import has_room_for_speeds, planned_budget
+from tauscope_drivers.dynamixel.enabling import Bounds, goals_of
 from tauscope_drivers.dynamixel.group import health_turns, paced_goals, servo_families
 from tauscope_drivers.dynamixel.pacing import GoalPace
 from tauscope_drivers.dynamixel.preparation import (

@@ -12,7 +12,7 @@ the mean, by v σ²/(4T) at speed v for lateness of variance σ² and a cycle T,
 import math
 from collections.abc import Sequence
 
-from tauscope_drivers.cycle_grid import CycleGrid
+from tauscope_drivers.clock import CycleGrid
 from tauscope_drivers.dynamixel.servo import JointServo
 
 _AHEAD_CYCLES = 2.0

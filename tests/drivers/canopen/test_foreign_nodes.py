@@ -1,4 +1,4 @@
-"""Our driver against nodes of durand: their service data, process data, network management and heartbeats are not ours.
+"""Our driver against nodes of durand: their SDOs, process data, network management and heartbeats are not ours.
 
 Only the power states and the motion of a drive, which durand leaves to its user, are written here.
 """
@@ -134,7 +134,7 @@ CYCLES, CYCLE_S, STEP = 40, 0.005, 0.002
 LENGTHS = {
     0x000: {2}, 0x080: {0, 8}, 0x180: {8}, 0x200: {6}, 0x280: {6}, 0x580: {8}, 0x600: {8}, 0x700: {1},
 }  # fmt: skip
-"""Bytes that a service of CANopen has: network management, SYNC or emergency, process data, service data, heartbeat."""
+"""Bytes that a service of CANopen has: network management, SYNC or emergency, process data, SDOs, heartbeat."""
 
 
 def logged_run(channel: str, joints: list[DriveJoint], log_file: Path) -> list[can.Message]:

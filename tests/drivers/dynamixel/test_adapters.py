@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import pytest
 
 from tauscope_drivers.drive_block import DriveJoint
+from tauscope_drivers.dynamixel.bus_budget import planned_budget
 from tauscope_drivers.dynamixel.configuration import read_configuration
-from tauscope_drivers.dynamixel.cycle_budget import planned_budget
 from tauscope_drivers.dynamixel.doctor import latency_finding, serial_adapters
 from tauscope_drivers.dynamixel.port import read_latency_timer_ms
 from tauscope_drivers.inspection import Severity

@@ -17,8 +17,7 @@ from tauscope_drivers.canopen.configuration import (
     read_configuration,
     require_targets,
 )
-from tauscope_drivers.canopen.data_sheet.device_file import DeviceFile, read_device_file
-from tauscope_drivers.canopen.data_sheet.text import DataSheetError
+from tauscope_drivers.canopen.data_sheet.device_file import DataSheetError, DeviceFile, read_device_file
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 
 WHOLE = text_of(sections(VendorNumber="0x3A1", ProductNumber="", RevisionNumber="0x20005"))
