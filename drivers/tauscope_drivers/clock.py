@@ -14,11 +14,6 @@ class Clock(Protocol):
     def wait_until_ns(self, deadline_ns: int) -> int:
         """Return at a deadline, or at once where it has passed.
 
-        Parameters
-        ----------
-        deadline_ns : int
-            absolute instant [ns]
-
         Returns
         -------
         int
@@ -35,13 +30,7 @@ class MonotonicClock:
         return time.monotonic_ns()
 
     def wait_until_ns(self, deadline_ns: int) -> int:
-        """Sleep until a deadline; the deadline is absolute, so that lateness does not add up.
-
-        Parameters
-        ----------
-        deadline_ns : int
-            absolute instant [ns]
-        """
+        """Sleep until a deadline; the deadline is absolute, so that lateness does not add up."""
         while (remaining := deadline_ns - time.monotonic_ns()) > 0:
             time.sleep(remaining * 1e-9)
         return time.monotonic_ns()
@@ -59,24 +48,12 @@ class CycleGrid:
     """Even instants, one a cycle, laid through the calls that were the earliest."""
 
     def __init__(self, cycle_s: float) -> None:
-        """The first call is in time.
-
-        Parameters
-        ----------
-        cycle_s : float
-            time between two cycles [s]
-        """
+        """The first call is in time."""
         self._period_ns = cycle_s * 1e9
         self._due_ns: int | None = None
 
     def cycles_until(self, now_ns: int) -> int:
-        """How many cycles there are since the call before: one, more where some were skipped, none after a late one.
-
-        Parameters
-        ----------
-        now_ns : int
-            present instant [ns]
-        """
+        """How many cycles there are since the call before: one, more where some were skipped, none after a late one."""
         if self._due_ns is None:
             self._due_ns = now_ns
             return 1
@@ -87,11 +64,5 @@ class CycleGrid:
         return cycles
 
     def late_ns(self, now_ns: int) -> int:
-        """How long ago the present cycle was due [ns].
-
-        Parameters
-        ----------
-        now_ns : int
-            present instant, of the last `cycles_until` [ns]
-        """
+        """How long ago the present cycle was due [ns]."""
         return 0 if self._due_ns is None else now_ns - self._due_ns

@@ -42,8 +42,6 @@ class Connection:
 class ArmDescription:
     """An arm as a driver is told of it.
 
-    joints : tuple of DriveJoint
-        base first
     robot : object
         the whole robot as Tauscope reads it, for a driver that simulates it
     folder : Path or None

@@ -29,11 +29,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class FoundDevice:
-    """A device that answered on a bus.
-
-    bit_rate : int
-        at which it answered [bit/s]
-    """
+    """A device that answered on a bus."""
 
     address: int
     bit_rate: int
@@ -45,12 +41,8 @@ class FoundDevice:
 class FrameRequest:
     """The run whose frames are asked for.
 
-    watchdog_s : float
-        time of silence after which the drives stop [s]
     targets : (K, n) float64
         positions of the first K cycles; the arm stands at the first of them [rad or m]
-    cycle_s : float or None
-        time between them, which drives are told; None where it is not known [s]
     """
 
     mode: ControlMode

@@ -56,13 +56,6 @@ class CanopenArm:
     ) -> None:
         """Check the configuration; nothing is opened yet.
 
-        Parameters
-        ----------
-        joints : sequence of DriveJoint
-            base first
-        patience_s : float
-            how much longer than the bus takes an answer is waited for [s]
-
         Raises
         ------
         DriverError
@@ -133,8 +126,6 @@ class CanopenArm:
 
         Parameters
         ----------
-        watchdog_s : float
-            time without the master's heartbeat after which the drives stop [s]
         cycle_s : float or None
             time between two SYNCs, over which the drives interpolate; they keep the one that they know where None [s]
         """

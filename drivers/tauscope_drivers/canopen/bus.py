@@ -123,11 +123,6 @@ class CanBus:
     def receive(self, deadline_ns: int) -> bool:
         """Wait for one frame and hand it to its handler; the heartbeat is sent meanwhile when it is due.
 
-        Parameters
-        ----------
-        deadline_ns : int
-            monotonic instant until which to wait [ns]
-
         Returns
         -------
         bool

@@ -111,8 +111,6 @@ def commission_drive(
 
     Parameters
     ----------
-    watchdog_s : float
-        time without the master's heartbeat after which the drive stops [s]
     cycle_s : float or None
         time between two SYNCs; the drive keeps the one that it knows where None [s]
 
@@ -199,11 +197,6 @@ def interpolation_period(cycle_s: float) -> tuple[int, int]:
     """Value and exponent (0x60C2) of a cycle, value · 10^exponent seconds: exact where possible, else the nearest.
 
     A drive moves to a target within this time: too short a time makes a halt at every target, too long a time a lag.
-
-    Parameters
-    ----------
-    cycle_s : float
-        time between two targets [s]
 
     Raises
     ------

@@ -54,8 +54,6 @@ class NodeConfiguration:
 class BusConfiguration:
     """The bus and the drives on it, in the order of the joints.
 
-    bit_rate : int
-        [bit/s]
     serial_baud : float or None
         of an adapter on a true serial line [bit/s]
     """
@@ -70,11 +68,6 @@ class BusConfiguration:
 
 def read_configuration(joints: Sequence[DriveJoint]) -> BusConfiguration:
     """Bus and drives of an arm.
-
-    Parameters
-    ----------
-    joints : sequence of DriveJoint
-        base first
 
     Raises
     ------

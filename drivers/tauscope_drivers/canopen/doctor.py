@@ -43,11 +43,6 @@ def can_interfaces() -> list[Finding]:
 def examine(joints: Sequence[DriveJoint]) -> list[Finding]:
     """Bus, and every drive that the robot file names.
 
-    Parameters
-    ----------
-    joints : sequence of DriveJoint
-        base first
-
     Raises
     ------
     DriverError

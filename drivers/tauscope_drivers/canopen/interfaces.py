@@ -26,11 +26,6 @@ _CONNECT_S = 3.0
 def open_interface(interface: str, channel: str, bit_rate: int, options: Mapping[str, Any]) -> can.BusABC:
     """An interface by the name that python-can knows it by.
 
-    Parameters
-    ----------
-    bit_rate : int
-        [bit/s]
-
     Raises
     ------
     can.CanError, OSError, ValueError, NotImplementedError, ImportError, TypeError

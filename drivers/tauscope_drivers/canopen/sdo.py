@@ -34,13 +34,7 @@ class Pump(Protocol):
     """What takes frames off the bus and hands them to whoever waits for them."""
 
     def receive(self, deadline_ns: int) -> bool:
-        """Wait for one frame; False where none came.
-
-        Parameters
-        ----------
-        deadline_ns : int
-            monotonic instant until which to wait [ns]
-        """
+        """Wait for one frame; False where none came."""
         ...
 
 

@@ -102,13 +102,7 @@ class Session:
         return stay_at(np.array([node.last_position for node in self.nodes]))
 
     def cycle(self, mode: ControlMode, goal: Goal, setpoint: Setpoint, answer_ns: int) -> ArmState:
-        """One cycle on the bus: targets out, SYNC, answers in.
-
-        Parameters
-        ----------
-        answer_ns : int
-            longest wait for the answers [ns]
-        """
+        """One cycle on the bus: targets out, SYNC, answers in."""
         pairs = zip(self.nodes, setpoint.position, setpoint.torque, strict=True)
         frames = [
             (RECEIVED_ID + node.configuration.node_id, node.target(mode, node.controlword(goal), float(q), float(tau)))
@@ -138,25 +132,13 @@ class Session:
         return self.observe(self.clock.now_ns())
 
     def observe(self, time_ns: int) -> ArmState:
-        """The arm by what its drives sent since they were asked.
-
-        Parameters
-        ----------
-        time_ns : int
-            when they were asked [ns]
-        """
+        """The arm by what its drives sent since they were asked."""
         for node in self.nodes:
             node.remember(time_ns)
         return arm_state(self.nodes, time_ns, self.caught)
 
     def step_until(self, is_reached: Callable[[], bool], step: Callable[[], ArmState], within_s: float) -> ArmState:
-        """Go on stepping until something is reached or the time for it has passed; the last state.
-
-        Parameters
-        ----------
-        within_s : float
-            time for it [s]
-        """
+        """Go on stepping until something is reached or the time for it has passed; the last state."""
         deadline = self.clock.now_ns() + round(within_s * 1e9)
         state = step()
         while not is_reached() and self.clock.now_ns() < deadline:

@@ -59,13 +59,6 @@ class DynamixelArm:
     def __init__(self, joints: Sequence[DriveJoint], *, slack_s: float = 0.002, clock: Clock | None = None) -> None:
         """Nothing is opened yet.
 
-        Parameters
-        ----------
-        joints : sequence of DriveJoint
-            base first
-        slack_s : float
-            how much longer than the bus takes an answer is waited for [s]
-
         Raises
         ------
         DriverError
@@ -110,11 +103,6 @@ class DynamixelArm:
 
     def require_rate(self, rate_hz: float) -> None:
         """Refuse a rate that the bus does not carry.
-
-        Parameters
-        ----------
-        rate_hz : float
-            wanted cycles a second [Hz]
 
         Raises
         ------

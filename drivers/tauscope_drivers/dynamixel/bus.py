@@ -134,13 +134,7 @@ class ServoBus:
         return dict(sorted(found.items()))
 
     def read_once(self, servo: int, address: int, length: int, patience_s: float = 0.0) -> Status | None:
-        """A stretch of a control table, asked for once; None where no whole answer came.
-
-        Parameters
-        ----------
-        patience_s : float
-            how much longer to wait than in the control loop [s]
-        """
+        """A stretch of a control table, asked for once; None where no whole answer came."""
         return self._ask(servo, packets.encode_read(servo, address, length), length, patience_s)
 
     def read_block(self, servo: int, block: Block) -> dict[str, int]:
@@ -207,11 +201,6 @@ class ServoBus:
 
         Nothing in an answer says to which question it belongs. Where an earlier one was not answered in time, as many
         bytes before the block as make another length are read with it, so that what comes late has the wrong length.
-
-        Parameters
-        ----------
-        patience_s : float
-            how much longer to wait than in the control loop [s]
         """
         if any(self._owed(servos, block.length + surplus) for surplus in range(spare + 1)):
             self.port.drain()

@@ -27,10 +27,6 @@ _READ_BYTES = 14
 class CycleTraffic:
     """What goes over the bus in one cycle.
 
-    state_bytes : int
-        that each servo is asked for [bytes]
-    goal_bytes : int
-        that each servo is sent [bytes]
     health_bytes : int
         that one servo is asked for besides; 0 for no such read [bytes]
     """
@@ -70,8 +66,6 @@ class CycleTraffic:
 class BusTiming:
     """How fast a bus is.
 
-    baud : float
-        [bit/s]
     return_delay_s : float
         largest Return Delay Time of the servos [s]
     latency_s : float
@@ -99,11 +93,6 @@ def largest_rate_hz(traffic: CycleTraffic, timing: BusTiming, load: float = LARG
 
 def require_rate(rate_hz: float, traffic: CycleTraffic, timing: BusTiming) -> None:
     """Refuse a rate that the bus does not carry, and say what limits it.
-
-    Parameters
-    ----------
-    rate_hz : float
-        wanted cycles a second [Hz]
 
     Raises
     ------
@@ -138,13 +127,7 @@ _PACED_GOAL_BYTES = 8
 
 
 def has_room_for_speeds(traffic: CycleTraffic, timing: BusTiming, cycle_s: float) -> bool:
-    """Whether a cycle is long enough to send each servo a speed with its goal.
-
-    Parameters
-    ----------
-    cycle_s : float
-        of the control loop [s]
-    """
+    """Whether a cycle is long enough to send each servo a speed with its goal."""
     return largest_rate_hz(replace(traffic, goal_bytes=_PACED_GOAL_BYTES), timing) * cycle_s >= 1.0
 
 

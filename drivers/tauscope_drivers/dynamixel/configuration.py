@@ -59,11 +59,7 @@ class ServoConfiguration:
 
 @dataclass(frozen=True)
 class BusConfiguration:
-    """The bus and the servos on it, in the order of the joints.
-
-    baud : int
-        [bit/s]
-    """
+    """The bus and the servos on it, in the order of the joints."""
 
     servos: tuple[ServoConfiguration, ...]
     port: str
@@ -72,11 +68,6 @@ class BusConfiguration:
 
 def read_configuration(joints: Sequence[DriveJoint]) -> BusConfiguration:
     """Bus and servos of an arm.
-
-    Parameters
-    ----------
-    joints : sequence of DriveJoint
-        base first, at least one
 
     Raises
     ------

@@ -32,13 +32,6 @@ _LEAST_FIRMWARE = 45
 def examine(joints: Sequence[DriveJoint], *, slack_s: float = 0.002) -> list[Finding]:
     """Port, adapter, and every servo that the robot file names.
 
-    Parameters
-    ----------
-    joints : sequence of DriveJoint
-        base first
-    slack_s : float
-        how much longer than the bus takes an answer is waited for [s]
-
     Raises
     ------
     DriverError
@@ -180,13 +173,6 @@ USUAL_BAUDS = (57_600, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 115_200, 4_50
 
 def scan_bus(path: str, bauds: Sequence[int] = USUAL_BAUDS, *, slack_s: float = 0.002) -> Iterator[FoundDevice]:
     """Every servo that answers a ping to all, one baud rate after the other; about a second each.
-
-    Parameters
-    ----------
-    bauds : sequence of int
-        rates to try [bit/s]
-    slack_s : float
-        how much longer than the bus takes an answer is waited for [s]
 
     Raises
     ------

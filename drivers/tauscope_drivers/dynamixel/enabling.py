@@ -67,11 +67,6 @@ def enable_servos(
     An arm may fall meanwhile: each servo is asked where it is at the last moment, and catches its joint there. A servo
     that holds its joint already, in the mode that is asked for, is taken over without letting go.
 
-    Parameters
-    ----------
-    watchdog_s : float
-        time of silence after which the servos stop [s]
-
     Returns
     -------
     Bounds
