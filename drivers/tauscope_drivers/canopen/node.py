@@ -121,7 +121,7 @@ class DriveNode:
         return frozenset(mode for mode, number in MODES.items() if supported >> (number - 1) & 1)
 
     def remember(self, time_ns: int) -> None:
-        """Keep state and place of this cycle for cycles without an answer; a frame that cannot be true counts as lost."""
+        """Keep state and place of this cycle for cycles without an answer; a frame that cannot be true is none."""
         self.measurement = measured = self._measured()
         if not self.glitches.believes_place(measured.position, time_ns):
             self._forget(STATE_PDO)
