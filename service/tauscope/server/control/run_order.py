@@ -12,7 +12,7 @@ from tauscope.server.queue.stored import StoredModel
 class BackendChoice(StoredModel):
     """Which arm is moved."""
 
-    name: str = Field(default=DEFAULT_BACKEND, description="backend: name of a driver, which may be gone by now")
+    name: str = Field(default=DEFAULT_BACKEND, description="backend: name of a driver, which need not be installed any more")
     time: Literal["virtual", "real"] = Field(
         default="virtual", description="of the simulated arm: as fast as it computes, or by the clock"
     )
