@@ -68,7 +68,8 @@ def test_every_registered_driver_has_a_rig_and_every_rig_a_driver() -> None:
 def test_a_driver_without_a_rig_fails(tmp_path: Any) -> None:
     (parameter,) = rig_parameters(["nullbus"])
     assert not parameter.marks, "it is run wherever the suite is"
-    with pytest.raises(pytest.fail.Exception, match="driver nullbus has no rig"), parameter.values[0](tmp_path):
+    maker: Any = parameter.values[0]
+    with pytest.raises(pytest.fail.Exception, match="driver nullbus has no rig"), maker(tmp_path):
         pass
 
 
