@@ -12,7 +12,7 @@ from tauscope.server.queue.stored import StoredModel
 class BackendChoice(StoredModel):
     """Which arm is moved."""
 
-    name: str = Field(default=DEFAULT_BACKEND, description="backend: name of a driver, which need not be installed any more")
+    name: str = Field(default=DEFAULT_BACKEND, description="backend: name of a driver, installed or not")
     time: Literal["virtual", "real"] = Field(
         default="virtual", description="of the simulated arm: as fast as it computes, or by the clock"
     )
