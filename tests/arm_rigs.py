@@ -1,6 +1,6 @@
 """Backends on the test bench: each with an onlooker who sees the arm itself, not what its drives say of it.
 
-A new backend joins the conformance suite by a rig of its own, in `RIGS` or in ``tests/drivers/conftest.py``.
+A new backend joins the conformance suite by a rig of its own, in ``tests/drivers/conftest.py``.
 """
 
 import time
@@ -219,10 +219,6 @@ def remote_rigs(folder: Path) -> Iterator[Callable[[], Rig]]:
             return RemoteRig(device.socket, device.trace)
 
         yield rig
-
-
-RIGS = {"virtual": virtual_rigs, "real-time": remote_rigs}
-"""Makers of rigs of the simulated arm by name."""
 
 
 def wide_limits(robot: Robot, **changes: ArrayLike) -> DriveLimits:

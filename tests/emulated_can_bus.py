@@ -8,7 +8,7 @@ from uuid import uuid4
 
 import can
 
-from tauscope_drivers.canopen.configuration import DriveJoint
+from tauscope_drivers.drive_block import DriveJoint
 from tauscope_sim.canopen_bus.axis import AxisMeasurement, AxisMode, AxisScale
 from tauscope_sim.canopen_bus.drive import EmulatedDrive
 
@@ -46,7 +46,10 @@ class EmulatedBus:
     def joints(self) -> list[DriveJoint]:
         bus = {"interface": "virtual", "channel": self.channel}
         drives = [{"node_id": number, "counts_per_turn": COUNTS_PER_TURN} for number in (1, 2, 3)]
-        return [DriveJoint(f"joint{n}", GEAR, drive | (bus if n == 1 else {})) for n, drive in enumerate(drives, 1)]
+        return [
+            DriveJoint(f"joint{n}", drive | (bus if n == 1 else {}), gear_ratio=GEAR)
+            for n, drive in enumerate(drives, 1)
+        ]
 
     def _serve(self) -> None:
         while not self._ends.is_set():

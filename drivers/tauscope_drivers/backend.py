@@ -62,8 +62,6 @@ class DriveLimits:
 class Capabilities:
     """What a backend can do, known without motion.
 
-    largest_rate_hz : float
-        cycles a second that the bus allows [Hz]
     watchdog_range_s : tuple of two float
         shortest and longest time of the device's watchdog [s]
     policies_by_mode : mapping of ControlMode to frozenset of StopPolicy, or None
@@ -131,8 +129,6 @@ class Backend(Protocol):
 
         Parameters
         ----------
-        watchdog_s : float
-            time without `exchange` after which it does [s]
         cycle_s : float or None
             time between two calls of `exchange`, for drives that interpolate between targets; None where it is not
             known [s]

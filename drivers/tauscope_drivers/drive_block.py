@@ -2,33 +2,38 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from dataclasses import KW_ONLY, dataclass
+from typing import Any
 
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 
 _KEYS_OF_ANY_BUS = ("stop_policy",)
 
 
-class JointWithDrive(Protocol):
-    """A joint as a driver sees it."""
+@dataclass(frozen=True)
+class DriveJoint:
+    """A joint as a driver sees it.
 
-    @property
-    def name(self) -> str:
-        """Of the joint."""
-        ...
+    gear_ratio : float
+        motor turns per joint turn
+    torque_per_unit : float or None
+        joint torque for one unit that the drive measures, signed as the robot file's ``sign`` and ``torque_constant``
+        are; None where it does not say [Nm or N]
+    """
 
-    @property
-    def drive(self) -> Mapping[str, Any]:
-        """Its ``drive`` block."""
-        ...
+    name: str
+    drive: Mapping[str, Any]
+    _: KW_ONLY
+    gear_ratio: float = 1.0
+    torque_per_unit: float | None = None
 
 
-def require_known_keys(joints: Sequence[JointWithDrive], bus_keys: Sequence[str], own_keys: Sequence[str]) -> None:
+def require_known_keys(joints: Sequence[DriveJoint], bus_keys: Sequence[str], own_keys: Sequence[str]) -> None:
     """Refuse keys that nobody knows, and several buses.
 
     Parameters
     ----------
-    joints : sequence of JointWithDrive
+    joints : sequence of DriveJoint
         base first; what they say of the bus stands on the first
 
     Raises
@@ -47,7 +52,7 @@ def require_known_keys(joints: Sequence[JointWithDrive], bus_keys: Sequence[str]
                 raise refusal(joint, key, f"differs from that of {first.name}; all drives are on one bus")
 
 
-def require_distinct(joints: Sequence[JointWithDrive], key: str) -> None:
+def require_distinct(joints: Sequence[DriveJoint], key: str) -> None:
     """Refuse an address that is there twice.
 
     Raises
@@ -61,7 +66,7 @@ def require_distinct(joints: Sequence[JointWithDrive], key: str) -> None:
             raise refusal(joint, key, f"= {address} is there twice; each drive has its own")
 
 
-def read_whole(joint: JointWithDrive, key: str, default: int | None, *, least: int, most: int) -> int:
+def read_whole(joint: DriveJoint, key: str, default: int | None, *, least: int, most: int) -> int:
     """A whole number.
 
     Parameters
@@ -80,7 +85,7 @@ def read_whole(joint: JointWithDrive, key: str, default: int | None, *, least: i
     return value
 
 
-def read_direction(joint: JointWithDrive) -> int:
+def read_direction(joint: DriveJoint) -> int:
     """Which way a drive turns: -1 where it is against the joint, else 1.
 
     Raises
@@ -94,7 +99,7 @@ def read_direction(joint: JointWithDrive) -> int:
     return direction
 
 
-def read_positive(joint: JointWithDrive, key: str) -> float | None:
+def read_positive(joint: DriveJoint, key: str) -> float | None:
     """A positive number; None where the key is missing.
 
     Raises
@@ -110,7 +115,7 @@ def read_positive(joint: JointWithDrive, key: str) -> float | None:
     return float(value)
 
 
-def read_text(joint: JointWithDrive, key: str, what: str) -> str:
+def read_text(joint: DriveJoint, key: str, what: str) -> str:
     """A text that has to be there.
 
     Raises
@@ -124,6 +129,6 @@ def read_text(joint: JointWithDrive, key: str, what: str) -> str:
     return value
 
 
-def refusal(joint: JointWithDrive, key: str, reason: str) -> DriverError:
+def refusal(joint: DriveJoint, key: str, reason: str) -> DriverError:
     """Why a block is not usable."""
     return DriverError(DriverErrorKind.REFUSED, f"joint {joint.name}: drive.{key} {reason}")

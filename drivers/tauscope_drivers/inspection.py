@@ -3,6 +3,11 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope_drivers.backend import ControlMode, DriveLimits
+
 
 class Severity(StrEnum):
     """How much a finding matters."""
@@ -24,16 +29,27 @@ class Finding:
 
 @dataclass(frozen=True)
 class FoundDevice:
-    """A device that answered on a bus.
-
-    bit_rate : int
-        at which it answered [bit/s]
-    """
+    """A device that answered on a bus."""
 
     address: int
     bit_rate: int
     model: str
     firmware: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class FrameRequest:
+    """The run whose frames are asked for.
+
+    targets : (K, n) float64
+        positions of the first K cycles; the arm stands at the first of them [rad or m]
+    """
+
+    mode: ControlMode
+    limits: DriveLimits
+    watchdog_s: float
+    targets: NDArray[np.float64]
+    cycle_s: float | None = None
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from tauscope_drivers.cycle_grid import CycleGrid
+from tauscope_drivers.clock import CycleGrid
 
 CYCLE_NS = 5_000_000
 

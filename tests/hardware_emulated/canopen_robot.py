@@ -7,7 +7,7 @@ from typing import Any
 from ruamel.yaml import YAML
 
 from tauscope.robot import Robot
-from tauscope_drivers.canopen import DriveJoint
+from tauscope_drivers.drive_block import DriveJoint
 
 GEAR = 50.0
 COUNTS_PER_TURN = 65_536
@@ -54,4 +54,4 @@ def write_canopen_arm(
 
 def drive_joints(robot: Robot) -> list[DriveJoint]:
     """The joints of such an arm, as the driver sees them."""
-    return [DriveJoint(joint.name, GEAR, joint.drive or {}) for joint in robot.joints]
+    return [DriveJoint(joint.name, joint.drive or {}, gear_ratio=GEAR) for joint in robot.joints]

@@ -11,7 +11,8 @@ import numpy as np
 
 from prompt_process import prompt_process
 from tauscope_drivers import ArmState, ControlMode, DriveLimits, Setpoint, StopPolicy
-from tauscope_drivers.dynamixel import DynamixelArm, DynamixelJoint
+from tauscope_drivers.drive_block import DriveJoint
+from tauscope_drivers.dynamixel.arm import DynamixelArm
 from tauscope_sim.dynamixel_bus import DynamixelOrder, ServoSpecification
 from tauscope_sim.emulation import EmulatorProcess
 
@@ -36,7 +37,7 @@ class Bench:
 
     def arm(self, torque_constant: float | None = TORQUE_PER_MILLIAMPERE, **changes: Any) -> DynamixelArm:
         joints = [
-            DynamixelJoint(f"joint{number}", {**drive, **changes}, torque_constant)
+            DriveJoint(f"joint{number}", {**drive, **changes}, torque_per_unit=torque_constant)
             for number, drive in enumerate(self.drives, 1)
         ]
         self.arms.append(DynamixelArm(joints, slack_s=SLACK_S))

@@ -11,7 +11,8 @@ from arm_rigs import START, Rig
 from hardware_emulated.emulated_rig import FAULTS, EmulatedRig
 from tauscope.robot import read_robot
 from tauscope_drivers import Backend
-from tauscope_drivers.dynamixel import DynamixelArm, DynamixelJoint
+from tauscope_drivers.drive_block import DriveJoint
+from tauscope_drivers.dynamixel.arm import DynamixelArm
 from tauscope_sim.device import Disturbance, Injection
 from tauscope_sim.dynamixel_bus import DynamixelOrder, ServoSpecification
 from tauscope_sim.emulation import EmulatorProcess, FaultKind, InjectedFault
@@ -52,7 +53,7 @@ class DynamixelRig(EmulatedRig):
 
 def _arm(emulator: EmulatorProcess) -> DynamixelArm:
     drives = [{"id": number, "port": emulator.order.port} for number in (1, 2, 3)]
-    joints = [DynamixelJoint(f"joint{drive['id']}", drive, TORQUE_PER_MILLIAMPERE) for drive in drives]
+    joints = [DriveJoint(f"joint{drive['id']}", drive, torque_per_unit=TORQUE_PER_MILLIAMPERE) for drive in drives]
     return DynamixelArm(joints, slack_s=SLACK_S)
 
 

@@ -19,8 +19,8 @@ from tauscope.identification import document, identify
 from tauscope.recording import read_recording
 from tauscope.robot import read_robot
 from tauscope.runtime import RunOptions, RunRecord, RunState, run_trajectory
-from tauscope.runtime.backends import Connection
-from tauscope_drivers.canopen import CanopenArm
+from tauscope.runtime.drivers import Connection
+from tauscope_drivers.canopen.arm import CanopenArm
 from tauscope_sim.canopen_bus.order import CanOrder
 from tauscope_sim.emulation import EmulatorProcess, FaultKind, InjectedFault
 

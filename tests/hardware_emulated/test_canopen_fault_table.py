@@ -14,7 +14,7 @@ from hardware_emulated.fault_runs import Site, fault_site
 from hardware_emulated.fault_table import FaultTable
 from hardware_emulated.stepped_clock import SteppedClock
 from tauscope.robot import Robot
-from tauscope_drivers.canopen import CanopenArm
+from tauscope_drivers.canopen.arm import CanopenArm
 from tauscope_sim.canopen_bus.order import CanOrder
 from tauscope_sim.emulation import FaultKind
 

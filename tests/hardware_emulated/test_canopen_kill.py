@@ -22,7 +22,7 @@ from tauscope.robot import read_robot
 from tauscope.runtime import BackendOrder, RunOptions, RunOrder, RunState, recover_runs
 from tauscope.runtime.run_process import RunProcess
 from tauscope.trajectory import write_trajectory
-from tauscope_drivers.canopen import CanopenArm
+from tauscope_drivers.canopen.arm import CanopenArm
 from tauscope_sim.canopen_bus.order import CanOrder
 from tauscope_sim.emulation.process import EmulatorProcess
 

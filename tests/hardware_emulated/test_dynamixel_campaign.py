@@ -27,10 +27,9 @@ from tauscope.identification import document, identify
 from tauscope.recording import read_recording
 from tauscope.robot import read_robot
 from tauscope.runtime import RunOptions, RunRecord, RunState, run_trajectory
-from tauscope.runtime.backends import Connection
-from tauscope.runtime.dynamixel_bus import dynamixel_joints
+from tauscope.runtime.drivers import Connection, find_driver, to_drive_joints
 from tauscope_drivers import ControlMode, StopPolicy
-from tauscope_drivers.dynamixel import DynamixelArm
+from tauscope_drivers.dynamixel.arm import DynamixelArm
 from tauscope_sim.dynamixel_bus import DynamixelOrder
 from tauscope_sim.dynamixel_bus.robot_servos import servos_of
 from tauscope_sim.emulation import EmulatorProcess, FaultKind, InjectedFault
@@ -81,7 +80,9 @@ def play(
         stepped=True,
     )
     with EmulatorProcess(order) as emulator:
-        backend = DynamixelArm(dynamixel_joints(robot), slack_s=0.5, clock=make_clock(emulator))
+        backend = DynamixelArm(
+            to_drive_joints(find_driver("dynamixel"), robot), slack_s=0.5, clock=make_clock(emulator)
+        )
         emulator.inject(*faults)
         return run_trajectory(
             robot,

@@ -17,9 +17,9 @@ from kills import killed_often
 from tauscope.excitation import ExcitationOptions, design_excitation
 from tauscope.robot import Robot, read_robot
 from tauscope.runtime import BackendOrder, RunOptions, RunOrder, RunProcess, RunState
-from tauscope.runtime.dynamixel_bus import dynamixel_joints
+from tauscope.runtime.drivers import find_driver, to_drive_joints
 from tauscope.trajectory import write_trajectory
-from tauscope_drivers.dynamixel import DynamixelArm
+from tauscope_drivers.dynamixel.arm import DynamixelArm
 from tauscope_sim.dynamixel_bus import DynamixelOrder
 from tauscope_sim.dynamixel_bus.robot_servos import servos_of
 from tauscope_sim.emulation import EmulatorProcess
@@ -115,7 +115,7 @@ def refuse_until_acknowledged(site: Site) -> None:
     assert "(watchdog)" in record.problem.detail
     assert "acknowledge" in record.problem.detail
     assert np.abs(np.array(site.bench.emulator.state["position"]) - before).max() < 1e-3
-    arm = DynamixelArm(dynamixel_joints(site.robot), slack_s=SLACK_S)
+    arm = DynamixelArm(to_drive_joints(find_driver("dynamixel"), site.robot), slack_s=SLACK_S)
     assert arm.connect().faults
     assert not arm.acknowledge_faults().faults
     arm.disconnect()

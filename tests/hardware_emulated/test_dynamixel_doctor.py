@@ -7,15 +7,20 @@ import pytest
 
 from hardware_emulated.dynamixel_bench import SLACK_S, Bench, bench, limits
 from tauscope_drivers import ControlMode, DriverError
-from tauscope_drivers.dynamixel import DynamixelJoint, examine, plan_frames, scan_bus
+from tauscope_drivers.drive_block import DriveJoint
+from tauscope_drivers.dynamixel.doctor import examine, scan_bus
+from tauscope_drivers.dynamixel.dry_run import plan_frames
 from tauscope_drivers.dynamixel.packets import FrameParser
-from tauscope_drivers.inspection import PHASES, FoundDevice, Severity
+from tauscope_drivers.inspection import PHASES, FoundDevice, FrameRequest, Severity
 from tauscope_sim.dynamixel_bus import ServoSpecification
 from tauscope_sim.emulation import FaultKind, InjectedFault
 
 
-def joints(one: Bench, torque_constant: float | None = 0.01) -> list[DynamixelJoint]:
-    return [DynamixelJoint(f"joint{number}", drive, torque_constant) for number, drive in enumerate(one.drives, 1)]
+def joints(one: Bench, torque_constant: float | None = 0.01) -> list[DriveJoint]:
+    return [
+        DriveJoint(f"joint{number}", drive, torque_per_unit=torque_constant)
+        for number, drive in enumerate(one.drives, 1)
+    ]
 
 
 def test_sound_arm_has_no_failures(tmp_path: Path) -> None:
@@ -41,7 +46,7 @@ def test_every_finding_comes_with_a_remedy(tmp_path: Path) -> None:
     )
     with bench(tmp_path, servos) as one:
         one.emulator.inject(InjectedFault(FaultKind.OVERLOAD, 2))
-        asked = [*joints(one, None), DynamixelJoint("joint4", {"id": 9}, None)]
+        asked = [*joints(one, None), DriveJoint("joint4", {"id": 9})]
         findings = examine(asked, slack_s=SLACK_S)
     troubles = [finding for finding in findings if finding.severity is not Severity.GOOD]
     assert all(finding.remedy for finding in troubles)
@@ -62,7 +67,7 @@ def test_every_finding_comes_with_a_remedy(tmp_path: Path) -> None:
 
 
 def test_port_that_is_missing_or_held_is_a_finding(tmp_path: Path) -> None:
-    (finding,) = examine([DynamixelJoint("joint1", {"id": 1, "port": str(tmp_path / "none")})])
+    (finding,) = examine([DriveJoint("joint1", {"id": 1, "port": str(tmp_path / "none")})])
     assert (finding.severity, finding.detail) == (Severity.FAILURE, f"port {tmp_path / 'none'} is not there")
     with bench(tmp_path) as one:
         one.arm().connect()
@@ -90,9 +95,10 @@ def test_slow_and_fast_rates_work(tmp_path: Path, baud: int) -> None:
 @pytest.mark.parametrize("mode", list(ControlMode))
 def test_dry_run_plans_what_a_run_sends(tmp_path: Path, mode: ControlMode) -> None:
     named = [
-        DynamixelJoint(f"joint{n}", {"id": n, "port": "/dev/none", "model": "XM430-W350"}, 0.01) for n in (1, 2, 3)
+        DriveJoint(f"joint{n}", {"id": n, "port": "/dev/none", "model": "XM430-W350"}, torque_per_unit=0.01)
+        for n in (1, 2, 3)
     ]
-    planned = list(plan_frames(named, mode, limits(3), 0.1, np.zeros((2, 3))))
+    planned = list(plan_frames(named, FrameRequest(mode, limits(3), 0.1, np.zeros((2, 3)))))
     assert [frame.phase for frame in planned] == sorted((frame.phase for frame in planned), key=PHASES.index)
     for frame in planned:
         raw = bytes.fromhex(frame.wire)
@@ -103,6 +109,6 @@ def test_dry_run_plans_what_a_run_sends(tmp_path: Path, mode: ControlMode) -> No
 
 
 def test_dry_run_needs_the_models() -> None:
-    unnamed = [DynamixelJoint("j", {"id": 1, "port": "p"})]
+    unnamed = [DriveJoint("j", {"id": 1, "port": "p"})]
     with pytest.raises(DriverError, match=r"drive\.model is missing"):
-        list(plan_frames(unnamed, ControlMode.POSITION, limits(1), 0.1, np.zeros((1, 1))))
+        list(plan_frames(unnamed, FrameRequest(ControlMode.POSITION, limits(1), 0.1, np.zeros((1, 1)))))

@@ -13,8 +13,8 @@ from hardware_emulated.fault_runs import Site, fault_site
 from hardware_emulated.fault_table import FaultTable
 from hardware_emulated.stepped_clock import SteppedClock
 from tauscope.robot import Robot
-from tauscope.runtime.dynamixel_bus import dynamixel_joints
-from tauscope_drivers.dynamixel import DynamixelArm
+from tauscope.runtime.drivers import find_driver, to_drive_joints
+from tauscope_drivers.dynamixel.arm import DynamixelArm
 from tauscope_sim.dynamixel_bus import DynamixelOrder
 from tauscope_sim.dynamixel_bus.robot_servos import servos_of
 from tauscope_sim.emulation import FaultKind
@@ -34,7 +34,9 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
 
 
 def arm_of(site: Site) -> DynamixelArm:
-    return DynamixelArm(dynamixel_joints(site.robot), slack_s=0.1, clock=SteppedClock(site.emulator))
+    return DynamixelArm(
+        to_drive_joints(find_driver("dynamixel"), site.robot), slack_s=0.1, clock=SteppedClock(site.emulator)
+    )
 
 
 TABLE = FaultTable(

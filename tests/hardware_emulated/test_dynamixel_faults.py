@@ -8,7 +8,7 @@ import pytest
 
 from hardware_emulated.dynamixel_bench import WATCHDOG_S, Bench, drive, limits, setpoint
 from tauscope_drivers import ArmState, ControlMode, DriverError, StopPolicy
-from tauscope_drivers.dynamixel import DynamixelArm
+from tauscope_drivers.dynamixel.arm import DynamixelArm
 from tauscope_sim.emulation import FaultKind, InjectedFault
 
 pytestmark = pytest.mark.realtime

@@ -12,7 +12,7 @@ import pytest
 
 from hardware_emulated.dynamixel_bench import WATCHDOG_S, Bench, drive, limits, setpoint
 from tauscope_drivers import ControlMode, DriverError, StopPolicy
-from tauscope_drivers.dynamixel import DynamixelArm
+from tauscope_drivers.dynamixel.arm import DynamixelArm
 from tauscope_drivers.errors import DriverErrorKind
 
 pytestmark = pytest.mark.realtime
@@ -133,9 +133,10 @@ import sys
 import numpy as np
 sys.path[:0] = [{tests!r}]
 from tauscope_drivers import ControlMode, StopPolicy
-from tauscope_drivers.dynamixel import DynamixelArm, DynamixelJoint
+from tauscope_drivers.dynamixel.arm import DynamixelArm
+from tauscope_drivers.drive_block import DriveJoint
 from hardware_emulated.dynamixel_bench import drive, limits, setpoint
-joints = [DynamixelJoint(f"joint{{n}}", {{"id": n, "port": {port!r}}}, 0.01) for n in (1, 2, 3)]
+joints = [DriveJoint(f"joint{{n}}", {{"id": n, "port": {port!r}}}, torque_per_unit=0.01) for n in (1, 2, 3)]
 arm = DynamixelArm(joints, slack_s=0.03)
 arm.connect()
 arm.enable(ControlMode.POSITION, limits(3), StopPolicy.HOLD, {watchdog!r})

@@ -16,8 +16,8 @@ from runtime.doubles import PointArm, VirtualClock
 from tauscope.recording.journal_rows import JournalHeader
 from tauscope.robot import Robot
 from tauscope.runtime import recorder as recorder_module
-from tauscope.runtime.backends import Connection
 from tauscope.runtime.control import control
+from tauscope.runtime.drivers import Connection
 from tauscope.runtime.in_process import open_recorder
 from tauscope.runtime.recorder import Recorder, RecorderProcess
 from tauscope.runtime.states import Stops
@@ -38,9 +38,9 @@ class RealClock(VirtualClock):
         return self._clock.wait_until_ns(deadline_ns)
 
 
-def double(robot: Robot, settings: Mapping[str, Any], folder: Path | None) -> Connection:
+def double(name: str, robot: Robot, settings: Mapping[str, Any], *, folder: Path | None = None) -> Connection:
     """Keys: `block` and `crash` name calls; `slow` maps calls to seconds; `virtual` keeps virtual time."""
-    del robot, folder
+    del name, robot, folder
     virtual = bool(settings.get("virtual"))
     arm = PointArm(position=np.array([0.2, 0.1]), clock=VirtualClock() if virtual else RealClock())
     if "block" in settings:
@@ -66,4 +66,4 @@ def stuck_recorder(path: Path, header: JournalHeader, stops: Stops, is_real_time
 
 if __name__ == "__main__":
     disk = stuck_recorder if os.environ.get("STUCK_DISK") else open_recorder
-    sys.exit(control(Path(sys.argv[1]), backends={"double": double}, recorder=disk))
+    sys.exit(control(Path(sys.argv[1]), make=double, recorder=disk))

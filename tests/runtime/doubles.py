@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from arms import dh_segment
 from tauscope.robot import Joint, JointLimits, LinkInertia, Robot
-from tauscope.runtime.backends import Connection
+from tauscope.runtime.drivers import Connection
 from tauscope.trajectory import FourierSegment, FourierSeries, Trajectory
 from tauscope_drivers import ArmState, Capabilities, ControlMode, DriveLimits, DriverError, Fault, Setpoint, StopPolicy
 from tauscope_drivers.errors import DriverErrorKind

@@ -12,10 +12,15 @@ from emulated_data_sheet import GAIN, sections, write_file
 from tauscope.errors import AcquisitionError
 from tauscope.robot import Robot
 from tauscope.runtime import RunOptions
-from tauscope.runtime.backends import make_backend
-from tauscope.runtime.dynamixel_bus import dynamixel_joints
-from tauscope.runtime.field_bus import FrameRequest
-from tauscope.runtime.field_buses import bus_of, find_bus
+from tauscope.runtime.drivers import (
+    FrameRequest,
+    PlannedFrame,
+    find_bus,
+    make_backend,
+    select_bus,
+    to_drive_joints,
+    translate_driver_errors,
+)
 from tauscope.runtime.options import choose_rate_hz, chosen_stop_policy
 from tauscope_drivers import Capabilities, ControlMode, DriveLimits, StopPolicy
 
@@ -45,20 +50,24 @@ def drive_arm(folder: Path, **second: Any) -> Robot:
 
 
 def refusal(call, *arguments: Any) -> str:
-    with pytest.raises(AcquisitionError) as caught:
+    with pytest.raises(AcquisitionError) as caught, translate_driver_errors():
         call(*arguments)
     assert "\n" not in str(caught.value)
     return str(caught.value)
 
 
+def frames_of(robot: Robot, bus: str, request: FrameRequest) -> list[PlannedFrame]:
+    return list(find_bus(bus).plan_frames(to_drive_joints(find_bus(bus), robot), request))
+
+
 def test_the_bus_that_the_drive_blocks_speak_of_is_found() -> None:
-    assert bus_of(servo_arm()).name == "dynamixel"
-    assert "no joint has a drive block" in refusal(bus_of, paper_arm())
+    assert select_bus(servo_arm()).name == "dynamixel"
+    assert "no joint has a drive block" in refusal(select_bus, paper_arm())
     assert "did you mean 'dynamixel'" in refusal(find_bus, "dynamixl")
 
 
 def test_sign_and_torque_constant_reach_the_driver_and_a_missing_one_does_not() -> None:
-    constants = [joint.torque_per_milliampere for joint in dynamixel_joints(servo_arm())]
+    constants = [joint.torque_per_unit for joint in to_drive_joints(find_bus("dynamixel"), servo_arm())]
     assert constants == [-0.002, 0.002, None]
     backend = make_backend("dynamixel", servo_arm(), {})
     assert backend.is_real_time
@@ -67,7 +76,7 @@ def test_sign_and_torque_constant_reach_the_driver_and_a_missing_one_does_not() 
 
 
 def test_the_port_may_be_another_one_than_the_robot_files() -> None:
-    joints = dynamixel_joints(servo_arm(), "/dev/other")
+    joints = to_drive_joints(find_bus("dynamixel"), servo_arm(), {"port": "/dev/other"})
     assert joints[0].drive["port"] == "/dev/other"
     assert "port" not in joints[1].drive
 
@@ -91,12 +100,12 @@ def test_what_cannot_be_a_backend_is_refused(robot: Robot, settings: dict[str, A
 def test_frames_of_a_dry_run_come_without_a_port() -> None:
     limits = DriveLimits(np.full(3, -2.0), np.full(3, 2.0), np.full(3, 1.0), np.full(3, np.inf))
     request = FrameRequest(ControlMode.POSITION, limits, 0.1, np.zeros((2, 3)))
-    frames = list(find_bus("dynamixel").planned_frames(servo_arm(), request))
+    frames = frames_of(servo_arm(), "dynamixel", request)
     assert [frame.phase for frame in frames if frame.phase == "cycle"] == ["cycle"] * 6
     nameless = replace(servo_arm().joints[0], drive={"id": 1, "port": "p"})
     robot = servo_arm()
     robot = replace(robot, joints=(nameless, *robot.joints[1:]))
-    assert "drive.model is missing" in refusal(list, find_bus("dynamixel").planned_frames(robot, request))
+    assert "drive.model is missing" in refusal(frames_of, robot, "dynamixel", request)
 
 
 def test_a_drives_data_sheet_is_looked_up_beside_the_robot_file(tmp_path: Path) -> None:
@@ -108,13 +117,13 @@ def test_a_drives_data_sheet_is_looked_up_beside_the_robot_file(tmp_path: Path) 
     make_backend("canopen", robot, {})
     limits = DriveLimits(np.full(3, -2.0), np.full(3, 2.0), np.full(3, 1.0), np.full(3, 1.0))
     request = FrameRequest(ControlMode.POSITION, limits, 0.1, np.zeros((1, 3)))
-    meanings = [frame.meaning for frame in find_bus("canopen").planned_frames(robot, request)]
+    meanings = [frame.meaning for frame in frames_of(robot, "canopen", request)]
     assert "joint 2 (node 2): Gain (0x2001:00) := 250" in meanings
     del content["6064"]
     assert write_file(tmp_path / "files", content, "drive.dcf") == path
     words = f"joint2: drive.eds = {path!r}: Position actual value (0x6064:00) is missing"
     assert words in refusal(make_backend, "canopen", robot, {})
-    assert words in refusal(find_bus("canopen").examine, robot)
+    assert words in refusal(find_bus("canopen").examine, to_drive_joints(find_bus("canopen"), robot))
     assert "there is no such file" in refusal(make_backend, "canopen", drive_arm(tmp_path / "files", eds="arm.eds"), {})
     assert "drive.eds = 3; give the path" in refusal(make_backend, "canopen", drive_arm(tmp_path, eds=3), {})
 

@@ -11,9 +11,8 @@ from contextlib import nullcontext
 import can
 import canopen
 
-from tauscope_drivers.canopen.claim import BusClaim, ClaimedError
 from tauscope_drivers.canopen.configuration import BusConfiguration
-from tauscope_drivers.canopen.interfaces import ONE_PROCESS, open_interface
+from tauscope_drivers.canopen.interfaces import ONE_PROCESS, BusClaim, ClaimedError, open_interface
 from tauscope_drivers.canopen.sdo import NodeDictionary, PumpedSdoClient
 from tauscope_drivers.canopen.serial_adapter import SerialAdapterBus
 from tauscope_drivers.clock import Clock, MonotonicClock
@@ -123,11 +122,6 @@ class CanBus:
 
     def receive(self, deadline_ns: int) -> bool:
         """Wait for one frame and hand it to its handler; the heartbeat is sent meanwhile when it is due.
-
-        Parameters
-        ----------
-        deadline_ns : int
-            monotonic instant until which to wait [ns]
 
         Returns
         -------

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 LARGEST_LOAD = 0.8
-"""Share of the bus that cyclic frames may take; the rest is for heartbeats, emergencies and service data."""
+"""Share of the bus that cyclic frames may take; the rest is for heartbeats, emergencies and SDOs."""
 
 ASCII_FRAME_BYTES = 22
 """Characters of an 8-byte frame in the serial-line CAN protocol (slcan): ``t`` + 3 + 1 + 16 + return."""
@@ -50,8 +50,6 @@ def largest_rate_hz(nodes: int, frames: CycleFrames, bit_rate: float, serial_bau
 
     Parameters
     ----------
-    bit_rate : float
-        of the bus [bit/s]
     serial_baud : float or None
         of the adapter's serial line at 10 bits a byte [bit/s]; None where it is none (a USB CDC adapter ignores it)
 
@@ -69,8 +67,6 @@ def rate_limit(nodes: int, frames: CycleFrames, bit_rate: float, serial_baud: fl
 
     Parameters
     ----------
-    bit_rate : float
-        of the bus [bit/s]
     serial_baud : float or None
         of the adapter's serial line [bit/s]; None where it is none
     """

@@ -11,16 +11,16 @@ from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.bus import MASTER_NODE
 from tauscope_drivers.canopen.data_sheet.device_file import DeviceFile
 from tauscope_drivers.canopen.data_sheet.settings import Setting, settings_of
-from tauscope_drivers.canopen.interpolation import interpolation_period
 from tauscope_drivers.canopen.node import MODES, DriveNode
-from tauscope_drivers.canopen.pdo import PdoLayout, mapping_entries
 from tauscope_drivers.canopen.process_data import (
     MOTION_PDO,
     RECEIVED_ID,
     SENT_IDS,
     STATE_PDO,
     TARGET_PDOS,
+    PdoLayout,
     PdoParameters,
+    mapping_entries,
     received_parameters,
     sent_parameters,
 )
@@ -107,12 +107,10 @@ def commission_drive(
     watchdog_s: float,
     cycle_s: float | None,
 ) -> None:
-    """Write all of it by service data; each value is read back.
+    """Write all of it by SDO; each value is read back.
 
     Parameters
     ----------
-    watchdog_s : float
-        time without the master's heartbeat after which the drive stops [s]
     cycle_s : float or None
         time between two SYNCs; the drive keeps the one that it knows where None [s]
 
@@ -169,7 +167,7 @@ def _tell_cycle(node: DriveNode, cycle_s: float) -> None:
 
 
 def _map(node: DriveNode, places: PdoParameters, identifier: int, layout: PdoLayout) -> None:
-    """Write a PDO's parameters by explicit service data, in the order that CiA 301 asks for."""
+    """Write a PDO's parameters by explicit SDOs, in the order that CiA 301 asks for."""
     number, write = node.configuration.node_id, node.dictionary.write
     write(places.identifier, _PDO_OFF | identifier + number)
     write(places.kind, _EVERY_SYNC)
@@ -186,3 +184,33 @@ def _map(node: DriveNode, places: PdoParameters, identifier: int, layout: PdoLay
     else:
         raise DriverError(DriverErrorKind.REFUSED, f"{node.place}: {strange[0]} is not kept; its PDOs are fixed")
     write(places.identifier, identifier + number)
+
+
+_PERIOD_EXPONENTS = range(-3, -7, -1)
+"""Milliseconds first: some drives know nothing else."""
+
+_LARGEST_PERIOD = 0xFF
+_ROUNDING = 1e-6
+
+
+def interpolation_period(cycle_s: float) -> tuple[int, int]:
+    """Value and exponent (0x60C2) of a cycle, value · 10^exponent seconds: exact where possible, else the nearest.
+
+    A drive moves to a target within this time: too short a time makes a halt at every target, too long a time a lag.
+
+    Raises
+    ------
+    ValueError
+        the cycle is shorter or longer than the object can tell
+    """
+    best: tuple[float, int, int] | None = None
+    for exponent in _PERIOD_EXPONENTS:
+        value = round(cycle_s / 10.0**exponent)
+        if not 1 <= value <= _LARGEST_PERIOD:
+            continue
+        error = abs(value * 10.0**exponent / cycle_s - 1.0)
+        if best is None or error < best[0] - _ROUNDING:
+            best = (error, value, exponent)
+    if best is None:
+        raise ValueError(f"a cycle of {cycle_s:g} s is not between 1 µs and {_LARGEST_PERIOD} ms")
+    return best[1:]

@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import Any
 
 from tauscope_drivers.backend import ControlMode
-from tauscope_drivers.canopen.data_sheet.device_file import DeviceFile, read_device_file
+from tauscope_drivers.canopen.data_sheet.device_file import DataSheetError, DeviceFile, read_device_file
 from tauscope_drivers.canopen.data_sheet.needs import require_needed, require_target
 from tauscope_drivers.canopen.data_sheet.settings import settings_of
-from tauscope_drivers.canopen.data_sheet.text import DataSheetError
 from tauscope_drivers.canopen.interfaces import OWN_OPTIONS
 from tauscope_drivers.drive_block import (
+    DriveJoint,
     read_direction,
     read_positive,
     read_text,
@@ -31,15 +31,6 @@ from tauscope_drivers.errors import DriverError, DriverErrorKind
 _HIGHEST_NODE = 127
 _BUS_KEYS = ("interface", "channel", "bit_rate", "serial_baud", "options")
 _NODE_KEYS = ("node_id", "counts_per_turn", "zero_count", "direction", "rated_torque_nm", "eds")
-
-
-@dataclass(frozen=True)
-class DriveJoint:
-    """A joint as the driver sees it."""
-
-    name: str
-    gear_ratio: float
-    drive: Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -63,8 +54,6 @@ class NodeConfiguration:
 class BusConfiguration:
     """The bus and the drives on it, in the order of the joints.
 
-    bit_rate : int
-        [bit/s]
     serial_baud : float or None
         of an adapter on a true serial line [bit/s]
     """
@@ -79,11 +68,6 @@ class BusConfiguration:
 
 def read_configuration(joints: Sequence[DriveJoint]) -> BusConfiguration:
     """Bus and drives of an arm.
-
-    Parameters
-    ----------
-    joints : sequence of DriveJoint
-        base first
 
     Raises
     ------

@@ -1,241 +1,67 @@
-"""An arm of CiA 402 drives on one CAN bus, as a backend: the order of calls, and what a cycle is made of."""
+"""The driver of CiA 402 drives on CANopen, as the registry finds it."""
 
-import math
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
-import can
-
-from tauscope_drivers.backend import Capabilities, ControlMode, DriveLimits, StopPolicy
-from tauscope_drivers.canopen.bus import NMT_PRE_OPERATIONAL, NMT_START, CanBus
-from tauscope_drivers.canopen.commissioning import commission_drive, write_settings
-from tauscope_drivers.canopen.configuration import BusConfiguration, DriveJoint, read_configuration, require_targets
-from tauscope_drivers.canopen.emergency import HEARTBEAT_LOST
-from tauscope_drivers.canopen.enabling import power_up
-from tauscope_drivers.canopen.node import DriveNode
-from tauscope_drivers.canopen.observation import blind_state, listed
-from tauscope_drivers.canopen.session import Session, possible_rate_hz, rate_limited_by
-from tauscope_drivers.canopen.state_machine import Goal
-from tauscope_drivers.canopen.stopping import (
-    POLICY_GOALS,
-    dropped_faults,
-    reset_faults,
-    stop_in_cycle,
-    stop_one_by_one,
-    stop_promptly,
-)
-from tauscope_drivers.canopen.target_limiter import TargetLimiter
-from tauscope_drivers.clock import Clock, MonotonicClock
-from tauscope_drivers.errors import DriverError, DriverErrorKind, Fault
-from tauscope_drivers.limits import RunawayWatch, require_finite, require_sensible
-from tauscope_drivers.state import ArmState, Setpoint
-
-WATCHDOG_RANGE_S = (0.02, 5.0)
-HEARTBEATS_A_WATCHDOG = 10
-"""The master beats so often within a drive's watchdog time: one lost frame stops nothing."""
-
-PATIENCE_S = 0.002
-"""Time that drives and adapter may take to answer SYNC, beyond twice that of the frames on the wire."""
+from tauscope_drivers.drive_block import DriveJoint
+from tauscope_drivers.driver import PATIENCE, ArmDescription, BusDriver, Connection, Option
+from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.inspection import Finding, FoundDevice, FrameRequest, PlannedFrame
 
 
-class CanopenArm:
-    """CiA 402 drives in cyclic synchronous position or torque mode; implements `drivers.Backend`.
+class CanopenDriver(BusDriver):
+    """Implements `BusDriver`."""
 
-    In each cycle the targets of all nodes go out, then SYNC, and the answers that SYNC asks for are collected. RPDOs
-    are taken over and TPDOs sampled at SYNC, so that all joints are read at one instant.
-    """
+    name = "canopen"
+    titles = {"en": "CANopen drives", "de": "CANopen-Antriebe"}  # noqa: RUF012 - never changed
+    options = (
+        Option("interface", "interface of python-can, in place of the robot file's"),
+        Option("channel", "its channel, in place of the robot file's"),
+        PATIENCE,
+    )
+    file_keys = ("eds",)
+    block_example = "{node_id: 1, ...}"
+    port_help = "INTERFACE:CHANNEL of python-can"
+    bus_options = ("interface", "channel")
 
-    def __init__(
-        self,
-        joints: Sequence[DriveJoint],
-        bus: can.BusABC | None = None,
-        *,
-        patience_s: float = PATIENCE_S,
-        clock: Clock | None = None,
-    ) -> None:
-        """Check the configuration; nothing is opened yet.
+    def is_meant(self, block: Mapping[str, Any]) -> bool:
+        """Whether it has a ``node_id``."""
+        return "node_id" in block
 
-        Parameters
-        ----------
-        joints : sequence of DriveJoint
-            base first
-        patience_s : float
-            how much longer than the bus takes an answer is waited for [s]
+    def make_backend(self, arm: ArmDescription, settings: Mapping[str, Any]) -> Connection:
+        """The arm in real time."""
+        from tauscope_drivers.canopen.arm import CanopenArm
 
-        Raises
-        ------
-        DriverError
-            ``refused``: the configuration is not usable; names the joint and the key
-        """
-        self._configuration = read_configuration(joints)
-        self._given_bus = bus
-        self._patience_s = patience_s
-        self._session: Session | None = None
-        self._modes = frozenset(ControlMode)
-        self._mode: ControlMode | None = None
-        self._policy = StopPolicy.HOLD
-        self._limiter: TargetLimiter | None = None
-        self._runaway: RunawayWatch | None = None
-        self._caught: Fault | None = None
-        self.clock = clock or MonotonicClock()
+        return Connection(CanopenArm(arm.joints, patience_s=self.read_patience_s(settings)), is_real_time=True)
 
-    @property
-    def configuration(self) -> BusConfiguration:
-        """Bus and drives."""
-        return self._configuration
+    def list_adapters(self) -> list[Finding]:
+        """CAN interfaces of this machine."""
+        from tauscope_drivers.canopen.doctor import can_interfaces
 
-    @property
-    def capabilities(self) -> Capabilities:
-        """What bus and drives can do; the modes are the drives' own once connected."""
-        return Capabilities(
-            joint_count=len(self._configuration.nodes),
-            modes=self._modes,
-            stop_policies=frozenset(POLICY_GOALS),
-            largest_rate_hz=possible_rate_hz(self._configuration),
-            watchdog_range_s=WATCHDOG_RANGE_S,
-            takes_feed_forward=False,
-            rate_limited_by=rate_limited_by(self._configuration),
-            holds_before_torque=False,
-        )
+        return can_interfaces()
 
-    def connect(self) -> ArmState:
-        """Open the bus, make sure that every node is a drive, and read it by service data."""
-        if self._session is not None:
-            raise DriverError(DriverErrorKind.CANNOT_CONNECT, "the arm is connected already; disconnect it first")
-        session = self._session = self._open()
-        try:
-            session.bus.command_nodes(NMT_PRE_OPERATIONAL)
-            self._modes = frozenset.intersection(*(node.identify() for node in session.nodes))
-        except DriverError:
-            self.disconnect()
-            raise
-        return session.read_by_service_data()
+    def examine(self, joints: Sequence[DriveJoint]) -> list[Finding]:
+        """Bus, and every drive that the robot file names."""
+        from tauscope_drivers.canopen.doctor import examine
 
-    def acknowledge_faults(self) -> ArmState:
-        """Reset drives in fault, once, and forget emergencies; a drive that holds goes on holding."""
-        session = self._reached()
-        self._mode = None
-        state = reset_faults(session)
-        if state.faults:
-            raise DriverError(DriverErrorKind.FAULT, f"still in fault: {listed(state.faults)}", state.faults)
-        return state
+        return examine(joints)
 
-    def enable(
-        self,
-        mode: ControlMode,
-        limits: DriveLimits,
-        stop_policy: StopPolicy,
-        watchdog_s: float,
-        cycle_s: float | None = None,
-    ) -> ArmState:
-        """Configure and commission every drive, arm its heartbeat consumer, take all to *operation enabled* together.
+    def scan(self, port: str, bit_rates: Sequence[int] | None) -> Iterator[FoundDevice]:
+        """Nodes that answer when they are asked for their device type."""
+        from tauscope_drivers.canopen.doctor import scan_bus
 
-        Parameters
-        ----------
-        watchdog_s : float
-            time without the master's heartbeat after which the drives stop [s]
-        cycle_s : float or None
-            time between two SYNCs, over which the drives interpolate; they keep the one that they know where None [s]
-        """
-        session = self._reached()
-        if self._mode is not None:
-            raise DriverError(DriverErrorKind.REFUSED, "the arm is enabled already; stop it first")
-        self._refuse_impossible(mode, stop_policy, watchdog_s)
-        for node in session.nodes:
-            if write_settings(node):
-                node.identify()
-        state = session.read_by_service_data()
-        require_sensible(limits, state.position, [node.place for node in session.nodes])
-        if state.faults:
-            raise DriverError(DriverErrorKind.FAULT, f"{listed(state.faults)}; acknowledge it first", state.faults)
-        session.learn_cycle(cycle_s)
-        session.bus.start_heartbeat(watchdog_s / HEARTBEATS_A_WATCHDOG)
-        try:
-            for node in session.nodes:
-                commission_drive(node, mode, limits, stop_policy, watchdog_s, cycle_s)
-            session.bus.command_nodes(NMT_START)
-            self._mode, self._policy = mode, stop_policy
-            state, place = power_up(session, mode)
-        except DriverError:
-            self.stop(stop_policy)
-            raise
-        for node in session.nodes:
-            node.leaps.limit = float(limits.velocity[node.joint - 1])
-        self._limiter = TargetLimiter(limits, place, session.settling_ns * 1e-9)
-        self._runaway = RunawayWatch(limits) if mode is ControlMode.TORQUE else None
-        return state
+        interface, _, channel = port.partition(":")
+        if not interface or not channel:
+            text = f"{port!r:.60} names no CAN bus; write INTERFACE:CHANNEL, as in socketcan:can0"
+            raise DriverError(DriverErrorKind.REFUSED, text)
+        return scan_bus(interface, channel, bit_rates)
 
-    def exchange(self, setpoint: Setpoint) -> ArmState:
-        """Targets out, SYNC, answers in; a node that does not answer in time leaves NaN."""
-        session = self._reached()
-        mode, limiter = self._mode, self._limiter
-        if mode is None or limiter is None:
-            raise DriverError(DriverErrorKind.NOT_ENABLED, "the drives are not enabled; enable the arm first")
-        require_finite(setpoint, len(session.nodes))
-        session.bus.drain()
-        if any(node.error_code == HEARTBEAT_LOST for node in session.nodes):
-            return session.read_by_service_data()  # such a drive takes no process data any more
-        goal = Goal.OPERATION_ENABLED if session.caught is None else Goal.QUICK_STOP
-        state = session.cycle(mode, goal, limiter.limited(setpoint, self.clock.now_ns()), session.answer_ns)
-        if self._runaway is not None and session.caught is None:
-            session.caught = self._runaway.look(state.position, state.velocity)
-        if goal is Goal.OPERATION_ENABLED and (session.caught is not None or state.faults):
-            # one drive's trouble becomes that of all: they stop together
-            return stop_promptly(session, mode, POLICY_GOALS[self._policy])
-        return state
+    def plan_frames(self, joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator[PlannedFrame]:
+        """The frames of a run, without a bus."""
+        from tauscope_drivers.canopen.dry_run import plan_frames
 
-    def stop(self, policy: StopPolicy) -> ArmState:
-        """Quick stop and hold, or ramp and let go; drives that are in such a state already stay as they are."""
-        session, mode = self._session, self._mode
-        if session is None:
-            return blind_state(self.clock.now_ns(), len(self._configuration.nodes))
-        goal = POLICY_GOALS.get(policy, Goal.QUICK_STOP)
-        for node in session.nodes:
-            node.leaps.limit = math.inf
-        self._mode, self._limiter, self._runaway = None, None, None
-        is_stopped = mode is not None and stop_in_cycle(session, mode, goal)
-        silent = stop_one_by_one(session.nodes, goal, is_stopped=is_stopped)
-        session.bus.start_heartbeat(0.0)
-        state = session.observe(self.clock.now_ns())
-        shall_hold = mode is not None and goal is Goal.QUICK_STOP and self._policy is policy
-        dropped = dropped_faults(session.nodes) if shall_hold else []
-        return replace(state, faults=(*state.faults, *silent, *dropped))
+        return plan_frames(joints, request)
 
-    def disconnect(self) -> None:
-        """Let go of the bus; drives under power are stopped by their policy first."""
-        session = self._session
-        if session is None:
-            return
-        try:
-            if self._mode is not None:
-                self.stop(self._policy)
-        finally:
-            session.bus.close()
-            self._caught = session.caught  # nobody has acknowledged it by reconnecting
-            self._session, self._mode = None, None
 
-    def _open(self) -> Session:
-        """Open the bus and listen to its drives."""
-        bus = CanBus(self._configuration, self._given_bus, self.clock)
-        nodes = tuple(DriveNode.on_bus(bus, node, joint) for joint, node in enumerate(self._configuration.nodes, 1))
-        answer_s = 2.0 / possible_rate_hz(self._configuration) + self._patience_s
-        return Session(bus, nodes, self.clock, round(answer_s * 1e9), self._caught)
-
-    def _refuse_impossible(self, mode: ControlMode, policy: StopPolicy, watchdog_s: float) -> None:
-        """Refuse what these drives cannot do, before anything is switched on."""
-        reason = None
-        if mode not in self._modes:
-            reason = f"not every drive has the cyclic synchronous {mode} mode (0x6502)"
-        elif policy not in POLICY_GOALS:
-            reason = f"drives cannot {policy} by themselves; choose hold or torque_off"
-        elif not WATCHDOG_RANGE_S[0] <= watchdog_s <= WATCHDOG_RANGE_S[1]:
-            reason = f"a watchdog of {watchdog_s:g} s is outside {WATCHDOG_RANGE_S[0]:g} to {WATCHDOG_RANGE_S[1]:g} s"
-        else:
-            require_targets(self._configuration, mode)
-        if reason is not None:
-            raise DriverError(DriverErrorKind.REFUSED, reason)
-
-    def _reached(self) -> Session:
-        if self._session is None:
-            raise DriverError(DriverErrorKind.NOT_CONNECTED, "the CAN bus is not open; connect first")
-        return self._session
+DRIVER = CanopenDriver()
+"""Found by the entry point ``tauscope.drivers``."""

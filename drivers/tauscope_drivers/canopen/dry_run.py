@@ -5,18 +5,19 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from tauscope_drivers.backend import ControlMode, DriveLimits, StopPolicy
+from tauscope_drivers.backend import ControlMode, StopPolicy
 from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.bus import HEARTBEAT_ID, MASTER_NODE, NMT_ID, NMT_PRE_OPERATIONAL, NMT_START, SYNC_ID
 from tauscope_drivers.canopen.commissioning import commission_drive, write_settings
-from tauscope_drivers.canopen.configuration import DriveJoint, NodeConfiguration, read_configuration, require_targets
+from tauscope_drivers.canopen.configuration import NodeConfiguration, read_configuration, require_targets
 from tauscope_drivers.canopen.node import DriveNode
 from tauscope_drivers.canopen.objects import DriveObject
 from tauscope_drivers.canopen.process_data import RECEIVED_ID
 from tauscope_drivers.canopen.state_machine import DriveState, Goal, next_controlword
 from tauscope_drivers.canopen.units import drive_units
+from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.errors import DriverError, DriverErrorKind
-from tauscope_drivers.inspection import PlannedFrame
+from tauscope_drivers.inspection import FrameRequest, PlannedFrame
 from tauscope_drivers.limits import require_sensible
 
 _TO_POWER = (DriveState.SWITCH_ON_DISABLED, DriveState.READY, DriveState.SWITCHED_ON)
@@ -77,35 +78,23 @@ class _PlannedDictionary:
         self.frames.append(_frame("enable", f"{self._label}: {meaning}", 0x600 + self.node_id, payload))
 
 
-def plan_frames(
-    joints: Sequence[DriveJoint],
-    mode: ControlMode,
-    limits: DriveLimits,
-    watchdog_s: float,
-    targets: NDArray[np.float64],
-    cycle_s: float | None = None,
-) -> Iterator[PlannedFrame]:
+def plan_frames(joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator[PlannedFrame]:
     """Frames of a connection, of enabling, of some cycles and of a stop, for drives that answer as they should.
 
-    Service data is shown as expedited transfers, and of more than four bytes by its first frame alone; heartbeats,
+    An SDO is shown as an expedited transfer, and one of more than four bytes by its first frame alone; heartbeats,
     which are sent as time passes, are shown once.
 
     Parameters
     ----------
     joints : sequence of DriveJoint
         base first; each ``drive`` block has to state ``rated_torque_nm``
-    watchdog_s : float
-        time of silence after which the drives stop [s]
-    targets : (K, n) float64
-        positions of the first K cycles; the arm is supposed to stand at the first of them [rad or m]
-    cycle_s : float or None
-        time between them, which drives are told; None where it is not known [s]
 
     Raises
     ------
     DriverError
         ``refused``: a ``drive`` block or a limit is not possible
     """
+    mode, limits, targets, cycle_s = request.mode, request.limits, request.targets, request.cycle_s
     configuration = read_configuration(joints)
     require_targets(configuration, mode)
     nodes = [_planned_node(number, wanted) for number, wanted in enumerate(configuration.nodes, 1)]
@@ -114,7 +103,7 @@ def plan_frames(
     for node, _ in nodes:
         write_settings(node)
     for node, dictionary in nodes:
-        commission_drive(node, mode, limits, StopPolicy.HOLD, watchdog_s, cycle_s)
+        commission_drive(node, mode, limits, StopPolicy.HOLD, request.watchdog_s, cycle_s)
         yield from dictionary.frames
     yield _frame("enable", "master: alive", HEARTBEAT_ID + MASTER_NODE, bytes([0x05]))
     yield _frame("enable", "all nodes: operational", NMT_ID, bytes([NMT_START, 0]))

@@ -13,7 +13,7 @@ SLACK_S = 0.002
 """How much later than the host thinks a drive may have sampled [s]."""
 
 
-class LeapFilter:
+class GlitchFilter:
     """Doubts a reading that is farther from the one before than its joint can have gone, or faster than it can go.
 
     One reading is doubted at a time: a joint that truly runs away, or whose encoder jumped, gives the next one too.

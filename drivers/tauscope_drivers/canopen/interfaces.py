@@ -1,8 +1,11 @@
-"""Opening any interface that python-can knows, with what it needs to be fit for a control loop."""
+"""Opening any interface that python-can knows, fit for a control loop, and claiming one that several may open."""
 
+import errno
 import socket
+import struct
 import sys
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import can
@@ -22,11 +25,6 @@ _CONNECT_S = 3.0
 
 def open_interface(interface: str, channel: str, bit_rate: int, options: Mapping[str, Any]) -> can.BusABC:
     """An interface by the name that python-can knows it by.
-
-    Parameters
-    ----------
-    bit_rate : int
-        [bit/s]
 
     Raises
     ------
@@ -55,3 +53,54 @@ def _open_daemon(channel: str, bit_rate: int, options: Mapping[str, Any]) -> can
     socket.create_connection((host, port), _CONNECT_S).close()
     tuned = {"tcp_tune": sys.platform == "linux", **options, "host": host, "port": port}
     return can.Bus(interface=_DAEMON, channel=channel, bitrate=bit_rate, **tuned)
+
+
+_PEER = struct.Struct("3i")
+"""The kernel's ``struct ucred``: process, user, group."""
+
+
+class ClaimedError(Exception):
+    """Another process has the claim; the message names it."""
+
+
+class BusClaim:
+    """Held from construction until `release`, or until the process ends, however it ends.
+
+    It is the name of a socket in the abstract namespace, which the kernel keeps for one process of this machine.
+    """
+
+    def __init__(self, interface: str) -> None:
+        """Claim.
+
+        Raises
+        ------
+        ClaimedError
+            another process has it
+        """
+        name = f"\0tauscope-can-{interface}"
+        self._socket = socket.socket(socket.AF_UNIX)
+        try:
+            self._socket.bind(name)
+        except OSError as error:
+            self._socket.close()
+            if error.errno != errno.EADDRINUSE:
+                raise
+            raise ClaimedError(_holder(name)) from error
+        self._socket.listen(1)
+
+    def release(self) -> None:
+        """Let another process have it."""
+        self._socket.close()
+
+
+def _holder(name: str) -> str:
+    """The process that has a name, as ``process 123 (name)``."""
+    with socket.socket(socket.AF_UNIX) as visitor:
+        visitor.setblocking(False)
+        try:
+            visitor.connect(name)
+            process, _, _ = _PEER.unpack(visitor.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _PEER.size))
+            command = Path("/proc", str(process), "comm").read_text(encoding="utf-8").strip()
+        except OSError:
+            return "another process"
+    return f"process {process} ({command})"

@@ -8,12 +8,19 @@ from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.bus import EMERGENCY_ID, HEARTBEAT_ID, NMT_OPERATIONAL_STATE, CanBus
 from tauscope_drivers.canopen.configuration import NodeConfiguration
-from tauscope_drivers.canopen.data_sheet.identity import require_identity
+from tauscope_drivers.canopen.data_sheet.needs import require_identity
 from tauscope_drivers.canopen.emergency import HEARTBEAT_LOST, decode_emergency, describe_error
-from tauscope_drivers.canopen.glitch_filter import LeapFilter
+from tauscope_drivers.canopen.glitch_filter import GlitchFilter
 from tauscope_drivers.canopen.objects import DriveObject
-from tauscope_drivers.canopen.pdo import PdoLayout, decode_pdo, encode_pdo
-from tauscope_drivers.canopen.process_data import MOTION_PDO, SENT_IDS, STATE_PDO, TARGET_PDOS
+from tauscope_drivers.canopen.process_data import (
+    MOTION_PDO,
+    SENT_IDS,
+    STATE_PDO,
+    TARGET_PDOS,
+    PdoLayout,
+    decode_pdo,
+    encode_pdo,
+)
 from tauscope_drivers.canopen.sdo import NodeDictionary
 from tauscope_drivers.canopen.state_machine import DriveState, Goal, decode_state, next_controlword
 from tauscope_drivers.canopen.units import DriveUnits, drive_units
@@ -62,7 +69,7 @@ class DriveNode:
     last_state: DriveState | None = None
     last_position: float = math.nan
     is_deaf: bool = False
-    leaps: LeapFilter = field(default_factory=LeapFilter)
+    glitches: GlitchFilter = field(default_factory=GlitchFilter)
 
     @staticmethod
     def on_bus(bus: CanBus, configuration: NodeConfiguration, joint: int) -> "DriveNode":
@@ -114,24 +121,18 @@ class DriveNode:
         return frozenset(mode for mode, number in MODES.items() if supported >> (number - 1) & 1)
 
     def remember(self, time_ns: int) -> None:
-        """Keep state and place of this cycle for cycles whose answer is lost; a frame that cannot be true is lost too.
-
-        Parameters
-        ----------
-        time_ns : int
-            when the drive was asked [ns]
-        """
+        """Keep state and place of this cycle for cycles without an answer; a frame that cannot be true is none."""
         self.measurement = measured = self._measured()
-        if not self.leaps.believes_place(measured.position, time_ns):
+        if not self.glitches.believes_place(measured.position, time_ns):
             self._forget(STATE_PDO)
         elif not math.isnan(measured.position):
             self.last_position = measured.position
-        if not self.leaps.believes_speed(measured.velocity):
+        if not self.glitches.believes_speed(measured.velocity):
             self._forget(MOTION_PDO)
         self.last_state = self.state or self.last_state
 
     def read_now(self) -> None:
-        """Fill `values` by service data: for an arm that is not in its cycle."""
+        """Fill `values` by SDO: for an arm that is not in its cycle."""
         self.values = {entry: self.dictionary.read(entry) for entry in (*STATE_PDO.objects, *MOTION_PDO.objects)}
         if self.values[objects.ERROR_CODE]:
             self.error_code = self.values[objects.ERROR_CODE]

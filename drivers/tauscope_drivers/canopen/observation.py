@@ -16,13 +16,7 @@ _UNDER_POWER = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
 
 
 def arm_state(nodes: Sequence[DriveNode], time_ns: int, caught: Fault | None) -> ArmState:
-    """What the nodes answered, in joint units; NaN where they did not.
-
-    Parameters
-    ----------
-    time_ns : int
-        instant of the reading [ns]
-    """
+    """What the nodes answered, in joint units; NaN where they did not."""
     measured = [node.measurement for node in nodes]
     return ArmState(
         time_ns=time_ns,
@@ -45,13 +39,7 @@ def arm_faults(nodes: Sequence[DriveNode], caught: Fault | None) -> tuple[Fault,
 
 
 def blind_state(time_ns: int, joint_count: int) -> ArmState:
-    """The state of an arm that nobody is connected to.
-
-    Parameters
-    ----------
-    time_ns : int
-        present instant [ns]
-    """
+    """The state of an arm that nobody is connected to."""
     unknown = np.full(joint_count, math.nan)
     return ArmState(time_ns, unknown, unknown, unknown, unknown, np.zeros(joint_count, dtype=np.bool_))
 

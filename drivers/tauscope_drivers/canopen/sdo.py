@@ -1,4 +1,4 @@
-"""Service data: a node's object dictionary, read and written; lost, late and doubled answers are made up for."""
+"""SDOs: a node's object dictionary, read and written; lost, late and doubled answers are made up for."""
 
 import time
 from collections.abc import Callable
@@ -34,18 +34,12 @@ class Pump(Protocol):
     """What takes frames off the bus and hands them to whoever waits for them."""
 
     def receive(self, deadline_ns: int) -> bool:
-        """Wait for one frame; False where none came.
-
-        Parameters
-        ----------
-        deadline_ns : int
-            monotonic instant until which to wait [ns]
-        """
+        """Wait for one frame; False where none came."""
         ...
 
 
 class NodeDictionary:
-    """The object dictionary of one node, read and written by service data."""
+    """The object dictionary of one node, read and written by SDO."""
 
     def __init__(self, client: SdoClient, node_id: int) -> None:
         """Reach a node; nothing is sent yet."""
@@ -205,5 +199,5 @@ class PumpedSdoClient(SdoClient):
         deadline = time.monotonic_ns() + round(SDO_TIMEOUT_S * 1e9)
         while self.responses.empty():
             if not self._pump.receive(deadline) and time.monotonic_ns() >= deadline:
-                raise SdoCommunicationError("no answer to a service data request")
+                raise SdoCommunicationError("no answer to an SDO request")
         return super().read_response()

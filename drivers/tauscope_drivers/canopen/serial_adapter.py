@@ -35,11 +35,6 @@ class SerialAdapterBus(slcanBus):
     def __init__(self, path: str, bit_rate: int) -> None:
         """Open the adapter, and the channel on it.
 
-        Parameters
-        ----------
-        bit_rate : int
-            of the bus [bit/s]
-
         Raises
         ------
         CanInitializationError

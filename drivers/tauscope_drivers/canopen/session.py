@@ -1,14 +1,14 @@
-"""The drives of an arm on an open bus, and the ways to ask them: in a cycle of process data, or by service data."""
+"""The drives of an arm on an open bus, and the ways to ask them: in a cycle of process data, or by SDO."""
 
 import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from statistics import median
 
 import numpy as np
 
 from tauscope_drivers.backend import ControlMode
-from tauscope_drivers.canopen.answer_time import AnswerTime
 from tauscope_drivers.canopen.bus import SYNC_ID, CanBus
 from tauscope_drivers.canopen.bus_budget import CycleFrames, largest_rate_hz, rate_limit
 from tauscope_drivers.canopen.configuration import BusConfiguration
@@ -19,6 +19,29 @@ from tauscope_drivers.canopen.state_machine import Goal
 from tauscope_drivers.clock import Clock
 from tauscope_drivers.errors import Fault
 from tauscope_drivers.state import ArmState, Array, Setpoint
+
+REMEMBERED = 31
+"""Answers by which it is known what is usual: adapters take their time, each its own."""
+
+
+class AnswerTime:
+    """Compares how long each answer took with what is usual on this bus and adapter."""
+
+    def __init__(self) -> None:
+        """Nothing is known yet, and nothing is late."""
+        self._taken_ns: deque[int] = deque(maxlen=REMEMBERED)
+
+    def late_ns(self, taken_ns: int) -> int:
+        """How much later than usual an answer came [ns].
+
+        Parameters
+        ----------
+        taken_ns : int
+            from SYNC to the last frame of the answer [ns]
+        """
+        self._taken_ns.append(taken_ns)
+        return max(0, taken_ns - round(median(self._taken_ns)))
+
 
 CYCLE_FRAMES = CycleFrames((TARGET_PDOS[ControlMode.POSITION].size,), (STATE_PDO.size, MOTION_PDO.size))
 
@@ -79,13 +102,7 @@ class Session:
         return stay_at(np.array([node.last_position for node in self.nodes]))
 
     def cycle(self, mode: ControlMode, goal: Goal, setpoint: Setpoint, answer_ns: int) -> ArmState:
-        """One cycle on the bus: targets out, SYNC, answers in.
-
-        Parameters
-        ----------
-        answer_ns : int
-            longest wait for the answers [ns]
-        """
+        """One cycle on the bus: targets out, SYNC, answers in."""
         pairs = zip(self.nodes, setpoint.position, setpoint.torque, strict=True)
         frames = [
             (RECEIVED_ID + node.configuration.node_id, node.target(mode, node.controlword(goal), float(q), float(tau)))
@@ -108,32 +125,20 @@ class Session:
         self.bus.beat()
         return replace(self.observe(stamp), late_ns=self.answer_time.late_ns(answered - stamp))
 
-    def read_by_service_data(self) -> ArmState:
+    def read_by_sdo(self) -> ArmState:
         """The arm as it stands, outside the cycle."""
         for node in self.nodes:
             node.read_now()
         return self.observe(self.clock.now_ns())
 
     def observe(self, time_ns: int) -> ArmState:
-        """The arm by what its drives sent since they were asked.
-
-        Parameters
-        ----------
-        time_ns : int
-            when they were asked [ns]
-        """
+        """The arm by what its drives sent since they were asked."""
         for node in self.nodes:
             node.remember(time_ns)
         return arm_state(self.nodes, time_ns, self.caught)
 
     def step_until(self, is_reached: Callable[[], bool], step: Callable[[], ArmState], within_s: float) -> ArmState:
-        """Go on stepping until something is reached or the time for it has passed; the last state.
-
-        Parameters
-        ----------
-        within_s : float
-            time for it [s]
-        """
+        """Go on stepping until something is reached or the time for it has passed; the last state."""
         deadline = self.clock.now_ns() + round(within_s * 1e9)
         state = step()
         while not is_reached() and self.clock.now_ns() < deadline:

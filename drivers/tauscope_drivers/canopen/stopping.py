@@ -46,7 +46,7 @@ def stop_in_cycle(session: Session, mode: ControlMode, goal: Goal) -> bool:
 def stop_promptly(session: Session, mode: ControlMode, goal: Goal) -> ArmState:
     """Tell all drives to stop within a cycle of the control loop, and again where one may not have heard it.
 
-    Those that missed the master have stopped by themselves and answer no SYNC: they are asked by service data, for
+    Those that missed the master have stopped by themselves and answer no SYNC: they are asked by SDO, for
     what they told last is from before.
     """
     still = session.standstill()
@@ -56,7 +56,7 @@ def stop_promptly(session: Session, mode: ControlMode, goal: Goal) -> ArmState:
             return state
         if all(node.is_deaf for node in session.nodes):
             break
-    return session.read_by_service_data() if any(node.is_deaf for node in session.nodes) else state
+    return session.read_by_sdo() if any(node.is_deaf for node in session.nodes) else state
 
 
 def stop_one_by_one(nodes: Sequence[DriveNode], goal: Goal, *, is_stopped: bool) -> list[Fault]:
@@ -113,4 +113,4 @@ def reset_faults(session: Session) -> ArmState:
         node.error_code, node.acknowledged_code = 0, node.values[objects.ERROR_CODE]
     # a drive whose cause persists needs a moment to be back in its fault
     session.clock.wait_until_ns(session.clock.now_ns() + session.settling_ns)
-    return session.step_until(lambda: not session.faults, session.read_by_service_data, RESET_S)
+    return session.step_until(lambda: not session.faults, session.read_by_sdo, RESET_S)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauscope_drivers.backend import DriveLimits
-from tauscope_drivers.cycle_grid import CycleGrid
+from tauscope_drivers.clock import CycleGrid
 from tauscope_drivers.limits import SPEED_MARGIN
 from tauscope_drivers.state import Setpoint
 
@@ -66,8 +66,6 @@ class TargetLimiter:
         ----------
         position : (n,) float64
             where the arm stands [rad or m]
-        cycle_s : float
-            time between two targets [s]
         """
         self._limits = limits
         rest, not_behind = np.zeros_like(position), np.zeros(len(position), dtype=np.bool_)
@@ -77,13 +75,7 @@ class TargetLimiter:
         self._grid = CycleGrid(cycle_s)
 
     def limited(self, setpoint: Setpoint, now_ns: int) -> Setpoint:
-        """The targets that may be sent now.
-
-        Parameters
-        ----------
-        now_ns : int
-            present instant [ns]
-        """
+        """The targets that may be sent now."""
         limits = self._limits
         cycles = self._grid.cycles_until(now_ns)
         if cycles > 0:

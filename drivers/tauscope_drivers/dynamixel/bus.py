@@ -10,8 +10,59 @@ from tauscope_drivers.dynamixel import packets
 from tauscope_drivers.dynamixel.control_table import Block, Item, encode_items
 from tauscope_drivers.dynamixel.packets import FrameParser, Status
 from tauscope_drivers.dynamixel.port import BITS_PER_BYTE, SerialPort
-from tauscope_drivers.dynamixel.turns import Turns
 from tauscope_drivers.errors import DriverError, DriverErrorKind
+
+
+class Turns:
+    """Keeps the answers of a Sync Read apart from late answers to an earlier one, which look the same.
+
+    Servos answer in turn. An answer that comes out of turn says that it, or one before it, is a late one: both are let
+    go. So are two answers of one servo that differ; of two that are equal, one is kept. Servos that owe an answer to
+    an earlier question are not believed among themselves: what comes from nobody else is likely what they owe.
+    """
+
+    def __init__(self, servos: Sequence[int], owed: Collection[int] = ()) -> None:
+        """Nothing has come yet."""
+        self._place = {servo: place for place, servo in enumerate(servos)}
+        self._owed = frozenset(owed)
+        self._found: dict[int, Status] = {}
+        self._contradicted: set[int] = set()
+        self._heard: set[int] = set()
+        self._last = -1
+
+    @property
+    def complete(self) -> bool:
+        """Whether every servo has answered."""
+        return len(self._found) + len(self._contradicted) >= len(self._place)
+
+    @property
+    def answers(self) -> dict[int, Status]:
+        """What can be believed, by ID."""
+        return {} if self._found.keys() <= self._owed else dict(self._found)
+
+    @property
+    def unheard(self) -> set[int]:
+        """Servos of which nothing has come, be it believed or not."""
+        return self._place.keys() - self._heard
+
+    def take(self, status: Status) -> None:
+        """Take an answer."""
+        servo = status.servo
+        place = self._place.get(servo)
+        if place is not None:
+            self._heard.add(servo)
+        if place is None or servo in self._contradicted or self._found.get(servo) == status:
+            return
+        if servo in self._found:
+            del self._found[servo]
+            self._contradicted.add(servo)
+            return
+        if place > self._last:
+            self._found[servo] = status
+        else:
+            self._found = {other: kept for other, kept in self._found.items() if self._place[other] < place}
+        self._last = place
+
 
 FACTORY_RETURN_DELAY_S = 500e-6
 """Return Delay Time of a servo as delivered [s]."""
@@ -83,13 +134,7 @@ class ServoBus:
         return dict(sorted(found.items()))
 
     def read_once(self, servo: int, address: int, length: int, patience_s: float = 0.0) -> Status | None:
-        """A stretch of a control table, asked for once; None where no whole answer came.
-
-        Parameters
-        ----------
-        patience_s : float
-            how much longer to wait than in the control loop [s]
-        """
+        """A stretch of a control table, asked for once; None where no whole answer came."""
         return self._ask(servo, packets.encode_read(servo, address, length), length, patience_s)
 
     def read_block(self, servo: int, block: Block) -> dict[str, int]:
@@ -156,11 +201,6 @@ class ServoBus:
 
         Nothing in an answer says to which question it belongs. Where an earlier one was not answered in time, as many
         bytes before the block as make another length are read with it, so that what comes late has the wrong length.
-
-        Parameters
-        ----------
-        patience_s : float
-            how much longer to wait than in the control loop [s]
         """
         if any(self._owed(servos, block.length + surplus) for surplus in range(spare + 1)):
             self.port.drain()

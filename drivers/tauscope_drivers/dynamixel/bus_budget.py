@@ -5,9 +5,12 @@ T = bytes · 10/baud + answers · return delay + reads · latency of the adapter
 packet on only when its latency timer ends.
 """
 
-from dataclasses import dataclass
+import os
+from dataclasses import dataclass, replace
 
-from tauscope_drivers.dynamixel.port import BITS_PER_BYTE
+from tauscope_drivers.dynamixel.configuration import BusConfiguration
+from tauscope_drivers.dynamixel.port import BITS_PER_BYTE, LEAST_LATENCY_S, read_latency_timer_ms
+from tauscope_drivers.dynamixel.session import SHORTEST_RETURN_DELAY_S, Session
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 
 LARGEST_LOAD = 0.85
@@ -24,10 +27,6 @@ _READ_BYTES = 14
 class CycleTraffic:
     """What goes over the bus in one cycle.
 
-    state_bytes : int
-        that each servo is asked for [bytes]
-    goal_bytes : int
-        that each servo is sent [bytes]
     health_bytes : int
         that one servo is asked for besides; 0 for no such read [bytes]
     """
@@ -67,8 +66,6 @@ class CycleTraffic:
 class BusTiming:
     """How fast a bus is.
 
-    baud : float
-        [bit/s]
     return_delay_s : float
         largest Return Delay Time of the servos [s]
     latency_s : float
@@ -97,11 +94,6 @@ def largest_rate_hz(traffic: CycleTraffic, timing: BusTiming, load: float = LARG
 def require_rate(rate_hz: float, traffic: CycleTraffic, timing: BusTiming) -> None:
     """Refuse a rate that the bus does not carry, and say what limits it.
 
-    Parameters
-    ----------
-    rate_hz : float
-        wanted cycles a second [Hz]
-
     Raises
     ------
     DriverError
@@ -129,3 +121,33 @@ _REMEDIES = (
     "write Return Delay Time = 0",
     "write 1 to its latency_timer in /sys/class/tty",
 )
+
+
+_PACED_GOAL_BYTES = 8
+
+
+def has_room_for_speeds(traffic: CycleTraffic, timing: BusTiming, cycle_s: float) -> bool:
+    """Whether a cycle is long enough to send each servo a speed with its goal."""
+    return largest_rate_hz(replace(traffic, goal_bytes=_PACED_GOAL_BYTES), timing) * cycle_s >= 1.0
+
+
+def planned_budget(configuration: BusConfiguration) -> tuple[CycleTraffic, BusTiming]:
+    """Before the servos are reached: with what they will be set to."""
+    latency_ms = read_latency_timer_ms(configuration.port)
+    exists = os.path.exists(configuration.port)
+    latency_s = LEAST_LATENCY_S if latency_ms is None and exists else (latency_ms or 1) * 1e-3
+    timing = BusTiming(configuration.baud, SHORTEST_RETURN_DELAY_S, latency_s)
+    return CycleTraffic(len(configuration.servos)), timing
+
+
+def found_budget(session: Session) -> tuple[CycleTraffic, BusTiming]:
+    """Of servos that were reached."""
+    port = session.bus.port
+    longest = max(block.length for servo in session.servos for block in servo.model.watched_blocks)
+    traffic = CycleTraffic(
+        len(session.servos),
+        health_bytes=longest,
+        fast=session.group.fast,
+        families=session.group.family_count,
+    )
+    return traffic, BusTiming(port.baudrate, session.bus.return_delay_s, port.latency_s)

@@ -5,11 +5,11 @@ are on one bus, and ``port`` and ``baud`` stand on the first joint: ``{id: 1, po
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from tauscope_drivers.drive_block import (
+    DriveJoint,
     read_direction,
     read_positive,
     read_text,
@@ -30,24 +30,12 @@ _LOWEST_BAUD, _HIGHEST_BAUD = 9_600, 10_500_000
 
 
 @dataclass(frozen=True)
-class DynamixelJoint:
-    """A joint as the driver sees it.
-
-    torque_per_milliampere : float or None
-        joint torque for one milliampere, signed as the robot file's ``sign`` and ``torque_constant`` are; None where
-        it does not say: then positions can be tracked, but torque neither limited in newton metres nor commanded
-        [Nm/mA or N/mA]
-    """
-
-    name: str
-    drive: Mapping[str, Any]
-    torque_per_milliampere: float | None = None
-
-
-@dataclass(frozen=True)
 class ServoConfiguration:
     """One servo.
 
+    torque_per_milliampere : float or None
+        joint torque for one milliampere; None: the driver tracks positions, but neither limits torque in newton metres
+        nor commands it [Nm/mA or N/mA]
     reduction : float
         turns of the horn per turn of the joint; radians of the horn per metre on prismatic joints
     zero_count : int or None
@@ -71,24 +59,15 @@ class ServoConfiguration:
 
 @dataclass(frozen=True)
 class BusConfiguration:
-    """The bus and the servos on it, in the order of the joints.
-
-    baud : int
-        [bit/s]
-    """
+    """The bus and the servos on it, in the order of the joints."""
 
     servos: tuple[ServoConfiguration, ...]
     port: str
     baud: int = DEFAULT_BAUD
 
 
-def read_configuration(joints: Sequence[DynamixelJoint]) -> BusConfiguration:
+def read_configuration(joints: Sequence[DriveJoint]) -> BusConfiguration:
     """Bus and servos of an arm.
-
-    Parameters
-    ----------
-    joints : sequence of DynamixelJoint
-        base first, at least one
 
     Raises
     ------
@@ -105,7 +84,7 @@ def read_configuration(joints: Sequence[DynamixelJoint]) -> BusConfiguration:
     )
 
 
-def _servo(joint: DynamixelJoint) -> ServoConfiguration:
+def _servo(joint: DriveJoint) -> ServoConfiguration:
     """The servo of a joint."""
     zero = joint.drive.get("zero_count")
     return ServoConfiguration(
@@ -121,7 +100,7 @@ def _servo(joint: DynamixelJoint) -> ServoConfiguration:
     )
 
 
-def _model(joint: DynamixelJoint) -> str | None:
+def _model(joint: DriveJoint) -> str | None:
     """The model that a robot file promises."""
     model = joint.drive.get("model")
     if model is None:
@@ -132,9 +111,9 @@ def _model(joint: DynamixelJoint) -> str | None:
     return model
 
 
-def _torque_per_milliampere(joint: DynamixelJoint) -> float | None:
+def _torque_per_milliampere(joint: DriveJoint) -> float | None:
     """The constant that a robot file states."""
-    constant = joint.torque_per_milliampere
+    constant = joint.torque_per_unit
     if constant is not None and (not math.isfinite(constant) or constant == 0.0):
         raise DriverError(
             DriverErrorKind.REFUSED, f"joint {joint.name}: torque_constant = {constant}; give one that is not zero"

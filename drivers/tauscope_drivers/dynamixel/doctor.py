@@ -1,20 +1,25 @@
 """Looks at a port and the servos on it, moves nothing, writes nothing, and says what to do about what it finds."""
 
+import os
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
-from tauscope_drivers.dynamixel.adapters import latency_finding
+from serial.tools.list_ports import comports
+
+from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.dynamixel.bus import ServoBus
 from tauscope_drivers.dynamixel.bus_budget import BusTiming, CycleTraffic, largest_rate_hz
-from tauscope_drivers.dynamixel.configuration import BusConfiguration, DynamixelJoint, read_configuration
+from tauscope_drivers.dynamixel.configuration import BusConfiguration, read_configuration
+from tauscope_drivers.dynamixel.control_table import model_names
 from tauscope_drivers.dynamixel.faults import hardware_faults, watchdog_fault
 from tauscope_drivers.dynamixel.models import WATCHDOG_MOST
-from tauscope_drivers.dynamixel.port import SerialPort
+from tauscope_drivers.dynamixel.port import SerialPort, read_latency_timer_ms
 from tauscope_drivers.dynamixel.preparation import drive_mode
 from tauscope_drivers.dynamixel.servo import JointServo, make_servo
 from tauscope_drivers.dynamixel.session import read_items
 from tauscope_drivers.errors import DriverError
-from tauscope_drivers.inspection import Finding, Severity, failure
+from tauscope_drivers.inspection import Finding, FoundDevice, Severity, failure
+from tauscope_drivers.port_holder import find_holder
 
 MEASURED_CYCLES = 50
 """Reads of which the loop rate is measured."""
@@ -24,15 +29,8 @@ _LEAST_FIRMWARE = 45
 """Of the X series for Fast Sync Read and all bits of Drive Mode."""
 
 
-def examine(joints: Sequence[DynamixelJoint], *, slack_s: float = 0.002) -> list[Finding]:
+def examine(joints: Sequence[DriveJoint], *, slack_s: float = 0.002) -> list[Finding]:
     """Port, adapter, and every servo that the robot file names.
-
-    Parameters
-    ----------
-    joints : sequence of DynamixelJoint
-        base first
-    slack_s : float
-        how much longer than the bus takes an answer is waited for [s]
 
     Raises
     ------
@@ -130,3 +128,65 @@ def _loop_rate(bus: ServoBus, servos: Sequence[JointServo], return_delay_s: floa
         remedy = "check cables, termination, supply and the adapter"
         return Finding(Severity.WARNING, bus.port.path, f"{missed} of {answers} answers were missed; {detail}", remedy)
     return Finding(Severity.GOOD, bus.port.path, detail)
+
+
+def serial_adapters() -> list[Finding]:
+    """Every serial adapter: whether it may be opened, who holds it, and its latency timer."""
+    found: list[Finding] = []
+    for adapter in sorted(comports(), key=lambda one: one.device):
+        what = adapter.description if adapter.description not in (None, "n/a", "") else "serial port"
+        found.append(_access(adapter.device, what))
+        if read_latency_timer_ms(adapter.device) is not None:
+            found.append(latency_finding(adapter.device))
+    return found
+
+
+def latency_finding(path: str) -> Finding:
+    """The adapter's latency timer, which caps every rate where it is long."""
+    latency_ms = read_latency_timer_ms(path)
+    if latency_ms is None:
+        return Finding(Severity.GOOD, path, "the adapter has no latency timer")
+    if latency_ms <= 1:
+        return Finding(Severity.GOOD, path, f"latency timer {latency_ms} ms")
+    name = os.path.basename(os.path.realpath(path))
+    remedy = f"write 1 to /sys/class/tty/{name}/device/latency_timer, for good by a udev rule"
+    # Two reads a cycle wait for it.
+    return Finding(
+        Severity.WARNING, path, f"latency timer {latency_ms} ms: no more than {500 / latency_ms:.0f} Hz", remedy
+    )
+
+
+def _access(path: str, what: str) -> Finding:
+    """Whether this program may open a port."""
+    if not os.access(path, os.R_OK | os.W_OK):
+        remedy = "add your account to the group that owns it (dialout), then log in again"
+        return Finding(Severity.FAILURE, path, f"{what}; may not be opened", remedy)
+    holder = find_holder(path)
+    if holder is not None:
+        return Finding(Severity.WARNING, path, f"{what}; held by {holder}", "end that program first")
+    return Finding(Severity.GOOD, path, what)
+
+
+USUAL_BAUDS = (57_600, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 115_200, 4_500_000, 9_600)
+"""Rates that servos can be set to, the factory's first [bit/s]."""
+
+
+def scan_bus(path: str, bauds: Sequence[int] = USUAL_BAUDS, *, slack_s: float = 0.002) -> Iterator[FoundDevice]:
+    """Every servo that answers a ping to all, one baud rate after the other; about a second each.
+
+    Raises
+    ------
+    DriverError
+        ``cannot-connect``: the port is missing, not permitted or taken
+    """
+    for baud in bauds:
+        port = SerialPort(path, baud, slack_s)
+        port.open()
+        try:
+            found = ServoBus(port).ping_all()
+        finally:
+            port.close()
+        for servo, (number, firmware) in found.items():
+            name = model_names().get(number)
+            label = f"model number {number}" if name is None else name.upper().replace("_", "-")
+            yield FoundDevice(servo, baud, label, str(firmware))

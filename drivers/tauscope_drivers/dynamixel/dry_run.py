@@ -6,11 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauscope_drivers.backend import ControlMode, DriveLimits
+from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.dynamixel import packets
-from tauscope_drivers.dynamixel.bounds import Bounds, goals_of
-from tauscope_drivers.dynamixel.configuration import DynamixelJoint, read_configuration
+from tauscope_drivers.dynamixel.bus_budget import has_room_for_speeds, planned_budget
+from tauscope_drivers.dynamixel.configuration import read_configuration
 from tauscope_drivers.dynamixel.control_table import Block, Item, encode_items
-from tauscope_drivers.dynamixel.cycle_budget import has_room_for_speeds, planned_budget
+from tauscope_drivers.dynamixel.enabling import Bounds, goals_of
 from tauscope_drivers.dynamixel.group import health_turns, paced_goals, servo_families
 from tauscope_drivers.dynamixel.pacing import GoalPace
 from tauscope_drivers.dynamixel.preparation import (
@@ -23,7 +24,7 @@ from tauscope_drivers.dynamixel.preparation import (
     watchdog_steps,
 )
 from tauscope_drivers.dynamixel.servo import JointServo, make_servo
-from tauscope_drivers.inspection import PlannedFrame
+from tauscope_drivers.inspection import FrameRequest, PlannedFrame
 from tauscope_drivers.limits import require_sensible
 from tauscope_drivers.state import Setpoint
 
@@ -38,14 +39,7 @@ _DELIVERED = {
 """Settings of a servo of the X series as delivered, but for a Current Limit that limits nothing."""
 
 
-def plan_frames(
-    joints: Sequence[DynamixelJoint],
-    mode: ControlMode,
-    limits: DriveLimits,
-    watchdog_s: float,
-    targets: NDArray[np.float64],
-    cycle_s: float | None = None,
-) -> Iterator[PlannedFrame]:
+def plan_frames(joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator[PlannedFrame]:
     """Frames of a connection, of enabling, of some cycles and of a stop, for servos as delivered.
 
     What only the servos themselves know is missing or assumed: their own current and PWM limits are those of an X
@@ -53,20 +47,15 @@ def plan_frames(
 
     Parameters
     ----------
-    joints : sequence of DynamixelJoint
+    joints : sequence of DriveJoint
         base first; each ``drive`` block has to name its model
-    watchdog_s : float
-        time of silence after which the servos stop [s]
-    targets : (K, n) float64
-        positions of the first K cycles; the arm is supposed to stand at the first of them [rad or m]
-    cycle_s : float or None
-        time between them, over which servos go from one to the next; None where it is not known [s]
 
     Raises
     ------
     DriverError
         ``refused``: a ``drive`` block, a limit or the watchdog's time is not possible
     """
+    mode, limits, targets, cycle_s = request.mode, request.limits, request.targets, request.cycle_s
     configuration = read_configuration(joints)
     servos = [make_servo(number, servo, None) for number, servo in enumerate(configuration.servos, 1)]
     require_sensible(limits, targets[0], [servo.label for servo in servos])
@@ -76,7 +65,7 @@ def plan_frames(
             current_cap(servo, _DELIVERED, float(limits.torque[joint])),
             servo.units.velocity_cap(float(limits.velocity[joint])),
             servo.units.counts(float(targets[0, joint])),
-            watchdog_steps(watchdog_s),
+            watchdog_steps(request.watchdog_s),
         )
         for joint, servo in enumerate(servos)
     ]

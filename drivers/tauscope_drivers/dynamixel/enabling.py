@@ -2,12 +2,12 @@
 
 import contextlib
 import math
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tauscope_drivers.backend import ControlMode, DriveLimits
-from tauscope_drivers.dynamixel.bounds import Bounds
 from tauscope_drivers.dynamixel.preparation import (
     ServoTask,
     current_cap,
@@ -18,9 +18,45 @@ from tauscope_drivers.dynamixel.preparation import (
     taking_writes,
     watchdog_steps,
 )
+from tauscope_drivers.dynamixel.servo import JointServo
 from tauscope_drivers.dynamixel.session import Session
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 from tauscope_drivers.limits import require_sensible
+from tauscope_drivers.state import Setpoint
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Ranges of the goals, in units of the servos, one a joint.
+
+    low, high : tuple of int
+        of Goal Position [counts]
+    current : tuple of int
+        of Goal Current, either sign [units]
+    velocity : tuple of int
+        of Profile Velocity, 0 for none [units]
+    """
+
+    low: tuple[int, ...]
+    high: tuple[int, ...]
+    current: tuple[int, ...]
+    velocity: tuple[int, ...]
+
+
+def goals_of(
+    servos: Sequence[JointServo], mode: ControlMode, bounds: Bounds, setpoint: Setpoint
+) -> tuple[str, list[int]]:
+    """Item and values of a setpoint. Positions and torques beyond the bounds are brought back to them."""
+    values = (setpoint.position if mode is ControlMode.POSITION else setpoint.torque).tolist()
+    if mode is ControlMode.POSITION:
+        return "Goal Position", [
+            min(max(servo.units.counts(value), low), high)
+            for servo, value, low, high in zip(servos, values, bounds.low, bounds.high, strict=True)
+        ]
+    return "Goal Current", [
+        min(max(servo.units.current_units(value), -cap), cap)
+        for servo, value, cap in zip(servos, values, bounds.current, strict=True)
+    ]
 
 
 def enable_servos(
@@ -30,11 +66,6 @@ def enable_servos(
 
     An arm may fall meanwhile: each servo is asked where it is at the last moment, and catches its joint there. A servo
     that holds its joint already, in the mode that is asked for, is taken over without letting go.
-
-    Parameters
-    ----------
-    watchdog_s : float
-        time of silence after which the servos stop [s]
 
     Returns
     -------

@@ -25,8 +25,6 @@ _CURRENT, _VELOCITY, _POSITION = STATE_ITEMS
 class GroupReading:
     """What the servos measured in one cycle; NaN for who did not answer in it.
 
-    time_ns : int
-        monotonic instant at which the question had left [ns]
     position : (n,) float64
         [rad or m]
     velocity : (n,) float64
@@ -90,13 +88,7 @@ class ServoGroup:
             self._bus.sync_write(items, values)
 
     def read(self, patience_s: float = 0.0) -> GroupReading:
-        """State of all servos.
-
-        Parameters
-        ----------
-        patience_s : float
-            how much longer to wait than in the control loop [s]
-        """
+        """State of all servos."""
         fast = self.fast and self._plain_cycles == 0
         self._plain_cycles = max(0, self._plain_cycles - 1)
         answers = self._read_all(fast=fast, patience_s=patience_s)

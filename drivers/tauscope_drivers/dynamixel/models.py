@@ -22,11 +22,7 @@ _E_MANUAL = "ROBOTIS e-Manual, unit of Present Current"
 
 @dataclass(frozen=True)
 class CurrentUnit:
-    """What one unit of Present Current and Goal Current is.
-
-    milliampere : float
-        [mA]
-    """
+    """What one unit of Present Current and Goal Current is."""
 
     milliampere: float
     source: str

@@ -59,12 +59,6 @@ def arm_state(session: Session, reading: GroupReading, temperature: Array) -> Ar
 
 
 def blind_state(time_ns: int, joint_count: int, faults: tuple[Fault, ...]) -> ArmState:
-    """State of an arm that cannot be seen.
-
-    Parameters
-    ----------
-    time_ns : int
-        present instant [ns]
-    """
+    """State of an arm that cannot be seen."""
     unknown = np.full(joint_count, np.nan)
     return ArmState(time_ns, unknown, unknown, unknown, unknown, np.zeros(joint_count, dtype=np.bool_), faults)

@@ -12,7 +12,7 @@ the mean, by v σ²/(4T) at speed v for lateness of variance σ² and a cycle T,
 import math
 from collections.abc import Sequence
 
-from tauscope_drivers.cycle_grid import CycleGrid
+from tauscope_drivers.clock import CycleGrid
 from tauscope_drivers.dynamixel.servo import JointServo
 
 _AHEAD_CYCLES = 2.0
@@ -45,10 +45,6 @@ class GoalPace:
             Goal Position of each [counts]
         caps : sequence of int
             most Profile Velocity of each, 0 for none [units]
-        cycle_s : float
-            time between two goals [s]
-        now_ns : int
-            present instant [ns]
         """
         self._counts_per_second = [servo.model.velocity_unit * servo.model.counts_per_radian for servo in servos]
         self._goals = list(goals)
@@ -66,8 +62,6 @@ class GoalPace:
         ----------
         goals : sequence of int
             Goal Position of each [counts]
-        now_ns : int
-            present instant [ns]
         """
         elapsed_s, self._now_ns = (now_ns - self._now_ns) * 1e-9, now_ns
         left_s = self._time_left_s(now_ns)

@@ -35,15 +35,7 @@ class SerialPort(PortHandler):
     """An exclusive serial port; also usable with dynamixel-sdk's own packet handler."""
 
     def __init__(self, path: str, baud: int, slack_s: float = 0.002) -> None:
-        """Nothing is opened yet.
-
-        Parameters
-        ----------
-        baud : int
-            [bit/s]
-        slack_s : float
-            how much longer than the bus takes an answer is waited for [s]
-        """
+        """Nothing is opened yet."""
         super().__init__(path)
         self.baudrate = baud
         self.latency_s = LEAST_LATENCY_S
@@ -87,13 +79,7 @@ class SerialPort(PortHandler):
             raise self._lost(error) from error
 
     def receive(self, deadline_ns: int) -> bytes:
-        """What comes first, or nothing by the deadline.
-
-        Parameters
-        ----------
-        deadline_ns : int
-            monotonic instant [ns]
-        """
+        """What comes first, or nothing by the deadline."""
         serial_port = self._opened()
         wait_s = (deadline_ns - time.monotonic_ns()) * 1e-9
         try:
@@ -113,36 +99,18 @@ class SerialPort(PortHandler):
             pass
 
     def reply_deadline_ns(self, byte_count: int, delay_s: float = 0.0) -> int:
-        """Instant by which so many bytes have passed, out and back.
-
-        Parameters
-        ----------
-        delay_s : float
-            sum of the servos' return delays [s]
-        """
+        """Instant by which so many bytes have passed, out and back."""
         wire_s = byte_count * BITS_PER_BYTE / self.baudrate
         return time.monotonic_ns() + round((wire_s + delay_s + 2.0 * self.latency_s + self._slack_s) * 1e9)
 
     # What dynamixel-sdk calls, in its own spelling:
 
     def getCFlagBaud(self, baudrate: int) -> int:  # noqa: N802
-        """Any rate that the system can set, not the library's list, which ends at 4 Mbaud.
-
-        Parameters
-        ----------
-        baudrate : int
-            [bit/s]
-        """
+        """Any rate that the system can set, not the library's list, which ends at 4 Mbaud."""
         return baudrate
 
     def setupPort(self, cflag_baud: int) -> bool:  # noqa: N802
-        """Open the device, lock it, and ask its driver for low latency.
-
-        Parameters
-        ----------
-        cflag_baud : int
-            [bit/s]
-        """
+        """Open the device, lock it, and ask its driver for low latency."""
         if self.is_open:
             self.closePort()
         self.ser = serial.Serial(self.port_name, cflag_baud, timeout=0, exclusive=True)

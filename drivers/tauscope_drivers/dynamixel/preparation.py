@@ -113,11 +113,6 @@ def taking_writes(servo: JointServo, task: ServoTask, *, holds: bool) -> list[Re
 def watchdog_steps(watchdog_s: float) -> int:
     """Bus Watchdog for a time, at most that time.
 
-    Parameters
-    ----------
-    watchdog_s : float
-        [s]
-
     Raises
     ------
     DriverError

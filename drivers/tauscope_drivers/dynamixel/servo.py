@@ -14,8 +14,6 @@ class JointServo:
 
     number : int
         of the joint, from 1
-    current_limit_ma : float or None
-        most current that the robot file allows [mA]
     """
 
     number: int

@@ -1,9 +1,10 @@
 """``tauscope bus``: its arguments."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
+from tauscope.cli.driver_choice import DriverCommand, check_bus
 from tauscope.cli.verbs import add_verb
 
 bus = typer.Typer(help="Look at field buses.", no_args_is_help=True, rich_markup_mode=None)
@@ -15,10 +16,10 @@ def _bus() -> None:
 
 
 def scan(
-    backend: Annotated[Literal["dynamixel", "canopen"], typer.Argument(metavar="BUS", help="dynamixel or canopen.")],
+    backend: Annotated[str, typer.Argument(parser=check_bus, metavar="BUS", help="{buses}.")],
     port: Annotated[
         str,
-        typer.Argument(metavar="PORT", help="Serial device (dynamixel), INTERFACE:CHANNEL of python-can (canopen)."),
+        typer.Argument(metavar="PORT", help="{ports}."),
     ],
     *,
     bit_rate: Annotated[
@@ -40,4 +41,4 @@ def scan(
     show_devices(backend, port, bit_rate)
 
 
-add_verb(bus, scan)
+add_verb(bus, scan, DriverCommand)

@@ -11,8 +11,15 @@ from tauscope.errors import AcquisitionError
 from tauscope.report.table import Table
 from tauscope.robot import Robot, read_robot
 from tauscope.runtime import RunOptions
-from tauscope.runtime.field_bus import FoundDevice, FrameRequest
-from tauscope.runtime.field_buses import bus_of, find_bus
+from tauscope.runtime.drivers import (
+    FoundDevice,
+    FrameRequest,
+    find_bus,
+    find_driver,
+    select_bus,
+    to_drive_joints,
+    translate_driver_errors,
+)
 from tauscope.runtime.guard import guard_limits
 from tauscope.trajectory import read_trajectory
 
@@ -20,7 +27,6 @@ SHOWN_CYCLES = 3
 """Cycles of a run whose frames are shown."""
 
 _RATE_HZ = 200.0
-_SIMULATION = "sim"
 
 
 def show_devices(backend: str, port: str, bit_rates: Sequence[int] | None) -> None:
@@ -37,7 +43,7 @@ def show_devices(backend: str, port: str, bit_rates: Sequence[int] | None) -> No
         nobody answers, or the port is missing, not permitted or taken
     """
     found: list[FoundDevice] = []
-    with shown_progress() as told:
+    with shown_progress() as told, translate_driver_errors():
         told(f"scan {port}")
         for device in find_bus(backend).scan(port, bit_rates or None):
             found.append(device)
@@ -63,9 +69,10 @@ def show_frames(robot_file: Path, backend: str, trajectory: Path | None, options
     limits = guard_limits(robot, targets.min(axis=0), targets.max(axis=0), speed).drive_limits
     request = FrameRequest(options.mode, limits, options.watchdog_s, targets[:SHOWN_CYCLES], 1.0 / rate_hz)
     console = output()
-    bus = bus_of(robot) if backend == _SIMULATION else find_bus(backend)
-    for frame in bus.planned_frames(robot, request):
-        console.print(plain(f"{frame.phase} | {frame.wire} | {frame.meaning}"), soft_wrap=True)
+    bus = select_bus(robot) if find_driver(backend).is_simulated else find_bus(backend)
+    with translate_driver_errors():
+        for frame in bus.plan_frames(to_drive_joints(bus, robot), request):
+            console.print(plain(f"{frame.phase} | {frame.wire} | {frame.meaning}"), soft_wrap=True)
 
 
 def _targets(robot: Robot, trajectory: Path | None, options: RunOptions) -> NDArray[np.float64]:

@@ -1,9 +1,11 @@
 """``tauscope doctor``: its arguments."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
+
+from tauscope.cli.driver_choice import check_bus
 
 RobotFile = Annotated[
     Path | None,
@@ -21,8 +23,12 @@ def doctor(
     robot: RobotFile = None,
     *,
     backend: Annotated[
-        Literal["dynamixel", "canopen"] | None,
-        typer.Option(help="Field bus; the one that the robot file's drives speak of by default."),
+        str | None,
+        typer.Option(
+            parser=check_bus,
+            metavar="[{buses}]",
+            help="Field bus; the one that the robot file's drives speak of by default.",
+        ),
     ] = None,
 ) -> None:
     """Look at adapters and drives, and say what keeps an arm from running well, each with its remedy.

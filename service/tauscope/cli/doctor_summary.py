@@ -9,8 +9,15 @@ from tauscope.cli.terminal import output, plain, shown_progress
 from tauscope.errors import AcquisitionError
 from tauscope.report.quantities import counted
 from tauscope.robot import read_robot
-from tauscope.runtime.field_bus import Finding, Severity
-from tauscope.runtime.field_buses import FIELD_BUSES, bus_of, find_bus
+from tauscope.runtime.drivers import (
+    Finding,
+    Severity,
+    bus_drivers,
+    find_bus,
+    select_bus,
+    to_drive_joints,
+    translate_driver_errors,
+)
 
 _MARKS = {Severity.GOOD: "ok", Severity.WARNING: "warning", Severity.FAILURE: "failure"}
 
@@ -40,18 +47,19 @@ def show_findings(robot: Path | None, backend: str | None) -> None:
 
 def _adapters(backend: str | None) -> list[Finding]:
     """Adapters of one bus, or of all."""
-    buses = FIELD_BUSES.values() if backend is None else [find_bus(backend)]
+    buses = bus_drivers().values() if backend is None else [find_bus(backend)]
     found: list[Finding] = []
     for bus in buses:
-        adapters = bus.adapters()
+        adapters = bus.list_adapters()
         found += adapters or [Finding(Severity.WARNING, bus.name, "no adapter is there", "plug one in")]
     return found
 
 
 def _drives(path: Path, backend: str | None) -> Sequence[Finding]:
     robot = read_robot(path)
-    bus = bus_of(robot) if backend is None else find_bus(backend)
-    return bus.examine(robot)
+    bus = select_bus(robot) if backend is None else find_bus(backend)
+    with translate_driver_errors():
+        return bus.examine(to_drive_joints(bus, robot))
 
 
 def _show(console: Console, finding: Finding) -> None:

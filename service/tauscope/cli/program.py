@@ -25,6 +25,7 @@ from tauscope.cli.bus_command import bus
 from tauscope.cli.demo_command import demo
 from tauscope.cli.diagnose_command import diagnose
 from tauscope.cli.doctor_command import doctor
+from tauscope.cli.driver_choice import DriverCommand
 from tauscope.cli.excite_command import excite
 from tauscope.cli.fleet_command import fleet
 from tauscope.cli.identify_command import identify
@@ -68,10 +69,10 @@ add_verb(app, diagnose, SeveralValuesCommand)
 add_verb(app, excite)
 app.add_typer(robot, name="robot")
 app.add_typer(recording, name="recording")
-add_verb(app, run)
-add_verb(app, doctor)
+add_verb(app, run, DriverCommand)
+add_verb(app, doctor, DriverCommand)
 app.add_typer(bus, name="bus")
-add_verb(app, serve)
+add_verb(app, serve, DriverCommand)
 app.add_typer(key, name="key")
 app.add_typer(audit, name="audit")
 app.add_typer(store, name="store")

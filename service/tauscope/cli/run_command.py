@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 import typer
 
 from tauscope.cli.arguments import RobotFile
+from tauscope.cli.driver_choice import DEFAULT_BACKEND, check_backend
 
 Trajectory = Annotated[
     Path | None,
@@ -37,7 +38,9 @@ Start = Annotated[
 def run(
     robot: RobotFile,
     *,
-    backend: Annotated[Literal["sim", "dynamixel", "canopen"], typer.Option(help="What moves the arm.")] = "sim",
+    backend: Annotated[
+        str, typer.Option(parser=check_backend, metavar="[{backends}]", help="What moves the arm.")
+    ] = DEFAULT_BACKEND,
     trajectory: Trajectory = None,
     out: Out = None,
     scenario: Scenario = None,

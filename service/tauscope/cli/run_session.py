@@ -19,6 +19,7 @@ from tauscope.excitation import ExcitationOptions, OptimiserProgress, design_exc
 from tauscope.robot import Robot, read_robot
 from tauscope.robot.messages import one_line
 from tauscope.runtime import BackendOrder, RunOptions, RunOrder, RunProcess, RunRecord, RunState
+from tauscope.runtime.drivers import driver_names, find_driver
 from tauscope.runtime.record import JOURNAL_FILE, RECORDING_STEM
 from tauscope.trajectory import write_trajectory
 
@@ -35,7 +36,7 @@ class Request:
     """
 
     robot: Path
-    backend: str = "sim"
+    backend: str
     trajectory: Path | None = None
     out: Path | None = None
     scenario: Path | None = None
@@ -51,18 +52,18 @@ class Request:
         Raises
         ------
         typer.BadParameter
-            where the simulated arm's settings are given for another backend
+            where an option is given that the backend's driver does not have
         """
-        if self.backend != "sim":
-            given = [name for name in ("scenario", "start") if getattr(self, name) is not None]
-            if given or self.time != "virtual":
-                raise typer.BadParameter(f"--{(given or ['time'])[0]} belongs to --backend sim")
-            return BackendOrder(name=self.backend)
-        settings: dict[str, Any] = {"time": self.time}
-        if self.scenario is not None:
-            settings["scenario"] = str(self.scenario.resolve())
-        if self.start is not None:
-            settings["start"] = list(self.start)
+        settings = {
+            "scenario": self.scenario and str(self.scenario.resolve()),
+            "start": self.start and list(self.start),
+            "time": None if self.time == "virtual" else self.time,
+        }
+        settings = {name: value for name, value in settings.items() if value is not None}
+        for name in settings:
+            if name not in find_driver(self.backend).option_names:
+                owners = [one for one in driver_names() if name in find_driver(one).option_names]
+                raise typer.BadParameter(f"--{name} belongs to --backend {' or '.join(owners)}")
         return BackendOrder(name=self.backend, settings=settings)
 
 

@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from tauscope.cli.driver_choice import DEFAULT_BACKEND, check_backend
 from tauscope.cli.store_command import Kind
 
 
@@ -30,8 +31,11 @@ def serve(
         ),
     ] = None,
     backend: Annotated[
-        Literal["sim", "dynamixel", "canopen"], typer.Option(help="What moves the arm where a request does not say.")
-    ] = "sim",
+        str,
+        typer.Option(
+            parser=check_backend, metavar="[{backends}]", help="What moves the arm where a request does not say."
+        ),
+    ] = DEFAULT_BACKEND,
     sim_time: Annotated[
         Literal["virtual", "real"], typer.Option(help="Of the simulated arm, where a request does not say.")
     ] = "virtual",

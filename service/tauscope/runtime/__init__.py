@@ -4,7 +4,7 @@
 start, what became of runs whose process is gone.
 """
 
-from tauscope.runtime.backends import BACKENDS, Connection, make_backend
+from tauscope.runtime.drivers import Connection, driver_names, make_backend
 from tauscope.runtime.guard import Guard, GuardLimits, GuardViolationError, Rule, Violation, guard_limits
 from tauscope.runtime.in_process import run_trajectory
 from tauscope.runtime.options import BackendOrder, RunOptions, RunOrder, read_order, write_order
@@ -17,7 +17,6 @@ from tauscope.runtime.states import TRANSITIONS, ManualStop, RunState, StopReque
 from tauscope.runtime.timing import Timing
 
 __all__ = [
-    "BACKENDS",
     "TRANSITIONS",
     "BackendOrder",
     "Connection",
@@ -40,6 +39,7 @@ __all__ = [
     "Timing",
     "Violation",
     "after_stop",
+    "driver_names",
     "guard_limits",
     "make_backend",
     "make_plan",

@@ -14,7 +14,7 @@ from typing import Any
 
 from tauscope.errors import AcquisitionError, TauscopeError
 from tauscope.robot import read_robot
-from tauscope.runtime.backends import BACKENDS, BackendFactory, make_backend
+from tauscope.runtime.drivers import Connection, make_backend
 from tauscope.runtime.in_process import open_recorder
 from tauscope.runtime.options import RunOrder, read_order
 from tauscope.runtime.processes import RunLock
@@ -40,7 +40,7 @@ _LARGEST_EVENT = 4096
 def control(
     folder: Path,
     *,
-    backends: Mapping[str, BackendFactory] = BACKENDS,
+    make: Callable[..., Connection] = make_backend,
     recorder: OpenRecorder = open_recorder,
 ) -> int:
     """Carry a run out, in the main thread of a process of its own."""
@@ -58,7 +58,7 @@ def control(
     record = record.model_copy(update={"control": ProcessName.of(os.getpid())})
     keeper.keep(record)
     try:
-        task = _task(order, folder, backends)
+        task = _task(order, folder, make)
         run = Run(task, record, Surroundings(folder, stops, keeper, recorder, report))
     except TauscopeError as error:
         stops.done()
@@ -74,14 +74,12 @@ def control(
     return 0 if unkept is None else 1
 
 
-def _task(order: RunOrder, folder: Path, backends: Mapping[str, BackendFactory]) -> RunTask:
+def _task(order: RunOrder, folder: Path, make: Callable[..., Connection]) -> RunTask:
     """Read what the order names."""
     robot = read_robot(order.robot)
     trajectory = read_trajectory(order.trajectory, robot)
     name, settings = order.backend.name, order.backend.settings
-    return RunTask(
-        robot, trajectory, order.options, lambda: make_backend(name, robot, settings, folder=folder, backends=backends)
-    )
+    return RunTask(robot, trajectory, order.options, lambda: make(name, robot, settings, folder=folder))
 
 
 def _refused(record: RunRecord, error: TauscopeError) -> RunRecord:

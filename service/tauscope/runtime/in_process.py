@@ -7,7 +7,7 @@ from typing import Any
 from tauscope.errors import AcquisitionError
 from tauscope.recording.journal_rows import JournalHeader
 from tauscope.robot import Robot
-from tauscope.runtime.backends import Connection
+from tauscope.runtime.drivers import DEFAULT_BACKEND, Connection
 from tauscope.runtime.options import ORDER_FILE, RunOptions
 from tauscope.runtime.progress import Report
 from tauscope.runtime.record import RUN_FILE, RunRecord, new_record, write_record
@@ -25,7 +25,7 @@ def run_trajectory(
     folder: Path,
     options: RunOptions | None = None,
     *,
-    backend_name: str = "sim",
+    backend_name: str = DEFAULT_BACKEND,
     stops: Stops | None = None,
     report: Report | None = None,
 ) -> RunRecord:

@@ -10,6 +10,7 @@ from tauscope.errors import AcquisitionError
 from tauscope.files import write_atomically
 from tauscope.robot import Joint
 from tauscope.robot.messages import one_line
+from tauscope.runtime.drivers import DEFAULT_BACKEND
 from tauscope_drivers import Capabilities, ControlMode, StopPolicy
 
 
@@ -128,10 +129,8 @@ ORDER_FILE = "order.json"
 class BackendOrder(StoredModel):
     """Which backend, and its own settings."""
 
-    name: str = Field(default="sim", description="sim, dynamixel or canopen")
-    settings: dict[str, Any] = Field(
-        default_factory=dict, description="the backend's own; for sim: time (virtual, real), scenario, start"
-    )
+    name: str = Field(default=DEFAULT_BACKEND, description="name of a driver")
+    settings: dict[str, Any] = Field(default_factory=dict, description="the driver's own options")
 
 
 class RunOrder(StoredModel):

@@ -11,7 +11,7 @@ import numpy as np
 from tauscope.errors import AcquisitionError
 from tauscope.recording.journal_rows import JournalHeader
 from tauscope.robot import Robot
-from tauscope.runtime.backends import Connection
+from tauscope.runtime.drivers import Connection
 from tauscope.runtime.options import RunOptions, chosen_stop_policy
 from tauscope.runtime.plan import Plan, make_plan
 from tauscope.runtime.progress import Report

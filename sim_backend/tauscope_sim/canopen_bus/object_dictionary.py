@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class Abort(IntEnum):
-    """Abort codes of service data transfers, CiA 301."""
+    """Abort codes of SDO transfers, CiA 301."""
 
     UNKNOWN_COMMAND = 0x05040001
     WRITE_ONLY = 0x06010001

@@ -1,4 +1,4 @@
-"""Expedited service data, as an emulated drive answers it (CiA 301): all its entries fit into four bytes."""
+"""Expedited SDOs, as an emulated drive answers it (CiA 301): all its entries fit into four bytes."""
 
 from tauscope_sim.canopen_bus.object_dictionary import Abort, AbortError, ObjectDictionary
 

@@ -8,7 +8,7 @@ import pytest
 from emulated_can_bus import GEAR, RATED_TORQUE_MNM, START, EmulatedBus
 from patience import eventually
 from tauscope_drivers import ArmState, ControlMode, DriveLimits, DriverError, Setpoint, StopPolicy
-from tauscope_drivers.canopen.driver import CanopenArm
+from tauscope_drivers.canopen.arm import CanopenArm
 from tauscope_drivers.errors import DriverErrorKind
 from tauscope_sim.canopen_bus.axis import AxisMode
 from tauscope_sim.canopen_bus.power_state import PowerState

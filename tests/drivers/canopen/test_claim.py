@@ -7,7 +7,7 @@ from uuid import uuid4
 
 import pytest
 
-from tauscope_drivers.canopen.claim import BusClaim, ClaimedError
+from tauscope_drivers.canopen.interfaces import BusClaim, ClaimedError
 
 
 def test_the_second_is_refused_by_the_name_of_the_first_until_that_lets_go() -> None:
@@ -23,7 +23,8 @@ def test_the_second_is_refused_by_the_name_of_the_first_until_that_lets_go() -> 
 def test_a_process_that_was_killed_holds_nothing() -> None:
     interface = f"can-{uuid4().hex[:8]}"
     code = (
-        f"import tauscope_drivers.canopen.claim as _; c = _.BusClaim({interface!r}); print('held', flush=True); input()"
+        f"from tauscope_drivers.canopen.interfaces import BusClaim; claim = BusClaim({interface!r}); "
+        "print('held', flush=True); input()"
     )
     with subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
         assert other.stdout is not None

@@ -5,15 +5,16 @@ from typing import Any
 
 import pytest
 
-from tauscope_drivers.canopen.configuration import DriveJoint, read_configuration
+from tauscope_drivers.canopen.configuration import read_configuration
+from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.errors import DriverError
 
 
 def joints(first: dict[str, Any] | None = None, second: dict[str, Any] | None = None) -> list[DriveJoint]:
     bus = {"interface": "socketcan", "channel": "can0", "node_id": 1, "counts_per_turn": 65536}
     return [
-        DriveJoint("shoulder", 50.0, bus | (first or {})),
-        DriveJoint("elbow", 50.0, {"node_id": 2, "counts_per_turn": 65536} | (second or {})),
+        DriveJoint("shoulder", bus | (first or {}), gear_ratio=50.0),
+        DriveJoint("elbow", {"node_id": 2, "counts_per_turn": 65536} | (second or {}), gear_ratio=50.0),
     ]
 
 

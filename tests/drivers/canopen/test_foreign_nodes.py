@@ -1,4 +1,4 @@
-"""Our driver against nodes of durand: their service data, process data, network management and heartbeats are not ours.
+"""Our driver against nodes of durand: their SDOs, process data, network management and heartbeats are not ours.
 
 Only the power states and the motion of a drive, which durand leaves to its user, are written here.
 """
@@ -14,7 +14,9 @@ import pytest
 
 from patience import eventually
 from tauscope_drivers import ControlMode, DriveLimits, Setpoint, StopPolicy
-from tauscope_drivers.canopen import CanopenArm, DriveJoint, scan_bus
+from tauscope_drivers.canopen.arm import CanopenArm
+from tauscope_drivers.canopen.doctor import scan_bus
+from tauscope_drivers.drive_block import DriveJoint
 from tauscope_sim.driver.virtual_clock import VirtualClock
 
 durand = pytest.importorskip("durand")
@@ -86,7 +88,7 @@ def drives(channel: str) -> Iterator[list[ForeignDrive]]:
 def joints_on(channel: str) -> list[DriveJoint]:
     bus = {"interface": "virtual", "channel": channel}
     blocks = [{"node_id": 4, "counts_per_turn": COUNTS, **bus}, {"node_id": 9, "counts_per_turn": COUNTS}]
-    return [DriveJoint(f"joint{number}", GEAR, block) for number, block in enumerate(blocks, 1)]
+    return [DriveJoint(f"joint{number}", block, gear_ratio=GEAR) for number, block in enumerate(blocks, 1)]
 
 
 @pytest.fixture
@@ -132,7 +134,7 @@ CYCLES, CYCLE_S, STEP = 40, 0.005, 0.002
 LENGTHS = {
     0x000: {2}, 0x080: {0, 8}, 0x180: {8}, 0x200: {6}, 0x280: {6}, 0x580: {8}, 0x600: {8}, 0x700: {1},
 }  # fmt: skip
-"""Bytes that a service of CANopen has: network management, SYNC or emergency, process data, service data, heartbeat."""
+"""Bytes that a service of CANopen has: network management, SYNC or emergency, process data, SDOs, heartbeat."""
 
 
 def logged_run(channel: str, joints: list[DriveJoint], log_file: Path) -> list[can.Message]:

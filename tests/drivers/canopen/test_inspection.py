@@ -1,5 +1,6 @@
 """What can be said of a CAN bus without moving anything: doctor, scan, and the frames of a run."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,14 +8,15 @@ import pytest
 
 from emulated_can_bus import COUNTS_PER_TURN, GEAR, EmulatedBus
 from tauscope_drivers import ControlMode, DriveLimits, DriverError
-from tauscope_drivers.canopen import DriveJoint, can_interfaces, examine, plan_frames, scan_bus
-from tauscope_drivers.inspection import PHASES, Finding, Severity
+from tauscope_drivers.canopen.doctor import can_interfaces, examine, scan_bus
+from tauscope_drivers.canopen.dry_run import plan_frames
+from tauscope_drivers.drive_block import DriveJoint
+from tauscope_drivers.inspection import PHASES, Finding, FrameRequest, Severity
 
 LIMITS = DriveLimits(np.full(2, -1.0), np.full(2, 1.0), np.full(2, 2.0), np.full(2, 10.0))
 JOINTS = [
     DriveJoint(
         f"joint{node}",
-        GEAR,
         {
             "node_id": node,
             "counts_per_turn": COUNTS_PER_TURN,
@@ -22,6 +24,7 @@ JOINTS = [
             "interface": "slcan",
             "channel": "port",
         },
+        gear_ratio=GEAR,
     )
     for node in (1, 2)
 ]
@@ -39,7 +42,7 @@ def test_a_missing_drive_and_one_in_fault_are_told_with_a_remedy() -> None:
     with EmulatedBus() as bus:
         bus.drives[1].fail(0x4310)
         joints = bus.joints()
-        joints[2] = DriveJoint("joint3", GEAR, {**joints[2].drive, "node_id": 9})
+        joints[2] = replace(joints[2], drive={**joints[2].drive, "node_id": 9})
         failures = [finding for finding in examine(joints) if finding.severity is Severity.FAILURE]
     assert [finding.subject for finding in failures] == ["joint 2 (node 2)", "joint 3 (node 9)"]
     assert "0x4310" in failures[0].detail
@@ -60,7 +63,7 @@ def test_doctor_and_scan_move_nothing_and_leave_every_state() -> None:
 def test_planned_frames_are_those_of_the_standard() -> None:
     """Bytes worked out by hand: expedited transfers, controlwords 6, 7, 15, and 50 · 65,536 counts a turn."""
     targets = np.array([[0.0, 0.0], [np.pi / 50.0, 0.0]])
-    frames = list(plan_frames(JOINTS, ControlMode.POSITION, LIMITS, 0.1, targets))
+    frames = list(plan_frames(JOINTS, FrameRequest(ControlMode.POSITION, LIMITS, 0.1, targets)))
     wires = [frame.wire for frame in frames]
     assert wires[0] == "000#8000"
     assert "601#2F60600008000000" in wires, "cyclic synchronous position"
@@ -85,15 +88,15 @@ def test_planned_frames_are_those_of_the_standard() -> None:
 
 
 def test_drives_are_told_the_cycle() -> None:
-    frames = list(plan_frames(JOINTS, ControlMode.POSITION, LIMITS, 0.1, np.zeros((1, 2)), 0.005))
+    frames = list(plan_frames(JOINTS, FrameRequest(ControlMode.POSITION, LIMITS, 0.1, np.zeros((1, 2)), 0.005)))
     assert "602#2FC2600105000000" in [frame.wire for frame in frames], "5 units, of a millisecond as delivered"
 
 
 def test_a_dry_run_needs_the_rated_torque() -> None:
-    joints = [DriveJoint("joint1", GEAR, {key: v for key, v in JOINTS[0].drive.items() if key != "rated_torque_nm"})]
+    joints = [replace(JOINTS[0], drive={key: v for key, v in JOINTS[0].drive.items() if key != "rated_torque_nm"})]
     limits = DriveLimits(*(np.full(1, value) for value in (-1.0, 1.0, 2.0, 10.0)))
     with pytest.raises(DriverError, match="rated_torque_nm"):
-        list(plan_frames(joints, ControlMode.POSITION, limits, 0.1, np.zeros((1, 1))))
+        list(plan_frames(joints, FrameRequest(ControlMode.POSITION, limits, 0.1, np.zeros((1, 1)))))
 
 
 @pytest.mark.parametrize(

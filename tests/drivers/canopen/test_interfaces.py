@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 
 import can
 import numpy as np
@@ -15,10 +16,12 @@ import pytest
 from emulated_can_bus import EmulatedBus
 from patience import eventually
 from tauscope_drivers import ControlMode, DriveLimits, DriverError, Setpoint, StopPolicy
-from tauscope_drivers.canopen import CanopenArm, DriveJoint, examine
+from tauscope_drivers.canopen.arm import CanopenArm
 from tauscope_drivers.canopen.bus import CanBus
 from tauscope_drivers.canopen.configuration import BusConfiguration
+from tauscope_drivers.canopen.doctor import examine
 from tauscope_drivers.canopen.interfaces import open_interface
+from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.errors import DriverErrorKind
 from tauscope_drivers.inspection import Severity
 
@@ -109,7 +112,7 @@ def joints(bus: EmulatedBus, port: int) -> list[DriveJoint]:
     """Drives of a bus of another machine."""
     there = {"interface": "socketcand", "channel": CHANNEL, "options": {"host": "127.0.0.1", "port": port}}
     first, *others = bus.joints()
-    return [DriveJoint(first.name, first.gear_ratio, {**first.drive, **there}), *others]
+    return [replace(first, drive={**first.drive, **there}), *others]
 
 
 def test_an_arm_on_another_machines_bus_is_moved(bus: EmulatedBus, daemon: Daemon) -> None:

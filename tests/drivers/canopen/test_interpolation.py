@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tauscope_drivers.canopen.interpolation import interpolation_period
+from tauscope_drivers.canopen.commissioning import interpolation_period
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import pytest
 from emulated_can_bus import START, EmulatedBus
 from patience import eventually
 from tauscope_drivers import ArmState, ControlMode, DriveLimits, Setpoint, StopPolicy
-from tauscope_drivers.canopen import CanopenArm
+from tauscope_drivers.canopen.arm import CanopenArm
 from tauscope_sim.canopen_bus.power_state import PowerState
 
 LIMITS = DriveLimits(*(np.full(3, value) for value in (-3.0, 3.0, 2.0, 20.0)))

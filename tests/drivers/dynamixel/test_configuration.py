@@ -5,12 +5,13 @@ from typing import Any
 
 import pytest
 
-from tauscope_drivers.dynamixel import DynamixelJoint, read_configuration
+from tauscope_drivers.drive_block import DriveJoint
+from tauscope_drivers.dynamixel.configuration import read_configuration
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 
 
-def joints(*drives: dict[str, Any]) -> list[DynamixelJoint]:
-    return [DynamixelJoint(f"joint{number}", drive) for number, drive in enumerate(drives, 1)]
+def joints(*drives: dict[str, Any]) -> list[DriveJoint]:
+    return [DriveJoint(f"joint{number}", drive) for number, drive in enumerate(drives, 1)]
 
 
 def test_defaults() -> None:
@@ -84,4 +85,4 @@ def test_refusals_name_joint_and_key(drives: list[dict[str, Any]], message: str)
 @pytest.mark.parametrize("constant", [0.0, math.nan, math.inf])
 def test_impossible_torque_constant_is_refused(constant: float) -> None:
     with pytest.raises(DriverError, match="torque_constant"):
-        read_configuration([DynamixelJoint("j", {**PORT, "id": 1}, constant)])
+        read_configuration([DriveJoint("j", {**PORT, "id": 1}, torque_per_unit=constant)])

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tauscope_drivers.dynamixel.bus import Turns
 from tauscope_drivers.dynamixel.packets import Status
-from tauscope_drivers.dynamixel.turns import Turns
 
 
 def fresh(servo: int) -> Status:

@@ -17,7 +17,7 @@ def drive() -> EmulatedDrive:
 
 
 def written(drive: EmulatedDrive, subindex: int, value: int, size: int) -> int:
-    """Abort code of a write of service data; 0 where it was done."""
+    """Abort code of an SDO write; 0 where it was done."""
     head = 0x23 | (4 - size) << 2
     request = bytes([head]) + MAPPING.to_bytes(2, "little") + bytes([subindex]) + value.to_bytes(4, "little")
     ((identifier, answer),) = drive.receive((0x602, request), 0.0)

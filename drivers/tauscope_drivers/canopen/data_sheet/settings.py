@@ -5,8 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from tauscope_drivers.canopen import objects
-from tauscope_drivers.canopen.data_sheet.device_file import DescribedObject, DeviceFile
-from tauscope_drivers.canopen.data_sheet.text import DataSheetError
+from tauscope_drivers.canopen.data_sheet.device_file import DataSheetError, DescribedObject, DeviceFile
 from tauscope_drivers.canopen.objects import DriveObject
 
 _COMMUNICATION = range(0x1000, 0x2000)

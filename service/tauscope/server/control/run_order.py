@@ -4,6 +4,7 @@ from typing import Any, Literal
 
 from pydantic import Field, FiniteFloat
 
+from tauscope.runtime.drivers import DEFAULT_BACKEND
 from tauscope.runtime.options import RunOptions
 from tauscope.server.queue.stored import StoredModel
 
@@ -11,7 +12,7 @@ from tauscope.server.queue.stored import StoredModel
 class BackendChoice(StoredModel):
     """Which arm is moved."""
 
-    name: Literal["sim", "dynamixel", "canopen"] = Field(default="sim", description="backend")
+    name: str = Field(default=DEFAULT_BACKEND, description="backend: name of a driver, installed or not")
     time: Literal["virtual", "real"] = Field(
         default="virtual", description="of the simulated arm: as fast as it computes, or by the clock"
     )

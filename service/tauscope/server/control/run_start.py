@@ -7,6 +7,7 @@ from typing import Any
 
 from tauscope.errors import AcquisitionError
 from tauscope.robot import read_robot
+from tauscope.runtime.drivers import find_driver
 from tauscope.runtime.options import BackendOrder, RunOrder
 from tauscope.runtime.progress import Report
 from tauscope.runtime.run_process import RunProcess
@@ -38,14 +39,13 @@ def start_control(workspace: RunWorkspace, report: Report, *, sim_socket: Path |
 
 
 def _settings(workspace: RunWorkspace, backend: BackendChoice, sim_socket: Path | None) -> dict[str, Any]:
-    """The backend's own settings; for the simulated arm a scenario file, whose noise is this run's own."""
-    if backend.name != "sim":
-        return {}
-    scenario = {"seed": zlib.crc32(workspace.folder.name.encode()), **(backend.scenario or {})}
-    workspace.scenario.write_text(json.dumps(scenario, ensure_ascii=False), encoding="utf-8")
-    settings: dict[str, Any] = {"time": backend.time, "scenario": str(workspace.scenario)}
-    if backend.start is not None:
-        settings["start"] = list(backend.start)
+    """The options that the driver has, of what was asked for; the noise of a scenario is this run's own."""
+    options = find_driver(backend.name).option_names
+    settings: dict[str, Any] = {"time": backend.time, "start": backend.start and list(backend.start)}
+    if "scenario" in options:
+        scenario = {"seed": zlib.crc32(workspace.folder.name.encode()), **(backend.scenario or {})}
+        workspace.scenario.write_text(json.dumps(scenario, ensure_ascii=False), encoding="utf-8")
+        settings["scenario"] = str(workspace.scenario)
     if sim_socket is not None and backend.time == "real":
         settings["socket"] = str(sim_socket)
-    return settings
+    return {name: value for name, value in settings.items() if name in options and value is not None}

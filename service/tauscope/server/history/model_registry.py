@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 from sqlalchemy.exc import IntegrityError
 
 from tauscope.errors import NotFoundError
+from tauscope.runtime.drivers import driver_names, find_driver
 from tauscope.server.control.run_workspace import RunWorkspace
 from tauscope.server.history.drift import Drift
 from tauscope.server.history.model_history import ModelEntry, ModelHistory
@@ -72,7 +73,7 @@ class ModelRegistry:
     def _source(self, order: IdentificationOrder) -> str:
         """What was measured: one simulated recording makes all of it simulated."""
         backends = {self._backend(entry.name) for entry in order.recordings if entry.origin == "server"} - {None}
-        if "sim" in backends:
+        if any(find_driver(name).is_simulated for name in driver_names() if name in backends):
             return "simulated"
         return "arm" if backends else "uploaded"
 

@@ -1,5 +1,6 @@
 """Which arm is moved: what the request leaves open, the operator of the service has decided."""
 
+from collections.abc import Sequence
 from typing import Any, Literal
 
 from pydantic import Field, FiniteFloat
@@ -7,6 +8,7 @@ from pydantic import Field, FiniteFloat
 from tauscope.errors import RobotFileError, ScenarioError
 from tauscope.robot import Robot
 from tauscope.robot.messages import one_line
+from tauscope.runtime.drivers import BackendName, find_driver
 from tauscope.server.control.run_order import BackendChoice
 from tauscope.server.http.documents import to_json_text
 from tauscope.server.http.settings import Settings
@@ -16,9 +18,7 @@ from tauscope.server.models import StrictModel
 class BackendRequest(StrictModel):
     """Which arm is moved; what is left out, the operator of the service has decided."""
 
-    name: Literal["sim", "dynamixel", "canopen"] | None = Field(
-        default=None, description="backend; null: the service's own"
-    )
+    name: BackendName | None = Field(default=None, description="backend; null: the service's own")
     time: Literal["virtual", "real"] | None = Field(
         default=None,
         description="of the simulated arm: as fast as it computes, or by the clock; null: the service's own",
@@ -46,8 +46,7 @@ def chosen_backend(settings: Settings, request: BackendRequest, robot: Robot) ->
     if request.scenario is not None and to_json_text(request.scenario) is None:
         raise ScenarioError("scenario: holds NaN, infinity or text that is not Unicode; write plain numbers and text")
     name = request.name or settings.backend
-    if name == "canopen":
-        _refuse_data_sheets(robot)
+    _refuse_files(robot, find_driver(name).file_keys)
     return BackendChoice(
         name=name,
         time=request.time or settings.sim_time,
@@ -56,9 +55,10 @@ def chosen_backend(settings: Settings, request: BackendRequest, robot: Robot) ->
     )
 
 
-def _refuse_data_sheets(robot: Robot) -> None:
-    """Refuse drives' EDS or DCF files: nothing in a request would bring them."""
+def _refuse_files(robot: Robot, keys: Sequence[str]) -> None:
+    """Refuse drives' own files: nothing in a request would bring them."""
     for joint in robot.joints:
-        if (joint.drive or {}).get("eds") is not None:
-            hint = "leave it out, or run this arm with tauscope run"
-            raise RobotFileError(one_line(f"{joint.name}: drive.eds names a file, which cannot be sent; {hint}"))
+        for key in keys:
+            if (joint.drive or {}).get(key) is not None:
+                hint = "leave it out, or run this arm with tauscope run"
+                raise RobotFileError(one_line(f"{joint.name}: drive.{key} names a file, which cannot be sent; {hint}"))

@@ -7,6 +7,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, SecretStr
 
+from tauscope.runtime.drivers import DEFAULT_BACKEND, BackendName
 from tauscope.server.store.data_folder import FOLDERS, RECORDINGS
 from tauscope.server.store.database.database import FILE_NAME
 
@@ -32,8 +33,8 @@ class Settings(BaseModel):
     workers: int = Field(default=1, gt=0, description="jobs that are worked on at a time, a process each")
     max_arms: int = Field(default=4, gt=0, description="arms that may move at a time, a control process each")
     fires_schedules: bool = Field(default=True, description="whether what schedules repeat is started when it is due")
-    backend: Literal["sim", "dynamixel", "canopen"] = Field(
-        default="sim", description="what moves the arm where a request names no backend"
+    backend: BackendName = Field(
+        default=DEFAULT_BACKEND, description="what moves the arm where a request names no backend"
     )
     sim_time: Literal["virtual", "real"] = Field(
         default="virtual", description="of the simulated arm, where a request does not say"

@@ -13,6 +13,7 @@ from fastapi import APIRouter, Request, Response
 from tauscope.effects import catalogue
 from tauscope.errors import IdentificationError, NotFoundError
 from tauscope.robot.messages import one_line, shown
+from tauscope.runtime.drivers import driver_names, find_driver
 
 router = APIRouter(include_in_schema=False)
 
@@ -69,22 +70,31 @@ def _answer(request: Request, name: str) -> Response:
 
 @cache
 def assets() -> Mapping[str, Asset]:
-    """All files of the page by name: ours, and the plotting library's."""
+    """All files of the page by name: ours, the plotting library's, and the list of drivers."""
     package = distribution("uplot-python")
     paths = {path.name: path for path in sorted(STATIC.iterdir()) if path.suffix in MEDIA_TYPES}
     paths |= {name: Path(str(package.locate_file(file))) for name, file in PLOT_LIBRARY.items()}
-    found = {name: _asset(path.read_bytes(), path.suffix) for name, path in paths.items()}
-    return {**found, "effects.js": _asset(f"export const EFFECTS = {json.dumps(_german_effects())};\n".encode(), ".js")}
+    contents = {name: path.read_bytes() for name, path in paths.items()}
+    contents |= {"drivers.js": _drivers_script(), "effects.js": _effects_script()}
+    return {name: _asset(name, content) for name, content in contents.items()}
 
 
-def _german_effects() -> Mapping[str, str]:
-    """German names of the effects; none where a plugin is broken, for the page has to come nevertheless."""
+def _drivers_script() -> bytes:
+    """The registered drivers as a module of the page: title by language, and whether each is a simulation."""
+    drivers = [find_driver(name) for name in driver_names()]
+    content = {one.name: {"titles": dict(one.titles), "is_simulated": one.is_simulated} for one in drivers}
+    return f"export const DRIVERS = {json.dumps(content, ensure_ascii=False)};\n".encode()
+
+
+def _effects_script() -> bytes:
+    """German names of the effects as a module of the page; none if a plugin is broken, so that the page still loads."""
     try:
-        return {each.id: each.german for each in catalogue() if each.german}
+        names = {each.id: each.german for each in catalogue() if each.german}
     except IdentificationError:
-        return {}
+        names = {}
+    return f"export const EFFECTS = {json.dumps(names, ensure_ascii=False)};\n".encode()
 
 
-def _asset(content: bytes, suffix: str) -> Asset:
+def _asset(name: str, content: bytes) -> Asset:
     """A file with its tag."""
-    return Asset(content, MEDIA_TYPES[suffix], f'"{hashlib.sha256(content).hexdigest()[:24]}"')
+    return Asset(content, MEDIA_TYPES[Path(name).suffix], f'"{hashlib.sha256(content).hexdigest()[:24]}"')

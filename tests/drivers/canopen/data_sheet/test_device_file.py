@@ -17,8 +17,7 @@ from tauscope_drivers.canopen.configuration import (
     read_configuration,
     require_targets,
 )
-from tauscope_drivers.canopen.data_sheet.device_file import DeviceFile, read_device_file
-from tauscope_drivers.canopen.data_sheet.text import DataSheetError
+from tauscope_drivers.canopen.data_sheet.device_file import DataSheetError, DeviceFile, read_device_file
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 
 WHOLE = text_of(sections(VendorNumber="0x3A1", ProductNumber="", RevisionNumber="0x20005"))
@@ -26,7 +25,7 @@ WHOLE = text_of(sections(VendorNumber="0x3A1", ProductNumber="", RevisionNumber=
 
 def configured(path: object, **block: Any) -> BusConfiguration:
     bus = {"interface": "nobody opens it", "channel": "none", "node_id": 5, "counts_per_turn": 4096}
-    return read_configuration([DriveJoint("elbow", 50.0, {**bus, "eds": path, **block})])
+    return read_configuration([DriveJoint("elbow", {**bus, "eds": path, **block}, gear_ratio=50.0)])
 
 
 def refusal(path: object, **block: Any) -> str:

@@ -11,9 +11,12 @@ import pytest
 from emulated_can_bus import EmulatedBus
 from emulated_data_sheet import COMMAND, GAIN, OFFSET, PRODUCT, REVISION, VENDOR, Sections, sections, write_file
 from tauscope_drivers import ControlMode, DriveLimits, DriverError, StopPolicy
-from tauscope_drivers.canopen import CanopenArm, DriveJoint, examine, plan_frames
+from tauscope_drivers.canopen.arm import CanopenArm
+from tauscope_drivers.canopen.doctor import examine
+from tauscope_drivers.canopen.dry_run import plan_frames
+from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.errors import DriverErrorKind
-from tauscope_drivers.inspection import Severity
+from tauscope_drivers.inspection import FrameRequest, Severity
 from tauscope_sim.canopen_bus.object_dictionary import Abort, AbortError
 
 FREE = np.full(3, np.inf)
@@ -209,7 +212,7 @@ def test_a_dry_run_shows_what_is_written(bus: EmulatedBus, tmp_path: Path) -> No
         replace(one, drive={**one.drive, "rated_torque_nm": 0.5}) for one in joints(bus, write_file(tmp_path, content))
     ]
     limits = DriveLimits(np.full(3, -1.0), np.full(3, 1.0), np.full(3, 2.0), np.full(3, 10.0))
-    frames = list(plan_frames(asked, ControlMode.POSITION, limits, 0.1, np.zeros((1, 3))))
+    frames = list(plan_frames(asked, FrameRequest(ControlMode.POSITION, limits, 0.1, np.zeros((1, 3)))))
     sent = [
         (frame.wire, frame.meaning) for frame in frames if frame.wire.startswith("602#2") and "0x200" in frame.meaning
     ]

@@ -1,10 +1,11 @@
 """Requests and answers about leases."""
 
 from datetime import datetime
-from typing import Any, Literal
+from typing import Any
 
 from pydantic import Field
 
+from tauscope.runtime.drivers import BackendName
 from tauscope.server.control.leases import LONGEST_TTL_S
 from tauscope.server.models import AnswerModel, StrictModel
 
@@ -13,9 +14,7 @@ class LeaseRequest(StrictModel):
     """Which arm is wanted."""
 
     robot: str = Field(min_length=1, max_length=200, description="what the robot file calls the robot")
-    backend: Literal["sim", "dynamixel", "canopen"] | None = Field(
-        default=None, description="what moves it; null: the service's own"
-    )
+    backend: BackendName | None = Field(default=None, description="what moves it; null: the service's own")
     ttl_s: float = Field(
         default=10.0, ge=1.0, le=LONGEST_TTL_S, description="how long the lease lasts without a heartbeat [s]"
     )

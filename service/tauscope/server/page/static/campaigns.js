@@ -3,11 +3,12 @@
 import { follow, getJson, post } from "./api.js";
 import { cautions, chance, explained, h, moment, render, section, state, title } from "./dom.js";
 import { HEADLINES, appendRobot } from "./diagnoses.js";
+import { DRIVERS } from "./drivers.js";
 import { move } from "./leases.js";
 import { items } from "./lists.js";
 import { robotSheet } from "./robots.js";
 import { liveMonitor } from "./runs.js";
-import { t } from "./words.js";
+import { language, t } from "./words.js";
 
 const STEPS = { design: t`Design the motion`, run: t`Run it`, "held-out design": t`Design a second one`, "held-out run": t`Run that`, identify: t`Identify`, diagnose: t`Diagnose` };
 const ENDS = ["succeeded", "failed", "cancelled", "interrupted", "damaged"];
@@ -102,7 +103,7 @@ const LENGTHS = {
 };
 
 const LENGTH_WORDS = { usual: t`usual`, short: t`short`, thorough: t`thorough` };
-const BACKENDS = { sim: t`simulated arm`, dynamixel: t`Dynamixel servos`, canopen: t`CANopen drives` };
+const BACKENDS = Object.fromEntries(Object.entries(DRIVERS).map(([name, { titles }]) => [name, titles[language] ?? titles.en]));
 const TIMES = { virtual: t`as fast as it computes`, real: t`by the clock` };
 
 /** A choice among words, each with what it stands for. */
@@ -151,7 +152,7 @@ export async function showNewCampaign(root, { signal }) {
   const plan = h("input", { type: "checkbox", id: "plan" });
   const simulated = [time, conceal, joints];
   backend.onchange = () => {
-    const real = backend.value !== "sim";
+    const real = !DRIVERS[backend.value].is_simulated;
     clearLabel.hidden = !real;
     clear.required = real;
     simulated.forEach((each) => { each.disabled = real; });
@@ -160,8 +161,8 @@ export async function showNewCampaign(root, { signal }) {
     event.preventDefault();
     begin.disabled = true;
     said.textContent = t`Handing in …`;
-    const concealed = backend.value === "sim" ? CONCEALED[conceal.value](Number(joints.value)) : null;
-    const isSim = backend.value === "sim";
+    const isSim = DRIVERS[backend.value].is_simulated;
+    const concealed = isSim ? CONCEALED[conceal.value](Number(joints.value)) : null;
     const request = { backend: { name: backend.value, ...(isSim ? { time: time.value } : {}), ...(concealed ? { scenario: { torque_noise_std: 0.1, seed: 1, effects: [concealed] } } : {}) }, diagnosis: { next_trajectory: plan.checked }, ...LENGTHS[length.value] };
     if (isSim) request.run = { feed_forward: false, rate_hz: 200 };
     const body = new FormData();

@@ -6,7 +6,6 @@ import { cautions, figures, h, moment, number, percent, render, section, table, 
 import { items } from "./lists.js";
 import { named, t } from "./words.js";
 
-const BACKENDS = ["sim", "dynamixel", "canopen"];
 const KINDS = { run: "runs", identification: "identifications", diagnosis: "diagnoses", campaign: "campaigns" };
 const STANDS_STILL = ["created", "finished", "stopped", "failed", "interrupted", "damaged"];
 const LATELY = 12;
@@ -23,7 +22,7 @@ const pageOf = (robot) => `#/robots/${encodeURIComponent(robot)}`;
 
 /** Who has the lease of an arm, in words; nothing where nobody has. */
 function holderOf(leases, robot) {
-  const held = leases.filter(({ arm }) => BACKENDS.some((backend) => arm === `${robot} on ${backend}`));
+  const held = leases.filter(({ arm }) => arm.slice(0, arm.lastIndexOf(" on ")) === robot);
   return held.map(({ holder, armed }) => (armed ? t`${holder} has its lease, and it may move` : t`${holder} has its lease`)).join("; ");
 }
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tauscope_drivers.canopen.glitch_filter import LeapFilter
+from tauscope_drivers.canopen.glitch_filter import GlitchFilter
 
 CYCLE_NS = 5_000_000
 LIMIT = 2.0
@@ -14,14 +14,14 @@ REACH = 3.0 * LIMIT * (0.005 + 0.002)
 """Three times the speed limit, over a cycle and what a drive may sample later [rad]."""
 
 
-def watching(limit: float = LIMIT) -> LeapFilter:
-    leaps = LeapFilter()
-    leaps.limit = limit
-    return leaps
+def watching(limit: float = LIMIT) -> GlitchFilter:
+    glitches = GlitchFilter()
+    glitches.limit = limit
+    return glitches
 
 
-def believed(leaps: LeapFilter, positions: list[float]) -> list[bool]:
-    return [leaps.believes_place(position, cycle * CYCLE_NS) for cycle, position in enumerate(positions)]
+def believed(glitches: GlitchFilter, positions: list[float]) -> list[bool]:
+    return [glitches.believes_place(position, cycle * CYCLE_NS) for cycle, position in enumerate(positions)]
 
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
@@ -48,8 +48,8 @@ def test_a_joint_that_was_not_heard_for_long_may_be_far_away() -> None:
 
 
 def test_a_speed_beyond_all_limits_is_doubted_once() -> None:
-    leaps = watching()
-    assert [leaps.believes_speed(v) for v in (5.9, 6.1, 5.9, -6.1, -6.1, math.nan)] == [
+    glitches = watching()
+    assert [glitches.believes_speed(v) for v in (5.9, 6.1, 5.9, -6.1, -6.1, math.nan)] == [
         True,
         False,
         True,
@@ -60,8 +60,8 @@ def test_a_speed_beyond_all_limits_is_doubted_once() -> None:
 
 
 def test_nothing_is_doubted_before_a_limit_is_known() -> None:
-    assert believed(LeapFilter(), [0.0, 1e9, -1e9]) == [True, True, True]
-    assert LeapFilter().believes_speed(1e9)
+    assert believed(GlitchFilter(), [0.0, 1e9, -1e9]) == [True, True, True]
+    assert GlitchFilter().believes_speed(1e9)
 
 
 @given(st.integers(0, 31), st.integers(1, 18), st.floats(-LIMIT, LIMIT))

@@ -1,4 +1,4 @@
-"""Service data on a bus that loses, delays and doubles frames; the node's side is written here, byte by byte."""
+"""SDOs on a bus that loses, delays and doubles frames; the node's side is written here, byte by byte."""
 
 from collections import deque
 
