@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from tauscope.errors import AcquisitionError
+from tauscope.extras import require_extra
 from tauscope.robot import Robot
 from tauscope.robot.messages import nearest, shown
 from tauscope_drivers import Backend
@@ -43,11 +44,14 @@ def make_backend(
     ------
     AcquisitionError
         there is no such backend, or its settings are not valid
+    MissingExtraError
+        the backend's optional dependencies are not installed
     """
     known = BACKENDS if backends is None else backends
     if name not in known:
         raise AcquisitionError(f"there is no backend {shown(name)}; {nearest(name, known)}")
-    return known[name](robot, settings, folder)
+    with require_extra(f"backend {name}"):
+        return known[name](robot, settings, folder)
 
 
 def _on_field_bus(name: str) -> BackendFactory:
