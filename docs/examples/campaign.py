@@ -8,17 +8,18 @@ from pathlib import Path
 import tauscope
 
 robot = tauscope.load_robot(Path(__file__).parent / "two_joint_arm.yaml")
-CONCEALED = {"torque_noise_std": [0.2, 0.1], "effects": [{"effect": "joint_spring", "joint": 1, "stiffness": 2.0}]}
+CONCEALED = {"torque_noise_std": [0.2, 0.1], "effects": [{"effect": "joint_spring", "joint": 1, "stiffness": 5.0}]}
 
 
 def record(motion, seed):
     """Record a motion on the arm that conceals a spring."""
-    return tauscope.simulate(robot, motion, scenario={**CONCEALED, "seed": seed}, name=f"recording {seed}")
+    return tauscope.simulate(robot, motion, scenario={**CONCEALED, "seed": seed}, rate_hz=100, name=f"recording {seed}")
 
 
 # %%
 motions = [
-    tauscope.design_excitation(robot, period_s=4.0, periods=2, slow_reversals=False, seed=seed) for seed in (0, 1)
+    tauscope.design_excitation(robot, period_s=3.0, harmonics=3, periods=2, slow_reversals=False, seed=seed)
+    for seed in (0, 1)
 ]
 print(f"condition number {motions[0].design.condition_number:.1f}")
 train, judge = (record(motion, seed) for seed, motion in enumerate(motions))
@@ -42,6 +43,7 @@ if diagnosis.planned is not None:
     recordings.append(record(diagnosis.planned.trajectory, 2))
     diagnosis = tauscope.diagnose(robot, recordings, held_out=judge)
     print(f"verdict after one more recording: {diagnosis.document.verdict}")
+    print(diagnosis.to_frame().to_string())
 
 # %%
 diagnosis.plot()

@@ -19,8 +19,8 @@ folder = Path(tempfile.mkdtemp(prefix="tauscope-example-"))
 noise = {"torque_noise_std": [0.2, 0.1]}
 recordings = []
 for seed in (0, 1):
-    motion = tauscope.design_excitation(robot, period_s=4.0, periods=2, slow_reversals=False, seed=seed)
-    frame = tauscope.simulate(robot, motion, scenario={**noise, "seed": seed}).to_frame()
+    motion = tauscope.design_excitation(robot, period_s=3.0, harmonics=3, periods=2, slow_reversals=False, seed=seed)
+    frame = tauscope.simulate(robot, motion, scenario={**noise, "seed": seed}, rate_hz=100).to_frame()
     recordings.append(folder / f"recording-{seed}.csv")
     frame[["t", "q1", "q2", "tau1", "tau2", "period"]].to_csv(recordings[-1], index=False)
 

@@ -21,9 +21,9 @@ NOISE = [0.2, 0.1]
 
 def record(seed, effects=()):
     """One recording; every seed plays another motion."""
-    motion = tauscope.design_excitation(ROBOT, period_s=4.0, periods=2, slow_reversals=False, seed=seed)
+    motion = tauscope.design_excitation(ROBOT, period_s=3.0, harmonics=3, periods=2, slow_reversals=False, seed=seed)
     scenario = {"torque_noise_std": NOISE, "seed": seed, "effects": list(effects)}
-    return tauscope.simulate(ROBOT, motion, scenario=scenario, name=f"recording {seed}")
+    return tauscope.simulate(ROBOT, motion, scenario=scenario, rate_hz=100, name=f"recording {seed}")
 
 
 def largest_drift(reference, present):
@@ -39,17 +39,23 @@ def largest_drift(reference, present):
 
 # %%
 @pytest.fixture(scope="module")
-def reference():
+def recordings():
+    """Two recordings: one to learn from, one to judge by."""
+    return record(0), record(1)
+
+
+@pytest.fixture(scope="module")
+def reference(recordings):
     """The model of record."""
-    return tauscope.identify(ROBOT, record(0), held_out=record(1))
+    return tauscope.identify(ROBOT, recordings[0], held_out=recordings[1])
 
 
 def test_the_model_predicts_other_motions(reference):
     assert reference.document.fit.held_out.relative_error < LARGEST_ERROR
 
 
-def test_no_physics_is_missing():
-    assert tauscope.diagnose(ROBOT, record(0), held_out=record(1)).document.verdict == "consistent"
+def test_no_physics_is_missing(recordings):
+    assert tauscope.diagnose(ROBOT, recordings[0], held_out=recordings[1]).document.verdict == "consistent"
 
 
 def test_the_arm_has_not_drifted(reference):

@@ -210,7 +210,7 @@ def simulate(
     arm = _robot(robot)
     if isinstance(motion, ExcitationResult):
         motion = motion.design.trajectory
-    trajectory = motion if isinstance(motion, Trajectory) else read_trajectory(Path(motion))
+    trajectory = motion if isinstance(motion, Trajectory) else read_trajectory(Path(motion), arm)
     with TemporaryDirectory(prefix="tauscope-") as folder:
         settings: dict[str, Any] = {"time": "virtual"}
         if isinstance(scenario, Mapping):
