@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Literal, NoReturn, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, NoReturn, TypeAlias, Union
 
 from tauscope.errors import AcquisitionError, TauscopeError
 
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from tauscope.robot import Robot
     from tauscope.trajectory import Trajectory
 
-RobotSource: TypeAlias = "Robot | str | Path"
-RecordingSource: TypeAlias = "Recording | SimulationResult | str | Path"
-Recordings: TypeAlias = "RecordingSource | Sequence[RecordingSource]"
+RobotSource: TypeAlias = Union["Robot", str, Path]
+RecordingSource: TypeAlias = Union["Recording", "SimulationResult", str, Path]
+Recordings: TypeAlias = RecordingSource | Sequence[RecordingSource]
 
 
 def _ignore(step: str) -> None:
@@ -37,7 +37,7 @@ def load_robot(path: str | Path) -> "Robot":
     return read_robot(path)
 
 
-def read_recording(path: str | Path, robot: "RobotSource | None" = None) -> "Recording":
+def read_recording(path: str | Path, robot: RobotSource | None = None) -> "Recording":
     """Read a recording: CSV, Parquet, MCAP or rosbag2.
 
     Parameters
@@ -93,7 +93,7 @@ def diagnose(
     recordings: Recordings,
     held_out: Recordings = (),
     *,
-    against: "Literal['identified', 'model'] | Recordings" = "identified",
+    against: Literal["identified", "model"] | Recordings = "identified",
     cutoff_hz: float | Literal["auto"] | None = "auto",
     progress: Callable[[str], None] = _ignore,
 ) -> "DiagnosisResult":
