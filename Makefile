@@ -5,6 +5,7 @@ UV ?= uv
 PYTEST_FLAGS ?=
 
 BIN := .venv/bin
+DEMO := .venv/.demo-installed
 INSTALLED := .venv/.installed
 
 # One BLAS thread a process: the two test processes already fill two cores.
@@ -22,20 +23,27 @@ help: ## say what there is
 
 venv: $(INSTALLED) ## install the locked versions into .venv; does nothing where they are in place
 
-$(INSTALLED): constraints-dev.txt pyproject.toml
+PIP_INSTALL = $(BIN)/python -m pip install -qq --disable-pip-version-check
+
+$(DEMO): constraints-demo.txt pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Tauscope needs Python 3.11 or later; name one: make PYTHON=...")'
 	@test -x $(BIN)/pip || $(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install -qq --disable-pip-version-check --require-hashes -r constraints-dev.txt
-	$(BIN)/python -m pip install -qq --disable-pip-version-check --no-deps --no-build-isolation -e .
+	$(PIP_INSTALL) --require-hashes -r constraints-demo.txt
+	$(PIP_INSTALL) --no-deps --no-build-isolation -e .
 	@touch $@
 
-demo: $(INSTALLED) ## a whole campaign on the paper's arm, simulated, and in a terminal the page; look into demo-output/
+# The demo needs a third of it: what only develops and tests comes with the first target that does.
+$(INSTALLED): $(DEMO) constraints-dev.txt
+	$(PIP_INSTALL) --require-hashes -r constraints-dev.txt
+	@touch $@
+
+demo: $(DEMO) ## a whole campaign on the paper's arm, simulated, and in a terminal the page; look into demo-output/
 	$(BIN)/tauscope demo --out demo-output
 
-prove: $(INSTALLED) ## concealed effects: the quick set, and its page with pictures; look into proof-output/
+prove: $(DEMO) ## concealed effects: the quick set, and its page with pictures; look into proof-output/
 	$(BIN)/tauscope prove --out proof-output
 
-page: $(INSTALLED) ## the page at http://127.0.0.1:8000 with what `make demo` has made; Ctrl-C ends it
+page: $(DEMO) ## the page at http://127.0.0.1:8000 with what `make demo` has made; Ctrl-C ends it
 	@test -d demo-output/service || { echo "nothing to show yet: run make demo first" >&2; exit 1; }
 	$(BIN)/tauscope serve --data demo-output/service
 
@@ -70,12 +78,16 @@ format: $(INSTALLED) ## put the source into its one format
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
 
+# Three lists of one resolution: all that develops, all that a user may install, and what the demo needs.
 COMPILE = $(UV) pip compile pyproject.toml --universal --python-version 3.11 --generate-hashes --no-annotate --no-header --quiet $(if $(UPGRADE),--upgrade)
+
+DEMO_EXTRAS := service hardware sim
 
 lock: ## resolve the versions anew from pyproject.toml; UPGRADE=1 takes the newest
 	@command -v $(UV) >/dev/null || { echo "make lock needs uv: pip install uv" >&2; exit 1; }
 	$(COMPILE) --all-extras --group dev --output-file constraints-dev.txt
 	$(COMPILE) --all-extras --group build --constraints constraints-dev.txt --output-file constraints.txt
+	$(COMPILE) $(DEMO_EXTRAS:%=--extra %) --group build --constraints constraints-dev.txt --output-file constraints-demo.txt
 
 clean: ## remove what was made, but not .venv
 	rm -rf build dist demo-output proof-output .pytest_cache .ruff_cache .hypothesis .import_linter_cache

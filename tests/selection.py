@@ -31,8 +31,8 @@ NEEDED: dict[str, tuple[str, ...]] = {
     "service/tauscope/trajectory/": ("tests/excitation", "tests/hardware_emulated"),
     "service/tauscope/excitation/": ("tests/excitation", "tests/diagnosis/test_next_experiment.py"),
     "service/tauscope/identification/": ("tests/identification", "tests/diagnosis", *QUICK_PROOF),
-    "service/tauscope/effects/": ("tests/diagnosis", *QUICK_PROOF),
-    "service/tauscope/diagnosis/": ("tests/diagnosis", "tests/report", *QUICK_PROOF),
+    "service/tauscope/effects/": ("tests/effects", "tests/diagnosis", *QUICK_PROOF),
+    "service/tauscope/diagnosis/": ("tests/effects", "tests/diagnosis", "tests/report", *QUICK_PROOF),
     "service/tauscope/export/": ("tests/identification", "tests/diagnosis/test_extended_model.py"),
     "service/tauscope/report/": ("tests/report", "tests/browser/test_report_on_paper.py"),
     # serving it

@@ -12,7 +12,8 @@ TauscopeError
 ├── AcquisitionError      (RuntimeError)  acquisition         a run cannot start, or ended before its time
 ├── StoreError            (RuntimeError)  store               the database or the data folder cannot be used
 ├── NotFoundError         (LookupError)   not-found           nothing of that name is kept here
-└── LimitExceededError    (ValueError)    limit-exceeded      an upload or a request is larger than allowed
+├── LimitExceededError    (ValueError)    limit-exceeded      an upload or a request is larger than allowed
+└── MissingExtraError     (ImportError)   missing-extra       an optional dependency is not installed
 
 Every leaf also inherits the builtin that a caller would expect, so that ``except ValueError`` keeps working. `code`
 is stable: scripts and the pages below ``docs/errors/`` rely on it. A message is one line; it names the file, column,
@@ -98,3 +99,9 @@ class LimitExceededError(TauscopeError, ValueError):
     """An upload or a request is larger than this service accepts."""
 
     code = "limit-exceeded"
+
+
+class MissingExtraError(TauscopeError, ImportError):
+    """An optional dependency is not installed; the message names the extra to install."""
+
+    code = "missing-extra"

@@ -29,7 +29,8 @@ TOP_LEVEL = ["pyproject.toml", "Makefile", "README.md", "CHANGELOG.md", "CONTRIB
 MACHINE_PATH = re.compile(r"(?<![\w.])/(?:wor[k]|roo[t]|opt/pyp[i])/")
 REGISTRY = re.compile(r"(?:pyp[i]\.org|pythonhoste[d]\.org|registry\.npmj[s]\.org|deb\.debia[n]\.org|/simpl[e]/)")
 
-CONSTRAINTS = ["constraints.txt", "constraints-dev.txt"]
+CONSTRAINTS = ["constraints.txt", "constraints-dev.txt", "constraints-demo.txt"]
+DEMO_EXTRAS = ["service", "hardware", "sim"]
 REQUIREMENT = re.compile(r"^(?P<name>[a-z0-9-]+)==(?P<version>\S+)(?: ; (?P<marker>[^\\]+?))? \\$")
 HASH = re.compile(r"^    --hash=sha256:[0-9a-f]{64}(?: \\)?$")
 
@@ -94,15 +95,19 @@ def test_constraints_are_exact_versions_with_hashes_only(file: str) -> None:
             assert HASH.match(following), f"{file}: no hash below `{line}`"
 
 
-def test_both_constraints_files_agree() -> None:
+def test_the_constraints_files_agree() -> None:
     assert locked("constraints.txt") <= locked("constraints-dev.txt")
+    versions = {file: {(name, version) for name, version, _ in locked(file)} for file in CONSTRAINTS}
+    assert versions["constraints-demo.txt"] < versions["constraints.txt"]  # markers follow from who needs a package
 
 
 @pytest.mark.parametrize("file", CONSTRAINTS)
 def test_every_dependency_is_locked(file: str) -> None:
     configuration = tomllib.loads((REPOSITORY / "pyproject.toml").read_text(encoding="utf-8"))
     project, groups = configuration["project"], configuration["dependency-groups"]
-    wanted = [*project["dependencies"], *chain(*project["optional-dependencies"].values()), *groups["build"]]
+    extras = {name: needs for name, needs in project["optional-dependencies"].items() if name != "all"}
+    chosen = DEMO_EXTRAS if file == "constraints-demo.txt" else list(extras)
+    wanted = [*project["dependencies"], *chain(*(extras[name] for name in chosen)), *groups["build"]]
     if file == "constraints-dev.txt":
         wanted += [requirement for requirement in groups["dev"] if isinstance(requirement, str)]
     names = {re.split(r"[\[<>=!~; ]", requirement)[0].lower().replace(".", "-") for requirement in wanted}

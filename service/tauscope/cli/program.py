@@ -41,6 +41,7 @@ from tauscope.cli.store_command import store
 from tauscope.cli.values import SeveralValuesCommand
 from tauscope.cli.verbs import add_verb
 from tauscope.errors import TauscopeError
+from tauscope.extras import require_extra
 
 DEBUG = "TAUSCOPE_DEBUG"
 """Environment variable that makes every failure show its traceback."""
@@ -90,8 +91,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments is None:
         _prepare_process()
     words = list(sys.argv[1:] if arguments is None else arguments)
+    verb = next((word for word in words if not word.startswith("-")), "")
     try:
-        get_command(app).main(words, prog_name="tauscope")
+        with require_extra(f"tauscope {verb}".rstrip()):
+            get_command(app).main(words, prog_name="tauscope")
     except SystemExit as exit_:
         return _status(exit_)
     except KeyboardInterrupt:

@@ -2,10 +2,8 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from tauscope.errors import ExportError
 from tauscope.export.compensation.identifiers import comment_text
@@ -47,7 +45,7 @@ def to_mjcf(robot: Robot, models: Mapping[str, JointModel]) -> MjcfModel:
     comment = "".join(f"\n    {comment_text(note).replace('--', '- -')}" for note in notes)
     text = "\n".join(
         [
-            f"<mujoco model={quoteattr(_xml_name(robot.name))}>",
+            f"<mujoco model={_quoted(robot.name)}>",
             f"  <!-- Model identified by Tauscope.{comment} -->",
             '  <compiler angle="radian" autolimits="true"/>',
             f'  <option gravity="{_numbers(*robot.gravity)}"/>',
@@ -65,6 +63,8 @@ def to_mjcf(robot: Robot, models: Mapping[str, JointModel]) -> MjcfModel:
 
 def _body(robot: Robot, index: int, joint: Joint, model: JointModel) -> list[str]:
     """Start tag, inertial and joint of one body."""
+    from scipy.spatial.transform import Rotation
+
     if model.link is None:
         raise ExportError(one_line(f"joint {shown(joint.name)} has no link to write; give the link of every joint"))
     inertia = centred(joint.name, model.link)
@@ -74,7 +74,7 @@ def _body(robot: Robot, index: int, joint: Joint, model: JointModel) -> list[str
     position = segment.before.rotation @ segment.after.translation + segment.before.translation
     quaternion = Rotation.from_matrix(rotation).as_quat(scalar_first=True)
     full = [inertia.inertia[row, column] for row, column in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
-    name = quoteattr(_xml_name(f"{joint.name}_link"))
+    name = _quoted(f"{joint.name}_link")
     return [
         f'<body name={name} pos="{_numbers(*position)}" quat="{_numbers(*quaternion)}">',
         f'  <inertial pos="{_numbers(*inertia.centre)}" mass="{_numbers(inertia.mass)}" '
@@ -99,7 +99,7 @@ def _joint(robot: Robot, index: int, joint: Joint, model: JointModel) -> str:
         attributes |= {"damping": _numbers(damping), "frictionloss": _numbers(dry)}
     attributes["armature"] = _numbers(_armature(joint, model))
     written = " ".join(f'{key}="{value}"' for key, value in attributes.items())
-    return f"<joint name={quoteattr(_xml_name(joint.name))} {written}/>"
+    return f"<joint name={_quoted(joint.name)} {written}/>"
 
 
 def _armature(joint: Joint, model: JointModel) -> float:
@@ -113,10 +113,17 @@ def _armature(joint: Joint, model: JointModel) -> float:
 
 def _motor(joint: Joint) -> str:
     """A torque motor on a joint, limited where the robot file states a limit."""
-    name = quoteattr(_xml_name(joint.name))
+    name = _quoted(joint.name)
     limit = joint.limits.torque
     control = "" if limit is None else f' ctrlrange="{_numbers(-limit, limit)}"'
     return f"<motor name={name} joint={name}{control}/>"
+
+
+def _quoted(name: str) -> str:
+    """A name as the value of an attribute."""
+    from xml.sax.saxutils import quoteattr  # loads urllib and ssl
+
+    return quoteattr(_xml_name(name))
 
 
 def _xml_name(name: str) -> str:

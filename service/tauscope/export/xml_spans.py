@@ -4,7 +4,6 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from xml.parsers import expat
-from xml.sax.saxutils import escape
 
 from tauscope.errors import ExportError
 
@@ -121,6 +120,8 @@ class XmlText:
 
 def _attribute_text(value: str) -> bytes:
     """A value as it may stand between quotes of either kind."""
+    from xml.sax.saxutils import escape  # loads urllib and ssl
+
     return escape(value, {'"': "&quot;", "'": "&apos;"}).encode()
 
 

@@ -10,6 +10,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
 from tauscope.errors import AcquisitionError
+from tauscope.extras import require_extra
 from tauscope.robot import Joint, Robot
 from tauscope.robot.messages import nearest, shown
 from tauscope_drivers.drive_block import DriveJoint
@@ -145,13 +146,15 @@ def make_backend(name: str, robot: Robot, settings: Mapping[str, Any], *, folder
     ------
     AcquisitionError
         there is no such backend, or a setting or a ``drive`` block is not valid
+    MissingExtraError
+        the backend's optional dependencies are not installed
     """
     driver = find_driver(name)
     for key in settings:
         if key not in driver.option_names:
             hint = nearest(str(key), driver.option_names)
             raise AcquisitionError(f"backend {name}: unknown setting {shown(key)}; {hint}")
-    with translate_driver_errors():
+    with translate_driver_errors(), require_extra(f"backend {name}"):
         return driver.make_backend(ArmDescription(to_drive_joints(driver, robot, settings), robot, folder), settings)
 
 

@@ -5,7 +5,6 @@ import os
 import time
 from pathlib import Path
 
-import tauscope
 from tauscope.errors import AcquisitionError
 
 _THREAD_SETTINGS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -13,7 +12,7 @@ _THREAD_SETTINGS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"
 
 def child_environment() -> dict[str, str]:
     """Environment of a child process: it imports the modules that this process has, and computes in one thread."""
-    source = str(Path(tauscope.__file__).resolve().parents[1])
+    source = str(Path(__file__).resolve().parents[2])
     known = os.environ.get("PYTHONPATH")
     threads = dict.fromkeys(_THREAD_SETTINGS, "1")
     return {**os.environ, **threads, "PYTHONPATH": f"{source}{os.pathsep}{known}" if known else source}

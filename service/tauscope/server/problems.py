@@ -39,6 +39,7 @@ _KINDS = (
     ProblemKind("store", HTTPStatus.SERVICE_UNAVAILABLE, "The database or the data folder cannot be used"),
     ProblemKind("not-found", HTTPStatus.NOT_FOUND, "Nothing of that name is kept here"),
     ProblemKind("limit-exceeded", HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "The request is larger than accepted"),
+    ProblemKind("missing-extra", HTTPStatus.NOT_IMPLEMENTED, "An optional dependency is not installed"),
     # What only a service can meet.
     ProblemKind("invalid-request", HTTPStatus.UNPROCESSABLE_ENTITY, "The request is not as documented"),
     ProblemKind("bad-request", HTTPStatus.BAD_REQUEST, "The request cannot be understood"),
