@@ -11,16 +11,15 @@ from tauscope.diagnosis import DiagnosisDocument
 from tauscope.errors import TauscopeError
 from tauscope.robot import read_robot
 from tauscope.runtime import RunOptions
-from tauscope.server.control.campaign_order import CampaignOrder, HeldOutMotion
-from tauscope.server.control.campaign_workspace import CampaignWorkspace
-from tauscope.server.control.run_order import BackendChoice
+from tauscope.server.control.campaign import CampaignOrder, CampaignWorkspace, HeldOutMotion
 from tauscope.server.http.assembly import open_services
-from tauscope.server.http.campaigns.status import describe, result_of
+from tauscope.server.http.campaigns.router import describe, result_of
 from tauscope.server.http.services import Services
 from tauscope.server.http.settings import Settings
-from tauscope.server.queue.diagnosis_order import DiagnosisOptions
-from tauscope.server.queue.excitation_order import ExcitationDesignOptions
 from tauscope.server.queue.states import JobState
+from tauscope.tasks.design_excitation import ExcitationDesignOptions
+from tauscope.tasks.diagnose import DiagnosisOptions
+from tauscope.tasks.run import BackendChoice
 
 ROOT = "/api/v1"
 POLL_S = 0.2

@@ -13,7 +13,7 @@ import typer
 
 from tauscope.cli.output_files import keep_file, require_new
 from tauscope.cli.run_summary import show_run
-from tauscope.cli.terminal import Told, output, plain, shown_percent
+from tauscope.cli.terminal import Told, output, plain, shown_progress
 from tauscope.errors import AcquisitionError
 from tauscope.excitation import ExcitationOptions, OptimiserProgress, design_excitation
 from tauscope.robot import Robot, read_robot
@@ -79,7 +79,7 @@ def run_arm(request: Request) -> None:
     backend, robot, out = request.backend_order, read_robot(request.robot), _output(request)
     folder, is_settled = _folder_beside(out), False
     try:
-        with shown_percent() as told:
+        with shown_progress() as told:
             trajectory = request.trajectory or _design(robot, request.seed, folder, told)
             order = RunOrder(
                 robot=str(request.robot.resolve()),

@@ -21,12 +21,11 @@ from server.queue.waiting import wait_until
 from tauscope.errors import StoreError
 from tauscope.server.queue.cluster_executor import SCHEDULER, ClusterAwayError, ClusterExecutor
 from tauscope.server.queue.executors import open_executor
-from tauscope.server.queue.identification_order import IdentificationOrder, OrderedRecording
-from tauscope.server.queue.identification_work import run_identification
-from tauscope.server.queue.identification_workspace import IdentificationWorkspace
+from tauscope.server.queue.identification import IdentificationOrder, IdentificationWorkspace, run_identification
 from tauscope.server.queue.queue import JobQueue
 from tauscope.server.queue.queued_job import JobKind
 from tauscope.server.queue.states import JobState
+from tauscope.server.queue.task_job import OrderedRecording
 from tauscope.server.queue.worker_pool import WorkerPool
 from tauscope.server.queue.workspace import Workspace
 from tauscope.server.store.incoming import hash_file

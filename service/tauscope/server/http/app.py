@@ -26,7 +26,6 @@ from tauscope.server.http.idempotency.repeatable import Repeatable
 from tauscope.server.http.identifications.models import IdentificationRequest
 from tauscope.server.http.identifications.router import router as identifications
 from tauscope.server.http.items.router import router as items
-from tauscope.server.http.jobs.events import EVENT_MODELS
 from tauscope.server.http.leases.models import LeaseRequest
 from tauscope.server.http.leases.router import router as leases
 from tauscope.server.http.leases.router import stop_router
@@ -43,6 +42,7 @@ from tauscope.server.http.runs.router import router as runs
 from tauscope.server.http.schedules.models import ScheduleRequest
 from tauscope.server.http.schedules.router import router as schedules
 from tauscope.server.http.settings import Settings
+from tauscope.server.http.tasks.events import EVENT_MODELS
 from tauscope.server.page.router import router as page
 from tauscope.server.problems import Problem
 

@@ -19,8 +19,8 @@ from tauscope.server.control.campaign_runner import CampaignDependencies
 from tauscope.server.control.device_claims import DeviceClaims
 from tauscope.server.control.lease import Lease
 from tauscope.server.control.leases import Leases
+from tauscope.server.control.run import start_control
 from tauscope.server.control.run_manager import RunManager
-from tauscope.server.control.run_start import start_control
 from tauscope.server.control.run_supervisor import StartControl
 from tauscope.server.history.drift_monitor import DriftMonitor
 from tauscope.server.history.indexer import open_index
@@ -34,11 +34,11 @@ from tauscope.server.http.operations.metrics import Metrics, TimedExecutor
 from tauscope.server.http.services import Services
 from tauscope.server.http.settings import Settings
 from tauscope.server.queue.cluster_executor import ClusterExecutor
-from tauscope.server.queue.diagnosis_work import run_diagnosis
-from tauscope.server.queue.excitation_work import run_excitation
+from tauscope.server.queue.diagnosis import run_diagnosis
+from tauscope.server.queue.excitation import run_excitation
 from tauscope.server.queue.executors import open_executor
 from tauscope.server.queue.housekeeping import Housekeeping
-from tauscope.server.queue.identification_work import run_identification
+from tauscope.server.queue.identification import run_identification
 from tauscope.server.queue.queue import JobQueue
 from tauscope.server.queue.queued_job import JobKind
 from tauscope.server.queue.worker_pool import WorkerPool

@@ -8,17 +8,14 @@ from pathlib import Path
 from typing import TypeVar
 
 from tauscope.errors import NotFoundError, TauscopeError
+from tauscope.server.control.campaign import CampaignOrder, CampaignWorkspace
 from tauscope.server.control.campaign_manager import CampaignManager
-from tauscope.server.control.campaign_order import CampaignOrder
 from tauscope.server.control.campaign_runner import CampaignDependencies
-from tauscope.server.control.campaign_workspace import CampaignWorkspace
 from tauscope.server.control.permits import FREE, Permit
-from tauscope.server.queue.diagnosis_order import DiagnosisOrder
-from tauscope.server.queue.diagnosis_workspace import DiagnosisWorkspace
-from tauscope.server.queue.identification_order import IdentificationOrder, OrderedRecording
-from tauscope.server.queue.identification_submission import ordered_on_server
-from tauscope.server.queue.identification_workspace import IdentificationWorkspace
+from tauscope.server.queue.diagnosis import DiagnosisOrder, DiagnosisWorkspace
+from tauscope.server.queue.identification import IdentificationOrder, IdentificationWorkspace
 from tauscope.server.queue.stored import StoredModel
+from tauscope.server.queue.task_job import OrderedRecording, ordered_on_server
 from tauscope.server.queue.workspace import Workspace
 from tauscope.server.schedules.definition import RecordingChoice, ScheduleDefinition
 from tauscope.server.schedules.entries import ScheduleEntry

@@ -9,7 +9,6 @@ from tauscope.errors import TauscopeError
 from tauscope.server.control.device_claims import BusyError
 from tauscope.server.control.interlock import objection
 from tauscope.server.control.lease_errors import LeasedError
-from tauscope.server.control.run_order import BackendChoice
 from tauscope.server.queue.messages import without_folders
 from tauscope.server.queue.queue import QueueFullError
 from tauscope.server.schedules.definition import ScheduleDefinition
@@ -17,6 +16,7 @@ from tauscope.server.schedules.entries import FiringEntry, ScheduleEntry
 from tauscope.server.schedules.repeater import NothingToDoError, Repeater
 from tauscope.server.schedules.repository import ScheduleRepository
 from tauscope.server.store.items import utc_now
+from tauscope.tasks.run import BackendChoice
 
 _log = logging.getLogger("tauscope.jobs")
 

@@ -4,9 +4,9 @@ import json
 from datetime import datetime
 
 from tauscope.errors import NotFoundError
-from tauscope.server.control.campaign_workspace import CampaignWorkspace
-from tauscope.server.queue.diagnosis_workspace import DiagnosisWorkspace
-from tauscope.server.queue.identification_workspace import IdentificationWorkspace
+from tauscope.server.control.campaign import CampaignWorkspace
+from tauscope.server.queue.diagnosis import DiagnosisWorkspace
+from tauscope.server.queue.identification import IdentificationWorkspace
 from tauscope.server.schedules.definition import ScheduleDefinition
 from tauscope.server.schedules.entries import ScheduleEntry
 from tauscope.server.schedules.repeater import Repeater

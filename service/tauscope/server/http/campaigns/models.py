@@ -7,17 +7,17 @@ from pydantic import Field
 from tauscope.diagnosis import DiagnosisDocument
 from tauscope.identification import IdentificationDocument
 from tauscope.runtime.options import RunOptions
-from tauscope.server.control.campaign_order import HeldOutMotion
-from tauscope.server.control.run_order import BackendChoice
+from tauscope.server.control.campaign import HeldOutMotion
 from tauscope.server.http.backends import BackendRequest
-from tauscope.server.http.jobs.answers import JobAnswer
-from tauscope.server.http.jobs.submission import RobotRequest
 from tauscope.server.http.robots.models import EXAMPLE_ROBOT
+from tauscope.server.http.tasks.answers import JobAnswer
+from tauscope.server.http.tasks.submission import RobotRequest
 from tauscope.server.models import AnswerModel
-from tauscope.server.queue.diagnosis_order import DiagnosisOptions
-from tauscope.server.queue.excitation_order import ExcitationDesignOptions
-from tauscope.server.queue.identification_order import IdentificationOptions
 from tauscope.server.queue.states import JobState
+from tauscope.tasks.design_excitation import ExcitationDesignOptions
+from tauscope.tasks.diagnose import DiagnosisOptions
+from tauscope.tasks.identify import IdentificationOptions
+from tauscope.tasks.run import BackendChoice
 
 
 class CampaignRequest(RobotRequest):

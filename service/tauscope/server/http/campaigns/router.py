@@ -1,63 +1,206 @@
-"""Routes about campaigns."""
+"""Campaigns: what is special about this resource."""
 
-from pathlib import Path
+from collections.abc import Callable, Iterator
+from typing import Any, Literal
+from urllib.parse import quote
 
-from fastapi import APIRouter, Request, Response
+from fastapi import Request
 from starlette.concurrency import run_in_threadpool
 
+from tauscope.diagnosis import DiagnosisDocument
+from tauscope.errors import NotFoundError
+from tauscope.identification import IdentificationDocument
+from tauscope.server.control.campaign import CampaignLinks, CampaignOrder, CampaignWorkspace
+from tauscope.server.control.run import RunWorkspace
+from tauscope.server.http.backends import chosen_backend
 from tauscope.server.http.campaigns.models import (
     EXAMPLES,
     CampaignAnswer,
+    CampaignLinksAnswer,
     CampaignListAnswer,
     CampaignRequest,
     CampaignResult,
+    CampaignStepAnswer,
     CampaignStopAnswer,
 )
-from tauscope.server.http.campaigns.status import describe, find_campaign, result_of
-from tauscope.server.http.campaigns.submission import submit_campaign
-from tauscope.server.http.jobs.events import add_events_route
-from tauscope.server.http.jobs.routes import ENDINGS, MOTION, SUBMISSION, Identifier, Limit, collection
-from tauscope.server.http.jobs.submission import request_body
-from tauscope.server.http.leases.holding import LeaseToken
-from tauscope.server.http.robots.of_job import add_robot_route
+from tauscope.server.http.diagnoses.router import DIAGNOSES
+from tauscope.server.http.excitations.router import EXCITATIONS
+from tauscope.server.http.identifications.router import IDENTIFICATIONS
+from tauscope.server.http.leases.holding import permit_of
+from tauscope.server.http.robots.files import read_received_robot
+from tauscope.server.http.runs.router import find_run
 from tauscope.server.http.services import Services, ServicesDep
+from tauscope.server.http.tasks.answers import damaged_fields, job_fields, require_document, require_success
+from tauscope.server.http.tasks.router import Resource, add_stopping, make_router
+from tauscope.server.http.tasks.routes import ENDINGS, Identifier, collection
+from tauscope.server.http.tasks.submission import Received, keep_robot, receive_request
 from tauscope.server.problems import ProblemError, problem_responses
+from tauscope.server.queue.states import JobState
 
-router = APIRouter(prefix="/campaigns", tags=["campaigns"], responses=problem_responses("invalid-request"))
+StepName = Literal["design", "run", "held-out design", "held-out run", "identify", "diagnose"]
+WAITING, GONE = "waiting", "gone"
 
 
-@router.post(
-    "",
-    status_code=202,
-    summary="Begin a campaign",
-    response_model=CampaignAnswer,
-    responses=problem_responses(*SUBMISSION, *MOTION),
-    openapi_extra=request_body(CampaignRequest, EXAMPLES),
-)
-async def hand_in(
-    request: Request, response: Response, services: ServicesDep, _lease: LeaseToken = None
-) -> CampaignAnswer:
-    """Designs a motion, runs it, runs a second one that the model is judged by, and identifies the arm.
+def find_campaign(services: Services, identifier: str) -> CampaignWorkspace:
+    """The folder of a campaign.
 
-    The campaign has the arm until its motions are done. Follow `Location` until it has ended, or stop it at any time.
+    Raises
+    ------
+    NotFoundError
+        if there is none
     """
-    identifier = await submit_campaign(request, services)
-    answer = await run_in_threadpool(describe, services, identifier, collection(request, 1))
-    response.headers["Location"] = answer.links.self_
-    return answer
+    return CampaignWorkspace(services.campaigns.items.folder(identifier))
 
 
-@router.get("", summary="List campaigns")
-def list_campaigns(request: Request, services: ServicesDep, limit: Limit = 100) -> CampaignListAnswer:
-    """The newest first."""
-    identifiers, root = services.campaigns.items.identifiers()[:limit], collection(request, 1)
-    return CampaignListAnswer(campaigns=[describe(services, identifier, root) for identifier in identifiers])
+def describe(services: Services, identifier: str, root: str) -> CampaignAnswer:
+    """The state of a campaign; one whose files are damaged is said to be so.
+
+    Raises
+    ------
+    NotFoundError
+        if there is none
+    """
+    workspace = find_campaign(services, identifier)
+    here, made, order = f"{root}/campaigns/{identifier}", workspace.read_made(), workspace.read_order()
+    if order is None:
+        links = _links(here, root, made, has_result=False)
+        return CampaignAnswer(**damaged_fields(identifier, here), links=links)
+    fields = job_fields(workspace, here)
+    links = _links(here, root, made, has_result=fields["state"] is JobState.SUCCEEDED)
+    steps = tuple(_steps(services, order, made, root))
+    return CampaignAnswer(**fields, robot=order.robot_name, backend=order.backend, steps=steps, links=links)
 
 
-@router.get("/{identifier}", summary="Follow a campaign", responses=problem_responses("not-found"))
-def get_campaign(request: Request, identifier: Identifier, services: ServicesDep) -> CampaignAnswer:
-    """Its state, its steps, and what it has made so far."""
-    return describe(services, identifier, collection(request, 2))
+def result_of(services: Services, identifier: str, root: str) -> CampaignResult:
+    """What came of a campaign that succeeded.
+
+    Raises
+    ------
+    NotFoundError
+        if there is none, or its identification was removed
+    ProblemError
+        if it has not succeeded
+    """
+    require_success(find_campaign(services, identifier))
+    answer = describe(services, identifier, root)
+    made = find_campaign(services, identifier).read_made()
+    identification = IDENTIFICATIONS.finished(services, made.identification or "")
+    content = require_document(identification.read_result(), identification.folder.name)
+    document = IdentificationDocument.model_validate_json(content)
+    diagnosis = None
+    if made.diagnosis is not None:
+        found = DIAGNOSES.finished(services, made.diagnosis)
+        content = require_document(found.read_result(), made.diagnosis)
+        diagnosis = DiagnosisDocument.model_validate_json(content)
+    return CampaignResult(identification=document, diagnosis=diagnosis, steps=answer.steps, links=answer.links)
+
+
+def _steps(services: Services, order: CampaignOrder, made: CampaignLinks, root: str) -> Iterator[CampaignStepAnswer]:
+    """Every step with its state."""
+    steps: list[tuple[StepName, str, Callable[[Services, str], Any], str | None, bool]] = [
+        ("design", "excitations", EXCITATIONS.find, made.excitation, True),
+        ("held-out design", "excitations", EXCITATIONS.find, made.held_out_excitation, order.held_out is not None),
+        ("run", "runs", find_run, made.run, True),
+        ("held-out run", "runs", find_run, made.held_out_run, order.held_out is not None),
+        ("identify", "identifications", IDENTIFICATIONS.find, made.identification, True),
+        ("diagnose", "diagnoses", DIAGNOSES.find, made.diagnosis, order.diagnosis is not None),
+    ]
+    for name, plural, find, identifier, is_wanted in steps:
+        if is_wanted and identifier is None:
+            yield CampaignStepAnswer(name=name, state=WAITING)
+        elif is_wanted and identifier is not None:
+            yield CampaignStepAnswer(
+                name=name, state=_state(services, find, identifier), link=f"{root}/{plural}/{identifier}"
+            )
+
+
+def _state(services: Services, find: Callable[[Services, str], Any], identifier: str) -> str:
+    """The state of a step's job or run."""
+    try:
+        folder = find(services, identifier)
+    except NotFoundError:
+        return GONE
+    record = folder.read_run() if isinstance(folder, RunWorkspace) else folder.read_record()
+    return "damaged" if record is None else record.state.value
+
+
+def _links(here: str, root: str, made: CampaignLinks, *, has_result: bool) -> CampaignLinksAnswer:
+    """Where to go on."""
+    identification = made.identification
+    return CampaignLinksAnswer(
+        self=here,
+        events=f"{here}/events",
+        stop=f"{here}/stop",
+        recordings=tuple(f"{root}/recordings/{quote(name)}" for name in made.recordings),
+        held_out=tuple(f"{root}/recordings/{quote(name)}" for name in made.held_out),
+        identification=None if identification is None else f"{root}/identifications/{identification}",
+        diagnosis=None if made.diagnosis is None else f"{root}/diagnoses/{made.diagnosis}",
+        result=f"{here}/result" if has_result else None,
+    )
+
+
+async def submit_campaign(request: Request, services: Services) -> str:
+    """Take a request for a campaign.
+
+    Raises
+    ------
+    ProblemError
+        if the request is not as documented
+    TauscopeError
+        if the robot is not valid, somebody else has the arm, or the lease does not let it move
+    """
+    items = services.campaigns.items
+    staged = await run_in_threadpool(items.stage)
+    try:
+        workspace = CampaignWorkspace(staged)
+        await run_in_threadpool(workspace.prepare)
+        received = await receive_request(request, CampaignRequest, services.settings, workspace.robot)
+        return await run_in_threadpool(_hand_in, received, services, workspace, request)
+    finally:
+        await run_in_threadpool(items.discard, staged)
+
+
+def _hand_in(
+    received: Received[CampaignRequest], services: Services, workspace: CampaignWorkspace, request: Request
+) -> str:
+    """Check what was received, and begin."""
+    document, robot_file = received.document, keep_robot(received, workspace.robot)
+    robot = read_received_robot(workspace.robot, robot_file)
+    backend = chosen_backend(services.settings, document.backend, robot)
+    permit = permit_of(request, services, backend.device(robot.name))
+    workspace.write_order(
+        CampaignOrder(
+            robot_file=robot_file,
+            robot_name=robot.name,
+            backend=backend,
+            excitation=document.excitation,
+            held_out=document.held_out,
+            run=document.run,
+            identification=document.identification,
+            diagnosis=document.diagnosis,
+        )
+    )
+    return services.campaigns.submit(workspace.folder, permit)
+
+
+CAMPAIGNS = Resource(
+    noun="a campaign",
+    plural="campaigns",
+    models=(CampaignRequest, CampaignAnswer, CampaignListAnswer),
+    examples=EXAMPLES,
+    items=lambda services: services.campaigns.items,
+    find=find_campaign,
+    followed=find_campaign,
+    submit=submit_campaign,
+    describe=describe,
+    summary="Begin a campaign",
+    words="Designs a motion, runs it, runs a second one that the model is judged by, and identifies the arm.\n\n"
+    "The campaign has the arm until its motions are done. Follow `Location` until it has ended, or stop it"
+    " at any time.",
+    moves_arm=True,
+)
+
+router = make_router(CAMPAIGNS)
 
 
 @router.get(
@@ -81,16 +224,8 @@ def get_result(request: Request, identifier: Identifier, services: ServicesDep) 
     return result_of(services, identifier, collection(request, 3))
 
 
-@router.post(
-    "/{identifier}/stop",
-    status_code=202,
-    summary="Stop a campaign",
-    responses={**problem_responses("not-found"), 202: {"description": "it stops, or had ended already"}},
-    openapi_extra={"requestBody": {"required": False, "content": {}}},
-)
-async def stop_campaign(identifier: Identifier, services: ServicesDep) -> CampaignStopAnswer:
-    """Stops the arm first, then everything else of it; legal in every state, any number of times; needs no body."""
-    # As for a run: no thread of the pool and no lock is needed for one that goes on.
+def _stop(services: Services, identifier: str) -> CampaignStopAnswer:
+    """Stop a campaign; neither a lock nor a disk is needed for one that goes on."""
     state = services.campaigns.stop(identifier)
     if state is not None:
         return CampaignStopAnswer(id=identifier, state=state)
@@ -100,26 +235,14 @@ async def stop_campaign(identifier: Identifier, services: ServicesDep) -> Campai
     return CampaignStopAnswer(id=identifier, state=record.state)
 
 
-@router.delete(
-    "/{identifier}",
-    status_code=204,
-    summary="Remove a campaign",
-    responses=problem_responses("not-found", "not-finished"),
+add_stopping(
+    router,
+    CAMPAIGNS,
+    CampaignStopAnswer,
+    _stop,
+    lambda services, identifier: services.campaigns.remove(identifier),
+    (
+        "Stops the arm first, then everything else of it; legal in every state, any number of times; needs no body.",
+        "One that has ended is removed; its excitations, runs, recordings and identification stay.",
+    ),
 )
-def remove_campaign(identifier: Identifier, services: ServicesDep) -> None:
-    """One that has ended is removed; its excitations, runs, recordings and identification stay."""
-    if not services.campaigns.remove(identifier):
-        raise ProblemError("not-finished", f"{identifier} goes on; stop it, and remove it when it has ended")
-
-
-add_events_route(router, "a campaign", find_campaign)
-
-
-def _robot(services: Services, identifier: str) -> tuple[Path, str | None]:
-    """Where the robot of a campaign lies."""
-    workspace = find_campaign(services, identifier)
-    order = workspace.read_order()
-    return workspace.robot, None if order is None else order.robot_file
-
-
-add_robot_route(router, "a campaign", _robot)

@@ -6,12 +6,12 @@ from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from tauscope.server.http.identifications.models import Names
-from tauscope.server.http.jobs.answers import JobAnswer
-from tauscope.server.http.jobs.submission import RobotRequest
 from tauscope.server.http.robots.models import EXAMPLE_ROBOT
+from tauscope.server.http.tasks.answers import JobAnswer
+from tauscope.server.http.tasks.submission import RobotRequest
 from tauscope.server.models import AnswerModel
-from tauscope.server.queue.diagnosis_order import DiagnosisOptions
-from tauscope.server.queue.identification_order import OrderedRecording
+from tauscope.server.queue.task_job import OrderedRecording
+from tauscope.tasks.diagnose import DiagnosisOptions
 
 
 class DiagnosisRequest(RobotRequest):
@@ -29,6 +29,11 @@ class DiagnosisRequest(RobotRequest):
     simulated: Names | None = Field(
         default=None,
         description="names of recordings made in your own simulator; null: all files sent as part `simulated`",
+    )
+    model: str | dict[str, Any] | None = Field(
+        default=None,
+        description="model to compare with, for `against` saved: a model document, or the identifier of a diagnosis"
+        " that succeeded; in a form, the part `model` may hold the file instead",
     )
     options: DiagnosisOptions = Field(default=DiagnosisOptions(), description="how it is diagnosed")
 
@@ -56,6 +61,15 @@ EXAMPLES: dict[str, tuple[str, Any]] = {
             "options": {"against": "simulation"},
         },
     ),
+    "saved": (
+        "What has changed since an earlier diagnosis",
+        {
+            "robot": EXAMPLE_ROBOT,
+            "recordings": ["friday.csv"],
+            "model": "20261103T101502Z-1f2e3d4c",
+            "options": {"against": "saved"},
+        },
+    ),
 }
 
 
@@ -68,6 +82,11 @@ class DiagnosisLinksAnswer(AnswerModel):
     plots: str | None = Field(default=None, description="data of its figures, once it succeeded")
     report: str | None = Field(default=None, description="its report as a page, once it succeeded")
     model: str | None = Field(default=None, description="the model with all findings, once it succeeded")
+    scenario: str | None = Field(default=None, description="its findings for the simulated arm, once it succeeded")
+    improved_robot: str | None = Field(
+        default=None, description="the robot file with what was identified, once it succeeded"
+    )
+    exports: dict[str, str] = Field(default={}, description="its compensation code by format, once it succeeded")
     next_trajectory: str | None = Field(default=None, description="the motion to record next, where one was planned")
 
 
@@ -79,6 +98,9 @@ class DiagnosisAnswer(JobAnswer):
     held_out: tuple[OrderedRecording, ...] = Field(default=(), description="what findings are confirmed by")
     simulated: tuple[OrderedRecording, ...] = Field(default=(), description="what the user's simulator recorded")
     options: DiagnosisOptions | None = Field(default=None, description="how it is diagnosed")
+    refused_exports: dict[str, str] = Field(
+        default={}, description="formats that cannot hold this model, each with the reason"
+    )
     links: DiagnosisLinksAnswer = Field(description="where to go on")
 
 

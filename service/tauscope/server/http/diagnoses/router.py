@@ -1,126 +1,144 @@
-"""Routes about diagnoses."""
+"""Diagnoses: what is special about this resource."""
 
 from pathlib import Path
-
-from fastapi import APIRouter, Request, Response
-from starlette.concurrency import run_in_threadpool
+from typing import Any
 
 from tauscope.diagnosis import DiagnosisDocument
 from tauscope.diagnosis.documents.plots import DiagnosisPlots
-from tauscope.diagnosis.extended_model.saved import ModelDocument
-from tauscope.errors import NotFoundError
+from tauscope.diagnosis.extended_model.saved import LARGEST_FILE, ModelDocument
+from tauscope.errors import IdentificationError
 from tauscope.server.http.diagnoses.models import EXAMPLES, DiagnosisAnswer, DiagnosisListAnswer, DiagnosisRequest
-from tauscope.server.http.diagnoses.status import describe, find_diagnosis, finished_diagnosis
-from tauscope.server.http.diagnoses.submission import submit_diagnosis
-from tauscope.server.http.jobs.collection import add_collection_routes
-from tauscope.server.http.jobs.documents import HTML, HTML_CONTENT, JobDocument, add_document_routes
-from tauscope.server.http.jobs.events import add_events_route
-from tauscope.server.http.jobs.routes import SUBMISSION
-from tauscope.server.http.jobs.submission import request_body
-from tauscope.server.http.robots.of_job import add_robot_route
-from tauscope.server.http.services import Services, ServicesDep
-from tauscope.server.problems import problem_responses
-from tauscope.server.queue.diagnosis_workspace import DiagnosisWorkspace
+from tauscope.server.http.documents import to_json_text
+from tauscope.server.http.openapi import binary_part, binary_parts
+from tauscope.server.http.services import Services
+from tauscope.server.http.tasks.answers import require_document
+from tauscope.server.http.tasks.queued import QueuedTask
+from tauscope.server.http.tasks.router import HTML, JobDocument, text_document
+from tauscope.server.http.tasks.submission import Received
+from tauscope.server.problems import ProblemError
+from tauscope.server.queue.diagnosis import DiagnosisWorkspace
+from tauscope.server.queue.task_job import SAVED_MODEL, TRAJECTORY
 from tauscope.trajectory.document import TrajectoryDocument
 
-router = APIRouter(prefix="/diagnoses", tags=["diagnoses"], responses=problem_responses("invalid-request"))
-
-_FILES = {"type": "array", "items": {"type": "string", "contentMediaType": "application/octet-stream"}}
-_UPLOADS = {
-    "recordings": {**_FILES, "description": "recordings that are to be explained"},
-    "held_out": {**_FILES, "description": "recordings that findings are confirmed by"},
-    "simulated": {**_FILES, "description": "recordings made in your own simulator"},
-}
+YAML = "application/yaml"
+MODEL_FILE = "model.json"
 
 
-@router.post(
-    "",
-    status_code=202,
+def compared_model(received: Received[DiagnosisRequest], services: Services, workspace: Any) -> dict[str, str | None]:
+    """Put the model that is compared with into its place; what is compared with and what was sent belong together.
+
+    Raises
+    ------
+    ProblemError
+        where they do not, or the model came twice
+    NotFoundError
+        if there is no diagnosis of that identifier
+    """
+    document, file = received.document, received.form.file("model")
+    against, has_simulated = document.options.against, bool(received.form.files.get("simulated") or document.simulated)
+    if (against == "simulation") != has_simulated:
+        text = "options.against: simulation and recordings of a simulator belong together; send both or neither"
+        raise ProblemError("invalid-request", text)
+    if (against == "saved") != (file is not None or document.model is not None):
+        text = "options.against: saved and a model belong together; send both or neither"
+        raise ProblemError("invalid-request", text)
+    if file is not None and document.model is not None:
+        raise ProblemError("invalid-request", "the model came twice, as part model and in part request; send it once")
+    if file is not None or document.model is None:
+        return {"model": None if file is None else file.name}
+    folder: Path = workspace.uploads(SAVED_MODEL)
+    if isinstance(document.model, str):
+        content = DIAGNOSES.finished(services, document.model).read_output(MODEL_FILE)
+        (folder / MODEL_FILE).write_bytes(require_document(content, document.model))
+    else:
+        text = to_json_text(document.model)
+        if text is None:
+            raise IdentificationError("model: holds NaN, infinity or text that is not Unicode; write plain numbers")
+        (folder / MODEL_FILE).write_text(text, encoding="utf-8")
+    return {"model": MODEL_FILE}
+
+
+DIAGNOSES = QueuedTask(
+    noun="a diagnosis",
+    plural="diagnoses",
+    kind=lambda services: services.diagnoses,
+    workspace=DiagnosisWorkspace,
+    models=(DiagnosisRequest, DiagnosisAnswer, DiagnosisListAnswer),
+    examples=EXAMPLES,
     summary="Hand in a diagnosis",
-    response_model=DiagnosisAnswer,
-    responses=problem_responses(*SUBMISSION, "recording", "not-found", "queue-full"),
-    openapi_extra=request_body(DiagnosisRequest, EXAMPLES, _UPLOADS),
+    words="The robot is checked at once, recordings are read by the job: follow `Location` until it has ended.",
+    parts={
+        "recordings": binary_parts("recordings that are to be explained"),
+        "held_out": binary_parts("recordings that findings are confirmed by"),
+        "simulated": binary_parts("recordings made in your own simulator"),
+        "model": binary_part("a model that an earlier diagnosis saved, to compare with"),
+    },
+    further=compared_model,
+    further_parts={"model": (SAVED_MODEL, LARGEST_FILE)},
+    work_problems=(
+        "robot-file",
+        "recording",
+        "recording-mismatch",
+        "identification",
+        "excitation",
+        "invalid-request",
+    ),
+    documents=(
+        JobDocument(
+            "result",
+            "result.json",
+            "Fetch the result",
+            "The result of a diagnosis that succeeded; else the problem that it ended in.",
+            {"model": DiagnosisDocument, "description": "the same document as `tauscope diagnose --json`"},
+        ),
+        JobDocument(
+            "plots",
+            "plots.json",
+            "Fetch the data of its figures",
+            "What figures of the diagnosis are drawn from.",
+            {"model": DiagnosisPlots, "description": "residuals over time and by variable, before and after"},
+        ),
+        text_document(
+            "report",
+            "report.html",
+            HTML,
+            "Fetch the report",
+            "The report as one page: no script, no request to anywhere, ready to print.",
+            "page as `tauscope diagnose --report`",
+        ),
+        JobDocument(
+            "model",
+            MODEL_FILE,
+            "Fetch the model with all findings",
+            "The extended model.",
+            {"model": ModelDocument, "description": "the same document as `tauscope diagnose --model`"},
+        ),
+        text_document(
+            "scenario",
+            "scenario.yaml",
+            YAML,
+            "Fetch the findings for the simulated arm",
+            "A scenario that the simulated arm plays with the improved robot.",
+            "file as `tauscope diagnose --scenario`",
+        ),
+        text_document(
+            "improved-robot",
+            "improved-robot.yaml",
+            YAML,
+            "Fetch the improved robot",
+            "The robot file with the identified links and friction.",
+            "file as `tauscope diagnose --improved-robot`",
+        ),
+        JobDocument(
+            "next-trajectory",
+            TRAJECTORY,
+            "Fetch the motion to record next",
+            "The motion that best separates, or shows, what is open; a problem where none was planned.",
+            {"model": TrajectoryDocument, "description": "a trajectory that `tauscope run` plays"},
+            missing="no motion was planned: nothing is open; ask for one with options.next_trajectory",
+        ),
+    ),
+    export_words="Compensation code of the model with all findings (c, python).",
 )
-async def hand_in(request: Request, response: Response, services: ServicesDep) -> DiagnosisAnswer:
-    """The robot is checked at once, recordings are read by the job: follow `Location` until it has ended."""
-    identifier = await submit_diagnosis(request, services)
-    answer = await run_in_threadpool(describe, services, identifier, request.url.path)
-    response.headers["Location"] = answer.links.self_
-    return answer
 
-
-def _planned_motion(workspace: DiagnosisWorkspace) -> bytes:
-    """The trajectory of a diagnosis that planned one."""
-    content = workspace.read_trajectory()
-    if content is None:
-        raise NotFoundError("no motion was planned: nothing is open; ask for one with options.next_trajectory")
-    return content
-
-
-_DOCUMENTS = (
-    JobDocument(
-        "result",
-        DiagnosisWorkspace.read_result,
-        "Fetch the result",
-        "The result of a diagnosis that succeeded; else the problem that it ended in.",
-        {"model": DiagnosisDocument, "description": "the same document as `tauscope diagnose --json`"},
-    ),
-    JobDocument(
-        "plots",
-        DiagnosisWorkspace.read_plots,
-        "Fetch the data of its figures",
-        "What figures of the diagnosis are drawn from.",
-        {"model": DiagnosisPlots, "description": "residuals over time and by variable, before and after"},
-    ),
-    JobDocument(
-        "report",
-        DiagnosisWorkspace.read_report,
-        "Fetch the report",
-        "The report as one page: no script, no request to anywhere, ready to print.",
-        {
-            "content": HTML_CONTENT,
-            "description": "the same page as `tauscope diagnose --report`",
-        },
-        HTML,
-    ),
-    JobDocument(
-        "model",
-        DiagnosisWorkspace.read_model,
-        "Fetch the model with all findings",
-        "The extended model.",
-        {"model": ModelDocument, "description": "the same document as `tauscope diagnose --model`"},
-    ),
-    JobDocument(
-        "next-trajectory",
-        _planned_motion,
-        "Fetch the motion to record next",
-        "The motion that best separates, or shows, what is open; a problem where none was planned.",
-        {"model": TrajectoryDocument, "description": "a trajectory that `tauscope run` plays"},
-    ),
-)
-
-add_collection_routes(
-    router, "a diagnosis", lambda services: services.diagnoses, (DiagnosisAnswer, DiagnosisListAnswer), describe
-)
-add_document_routes(
-    router,
-    finished_diagnosis,
-    _DOCUMENTS,
-    "robot-file",
-    "recording",
-    "recording-mismatch",
-    "identification",
-    "excitation",
-    "invalid-request",
-)
-add_events_route(router, "a diagnosis", find_diagnosis)
-
-
-def _robot(services: Services, identifier: str) -> tuple[Path, str | None]:
-    """Where the robot of a diagnosis lies."""
-    workspace = find_diagnosis(services, identifier)
-    order = workspace.read_order()
-    return workspace.robot, None if order is None else order.robot_file
-
-
-add_robot_route(router, "a diagnosis", _robot)
+router = DIAGNOSES.router()

@@ -4,11 +4,11 @@ from typing import Any
 
 from pydantic import Field
 
-from tauscope.server.http.jobs.answers import JobAnswer
-from tauscope.server.http.jobs.submission import RobotRequest
 from tauscope.server.http.robots.models import EXAMPLE_ROBOT
+from tauscope.server.http.tasks.answers import JobAnswer
+from tauscope.server.http.tasks.submission import RobotRequest
 from tauscope.server.models import AnswerModel
-from tauscope.server.queue.excitation_order import ExcitationDesignOptions
+from tauscope.tasks.design_excitation import ExcitationDesignOptions
 
 
 class ExcitationRequest(RobotRequest):

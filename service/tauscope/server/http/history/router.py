@@ -20,9 +20,9 @@ from tauscope.server.http.history.models import (
     ReasonRequest,
     TrendAnswer,
 )
-from tauscope.server.http.jobs.routes import Identifier, Limit, collection
 from tauscope.server.http.openapi import Examples, json_body
 from tauscope.server.http.services import Services, ServicesDep
+from tauscope.server.http.tasks.routes import Identifier, Limit, collection
 from tauscope.server.models import StrictModel
 from tauscope.server.problems import problem_responses
 

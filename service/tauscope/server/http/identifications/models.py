@@ -5,12 +5,13 @@ from typing import Annotated, Any, Self
 from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from tauscope.server.http.jobs.answers import JobAnswer
-from tauscope.server.http.jobs.submission import RobotRequest
 from tauscope.server.http.robots.models import EXAMPLE_ROBOT
+from tauscope.server.http.tasks.answers import JobAnswer
+from tauscope.server.http.tasks.submission import RobotRequest
 from tauscope.server.models import AnswerModel
-from tauscope.server.queue.identification_order import IdentificationOptions, OrderedRecording
+from tauscope.server.queue.task_job import OrderedRecording
 from tauscope.server.store.names import FILE_NAME_PATTERN, FILE_NAME_RULE, is_file_name
+from tauscope.tasks.identify import IdentificationOptions
 
 
 def _file_name(value: str) -> str:

@@ -7,8 +7,8 @@ from fastapi import APIRouter, Query
 from pydantic import AwareDatetime
 
 from tauscope.server.http.items.models import ItemAnswer, ItemListAnswer, KnownRobotAnswer, RobotListAnswer
-from tauscope.server.http.jobs.routes import Limit
 from tauscope.server.http.services import ServicesDep
+from tauscope.server.http.tasks.routes import Limit
 from tauscope.server.problems import problem_responses
 from tauscope.server.store.database.facts import ItemEntry, ItemQuery
 from tauscope.server.store.layout import FOLDERS

@@ -12,7 +12,6 @@ from tauscope.server.auth.gate import caller_of
 from tauscope.server.auth.scopes import Scope
 from tauscope.server.control.lease import Lease
 from tauscope.server.control.lease_errors import LeaseLostError
-from tauscope.server.control.run_order import BackendChoice
 from tauscope.server.http.documents import JSON, media_type, read_document, refuse_media_type
 from tauscope.server.http.leases.holding import LeaseToken, owner_of
 from tauscope.server.http.leases.models import (
@@ -26,6 +25,7 @@ from tauscope.server.http.leases.models import (
 from tauscope.server.http.openapi import json_body
 from tauscope.server.http.services import Services, ServicesDep
 from tauscope.server.problems import ProblemError, problem_responses
+from tauscope.tasks.run import BackendChoice
 
 router = APIRouter(prefix="/leases", tags=["leases"], responses=problem_responses("invalid-request"))
 stop_router = APIRouter(tags=["runs"])

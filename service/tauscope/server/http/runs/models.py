@@ -10,12 +10,12 @@ from tauscope.runtime.options import RunOptions
 from tauscope.runtime.real_time import RealTime
 from tauscope.runtime.states import RunState
 from tauscope.runtime.timing import Timing
-from tauscope.server.control.run_order import BackendChoice
 from tauscope.server.http.backends import BackendRequest
-from tauscope.server.http.jobs.submission import RobotRequest
 from tauscope.server.http.robots.models import EXAMPLE_ROBOT
+from tauscope.server.http.tasks.submission import RobotRequest
 from tauscope.server.models import AnswerModel
 from tauscope.server.problems import Problem
+from tauscope.tasks.run import BackendChoice
 
 RecordingFormat = Literal["mcap", "csv", "parquet"]
 
@@ -32,6 +32,8 @@ class RunRequest(RunOptions, RobotRequest, strict=True):
     trajectory: dict[str, Any] | None = Field(
         default=None, description="a trajectory document; in a form, the part `trajectory` may hold the file instead"
     )
+
+    seed: int = Field(default=0, ge=0, lt=2**63, description="of the default motion")
 
     @model_validator(mode="after")
     def _check_motion(self) -> Self:

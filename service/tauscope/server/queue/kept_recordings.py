@@ -1,16 +1,37 @@
-"""Samples of a recording for a plot, as a worker process reads them: a hostile file harms that process at most."""
+"""Recordings of the store as a worker process reads them: a hostile file harms that process at most."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tauscope.errors import RecordingError
-from tauscope.recording import read_recording
+from tauscope.recording import RecordingReport, check_recording, read_recording
 from tauscope.recording.recording import Array
 from tauscope.report.decimation import envelope_indices
 from tauscope.server.queue.messages import without_folders
+
+
+def check_kept_recording(path: Path, joint_count: int | None) -> RecordingReport:
+    """Report what a recording in the store holds.
+
+    Parameters
+    ----------
+    joint_count : int or None
+        joints that it must have; None where any number is welcome
+
+    Raises
+    ------
+    RecordingError
+        if it cannot be read or breaks a rule; the message calls the file by its name alone
+    """
+    try:
+        report = check_recording(path, joint_count)
+    except RecordingError as error:
+        raise type(error)(without_folders(str(error), path.parent)) from None
+    return replace(report, name=path.name)
 
 
 def read_kept_samples(path: Path, most: int) -> bytes:

@@ -1,24 +1,39 @@
-"""What motion is wanted: the robot's file and the options, as they are kept with the job."""
+"""Design an excitation: the motion that tells most about an arm."""
 
+import math
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, FiniteFloat
 
-from tauscope.excitation import Box, ColumnScaling, Criterion, ExcitationOptions, Workspace
-from tauscope.server.queue.stored import StoredModel
+from tauscope.excitation import (
+    Box,
+    ColumnScaling,
+    Criterion,
+    ExcitationDesign,
+    ExcitationOptions,
+    OptimiserProgress,
+    Workspace,
+    design_excitation,
+    excitation_document,
+)
+from tauscope.robot import Robot, read_robot
+from tauscope.tasks.task import Files, Outputs, Progress, TaskModel, json_text
+from tauscope.trajectory import trajectory_json
+from tauscope.trajectory.csv_format import trajectory_csv
 
 Point = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 
 
-class ForbiddenBox(StoredModel):
+class ForbiddenBox(TaskModel):
     """A box along the axes of the base frame, which the arm keeps clear of."""
 
     low: Point = Field(description="least x, y, z [m]")
     high: Point = Field(description="greatest x, y, z [m]")
 
 
-class ExcitationDesignOptions(StoredModel):
+class ExcitationDesignOptions(TaskModel):
     """How a motion is designed."""
 
     duration_s: Annotated[FiniteFloat, Field(gt=0.0, le=600.0)] = Field(
@@ -52,6 +67,10 @@ class ExcitationDesignOptions(StoredModel):
         default=(), max_length=100, description="boxes into which no joint and no tool may come"
     )
     tool_m: Point = Field(default=(0.0, 0.0, 0.0), description="tool point in the last link's frame [m]")
+    noise_std: tuple[FiniteFloat, ...] | None = Field(
+        default=None,
+        description="expected torque noise of each joint [Nm or N], which weights its equations; null: equal weights",
+    )
 
     def to_options(self) -> ExcitationOptions:
         """The options as the design takes them.
@@ -75,17 +94,59 @@ class ExcitationDesignOptions(StoredModel):
             closing_period=self.closing_period,
             starts=self.starts,
             seed=self.seed,
+            noise_std=None if self.noise_std is None else np.array(self.noise_std),
         )
 
 
-class ExcitationOrder(StoredModel):
-    """Input of an excitation job."""
+class Request(TaskModel):
+    """Which motion is wanted, and for which robot file."""
 
-    form: Literal["tauscope.excitation-order/1"] = Field(
-        default="tauscope.excitation-order/1", description="name and version of this form"
-    )
-    robot_file: str = Field(description="name of the robot file in the job's robot folder")
-    robot_name: str = Field(description="what the robot file calls the robot")
+    robot: str = Field(description="robot file")
     options: ExcitationDesignOptions = Field(
         default=ExcitationDesignOptions(), description="how the motion is designed"
     )
+    rate_hz: float = Field(default=500.0, gt=0.0, le=10_000.0, description="samples a second of the CSV [Hz]")
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What came of it."""
+
+    request: Request
+    robot: Robot
+    design: ExcitationDesign
+
+    @property
+    def outputs(self) -> Outputs:
+        """``result.json``, ``trajectory.json`` and ``trajectory.csv``."""
+        return Outputs(
+            {
+                "trajectory.json": lambda: trajectory_json(self.design.trajectory),
+                "trajectory.csv": lambda: trajectory_csv(self.design.trajectory, self.request.rate_hz),
+                "result.json": lambda: json_text(excitation_document(self.design)),
+            }
+        )
+
+
+def perform(request: Request, files: Files, progress: Progress) -> Result:
+    """Read the robot and design its motion.
+
+    Raises
+    ------
+    TauscopeError
+        where the robot file is not valid, or no motion keeps the limits
+    """
+    progress("read robot")
+    robot = read_robot(files.find("robot", request.robot))
+    progress("design the motion")
+
+    def tell(now: OptimiserProgress) -> None:
+        figures = {"step": now.step, "cost": _finite(now.cost), "best_cost": _finite(now.best)}
+        progress(f"{now.step}, best {now.best:.4g}", round(100.0 * now.fraction, 1), figures)
+
+    return Result(request, robot, design_excitation(robot, request.options.to_options(), progress=tell))
+
+
+def _finite(value: float) -> float | None:
+    """JSON knows no infinity."""
+    return value if math.isfinite(value) else None

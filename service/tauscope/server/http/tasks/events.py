@@ -10,8 +10,8 @@ from fastapi import APIRouter, Depends, Header, Request, Response
 from fastapi.sse import KEEPALIVE_COMMENT, EventSourceResponse, format_sse_event
 from pydantic.json_schema import models_json_schema
 
-from tauscope.server.http.jobs.routes import Identifier
 from tauscope.server.http.services import Services, ServicesDep
+from tauscope.server.http.tasks.routes import Identifier
 from tauscope.server.problems import problem_responses
 from tauscope.server.queue.events import EndedEvent, ProgressEvent, StateEvent, StepEvent
 from tauscope.server.store.event_log import EventLog, LogFollower, LoggedEvent

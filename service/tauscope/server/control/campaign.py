@@ -1,15 +1,17 @@
-"""Which campaign was asked for, and how far it has come, as both are kept with it."""
+"""Campaigns: what is asked for, how far they have come, and what their folder holds."""
 
+from pathlib import Path
 from typing import Literal
 
 from pydantic import Field
 
 from tauscope.runtime.options import RunOptions
-from tauscope.server.control.run_order import BackendChoice
-from tauscope.server.queue.diagnosis_order import DiagnosisOptions
-from tauscope.server.queue.excitation_order import ExcitationDesignOptions
-from tauscope.server.queue.identification_order import IdentificationOptions
-from tauscope.server.queue.stored import StoredModel
+from tauscope.server.queue.stored import StoredModel, read_stored, write_stored
+from tauscope.server.queue.workspace import Workspace
+from tauscope.tasks.design_excitation import ExcitationDesignOptions
+from tauscope.tasks.diagnose import DiagnosisOptions
+from tauscope.tasks.identify import IdentificationOptions
+from tauscope.tasks.run import BackendChoice
 
 
 class HeldOutMotion(StoredModel):
@@ -67,3 +69,34 @@ class CampaignLinks(StoredModel):
     diagnosis: str | None = Field(default=None, description="identifier of the diagnosis")
     recordings: tuple[str, ...] = Field(default=(), description="recordings that the model is made from")
     held_out: tuple[str, ...] = Field(default=(), description="recordings that it is judged by")
+
+
+class CampaignWorkspace(Workspace):
+    """Files of a campaign: ``order.json`` and ``robot/``; ``made.json`` names what it has made so far."""
+
+    def __init__(self, folder: Path) -> None:
+        """Look at a campaign's folder; nothing is opened yet."""
+        super().__init__(folder)
+        self.robot = folder / "robot"
+        self._order = folder / "order.json"
+        self._made = folder / "made.json"
+
+    def prepare(self) -> None:
+        """Make the folder that holds a campaign's input."""
+        self.robot.mkdir()
+
+    def read_order(self) -> CampaignOrder | None:
+        """The campaign's input, or None where the file is missing or damaged."""
+        return read_stored(self._order, CampaignOrder)
+
+    def write_order(self, order: CampaignOrder) -> None:
+        """Keep the campaign's input."""
+        write_stored(self._order, order)
+
+    def read_made(self) -> CampaignLinks:
+        """What the campaign has made so far; nothing where the file is missing or damaged."""
+        return read_stored(self._made, CampaignLinks) or CampaignLinks()
+
+    def write_made(self, made: CampaignLinks) -> None:
+        """Keep what the campaign has made so far."""
+        write_stored(self._made, made)

@@ -1,12 +1,17 @@
-"""The folder of a run: which file in it holds what."""
+"""Runs: what is asked for, what their folder holds, and how their control process is started."""
 
+import json
+import zlib
 from datetime import UTC
 from pathlib import Path
+from typing import Literal
+
+from pydantic import Field
 
 from tauscope.errors import AcquisitionError
+from tauscope.runtime.options import RunOptions
+from tauscope.runtime.progress import Report
 from tauscope.runtime.record import (
-    JOURNAL_FILE,
-    RECORDING_STEM,
     RUN_FILE,
     RunProblem,
     RunRecord,
@@ -15,13 +20,33 @@ from tauscope.runtime.record import (
     write_record,
 )
 from tauscope.runtime.recovery import recover_run
+from tauscope.runtime.run_process import RunProcess
 from tauscope.runtime.states import RunState
-from tauscope.server.control.run_order import RunRequestRecord
 from tauscope.server.queue.events import EndedEvent
 from tauscope.server.queue.job_folder import JobFolder
 from tauscope.server.queue.messages import without_folders
 from tauscope.server.queue.record import JobProblem
-from tauscope.server.queue.stored import read_stored, write_stored
+from tauscope.server.queue.stored import StoredModel, read_stored, write_stored
+from tauscope.tasks import run
+from tauscope.tasks.run import BackendChoice, recording_file
+from tauscope.tasks.task import LocalFiles
+
+
+class RunRequestRecord(StoredModel):
+    """What was asked for."""
+
+    form: Literal["tauscope.run-request/1"] = Field(
+        default="tauscope.run-request/1", description="name and version of this form"
+    )
+    robot_file: str = Field(description="name of the robot file in the run's robot folder")
+    robot_name: str = Field(description="what the robot file calls the robot")
+    backend: BackendChoice = Field(default=BackendChoice(), description="which arm is moved")
+    device: str = Field(description="names the arm: one run at a time has it")
+    excitation: str | None = Field(
+        default=None, description="identifier of the excitation that is played; null for a trajectory from elsewhere"
+    )
+    campaign: str | None = Field(default=None, description="identifier of the campaign that it belongs to")
+    options: RunOptions = Field(default=RunOptions(), description="how it is run")
 
 
 class RunWorkspace(JobFolder):
@@ -52,9 +77,9 @@ class RunWorkspace(JobFolder):
 
     def recording(self, format_: str) -> Path:
         """Where the recording of a format lies; the journal is the MCAP, ramp included."""
-        return self.control / (JOURNAL_FILE if format_ == "mcap" else f"{RECORDING_STEM}.{format_}")
+        return recording_file(self.control, format_)
 
-    def read_request(self) -> RunRequestRecord | None:
+    def read_order(self) -> RunRequestRecord | None:
         """What was asked for, or None where the file is missing or damaged."""
         return read_stored(self._request, RunRequestRecord)
 
@@ -128,3 +153,36 @@ class RunWorkspace(JobFolder):
     def _has_begun(self) -> bool:
         """Whether the control process has a record of its own."""
         return (self.control / RUN_FILE).exists()
+
+
+def start_control(workspace: RunWorkspace, report: Report, *, sim_socket: Path | None = None) -> RunProcess:
+    """Start the control process of a run whose folder holds everything that it needs.
+
+    Raises
+    ------
+    RobotFileError
+        if the robot file was damaged meanwhile
+    AcquisitionError
+        if files are missing, or the process cannot be started
+    """
+    order, trajectory = workspace.read_order(), workspace.trajectory
+    if order is None or trajectory is None:
+        raise AcquisitionError("files of the run are missing or damaged; hand it in again")
+    if order.backend.name == "sim":  # the noise of a scenario is this run's own
+        scenario = {"seed": zlib.crc32(workspace.folder.name.encode()), **(order.backend.scenario or {})}
+        workspace.scenario.write_text(json.dumps(scenario, ensure_ascii=False), encoding="utf-8")
+    request = run.Request(
+        robot=str(workspace.robot / order.robot_file),
+        backend=order.backend,
+        scenario=str(workspace.scenario),
+        options=order.options,
+    )
+    return run.start(
+        request,
+        LocalFiles(),
+        trajectory,
+        workspace.control,
+        report,
+        sim_socket=sim_socket,
+        beats_by_itself=False,
+    )
