@@ -18,7 +18,7 @@ from tauscope.cli.demo_folder import prepare_folder
 from tauscope.cli.demo_page import DATA, LEFT_FOR_S, PORT, PageShown, leave_page, show_page
 from tauscope.cli.identify_summary import show_identification
 from tauscope.cli.output_files import write_file
-from tauscope.cli.run_session import keep_recording, run_to_end, why_unfinished
+from tauscope.cli.run_session import keep_recording, why_unfinished
 from tauscope.cli.task_run import write_outputs
 from tauscope.cli.terminal import Told, output, plain, shown_progress, table
 from tauscope.diagnosis import DiagnosisDocument
@@ -29,8 +29,9 @@ from tauscope.identification import Identification
 from tauscope.report.quantities import given, with_uncertainty
 from tauscope.report.table import Table
 from tauscope.robot import Robot, read_robot
-from tauscope.runtime import BackendOrder, RunOptions, RunOrder, RunState
-from tauscope.tasks import identify
+from tauscope.runtime import RunOptions, RunState
+from tauscope.tasks import identify, run
+from tauscope.tasks.task import LocalFiles
 from tauscope.trajectory import write_trajectory
 from tauscope_sim.examples import example_robot
 
@@ -132,18 +133,17 @@ def run_motion(folder: Path, trajectory: Path, out: Path, seed: int, told: Told)
     """
     scenario = folder.with_suffix(".yaml")
     scenario.write_text(f"{SCENARIO_TEXT}seed: {seed}\n", encoding="utf-8")
-    arm = example_robot("paper_arm")
-    order = RunOrder(
-        robot=str(arm),
-        trajectory=str(trajectory.resolve()),
-        backend=BackendOrder(name="sim", settings={"time": "virtual", "scenario": str(scenario)}),
+    request = run.Request(
+        robot=str(example_robot("paper_arm")),
+        scenario=str(scenario),
+        trajectory=str(trajectory),
         # What the arm weighs is the simulation's secret: nobody may feed it forward.
         options=RunOptions(rate_hz=RATE_HZ, feed_forward=False),
     )
-    record = run_to_end(folder, order, read_robot(arm), told)
-    if record.state is not RunState.FINISHED:
-        raise AcquisitionError(why_unfinished(record, None))
-    keep_recording(folder, record, out)
+    result = run.perform(request, LocalFiles({"run": folder}), told)
+    if result.record.state is not RunState.FINISHED:
+        raise AcquisitionError(why_unfinished(result.record, None))
+    keep_recording(result, out)
 
 
 def robot_text_without_model(path: Path) -> str:

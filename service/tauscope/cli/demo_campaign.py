@@ -11,12 +11,13 @@ from tauscope.diagnosis import DiagnosisDocument
 from tauscope.errors import TauscopeError
 from tauscope.robot import read_robot
 from tauscope.runtime import RunOptions
-from tauscope.server.control.campaign import CampaignOrder, CampaignWorkspace, HeldOutMotion
+from tauscope.server.control.campaign import CampaignOrder, CampaignWorkspace
 from tauscope.server.http.assembly import open_services
 from tauscope.server.http.campaigns.router import describe, result_of
 from tauscope.server.http.services import Services
 from tauscope.server.http.settings import Settings
 from tauscope.server.queue.states import JobState
+from tauscope.tasks.campaign import HeldOutMotion
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
 from tauscope.tasks.diagnose import DiagnosisOptions
 from tauscope.tasks.run import BackendChoice

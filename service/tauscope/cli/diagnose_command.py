@@ -18,8 +18,9 @@ Recordings = Annotated[
     ),
 ]
 Against = Annotated[
-    list[str] | None,
+    list[str],
     typer.Option(
+        default_factory=lambda: ["identified"],
         metavar="identified|model|MODEL.json|SIM...",
         help="What the recordings are compared with: the best model that the data allow (default), the robot file's"
         " model block, a model that --model wrote, or recordings made in your own simulator.",
@@ -40,7 +41,7 @@ def diagnose(
     recordings: Recordings,
     *,
     held_out: HeldOut = None,
-    against: Against = None,
+    against: Against,
     cutoff: Cutoff = "auto",
     json: Annotated[Path | None, _output("Write the result as JSON; - is standard output.")] = None,
     report: Annotated[Path | None, _output("Write a page with verdict, findings and residuals.", "OUT.html")] = None,
@@ -76,7 +77,7 @@ def diagnose(
     from tauscope.export.formats import CODE_FILES
     from tauscope.tasks import diagnose as task
 
-    what, simulated, saved = parse_against(against or ["identified"])
+    what, simulated, saved = parse_against(against)
     options = make_request(
         task.DiagnosisOptions, against=what, cutoff_hz=cutoff_hz, next_trajectory=next_trajectory is not None
     )

@@ -11,7 +11,7 @@ from server.queue.executors import InlineExecutor, ManualExecutor
 from server.queue.waiting import wait_until
 from tauscope.runtime import RunProblem, RunState
 from tauscope.server.control import campaign_runner
-from tauscope.server.control.campaign import CampaignLinks, CampaignOrder, CampaignWorkspace, HeldOutMotion
+from tauscope.server.control.campaign import CampaignLinks, CampaignOrder, CampaignWorkspace
 from tauscope.server.control.campaign_manager import CampaignManager
 from tauscope.server.control.campaign_runner import CampaignDependencies
 from tauscope.server.control.device_claims import BusyError, DeviceClaims
@@ -28,6 +28,7 @@ from tauscope.server.queue.states import JobState
 from tauscope.server.queue.workspace import Workspace
 from tauscope.server.store.items import ItemStore
 from tauscope.server.store.recordings import RecordingStore
+from tauscope.tasks.campaign import HeldOutMotion
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
 from tauscope.tasks.diagnose import DiagnosisOptions
 from tauscope.tasks.run import BackendChoice

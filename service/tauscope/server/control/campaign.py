@@ -5,25 +5,13 @@ from typing import Literal
 
 from pydantic import Field
 
-from tauscope.runtime.options import RunOptions
 from tauscope.server.queue.stored import StoredModel, read_stored, write_stored
 from tauscope.server.queue.workspace import Workspace
-from tauscope.tasks.design_excitation import ExcitationDesignOptions
-from tauscope.tasks.diagnose import DiagnosisOptions
-from tauscope.tasks.identify import IdentificationOptions
+from tauscope.tasks.campaign import CampaignOptions
 from tauscope.tasks.run import BackendChoice
 
 
-class HeldOutMotion(StoredModel):
-    """The motion that the model is judged by, never made from."""
-
-    seed: int | None = Field(
-        default=None, ge=0, lt=2**63, description="of its design; null: one more than that of the training motion"
-    )
-    periods: int = Field(default=2, ge=1, le=100, description="how often its period is repeated")
-
-
-class CampaignOrder(StoredModel):
+class CampaignOrder(StoredModel, CampaignOptions):
     """Input of a campaign."""
 
     form: Literal["tauscope.campaign-order/1"] = Field(
@@ -32,30 +20,6 @@ class CampaignOrder(StoredModel):
     robot_file: str = Field(description="name of the robot file in the campaign's robot folder")
     robot_name: str = Field(description="what the robot file calls the robot")
     backend: BackendChoice = Field(default=BackendChoice(), description="which arm is moved")
-    excitation: ExcitationDesignOptions = Field(
-        default=ExcitationDesignOptions(), description="how the training motion is designed"
-    )
-    held_out: HeldOutMotion | None = Field(default=HeldOutMotion(), description="null: no second motion")
-    run: RunOptions = Field(default=RunOptions(), description="how the motions are run")
-    identification: IdentificationOptions = Field(
-        default=IdentificationOptions(), description="how the arm is identified"
-    )
-    diagnosis: DiagnosisOptions | None = Field(default=None, description="how it is diagnosed; null: it is not")
-
-    def backend_of(self, *, held_out: bool) -> BackendChoice:
-        """Which arm is moved by a run; the noise that a scenario's seed fixes is another one in each."""
-        scenario = self.backend.scenario
-        if not held_out or scenario is None or not isinstance(scenario.get("seed"), int):
-            return self.backend
-        return self.backend.model_copy(update={"scenario": {**scenario, "seed": scenario["seed"] + 1}})
-
-    def held_out_options(self) -> ExcitationDesignOptions | None:
-        """How the held-out motion is designed; None where there is none."""
-        if self.held_out is None:
-            return None
-        seed = self.excitation.seed + 1 if self.held_out.seed is None else self.held_out.seed
-        changes = {"seed": seed, "periods": self.held_out.periods, "slow_postures": 0, "closing_period": False}
-        return self.excitation.model_copy(update=changes)
 
 
 class CampaignLinks(StoredModel):

@@ -41,6 +41,7 @@ from tauscope.server.queue.task_job import (
 from tauscope.server.queue.work import StoppedError
 from tauscope.server.queue.workspace import Workspace
 from tauscope.server.store.recordings import RecordingStore
+from tauscope.tasks.campaign import backend_of_run
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
 from tauscope.tasks.diagnose import DiagnosisOptions
 
@@ -195,7 +196,7 @@ class CampaignRunner:
         order, shop = self._order, self._shop
         request = RunRequestRecord(
             **self._robot,
-            backend=order.backend_of(held_out=link == "held_out_run"),
+            backend=backend_of_run(order.backend, held_out=link == "held_out_run"),
             device=order.backend.device(order.robot_name),
             excitation=excitation,
             campaign=self._workspace.folder.name,

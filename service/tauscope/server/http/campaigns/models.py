@@ -6,37 +6,20 @@ from pydantic import Field
 
 from tauscope.diagnosis import DiagnosisDocument
 from tauscope.identification import IdentificationDocument
-from tauscope.runtime.options import RunOptions
-from tauscope.server.control.campaign import HeldOutMotion
 from tauscope.server.http.backends import BackendRequest
 from tauscope.server.http.robots.models import EXAMPLE_ROBOT
 from tauscope.server.http.tasks.answers import JobAnswer
 from tauscope.server.http.tasks.submission import RobotRequest
 from tauscope.server.models import AnswerModel
 from tauscope.server.queue.states import JobState
-from tauscope.tasks.design_excitation import ExcitationDesignOptions
-from tauscope.tasks.diagnose import DiagnosisOptions
-from tauscope.tasks.identify import IdentificationOptions
+from tauscope.tasks.campaign import CampaignOptions
 from tauscope.tasks.run import BackendChoice
 
 
-class CampaignRequest(RobotRequest):
+class CampaignRequest(RobotRequest, CampaignOptions):
     """Which campaign is wanted."""
 
     backend: BackendRequest = Field(default=BackendRequest(), description="which arm is moved")
-    excitation: ExcitationDesignOptions = Field(
-        default=ExcitationDesignOptions(), description="how the training motion is designed"
-    )
-    held_out: HeldOutMotion | None = Field(
-        default=HeldOutMotion(), description="a second motion, by which the model is judged; null: none"
-    )
-    run: RunOptions = Field(default=RunOptions(), description="how the motions are run")
-    identification: IdentificationOptions = Field(
-        default=IdentificationOptions(), description="how the arm is identified"
-    )
-    diagnosis: DiagnosisOptions | None = Field(
-        default=None, description="how what the model leaves out is diagnosed; null: it is not"
-    )
 
 
 EXAMPLES: dict[str, tuple[str, Any]] = {

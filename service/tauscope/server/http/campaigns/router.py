@@ -36,6 +36,7 @@ from tauscope.server.http.tasks.routes import ENDINGS, Identifier, collection
 from tauscope.server.http.tasks.submission import Received, keep_robot, receive_request
 from tauscope.server.problems import ProblemError, problem_responses
 from tauscope.server.queue.states import JobState
+from tauscope.tasks.campaign import CampaignOptions
 
 StepName = Literal["design", "run", "held-out design", "held-out run", "identify", "diagnose"]
 WAITING, GONE = "waiting", "gone"
@@ -173,11 +174,7 @@ def _hand_in(
             robot_file=robot_file,
             robot_name=robot.name,
             backend=backend,
-            excitation=document.excitation,
-            held_out=document.held_out,
-            run=document.run,
-            identification=document.identification,
-            diagnosis=document.diagnosis,
+            **{name: getattr(document, name) for name in CampaignOptions.model_fields},
         )
     )
     return services.campaigns.submit(workspace.folder, permit)
