@@ -21,6 +21,7 @@ Against = Annotated[
     list[str],
     typer.Option(
         default_factory=lambda: ["identified"],
+        show_default=False,
         metavar="identified|model|MODEL.json|SIM...",
         help="What the recordings are compared with: the best model that the data allow (default), the robot file's"
         " model block, a model that --model wrote, or recordings made in your own simulator.",

@@ -37,7 +37,7 @@ def make_schedule(
     order = workspace.read_order()
     if order is None:
         raise NotFoundError(f"{definition.kind} {like}: its order is missing or damaged; name another one")
-    plain = json.loads(order.model_dump_json(exclude={"recordings", "held_out", "simulated"} & _lists(definition)))
+    plain = json.loads(order.model_dump_json(exclude=_lists(definition)))
     if definition.kind != "campaign":
         plain["recordings"] = []
     try:
@@ -50,5 +50,5 @@ def make_schedule(
 
 
 def _lists(definition: ScheduleDefinition) -> set[str]:
-    """Fields of an order that name recordings: a campaign's `held_out` is a motion."""
-    return set() if definition.kind == "campaign" else {"recordings", "held_out", "simulated"}
+    """Fields of an order that name files: a campaign's `held_out` is a motion."""
+    return set() if definition.kind == "campaign" else {"recordings", "held_out", "simulated", "model"}
