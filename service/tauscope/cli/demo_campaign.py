@@ -17,6 +17,7 @@ from tauscope.server.http.campaigns.router import describe, result_of
 from tauscope.server.http.services import Services
 from tauscope.server.http.settings import Settings
 from tauscope.server.queue.states import JobState
+from tauscope.server.queue.task_job import staged_workspace
 from tauscope.tasks.campaign import HeldOutMotion
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
 from tauscope.tasks.diagnose import DiagnosisOptions
@@ -47,11 +48,7 @@ def run_campaign(data: Path, robot_file: Path, scenario: Mapping[str, Any], told
 
 def _begun(services: Services, robot_file: Path, scenario: Mapping[str, Any]) -> str:
     """Hand the campaign in."""
-    items = services.campaigns.items
-    staged = items.stage()
-    try:
-        workspace = CampaignWorkspace(staged)
-        workspace.prepare()
+    with staged_workspace(services.campaigns.items, CampaignWorkspace) as workspace:
         shutil.copy(robot_file, workspace.robot)
         workspace.write_order(
             CampaignOrder(
@@ -64,9 +61,7 @@ def _begun(services: Services, robot_file: Path, scenario: Mapping[str, Any]) ->
                 diagnosis=DiagnosisOptions(),
             )
         )
-        return services.campaigns.submit(staged)
-    finally:
-        items.discard(staged)
+        return services.campaigns.submit(workspace.folder)
 
 
 async def _ended(services: Services, identifier: str, told: Told) -> None:

@@ -19,7 +19,7 @@ from tauscope.diagnosis import (
 from tauscope.diagnosis.documents.plots import diagnosis_plots
 from tauscope.diagnosis.extended_model.saved import model_document, read_model
 from tauscope.diagnosis.next_experiment import PlannedExperiment, planned_experiment
-from tauscope.errors import ExcitationError
+from tauscope.errors import ExcitationError, IdentificationError
 from tauscope.export.extended_compensation import compensation_code
 from tauscope.export.formats import CODE_FILES, ExportFormat
 from tauscope.export.simulation_files import improved_robot, scenario_text
@@ -161,6 +161,8 @@ def perform(request: Request, files: Files, progress: Progress) -> Result:
     TauscopeError
         where the data or the robot cannot answer
     """
+    if request.options.against == "saved" and request.model is None:
+        raise IdentificationError("against saved: no model was given; give one, or compare with something else")
     progress("read robot and recordings")
     robot = read_robot(files.find("robot", request.robot))
     saved = None if request.model is None else read_model(files.find("model", request.model), robot)
