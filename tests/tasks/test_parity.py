@@ -11,13 +11,11 @@ from typer.main import get_command
 from tauscope.cli.program import app
 from tauscope.runtime import RunOptions
 from tauscope.server.http.backends import BackendRequest
-from tauscope.server.http.campaigns.models import CampaignRequest
-from tauscope.server.http.diagnoses.models import DiagnosisRequest
-from tauscope.server.http.diagnoses.router import DIAGNOSES
-from tauscope.server.http.excitations.models import ExcitationRequest
-from tauscope.server.http.identifications.models import IdentificationRequest
-from tauscope.server.http.identifications.router import IDENTIFICATIONS
-from tauscope.server.http.runs.models import RunRequest
+from tauscope.server.http.campaigns import CampaignRequest
+from tauscope.server.http.diagnoses import DIAGNOSES, DiagnosisRequest
+from tauscope.server.http.excitations import ExcitationRequest
+from tauscope.server.http.identifications import IDENTIFICATIONS, IdentificationRequest
+from tauscope.server.http.runs import RunRequest
 from tauscope.server.http.settings import Settings
 from tauscope.tasks import campaign, design_excitation, diagnose, identify, run
 

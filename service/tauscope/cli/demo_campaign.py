@@ -13,7 +13,7 @@ from tauscope.robot import read_robot
 from tauscope.runtime import RunOptions
 from tauscope.server.control.campaign import CampaignOrder, CampaignWorkspace
 from tauscope.server.http.assembly import open_services
-from tauscope.server.http.campaigns.router import describe, result_of
+from tauscope.server.http.campaigns import describe, result_of
 from tauscope.server.http.services import Services
 from tauscope.server.http.settings import Settings
 from tauscope.server.queue.states import JobState

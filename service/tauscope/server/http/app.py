@@ -13,18 +13,18 @@ from tauscope.server.history import ModelPolicy
 from tauscope.server.http import health, pages
 from tauscope.server.http.assembly import open_services
 from tauscope.server.http.body_limit import BodyLimit
-from tauscope.server.http.campaigns.models import CampaignRequest
-from tauscope.server.http.campaigns.router import router as campaigns
+from tauscope.server.http.campaigns import CampaignRequest
+from tauscope.server.http.campaigns import router as campaigns
 from tauscope.server.http.concurrency_limiter import TakingTurns
-from tauscope.server.http.diagnoses.models import DiagnosisRequest
-from tauscope.server.http.diagnoses.router import router as diagnoses
-from tauscope.server.http.excitations.models import ExcitationRequest
-from tauscope.server.http.excitations.router import router as excitations
+from tauscope.server.http.diagnoses import DiagnosisRequest
+from tauscope.server.http.diagnoses import router as diagnoses
+from tauscope.server.http.excitations import ExcitationRequest
+from tauscope.server.http.excitations import router as excitations
 from tauscope.server.http.history.models import ReasonRequest
 from tauscope.server.http.history.router import router as history
 from tauscope.server.http.idempotency.repeatable import Repeatable
-from tauscope.server.http.identifications.models import IdentificationRequest
-from tauscope.server.http.identifications.router import router as identifications
+from tauscope.server.http.identifications import IdentificationRequest
+from tauscope.server.http.identifications import router as identifications
 from tauscope.server.http.items.router import router as items
 from tauscope.server.http.leases.models import LeaseRequest
 from tauscope.server.http.leases.router import router as leases
@@ -37,8 +37,8 @@ from tauscope.server.http.protection import KnownCallers, SafeAnswers
 from tauscope.server.http.recordings.router import router as recordings
 from tauscope.server.http.robots.models import RobotCheckRequest
 from tauscope.server.http.robots.router import router as robots
-from tauscope.server.http.runs.models import RunRequest
-from tauscope.server.http.runs.router import router as runs
+from tauscope.server.http.runs import RunRequest
+from tauscope.server.http.runs import router as runs
 from tauscope.server.http.schedules.models import ScheduleRequest
 from tauscope.server.http.schedules.router import router as schedules
 from tauscope.server.http.settings import Settings
