@@ -4,12 +4,13 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
+from tauscope.server.store.files import hash_file
+
 from tauscope.errors import RecordingError, TauscopeError
 from tauscope.files import write_atomically
 from tauscope.server.queue.identification import IdentificationWorkspace
 from tauscope.server.queue.record import JobProblem
 from tauscope.server.queue.work import begin_step, do_work
-from tauscope.server.store.incoming import hash_file
 
 SCHEMA = "tauscope.identification/1"
 

@@ -12,11 +12,10 @@ from tauscope.errors import TauscopeError
 from tauscope.robot import read_robot
 from tauscope.runtime import RunOptions
 from tauscope.server.control.campaign import CampaignOrder, CampaignWorkspace
-from tauscope.server.http.assembly import open_services
 from tauscope.server.http.campaigns import describe, result_of
-from tauscope.server.http.services import Services
+from tauscope.server.http.services import Services, open_services
 from tauscope.server.http.settings import Settings
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.record import JobState
 from tauscope.server.queue.task_job import staged_workspace
 from tauscope.tasks.campaign import HeldOutMotion
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
@@ -65,8 +64,8 @@ def _begun(services: Services, robot_file: Path, scenario: Mapping[str, Any]) ->
 
 
 async def _ended(services: Services, identifier: str, told: Told) -> None:
-    """Wait for the end, the service's pulse beating: no run goes on without it."""
-    async with services.pulse.beating():
+    """Wait for the end, the service's heartbeat beating: no run goes on without it."""
+    async with services.heartbeat.keep_beating():
         while True:
             answer = describe(services, identifier, ROOT)
             if answer.state == "damaged" or JobState(answer.state).is_end:

@@ -21,10 +21,8 @@ from tauscope.server.control.run_supervisor import StartControl
 from tauscope.server.queue.diagnosis import DiagnosisWorkspace
 from tauscope.server.queue.excitation import ExcitationWorkspace
 from tauscope.server.queue.identification import IdentificationWorkspace
-from tauscope.server.queue.queue import JobQueue
-from tauscope.server.queue.queued_job import JobKind
-from tauscope.server.queue.record import JobProblem, JobRecord
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.queue import JobKind, JobQueue
+from tauscope.server.queue.record import JobProblem, JobRecord, JobState
 from tauscope.server.queue.workspace import Workspace
 from tauscope.server.store.items import ItemStore
 from tauscope.server.store.recordings import RecordingStore
@@ -70,10 +68,10 @@ class Bench:
         self.claims = DeviceClaims(4)
         items = ItemStore(folder / "runs", "run")
         self.runs = RunManager(items, self.recordings, start, self.claims, lambda: True)
-        shop = CampaignDependencies(
+        dependencies = CampaignDependencies(
             self.jobs, self.excitations, self.identifications, self.diagnoses, self.runs, self.recordings
         )
-        self.desk = CampaignManager(ItemStore(folder / "campaigns", "campaign"), shop)
+        self.desk = CampaignManager(ItemStore(folder / "campaigns", "campaign"), dependencies)
 
     def submit(self, **changes: object) -> str:
         staged = self.desk.items.stage()

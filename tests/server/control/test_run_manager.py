@@ -261,7 +261,7 @@ def test_a_recording_that_a_full_disk_did_not_take_is_kept_afterwards(
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patched:
-        patched.setattr("tauscope.server.store.recording_hashes.write_atomically", full)
+        patched.setattr("tauscope.server.store.recordings.write_atomically", full)
         run = bench.submit()
         bench.controls.next().finish()
         assert bench.ended(run) is RunState.FINISHED

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 from starlette.testclient import TestClient
+from tauscope.server.store.files import KeptFile
 
 from server.conftest import IDENTIFICATIONS, RECORDINGS, connected
 from server.http.event_stream import read_events
@@ -20,7 +21,6 @@ from tauscope.server.control.run import RunWorkspace
 from tauscope.server.http import Settings, create_app
 from tauscope.server.http.tasks import events as event_routes
 from tauscope.server.queue.excitation import ExcitationWorkspace
-from tauscope.server.store.incoming import KeptFile
 from tauscope.server.store.recordings import RecordingStore, StoredRecording
 
 RUNS, EXCITATIONS = "/api/v1/runs", "/api/v1/excitations"

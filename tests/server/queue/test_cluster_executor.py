@@ -14,21 +14,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from tauscope.server.store.files import hash_file
 
 from patience import eventually
 from server.queue.paper_files import PAPER_ROBOT, write_recording
 from server.queue.waiting import wait_until
 from tauscope.errors import StoreError
-from tauscope.server.queue.cluster_executor import SCHEDULER, ClusterAwayError, ClusterExecutor
-from tauscope.server.queue.executors import open_executor
+from tauscope.server.queue.cluster_executor import SCHEDULER, ClusterExecutor, ClusterUnavailableError
+from tauscope.server.queue.executors import WorkerPool, open_executor
 from tauscope.server.queue.identification import IdentificationOrder, IdentificationWorkspace, run_identification
-from tauscope.server.queue.queue import JobQueue
-from tauscope.server.queue.queued_job import JobKind
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.queue import JobKind, JobQueue
+from tauscope.server.queue.record import JobState
 from tauscope.server.queue.task_job import OrderedRecording
-from tauscope.server.queue.worker_pool import WorkerPool
 from tauscope.server.queue.workspace import Workspace
-from tauscope.server.store.incoming import hash_file
 from tauscope.server.store.items import ItemStore
 
 if TYPE_CHECKING:
@@ -160,7 +158,7 @@ class TestASchedulerThatDies:
                 assert eventually((items.folder(running) / "begun").exists, 60)
             assert eventually(lambda: executor._client.status == "closed", 60)
             assert not queue.can_work()
-            with pytest.raises(ClusterAwayError):
+            with pytest.raises(ClusterUnavailableError):
                 executor.submit(divide, 1)
             added = queue.submit(kind, items.stage())
             assert {state(items, job) for job in (running, waiting, added)} == {"queued"}
@@ -193,7 +191,7 @@ class TestASchedulerThatDies:
     def test_reaching_for_it_again_and_again_leaves_nothing_behind(self, monkeypatch: pytest.MonkeyPatch) -> None:
         pytest.importorskip("distributed", reason="needs tauscope[fleet]")
         monkeypatch.setattr("tauscope.server.queue.cluster_executor.PATIENCE_S", 1)
-        monkeypatch.setattr("tauscope.server.queue.cluster_executor.LOOK_S", 0.01)
+        monkeypatch.setattr("tauscope.server.queue.cluster_executor.CHECK_S", 0.01)
         before = set(threading.enumerate())
         failures: list[OSError] = []
         open_client = ClusterExecutor._open_client

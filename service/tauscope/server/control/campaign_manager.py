@@ -7,11 +7,10 @@ from tauscope.errors import TauscopeError
 from tauscope.server.control.campaign import CampaignWorkspace
 from tauscope.server.control.campaign_runner import CampaignDependencies, CampaignRunner
 from tauscope.server.control.device_claims import BusyError
-from tauscope.server.control.permits import FREE, Permit
+from tauscope.server.control.leases import FREE, Permit
 from tauscope.server.control.supervised_threads import SupervisedThreads
 from tauscope.server.queue.queue import INTERRUPTED
-from tauscope.server.queue.record import JobRecord
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.record import JobRecord, JobState
 from tauscope.server.store.items import ItemStore, staged_identifier
 
 PATIENCE_S = 15.0
@@ -21,14 +20,14 @@ PATIENCE_S = 15.0
 class CampaignManager:
     """Campaigns that go on, and the folders of all campaigns. Every method may be called from any thread."""
 
-    def __init__(self, items: ItemStore, shop: CampaignDependencies) -> None:
+    def __init__(self, items: ItemStore, dependencies: CampaignDependencies) -> None:
         """Open the desk.
 
         Of the campaigns that an earlier service left unfinished, those whose motions had all been recorded go on with
         the identification; the others become `interrupted`: nothing moves by itself.
         """
         self.items = items
-        self._shop = shop
+        self._dependencies = dependencies
         self._lock = threading.Lock()
         self._led: SupervisedThreads[CampaignRunner] = SupervisedThreads()
         self._is_closed = False
@@ -54,17 +53,17 @@ class CampaignManager:
         with self._lock:
             if self._is_closed:
                 raise BusyError("the service is ending; hand the campaign in when it is up again")
-            self._shop.runs.claims.take(*claim)
+            self._dependencies.runs.claims.take(*claim)
             try:
                 permit.require()
                 workspace.write_record(JobRecord(state=JobState.QUEUED, created=self.items.clock()))
                 identifier = self.items.publish(staged)
             except BaseException:
-                self._shop.runs.claims.release(*claim)
+                self._dependencies.runs.claims.release(*claim)
                 raise
             workspace = CampaignWorkspace(self.items.folder(identifier))
             leader = CampaignRunner(
-                workspace, order, self._shop, lambda: self._shop.runs.claims.release(*claim), permit
+                workspace, order, self._dependencies, lambda: self._dependencies.runs.claims.release(*claim), permit
             )
             self._led.begin(identifier, leader, lambda: None)
         return identifier
@@ -102,14 +101,14 @@ class CampaignManager:
         self.items.remove(identifier)
         return True
 
-    def stop_every(self) -> list[str]:
+    def stop_all(self) -> list[str]:
         """Stop every campaign that goes on, and go on taking further ones; takes no lock. Their identifiers."""
         return [identifier for identifier in self._led.identifiers() if self.stop(identifier) is not None]
 
     def stop_all(self) -> None:
         """Stop every campaign and take no further ones; returns at once."""
         self._is_closed = True
-        for leader in self._led.leaders():
+        for leader in self._led.supervisors():
             leader.interrupt()
 
     def close(self) -> None:
@@ -124,7 +123,7 @@ class CampaignManager:
         if record is None or record.state.is_end:
             workspace.tell_lost_end()
         elif order is not None and workspace.read_made().recordings:
-            leader = CampaignRunner(workspace, order, self._shop, lambda: None)
+            leader = CampaignRunner(workspace, order, self._dependencies, lambda: None)
             self._led.begin(workspace.folder.name, leader, lambda: None)
         else:
             workspace.write_record(record.moved(JobState.INTERRUPTED, self.items.clock(), INTERRUPTED))

@@ -14,6 +14,7 @@ from tauscope.errors import NotFoundError, TauscopeError
 from tauscope.runtime.record import RunRecord
 from tauscope.runtime.states import RunState
 from tauscope.server.control.campaign import CampaignOrder, CampaignWorkspace
+from tauscope.server.control.leases import FREE, Permit
 from tauscope.server.control.motions import (
     StepFailedError,
     ready_motion,
@@ -21,16 +22,13 @@ from tauscope.server.control.motions import (
     take_trajectory,
     wait_for_end,
 )
-from tauscope.server.control.permits import FREE, Permit
 from tauscope.server.control.run import RunRequestRecord, RunWorkspace
 from tauscope.server.control.run_manager import RunManager, run_recording_name
 from tauscope.server.queue.diagnosis import DiagnosisOrder, DiagnosisWorkspace
 from tauscope.server.queue.excitation import ExcitationOrder, ExcitationWorkspace
 from tauscope.server.queue.identification import IdentificationOrder, IdentificationWorkspace
-from tauscope.server.queue.queue import CANCELLED, INTERNAL, INTERRUPTED, JobQueue, QueueFullError
-from tauscope.server.queue.queued_job import JobKind
-from tauscope.server.queue.record import JobProblem
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.queue import CANCELLED, INTERNAL, INTERRUPTED, JobKind, JobQueue, QueueFullError
+from tauscope.server.queue.record import JobProblem, JobState
 from tauscope.server.queue.task_job import (
     Order,
     TaskWorkspace,
@@ -73,7 +71,7 @@ class CampaignRunner:
         self,
         workspace: CampaignWorkspace,
         order: CampaignOrder,
-        shop: CampaignDependencies,
+        dependencies: CampaignDependencies,
         release_arm: Callable[[], None],
         permit: Permit = FREE,
     ) -> None:
@@ -81,7 +79,7 @@ class CampaignRunner:
         self.state = JobState.QUEUED
         self._workspace = workspace
         self._order = order
-        self._shop = shop
+        self._dependencies = dependencies
         self._release_arm = release_arm
         self._permit = permit
         self._robot: dict[str, Any] = {"robot_file": order.robot_file, "robot_name": order.robot_name}
@@ -101,7 +99,7 @@ class CampaignRunner:
         # Whoever begins a run looks at the flag after it has told us of the run.
         run = self._run
         if run is not None:
-            self._shop.runs.stop(run)
+            self._dependencies.runs.stop(run)
 
     def interrupt(self) -> None:
         """Stop because the service ends: what is left of the analysis is done after the next start."""
@@ -147,13 +145,13 @@ class CampaignRunner:
             excitation = self._design(order.excitation, "excitation")
             held_out_options = order.held_out_options()
             held_out = held_out_options and self._design(held_out_options, "held_out_excitation")
-            self._wait(ExcitationWorkspace, self._shop.excitations, excitation, "excitation")
+            self._wait(ExcitationWorkspace, self._dependencies.excitations, excitation, "excitation")
             self._begin("run the motion")
             recordings = (self._run_motion(excitation, "run"),)
             judges: tuple[str, ...] = ()
             if held_out:
                 self._begin("design the held-out motion")
-                self._wait(ExcitationWorkspace, self._shop.excitations, held_out, "excitation")
+                self._wait(ExcitationWorkspace, self._dependencies.excitations, held_out, "excitation")
                 self._begin("run the held-out motion")
                 judges = (self._run_motion(held_out, "held_out_run"),)
             self._note(recordings=recordings, held_out=judges)
@@ -167,7 +165,7 @@ class CampaignRunner:
     def _design(self, options: ExcitationDesignOptions, link: str) -> str:
         """Have a motion designed; returns at once."""
         order = ExcitationOrder(**self._robot, options=options)
-        identifier = self._submit(self._shop.excitations, ExcitationWorkspace, order)
+        identifier = self._submit(self._dependencies.excitations, ExcitationWorkspace, order)
         self._note(**{link: identifier})
         return identifier
 
@@ -175,7 +173,7 @@ class CampaignRunner:
         """Hand a job in, as soon as the queue takes one."""
         while True:
             try:
-                return submit_job(self._shop.jobs, kind, workspace, order, self._put_robot)
+                return submit_job(self._dependencies.jobs, kind, workspace, order, self._put_robot)
             except QueueFullError:
                 if self._stop_asked.wait(ROOM_POLL_S):
                     raise StoppedError from None
@@ -193,7 +191,7 @@ class CampaignRunner:
 
     def _run_motion(self, excitation: str, link: str) -> str:
         """Run a motion to its end; the name of its recording."""
-        order, shop = self._order, self._shop
+        order, dependencies = self._order, self._dependencies
         request = RunRequestRecord(
             **self._robot,
             backend=backend_of_run(order.backend, held_out=link == "held_out_run"),
@@ -202,16 +200,16 @@ class CampaignRunner:
             campaign=self._workspace.folder.name,
             options=order.run,
         )
-        with staged_workspace(shop.runs.items, RunWorkspace) as staged:
+        with staged_workspace(dependencies.runs.items, RunWorkspace) as staged:
             self._put_robot(staged.robot)
-            take_trajectory(ExcitationWorkspace(shop.excitations.items.folder(excitation)), staged)
+            take_trajectory(ExcitationWorkspace(dependencies.excitations.items.folder(excitation)), staged)
             staged.write_request(request)
-            self._run = shop.runs.submit(staged.folder, ready_motion, self.holder, self._permit)
+            self._run = dependencies.runs.submit(staged.folder, ready_motion, self.holder, self._permit)
         self._note(**{link: self._run})
         if self._stop_asked.is_set():
-            shop.runs.stop(self._run)
+            dependencies.runs.stop(self._run)
         self._follow(self._run)
-        record = RunWorkspace(shop.runs.items.folder(self._run)).read_run()
+        record = RunWorkspace(dependencies.runs.items.folder(self._run)).read_run()
         if record is None or record.state is not RunState.FINISHED:
             if self._stop_asked.is_set():
                 raise StoppedError
@@ -222,7 +220,7 @@ class CampaignRunner:
     def _follow(self, run: str) -> None:
         """Tell the progress of a run until it is over."""
         told = None
-        while (live := self._shop.runs.live(run)) is not None:
+        while (live := self._dependencies.runs.live(run)) is not None:
             if live.percent is not None and live.percent != told:
                 told = live.percent
                 self._workspace.write_progress(told, {"run": run, "state": live.state.value})
@@ -230,29 +228,29 @@ class CampaignRunner:
 
     def _identify(self) -> None:
         """From the recordings to the model."""
-        shop, made = self._shop, self._workspace.read_made()
-        identifier = self._handed_in(shop.identifications, made.identification)
+        dependencies, made = self._dependencies, self._workspace.read_made()
+        identifier = self._handed_in(dependencies.identifications, made.identification)
         if identifier is None:
             order = IdentificationOrder(**self._robot, **self._recordings(), options=self._order.identification)
-            identifier = self._submit(shop.identifications, IdentificationWorkspace, order)
+            identifier = self._submit(dependencies.identifications, IdentificationWorkspace, order)
         self._note(identification=identifier)
-        self._wait(Workspace, shop.identifications, identifier, "identification")
+        self._wait(Workspace, dependencies.identifications, identifier, "identification")
 
     def _diagnose(self, options: DiagnosisOptions) -> None:
         """From the same recordings to what the model leaves out."""
-        shop, made = self._shop, self._workspace.read_made()
-        identifier = self._handed_in(shop.diagnoses, made.diagnosis)
+        dependencies, made = self._dependencies, self._workspace.read_made()
+        identifier = self._handed_in(dependencies.diagnoses, made.diagnosis)
         if identifier is None:
             order = DiagnosisOrder(**self._robot, **self._recordings(), options=options)
-            identifier = self._submit(shop.diagnoses, DiagnosisWorkspace, order)
+            identifier = self._submit(dependencies.diagnoses, DiagnosisWorkspace, order)
         self._note(diagnosis=identifier)
-        self._wait(Workspace, shop.diagnoses, identifier, "diagnosis")
+        self._wait(Workspace, dependencies.diagnoses, identifier, "diagnosis")
 
     def _recordings(self) -> dict[str, Any]:
         """What was recorded, as an order holds it."""
         made = self._workspace.read_made()
         lists = {"recordings": made.recordings, "held_out": made.held_out}
-        return {role: ordered_on_server(self._shop.recordings, names) for role, names in lists.items()}
+        return {role: ordered_on_server(self._dependencies.recordings, names) for role, names in lists.items()}
 
     def _handed_in(self, kind: JobKind, identifier: str | None) -> str | None:
         """The job that this campaign handed in before the service was started again, where that one counts still."""
@@ -260,8 +258,8 @@ class CampaignRunner:
             record = None if identifier is None else Workspace(kind.items.folder(identifier)).read_record()
         except NotFoundError:
             return None
-        given_up = (JobState.CANCELLED, JobState.INTERRUPTED)
-        return None if record is None or record.state in given_up else identifier
+        requeue = (JobState.CANCELLED, JobState.INTERRUPTED)
+        return None if record is None or record.state in requeue else identifier
 
     def _begin(self, step: str) -> None:
         """Tell a step, unless nobody wants to know any more."""
@@ -275,14 +273,14 @@ class CampaignRunner:
 
     def _cancel_jobs(self) -> None:
         """Nobody waits for what is still designed, identified or diagnosed."""
-        made, shop = self._workspace.read_made(), self._shop
-        jobs = [(shop.excitations, made.excitation), (shop.excitations, made.held_out_excitation)]
-        jobs += [(shop.identifications, made.identification), (shop.diagnoses, made.diagnosis)]
+        made, dependencies = self._workspace.read_made(), self._dependencies
+        jobs = [(dependencies.excitations, made.excitation), (dependencies.excitations, made.held_out_excitation)]
+        jobs += [(dependencies.identifications, made.identification), (dependencies.diagnoses, made.diagnosis)]
         for kind, identifier in jobs:
             # one that a full disk does not let be cancelled is done for nobody
             with suppress(NotFoundError, OSError):
                 if identifier is not None:
-                    shop.jobs.cancel(kind, identifier)
+                    dependencies.jobs.cancel(kind, identifier)
 
     def _move(self, state: JobState, problem: JobProblem | None = None) -> bool:
         """Write the campaign's new state, if it may follow the present one; False where the disk does not take it."""

@@ -9,10 +9,8 @@ from typing import Any
 from tauscope.errors import AcquisitionError
 from tauscope.server.control.run import RunWorkspace
 from tauscope.server.queue.excitation import ExcitationWorkspace
-from tauscope.server.queue.queue import JobQueue
-from tauscope.server.queue.queued_job import JobKind
-from tauscope.server.queue.record import JobProblem, JobRecord
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.queue import JobKind, JobQueue
+from tauscope.server.queue.record import JobProblem, JobRecord, JobState
 from tauscope.server.queue.task_job import TaskWorkspace
 from tauscope.server.queue.workspace import Workspace
 

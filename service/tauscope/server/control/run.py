@@ -22,10 +22,8 @@ from tauscope.runtime.record import (
 from tauscope.runtime.recovery import recover_run
 from tauscope.runtime.run_process import RunProcess
 from tauscope.runtime.states import RunState
-from tauscope.server.queue.events import EndedEvent
 from tauscope.server.queue.job_folder import JobFolder
-from tauscope.server.queue.messages import without_folders
-from tauscope.server.queue.record import JobProblem
+from tauscope.server.queue.record import EndedEvent, JobProblem, without_folders
 from tauscope.server.queue.stored import StoredModel, read_stored, write_stored
 from tauscope.tasks import run
 from tauscope.tasks.run import BackendChoice, recording_file

@@ -8,12 +8,12 @@ from pathlib import Path
 from tauscope.errors import TauscopeError
 from tauscope.runtime.record import RunRecord
 from tauscope.server.control.device_claims import BusyError, DeviceClaims
+from tauscope.server.control.leases import FREE, Permit
 from tauscope.server.control.motions import Motion
-from tauscope.server.control.permits import FREE, Permit
 from tauscope.server.control.run import RunWorkspace
 from tauscope.server.control.run_supervisor import Live, RunSupervisor, StartControl
 from tauscope.server.control.supervised_threads import SupervisedThreads
-from tauscope.server.store.incoming import KeptFile, hash_file
+from tauscope.server.store.files import KeptFile, hash_file
 from tauscope.server.store.items import ItemStore, staged_identifier
 from tauscope.server.store.recordings import RecordingStore
 
@@ -127,7 +127,7 @@ class RunManager:
 
     def lives(self) -> list[Live]:
         """What is known of each run that goes on."""
-        return [leader.live for leader in self._led.leaders()]
+        return [leader.live for leader in self._led.supervisors()]
 
     def settle(self) -> None:
         """Keep the recordings that a full disk did not take; to be called again and again.
@@ -140,14 +140,14 @@ class RunManager:
         for workspace in list(self._unkept.values()):
             self._conclude(workspace)
 
-    def stop_every(self) -> list[str]:
+    def stop_all(self) -> list[str]:
         """Stop every run that goes on, and go on taking further ones; takes no lock. The runs' identifiers."""
         return [identifier for identifier in self._led.identifiers() if self.stop(identifier) is not None]
 
     def stop_all(self) -> None:
         """Stop every run and take no further ones; returns at once."""
         self._is_closed = True
-        for leader in self._led.leaders():
+        for leader in self._led.supervisors():
             leader.stop()
 
     def close(self) -> None:

@@ -11,10 +11,10 @@ from tauscope.errors import TauscopeError
 from tauscope.runtime.progress import Report
 from tauscope.runtime.record import RunProblem, RunRecord
 from tauscope.runtime.states import RunState
+from tauscope.server.control.leases import FREE, Permit
 from tauscope.server.control.motions import Motion, StepFailedError
-from tauscope.server.control.permits import FREE, Permit
 from tauscope.server.control.run import RunWorkspace
-from tauscope.server.queue.events import StateEvent
+from tauscope.server.queue.record import StateEvent
 
 _log = logging.getLogger("tauscope.jobs")
 

@@ -12,11 +12,10 @@ from tauscope.server.control.run import RunWorkspace
 from tauscope.server.queue.diagnosis import DiagnosisWorkspace
 from tauscope.server.queue.excitation import ExcitationWorkspace
 from tauscope.server.queue.identification import IdentificationWorkspace
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.record import JobState
 from tauscope.server.queue.workspace import Workspace
-from tauscope.server.store.database.facts import FileMetadata, ItemMetadata, RecordingRole
-from tauscope.server.store.incoming import hash_file
-from tauscope.server.store.names import identifier_time
+from tauscope.server.store.database.index import FileMetadata, ItemMetadata, RecordingRole
+from tauscope.server.store.files import hash_file, identifier_time
 
 DAMAGED = "damaged"
 _ROLES = ("recordings", "held_out", "simulated")
@@ -24,7 +23,7 @@ _LIVING = {"state.json", "events.jsonl", "progress", "cancel", "run.json", "stop
 """Files that may still change when an item has ended, or that say nothing of its result."""
 
 
-def read_facts(kind: str, folder: Path) -> ItemMetadata:
+def read_metadata(kind: str, folder: Path) -> ItemMetadata:
     """What an item's folder shows."""
     facts = _READERS[kind](folder)
     if not facts.is_final:
@@ -47,7 +46,7 @@ def stamp(kind: str, folder: Path) -> str:
     return "none"
 
 
-def changed_file(folder: Path, artefacts: tuple[FileMetadata, ...], *, deep: bool) -> str | None:
+def find_changed_file(folder: Path, artefacts: tuple[FileMetadata, ...], *, deep: bool) -> str | None:
     """The first file of an item that is not what it was when the item ended.
 
     Returns

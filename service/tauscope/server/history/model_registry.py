@@ -8,8 +8,7 @@ from sqlalchemy.exc import IntegrityError
 
 from tauscope.errors import NotFoundError
 from tauscope.server.control.run import RunWorkspace
-from tauscope.server.history.model_entries import ModelEntry
-from tauscope.server.history.model_history import ModelHistory
+from tauscope.server.history.model_history import ModelEntry, ModelHistory
 from tauscope.server.history.model_judgement import Candidate
 from tauscope.server.queue.identification import IdentificationOrder, IdentificationWorkspace
 from tauscope.server.store.items import ItemStore
@@ -28,7 +27,7 @@ class ModelRegistry:
         self._runs = items["run"]
         self._strange: set[str] = set()
 
-    def consider_new(self) -> list[ModelEntry]:
+    def judge_new(self) -> list[ModelEntry]:
         """Judge every identification in the index that was not judged yet.
 
         Raises
@@ -36,7 +35,7 @@ class ModelRegistry:
         StoreError
             if the database does not answer; the next call goes on where this one ended
         """
-        return [entry for identifier in self.history.unjudged(self._site) if (entry := self._consider(identifier))]
+        return [entry for identifier in self.history.list_unjudged(self._site) if (entry := self._consider(identifier))]
 
     def _consider(self, identifier: str) -> ModelEntry | None:
         """Judge one identification; None where it was removed or judged meanwhile, or names an unknown robot."""

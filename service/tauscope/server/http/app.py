@@ -6,41 +6,38 @@ from contextlib import asynccontextmanager
 
 from fastapi import FastAPI
 
-from tauscope.server.auth.audit.recorder import Audited
+from tauscope.server.auth.audited_requests import AuditedRequests
 from tauscope.server.auth.gate import Gate
 from tauscope.server.control.run_supervisor import StartControl
 from tauscope.server.history import ModelPolicy
 from tauscope.server.http import health, pages
-from tauscope.server.http.assembly import open_services
-from tauscope.server.http.body_limit import BodyLimit
 from tauscope.server.http.campaigns import CampaignRequest
 from tauscope.server.http.campaigns import router as campaigns
-from tauscope.server.http.concurrency_limiter import TakingTurns
 from tauscope.server.http.diagnoses import DiagnosisRequest
 from tauscope.server.http.diagnoses import router as diagnoses
 from tauscope.server.http.excitations import ExcitationRequest
 from tauscope.server.http.excitations import router as excitations
-from tauscope.server.http.history.models import ReasonRequest
-from tauscope.server.http.history.router import router as history
-from tauscope.server.http.idempotency.repeatable import Repeatable
+from tauscope.server.http.heartbeat import told
+from tauscope.server.http.history import ReasonRequest
+from tauscope.server.http.history import router as history
 from tauscope.server.http.identifications import IdentificationRequest
 from tauscope.server.http.identifications import router as identifications
-from tauscope.server.http.items.router import router as items
+from tauscope.server.http.items import router as items
 from tauscope.server.http.leases.models import LeaseRequest
 from tauscope.server.http.leases.router import router as leases
 from tauscope.server.http.leases.router import stop_router
 from tauscope.server.http.openapi import install_openapi
-from tauscope.server.http.operations.observed import Observed
-from tauscope.server.http.operations.systemd import told
 from tauscope.server.http.problem_handlers import install_problem_handlers
-from tauscope.server.http.protection import KnownCallers, SafeAnswers
+from tauscope.server.http.protection import BodyLimit, ConcurrencyLimiter, OriginCheck, RequestLog, ResponseProtection
 from tauscope.server.http.recordings.router import router as recordings
+from tauscope.server.http.repeated_requests import IdempotentRequests
 from tauscope.server.http.robots.models import RobotCheckRequest
 from tauscope.server.http.robots.router import router as robots
 from tauscope.server.http.runs import RunRequest
 from tauscope.server.http.runs import router as runs
-from tauscope.server.http.schedules.models import ScheduleRequest
-from tauscope.server.http.schedules.router import router as schedules
+from tauscope.server.http.schedules import ScheduleRequest
+from tauscope.server.http.schedules import router as schedules
+from tauscope.server.http.services import open_services
 from tauscope.server.http.settings import Settings
 from tauscope.server.http.tasks.events import EVENT_MODELS
 from tauscope.server.page.router import router as page
@@ -90,7 +87,7 @@ def create_app(settings: Settings, executor: Executor | None = None, start: Star
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         with open_services(settings, executor, start) as services:
             app.state.services = services
-            async with services.pulse.beating(), told():
+            async with services.heartbeat.keep_beating(), told():
                 yield
 
     app = FastAPI(
@@ -110,12 +107,12 @@ def create_app(settings: Settings, executor: Executor | None = None, start: Star
     install_problem_handlers(app)
     install_openapi(app, [*REQUESTS, Problem, *EVENT_MODELS])
     # The last one added is the first to see a request.
-    app.add_middleware(Repeatable)
-    app.add_middleware(Audited)
+    app.add_middleware(IdempotentRequests)
+    app.add_middleware(AuditedRequests)
     app.add_middleware(Gate)
     app.add_middleware(BodyLimit, limit=settings.max_upload_bytes)
-    app.add_middleware(KnownCallers, answers_for=settings.answers_for)
-    app.add_middleware(TakingTurns)
-    app.add_middleware(Observed)
-    app.add_middleware(SafeAnswers)
+    app.add_middleware(OriginCheck, answers_for=settings.answers_for)
+    app.add_middleware(ConcurrencyLimiter)
+    app.add_middleware(RequestLog)
+    app.add_middleware(ResponseProtection)
     return app

@@ -9,49 +9,40 @@ from datetime import timedelta
 from functools import partial
 
 from tauscope.errors import TauscopeError
-from tauscope.server.auth.audit.log import AuditLog, AuditTrail
-from tauscope.server.auth.gate import Access
-from tauscope.server.auth.key_ring import KeyRing
-from tauscope.server.auth.keys import KeyFile
-from tauscope.server.auth.rate_limit import RateLimit
+from tauscope.server.auth.audit_log import AuditLog, AuditTrail
+from tauscope.server.auth.gate import Access, RateLimit
+from tauscope.server.auth.keys import KeyFile, KeyRing
 from tauscope.server.control.campaign_manager import CampaignManager
 from tauscope.server.control.campaign_runner import CampaignDependencies
 from tauscope.server.control.device_claims import DeviceClaims
-from tauscope.server.control.lease import Lease
-from tauscope.server.control.leases import Leases
+from tauscope.server.control.leases import Lease, Leases
 from tauscope.server.control.run import start_control
 from tauscope.server.control.run_manager import RunManager
 from tauscope.server.control.run_supervisor import StartControl
-from tauscope.server.history.drift_monitor import DriftMonitor
 from tauscope.server.history.indexer import open_index
 from tauscope.server.history.model_history import ModelHistory
-from tauscope.server.history.model_registry import ModelRegistry
+from tauscope.server.history.model_registry import DriftMonitor, ModelRegistry
 from tauscope.server.history.retention import RetentionRule, RetentionSweeper
 from tauscope.server.http.heartbeat import Heartbeat
-from tauscope.server.http.idempotency.on_disk import AnswersOnDisk
-from tauscope.server.http.idempotency.passing import PassingAnswers
-from tauscope.server.http.operations.metrics import Metrics, TimedExecutor
+from tauscope.server.http.metrics import Metrics, TimedExecutor
+from tauscope.server.http.repeated_answers import MemoryAnswers, StoredAnswers
 from tauscope.server.http.services import Services
 from tauscope.server.http.settings import Settings
 from tauscope.server.queue.cluster_executor import ClusterExecutor
 from tauscope.server.queue.diagnosis import run_diagnosis
 from tauscope.server.queue.excitation import run_excitation
-from tauscope.server.queue.executors import open_executor
+from tauscope.server.queue.executors import WorkerPool, open_executor
 from tauscope.server.queue.housekeeping import Housekeeping
 from tauscope.server.queue.identification import run_identification
-from tauscope.server.queue.queue import JobQueue
-from tauscope.server.queue.queued_job import JobKind
-from tauscope.server.queue.worker_pool import WorkerPool
+from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.schedules.repeater import Repeater
 from tauscope.server.schedules.repository import ScheduleRepository
 from tauscope.server.schedules.scheduler import Scheduler, new_boot
+from tauscope.server.store.data_folder import FOLDERS, FolderLock, item_stores, site_identifier
 from tauscope.server.store.database.database import Database
 from tauscope.server.store.database.index import Index
-from tauscope.server.store.folder_lock import FolderLock
 from tauscope.server.store.items import ItemStore
-from tauscope.server.store.layout import FOLDERS, item_stores
 from tauscope.server.store.recordings import RecordingStore
-from tauscope.server.store.site import site_identifier
 
 PRUNING_S = 3600.0
 """How often what is old is removed, where the operator asked for it [s]."""
@@ -83,7 +74,7 @@ def open_services(
     drift = DriftMonitor(services.models.history, site)
     _watch(services, drift)
     housekeeping = Housekeeping(
-        [services.jobs.settle, services.runs.settle, services.index.sync, services.models.consider_new, drift.look]
+        [services.jobs.settle, services.runs.settle, services.index.sync, services.models.judge_new, drift.look]
     )
     clock = Housekeeping([services.schedules.tick])  # apart: an interlock may take its time
     housekeeping.start()
@@ -125,7 +116,7 @@ class _Ground:
 def _assemble(ground: _Ground, executor: Executor | None, start: StartControl | None) -> Services:
     """Everything that the routes work with; nothing of it moves yet, and unfinished analysis goes on."""
     settings, database, site = ground.settings, ground.database, ground.site
-    items, metrics, pulse = item_stores(settings.data_folder), Metrics(), Heartbeat()
+    items, metrics, heartbeat = item_stores(settings.data_folder), Metrics(), Heartbeat()
     recordings = RecordingStore(settings.recordings_folder)
     recordings.tidy()
     identifications, diagnoses, excitations = kinds = _kinds(settings, items)
@@ -139,14 +130,14 @@ def _assemble(ground: _Ground, executor: Executor | None, start: StartControl | 
     claims = DeviceClaims(settings.max_arms)
     leases = Leases(claims, settings.data_folder / "lease-number", on_end=partial(_note_end, audit))
     start = start or partial(start_control, sim_socket=settings.sim_socket)
-    runs = RunManager(items["run"], recordings, start, claims, pulse.is_felt, metrics.run_ended)
-    shop = CampaignDependencies(jobs, excitations, identifications, diagnoses, runs, recordings)
-    campaigns = CampaignManager(items["campaign"], shop)
+    runs = RunManager(items["run"], recordings, start, claims, heartbeat.is_alive, metrics.run_ended)
+    dependencies = CampaignDependencies(jobs, excitations, identifications, diagnoses, runs, recordings)
+    campaigns = CampaignManager(items["campaign"], dependencies)
     models = ModelRegistry(ModelHistory(database), site, items)
     index = open_index(Index(database, site), items, recordings, settings.data_folder.name)
-    models.consider_new()
+    models.judge_new()
     # What a schedule moves has no lease: it waits for its next time where somebody has one.
-    repeater = Repeater(shop, campaigns, partial(leases.permit, token=None, owner="schedule", is_needed=False))
+    repeater = Repeater(dependencies, campaigns, partial(leases.permit, token=None, owner="schedule", is_needed=False))
     return Services(
         settings=settings,
         recordings=recordings,
@@ -160,10 +151,10 @@ def _assemble(ground: _Ground, executor: Executor | None, start: StartControl | 
         access=ground.access,
         leases=leases,
         audit=audit,
-        answers=AnswersOnDisk(settings.data_folder / "idempotency"),
-        lease_answers=PassingAnswers(),
+        answers=StoredAnswers(settings.data_folder / "idempotency"),
+        lease_answers=MemoryAnswers(),
         metrics=metrics,
-        pulse=pulse,
+        heartbeat=heartbeat,
         index=index,
         models=models,
         schedules=Scheduler(ScheduleRepository(database, site, new_boot()), repeater, settings.data_folder),
@@ -205,7 +196,7 @@ def _retention(services: Services) -> list[Callable[[], object]]:
 def _watch(services: Services, drift: DriftMonitor) -> None:
     """Numbers that are asked for when somebody looks at the metrics."""
     metrics, folder = services.metrics, services.settings.data_folder
-    metrics.loops.live = services.runs.lives
+    metrics.loops.live = services.runs.list_live
     metrics.watch_drift(drift)
     metrics.watch("tauscope_jobs_waiting", "Jobs that wait", services.jobs.waiting)
     metrics.watch("tauscope_leases", "Leases that hold", lambda: len(services.leases.active()))

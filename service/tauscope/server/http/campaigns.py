@@ -17,7 +17,7 @@ from tauscope.server.http.backends import BackendRequest, chosen_backend
 from tauscope.server.http.diagnoses import DIAGNOSES
 from tauscope.server.http.excitations import EXCITATIONS
 from tauscope.server.http.identifications import IDENTIFICATIONS
-from tauscope.server.http.leases.holding import permit_of
+from tauscope.server.http.leases.router import permit_of
 from tauscope.server.http.robots.files import read_received_robot
 from tauscope.server.http.robots.models import EXAMPLE_ROBOT
 from tauscope.server.http.runs import find_run
@@ -28,7 +28,7 @@ from tauscope.server.http.tasks.routes import ENDINGS, Identifier, collection
 from tauscope.server.http.tasks.submission import Received, RobotRequest, keep_robot, receive_request
 from tauscope.server.models import AnswerModel
 from tauscope.server.problems import ProblemError, problem_responses
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.record import JobState
 from tauscope.tasks.campaign import CampaignOptions
 from tauscope.tasks.run import BackendChoice
 

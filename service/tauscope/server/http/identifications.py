@@ -16,7 +16,7 @@ from tauscope.server.http.tasks.submission import RobotRequest
 from tauscope.server.models import AnswerModel
 from tauscope.server.queue.identification import IdentificationWorkspace
 from tauscope.server.queue.task_job import OrderedRecording
-from tauscope.server.store.names import FILE_NAME_PATTERN, FILE_NAME_RULE, is_file_name
+from tauscope.server.store.files import FILE_NAME_PATTERN, FILE_NAME_RULE, is_file_name
 from tauscope.tasks.identify import IdentificationOptions
 
 

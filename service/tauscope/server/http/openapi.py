@@ -8,10 +8,10 @@ from fastapi.openapi.utils import get_openapi
 from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
-from tauscope.server.auth.audit.recorder import is_noted
-from tauscope.server.auth.scopes import is_stop, needed_scope
-from tauscope.server.http.idempotency.repeatable import HEADER as ONCE
-from tauscope.server.http.idempotency.repeatable import LONGEST_KEY, is_repeatable
+from tauscope.server.auth.audited_requests import is_audited
+from tauscope.server.auth.scopes import find_needed_scope, is_stop
+from tauscope.server.http.repeated_requests import HEADER as ONCE
+from tauscope.server.http.repeated_requests import LONGEST_KEY, is_repeatable
 from tauscope.server.problems import MEDIA_TYPE, problem_responses
 
 _REFERENCE = "#/components/schemas/{model}"
@@ -112,13 +112,13 @@ def _add_common_answers(document: dict[str, Any]) -> None:
     }
     for path, operations in document["paths"].items():
         for method, operation in operations.items():
-            scope = needed_scope(method.upper(), path)
+            scope = find_needed_scope(method.upper(), path)
             if scope is None:
                 continue
             operation["security"] = [{"key": []}, {}]
             operation["x-tauscope-scope"] = scope.value
             met: list[str] = list(_COMMON)
-            if is_noted(method.upper(), path) and not is_stop(method.upper(), path):
+            if is_audited(method.upper(), path) and not is_stop(method.upper(), path):
                 met.append("storage-full")  # of the audit log, if of nothing else
             if method == "post" and is_repeatable(path):
                 operation.setdefault("parameters", []).append(_ONCE_PARAMETER)

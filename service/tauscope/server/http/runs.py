@@ -17,20 +17,18 @@ from starlette.concurrency import run_in_threadpool
 from tauscope.errors import ExcitationError, NotFoundError
 from tauscope.robot import Robot
 from tauscope.runtime.options import RunOptions
-from tauscope.runtime.real_time import RealTime
 from tauscope.runtime.record import RunRecord
 from tauscope.runtime.states import RunState
-from tauscope.runtime.timing import Timing
+from tauscope.runtime.timing import RealTime, Timing
+from tauscope.server.control.leases import Permit
 from tauscope.server.control.motions import DesignedMotion, Motion, ready_motion, take_trajectory
-from tauscope.server.control.permits import Permit
 from tauscope.server.control.run import RunRequestRecord, RunWorkspace
 from tauscope.server.control.run_manager import run_recording_name
 from tauscope.server.http.backends import BackendRequest, chosen_backend
-from tauscope.server.http.documents import to_json_text
-from tauscope.server.http.downloads import file_answer
+from tauscope.server.http.documents import file_answer, to_json_text
 from tauscope.server.http.excitations import EXCITATIONS
 from tauscope.server.http.form import PartRule
-from tauscope.server.http.leases.holding import permit_of
+from tauscope.server.http.leases.router import permit_of
 from tauscope.server.http.openapi import binary_part
 from tauscope.server.http.robots.files import read_received_robot
 from tauscope.server.http.robots.models import EXAMPLE_ROBOT

@@ -8,8 +8,7 @@ from pydantic import Field
 
 from tauscope.errors import LimitExceededError, TauscopeError
 from tauscope.robot import read_robot
-from tauscope.server.queue.messages import without_folders
-from tauscope.server.queue.record import JobProblem
+from tauscope.server.queue.record import JobProblem, without_folders
 from tauscope.server.queue.task_job import TRAJECTORY, TaskOrder, TaskWorkspace, perform_job
 from tauscope.tasks import design_excitation
 from tauscope.tasks.design_excitation import ExcitationDesignOptions

@@ -12,8 +12,8 @@ from typing import Any
 from tauscope.errors import RecordingError, TauscopeError
 from tauscope.files import write_atomically
 from tauscope.robot.messages import one_line, shown
-from tauscope.server.queue.cluster_executor import ClusterAwayError
-from tauscope.server.store.names import FILE_NAME_RULE, is_file_name
+from tauscope.server.queue.cluster_executor import ClusterUnavailableError
+from tauscope.server.store.files import FILE_NAME_RULE, is_file_name
 from tauscope.tasks import diagnose, identify
 from tauscope.tasks.task import LocalFiles
 
@@ -164,7 +164,7 @@ def _result(future: "Future[FleetResult]", entry: FleetEntry) -> FleetResult:
     """What came of a robot, whatever it was."""
     try:
         return future.result()
-    except ClusterAwayError:
+    except ClusterUnavailableError:
         return FleetResult(entry, {}, AWAY)
     except BrokenExecutor:
         return FleetResult(entry, {}, LOST)

@@ -11,7 +11,7 @@ from tauscope.errors import RecordingError
 from tauscope.recording import RecordingReport, check_recording, read_recording
 from tauscope.recording.recording import Array
 from tauscope.report.decimation import envelope_indices
-from tauscope.server.queue.messages import without_folders
+from tauscope.server.queue.record import without_folders
 
 
 def check_kept_recording(path: Path, joint_count: int | None) -> RecordingReport:

@@ -12,14 +12,12 @@ from pydantic import Field
 from tauscope.errors import ExportError, NotFoundError, RecordingError, TauscopeError
 from tauscope.export.formats import ExportFile, ExportFormat
 from tauscope.files import write_atomically
-from tauscope.server.queue.messages import without_folders
-from tauscope.server.queue.queue import JobQueue
-from tauscope.server.queue.queued_job import JobKind
-from tauscope.server.queue.record import JobProblem
+from tauscope.server.queue.queue import JobKind, JobQueue
+from tauscope.server.queue.record import JobProblem, without_folders
 from tauscope.server.queue.stored import StoredModel, read_bytes, read_document, read_stored, write_stored
 from tauscope.server.queue.work import begin_step, do_work, require_wanted
 from tauscope.server.queue.workspace import Workspace
-from tauscope.server.store.incoming import hash_file
+from tauscope.server.store.files import hash_file
 from tauscope.server.store.items import ItemStore
 from tauscope.server.store.recordings import RecordingStore
 

@@ -11,14 +11,14 @@ from tauscope.errors import NotFoundError, TauscopeError
 from tauscope.server.control.campaign import CampaignOrder, CampaignWorkspace
 from tauscope.server.control.campaign_manager import CampaignManager
 from tauscope.server.control.campaign_runner import CampaignDependencies
-from tauscope.server.control.permits import FREE, Permit
+from tauscope.server.control.leases import FREE, Permit
 from tauscope.server.queue.diagnosis import DiagnosisOrder, DiagnosisWorkspace
 from tauscope.server.queue.identification import IdentificationOrder, IdentificationWorkspace
 from tauscope.server.queue.stored import StoredModel
 from tauscope.server.queue.task_job import OrderedRecording, ordered_on_server
 from tauscope.server.queue.workspace import Workspace
 from tauscope.server.schedules.definition import RecordingChoice, ScheduleDefinition
-from tauscope.server.schedules.entries import ScheduleEntry
+from tauscope.server.schedules.repository import ScheduleEntry
 from tauscope.server.store.items import ItemStore
 from tauscope.server.store.recordings import RecordingStore
 
@@ -33,7 +33,7 @@ class NothingToDoError(TauscopeError):
 class Repeater:
     """Starts what schedules repeat."""
 
-    shop: CampaignDependencies
+    dependencies: CampaignDependencies
     campaigns: CampaignManager
     permit_for: Callable[[str], Permit] = field(default_factory=lambda: lambda _device: FREE)
 
@@ -56,7 +56,7 @@ class Repeater:
         if definition.kind == "campaign":
             return "campaign", self._campaign(entry)
         assert definition.recordings is not None  # noqa: S101 - checked by the definition
-        train, held_out = newest_recordings(self.shop.recordings, definition.recordings, since)
+        train, held_out = newest_recordings(self.dependencies.recordings, definition.recordings, since)
         if definition.kind == "identification":
             return "identification", self._identification(entry, train, held_out)
         return "diagnosis", self._diagnosis(entry, train, held_out)
@@ -72,7 +72,7 @@ class Repeater:
         """The folders of what is repeated."""
         if kind == "campaign":
             return self.campaigns.items
-        return (self.shop.identifications if kind == "identification" else self.shop.diagnoses).items
+        return (self.dependencies.identifications if kind == "identification" else self.dependencies.diagnoses).items
 
     def _campaign(self, entry: ScheduleEntry) -> str:
         """A campaign like the one that the schedule was made from."""
@@ -92,7 +92,7 @@ class Repeater:
         self, entry: ScheduleEntry, train: tuple[OrderedRecording, ...], held_out: tuple[OrderedRecording, ...]
     ) -> str:
         """An identification from other recordings."""
-        kind = self.shop.identifications
+        kind = self.dependencies.identifications
         staged = kind.items.stage()
         try:
             workspace = IdentificationWorkspace(staged)
@@ -100,7 +100,7 @@ class Repeater:
             write_robot(workspace.robot, entry)
             changes = {"recordings": train, "held_out": held_out}
             workspace.write_order(_order(entry, IdentificationOrder).model_copy(update=changes))
-            return self.shop.jobs.submit(kind, staged)
+            return self.dependencies.jobs.submit(kind, staged)
         finally:
             kind.items.discard(staged)
 
@@ -108,7 +108,7 @@ class Repeater:
         self, entry: ScheduleEntry, train: tuple[OrderedRecording, ...], held_out: tuple[OrderedRecording, ...]
     ) -> str:
         """A diagnosis of other recordings."""
-        kind = self.shop.diagnoses
+        kind = self.dependencies.diagnoses
         staged = kind.items.stage()
         try:
             workspace = DiagnosisWorkspace(staged)
@@ -116,7 +116,7 @@ class Repeater:
             write_robot(workspace.robot, entry)
             changes = {"recordings": train, "held_out": held_out}
             workspace.write_order(_order(entry, DiagnosisOrder).model_copy(update=changes))
-            return self.shop.jobs.submit(kind, staged)
+            return self.dependencies.jobs.submit(kind, staged)
         finally:
             kind.items.discard(staged)
 

@@ -7,14 +7,13 @@ from pathlib import Path
 
 from tauscope.errors import TauscopeError
 from tauscope.server.control.device_claims import BusyError
-from tauscope.server.control.interlock import objection
-from tauscope.server.control.lease_errors import LeasedError
-from tauscope.server.queue.messages import without_folders
+from tauscope.server.control.interlock import find_objection
+from tauscope.server.control.leases import LeasedError
 from tauscope.server.queue.queue import QueueFullError
+from tauscope.server.queue.record import without_folders
 from tauscope.server.schedules.definition import ScheduleDefinition
-from tauscope.server.schedules.entries import FiringEntry, ScheduleEntry
 from tauscope.server.schedules.repeater import NothingToDoError, Repeater
-from tauscope.server.schedules.repository import ScheduleRepository
+from tauscope.server.schedules.repository import FiringEntry, ScheduleEntry, ScheduleRepository
 from tauscope.server.store.items import utc_now
 from tauscope.tasks.run import BackendChoice
 
@@ -51,7 +50,7 @@ class Scheduler:
             self._fire(*asked, lateness=None)
         for entry in self.book.due(self._clock()):
             now = self._clock()
-            due, definition = entry.next_due, parse_schedule(entry)
+            due, definition = entry.next_due, read_definition(entry)
             number = self.book.claim(entry, definition.next_after(now, entry.created), now)
             if number is not None and due is not None:
                 self._fire(number, entry, lateness=now - due)
@@ -73,7 +72,7 @@ class Scheduler:
     def _fire(self, number: int, entry: ScheduleEntry, lateness: timedelta | None) -> None:
         """Start what a schedule repeats, or write down why not."""
         try:
-            outcome = self._outcome(entry, parse_schedule(entry), lateness)
+            outcome = self._outcome(entry, read_definition(entry), lateness)
         except Exception as error:
             _log.exception("schedule %s failed for an unforeseen reason", entry.name)
             outcome = "failed", f"a fault of Tauscope's own ({type(error).__name__}); see the log", None
@@ -124,7 +123,7 @@ class Scheduler:
             return None
         robot = str(entry.order.get("robot_name"))
         backend = BackendChoice.model_validate(entry.order.get("backend") or {}, strict=False)
-        return objection(self._data_folder, definition.interlock, robot, backend.device(robot))
+        return find_objection(self._data_folder, definition.interlock, robot, backend.device(robot))
 
     def _goes_on(self, firing: FiringEntry, kind: str, identifier: str) -> bool:
         """Whether what was started has not ended; of another site only the index knows."""
@@ -137,7 +136,7 @@ class Scheduler:
         return next((each.due for each in self.book.firings(entry.name, 100) if each.state == "started"), None)
 
 
-def parse_schedule(entry: ScheduleEntry) -> ScheduleDefinition:
+def read_definition(entry: ScheduleEntry) -> ScheduleDefinition:
     """When a schedule is due."""
     return ScheduleDefinition.model_validate(dict(entry.definition), strict=False)
 

@@ -8,8 +8,8 @@ from tauscope.server.control.campaign import CampaignWorkspace
 from tauscope.server.queue.diagnosis import DiagnosisWorkspace
 from tauscope.server.queue.identification import IdentificationWorkspace
 from tauscope.server.schedules.definition import ScheduleDefinition
-from tauscope.server.schedules.entries import ScheduleEntry
 from tauscope.server.schedules.repeater import Repeater
+from tauscope.server.schedules.repository import ScheduleEntry
 
 _WORKSPACES = {
     "campaign": CampaignWorkspace,

@@ -10,8 +10,7 @@ from tauscope.errors import NotFoundError
 from tauscope.identification import IdentificationDocument
 from tauscope.server.history import ModelPolicy
 from tauscope.server.http.documents import JSON, media_type, read_document, refuse_media_type
-from tauscope.server.http.history.answers import comparison_answer, model_answer, trend_answer
-from tauscope.server.http.history.models import (
+from tauscope.server.http.history import (
     ComparisonAnswer,
     EventAnswer,
     EventListAnswer,
@@ -19,6 +18,9 @@ from tauscope.server.http.history.models import (
     ModelListAnswer,
     ReasonRequest,
     TrendAnswer,
+    comparison_answer,
+    make_model_answer,
+    trend_answer,
 )
 from tauscope.server.http.openapi import Examples, json_body
 from tauscope.server.http.services import Services, ServicesDep
@@ -50,14 +52,14 @@ def list_models(request: Request, services: ServicesDep, robot: AnyRobot = None,
     """Every identification that was judged: the active one of each robot, those that were, those that were refused."""
     _bring_up_to_date(services)
     entries = services.models.history.models(robot, limit)
-    return ModelListAnswer(models=[model_answer(entry, request.url.path) for entry in entries])
+    return ModelListAnswer(models=[make_model_answer(entry, request.url.path) for entry in entries])
 
 
 @router.get("/models/{identifier}", summary="Look a model up", responses=problem_responses("not-found"))
 def get_model(request: Request, identifier: Identifier, services: ServicesDep) -> ModelAnswer:
     """Its state and the gates that it had to pass; the identifier is the identification's."""
     _bring_up_to_date(services)
-    return model_answer(services.models.history.find(identifier), collection(request, 1))
+    return make_model_answer(services.models.history.find(identifier), collection(request, 1))
 
 
 @router.get(
@@ -169,7 +171,7 @@ async def _choose(request: Request, identifier: str, services: Services, role: s
     body = await _read(request, ReasonRequest, services)
     history, now = services.models.history, datetime.now(UTC)
     entry = await run_in_threadpool(history.activate, identifier, role, body.reason, now)
-    return model_answer(entry, collection(request, 2))
+    return make_model_answer(entry, collection(request, 2))
 
 
 async def _read(request: Request, kind: type[Body], services: Services) -> Body:
@@ -182,4 +184,4 @@ async def _read(request: Request, kind: type[Body], services: Services) -> Body:
 def _bring_up_to_date(services: Services) -> None:
     """What ended a moment ago counts already."""
     services.index.sync()
-    services.models.consider_new()
+    services.models.judge_new()

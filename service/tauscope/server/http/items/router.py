@@ -6,12 +6,12 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query
 from pydantic import AwareDatetime
 
-from tauscope.server.http.items.models import ItemAnswer, ItemListAnswer, KnownRobotAnswer, RobotListAnswer
+from tauscope.server.http.items import ItemAnswer, ItemListAnswer, KnownRobotAnswer, RobotListAnswer
 from tauscope.server.http.services import ServicesDep
 from tauscope.server.http.tasks.routes import Limit
 from tauscope.server.problems import problem_responses
-from tauscope.server.store.database.facts import ItemEntry, ItemQuery
-from tauscope.server.store.layout import FOLDERS
+from tauscope.server.store.data_folder import FOLDERS
+from tauscope.server.store.database.index import ItemEntry, ItemQuery
 
 router = APIRouter(tags=["items"], responses=problem_responses("invalid-request", "store"))
 

@@ -8,12 +8,10 @@ from starlette.concurrency import run_in_threadpool
 
 from tauscope.errors import NotFoundError
 from tauscope.robot.messages import one_line, shown
-from tauscope.server.auth.gate import caller_of
+from tauscope.server.auth.gate import find_caller
 from tauscope.server.auth.scopes import Scope
-from tauscope.server.control.lease import Lease
-from tauscope.server.control.lease_errors import LeaseLostError
+from tauscope.server.control.leases import Lease, LeaseLostError
 from tauscope.server.http.documents import JSON, media_type, read_document, refuse_media_type
-from tauscope.server.http.leases.holding import LeaseToken, owner_of
 from tauscope.server.http.leases.models import (
     EXAMPLES,
     LeaseAnswer,
@@ -22,6 +20,7 @@ from tauscope.server.http.leases.models import (
     LeaseRequest,
     StopAllAnswer,
 )
+from tauscope.server.http.leases.router import LeaseToken, find_owner
 from tauscope.server.http.openapi import json_body
 from tauscope.server.http.services import Services, ServicesDep
 from tauscope.server.problems import ProblemError, problem_responses
@@ -53,13 +52,13 @@ async def take_lease(request: Request, response: Response, services: ServicesDep
     if media_type(request) != JSON:
         raise refuse_media_type(request, JSON)
     wanted = await read_document(request, LeaseRequest, services.settings.max_document_bytes)
-    caller = caller_of(request.scope)
+    caller = find_caller(request.scope)
     if wanted.take and not caller.scope.includes(Scope.ADMIN):
         raise ProblemError("forbidden", f"taking an arm needs a key of scope admin; the one of {caller.name} has less")
     device = BackendChoice(name=wanted.backend or services.settings.backend).device(wanted.robot)
     holder = one_line(wanted.holder) or caller.name
     lease = await run_in_threadpool(
-        services.leases.acquire, device, holder, owner_of(request), wanted.ttl_s, take=wanted.take
+        services.leases.acquire, device, holder, find_owner(request), wanted.ttl_s, take=wanted.take
     )
     answer = _answer(services, lease, request.url.path, token=lease.token)
     response.headers["Location"] = answer.links.self_
@@ -84,14 +83,14 @@ async def get_lease(request: Request, identifier: Identifier, services: Services
 @router.post("/{identifier}/heartbeat", summary="Keep a lease", responses=_HELD, openapi_extra=_NO_BODY)
 async def keep_lease(request: Request, identifier: Identifier, services: ServicesDep, token: LeaseToken) -> LeaseAnswer:
     """A sign of life: the lease lasts for its whole time again. One that has ended is not brought back."""
-    lease = services.leases.renew(_device(services, identifier), token or "", owner_of(request))
+    lease = services.leases.renew(_device(services, identifier), token or "", find_owner(request))
     return _answer(services, lease, request.url.path.rsplit("/", 2)[0])
 
 
 @router.post("/{identifier}/arm", summary="Arm a lease", responses=_HELD, openapi_extra=_NO_BODY)
 async def arm_lease(request: Request, identifier: Identifier, services: ServicesDep, token: LeaseToken) -> LeaseAnswer:
     """From now on the arm moves when a run or a campaign is handed in with the lease. Every stop disarms."""
-    lease = services.leases.arm(_device(services, identifier), token or "", owner_of(request), armed=True)
+    lease = services.leases.arm(_device(services, identifier), token or "", find_owner(request), armed=True)
     return _answer(services, lease, request.url.path.rsplit("/", 2)[0])
 
 
@@ -100,21 +99,21 @@ async def disarm_lease(
     request: Request, identifier: Identifier, services: ServicesDep, token: LeaseToken
 ) -> LeaseAnswer:
     """What moves by the lease stops; the arm is kept."""
-    lease = services.leases.arm(_device(services, identifier), token or "", owner_of(request), armed=False)
+    lease = services.leases.arm(_device(services, identifier), token or "", find_owner(request), armed=False)
     return _answer(services, lease, request.url.path.rsplit("/", 2)[0])
 
 
 @router.delete("/{identifier}", status_code=204, summary="Give an arm back", responses=_HELD)
 async def release_lease(request: Request, identifier: Identifier, services: ServicesDep, token: LeaseToken) -> None:
     """What moves by the lease stops. A lease that does not hold any more changes nothing for the present one."""
-    services.leases.release(_device(services, identifier), token or "", owner_of(request))
+    services.leases.release(_device(services, identifier), token or "", find_owner(request))
 
 
 @stop_router.post("/stop", status_code=202, summary="Stop every arm", openapi_extra=_NO_BODY)
 async def stop_everything(services: ServicesDep) -> StopAllAnswer:
     """Stops all runs and campaigns and disarms all leases; needs no lease and no body, and waits for nothing."""
     services.leases.disarm_all()
-    campaigns, runs = services.campaigns.stop_every(), services.runs.stop_every()
+    campaigns, runs = services.campaigns.stop_all(), services.runs.stop_all()
     return StopAllAnswer(runs=runs, campaigns=campaigns, time=datetime.now(UTC))
 
 

@@ -7,9 +7,9 @@ from fastapi import APIRouter, Path, Request
 from starlette.concurrency import run_in_threadpool
 
 from tauscope.server.http.documents import JSON, media_type, read_document, refuse_media_type
-from tauscope.server.http.history.models import ReasonRequest
+from tauscope.server.http.history import ReasonRequest
 from tauscope.server.http.openapi import json_body
-from tauscope.server.http.schedules.models import (
+from tauscope.server.http.schedules import (
     EXAMPLES,
     FiringAnswer,
     FiringListAnswer,
@@ -20,10 +20,10 @@ from tauscope.server.http.schedules.models import (
 from tauscope.server.http.services import Services, ServicesDep
 from tauscope.server.http.tasks.routes import Limit, collection
 from tauscope.server.problems import problem_responses
-from tauscope.server.schedules.entries import FiringEntry, ScheduleEntry
-from tauscope.server.schedules.scheduler import parse_schedule
-from tauscope.server.schedules.template import make_schedule
-from tauscope.server.store.layout import FOLDERS
+from tauscope.server.schedules.repeater import make_schedule
+from tauscope.server.schedules.repository import FiringEntry, ScheduleEntry
+from tauscope.server.schedules.scheduler import read_definition
+from tauscope.server.store.data_folder import FOLDERS
 
 router = APIRouter(prefix="/schedules", tags=["schedules"], responses=problem_responses("invalid-request", "store"))
 
@@ -36,7 +36,7 @@ _BODY_PROBLEMS = ("bad-request", "limit-exceeded", "media-type", "not-found")
 @router.get("", summary="List schedules")
 def list_schedules(request: Request, services: ServicesDep) -> ScheduleListAnswer:
     """Those of every service that shares the database."""
-    entries = services.schedules.book.schedules()
+    entries = services.schedules.repository.schedules()
     return ScheduleListAnswer(schedules=[_answer(entry, request.url.path) for entry in entries])
 
 
@@ -59,20 +59,20 @@ async def put_schedule(request: Request, name: Name, services: ServicesDep) -> S
 @router.get("/{name}", summary="Look a schedule up", responses=problem_responses("not-found"))
 def get_schedule(request: Request, name: Name, services: ServicesDep) -> ScheduleAnswer:
     """What is repeated, and when it is due next."""
-    return _answer(services.schedules.book.find(name), collection(request, 1))
+    return _answer(services.schedules.repository.find(name), collection(request, 1))
 
 
 @router.delete("/{name}", status_code=204, summary="Remove a schedule", responses=problem_responses("not-found"))
 def remove_schedule(name: Name, services: ServicesDep) -> None:
     """Its firings are forgotten; what they started stays."""
-    services.schedules.book.remove(name)
+    services.schedules.repository.remove(name)
 
 
 @router.get("/{name}/firings", summary="List the firings of a schedule", responses=problem_responses("not-found"))
 def list_firings(name: Name, services: ServicesDep, limit: Limit = 100) -> FiringListAnswer:
     """Every time that it was due, what was started, and why nothing was."""
     services.index.sync()
-    return FiringListAnswer(firings=[_firing(each) for each in services.schedules.book.firings(name, limit)])
+    return FiringListAnswer(firings=[_firing(each) for each in services.schedules.repository.firings(name, limit)])
 
 
 @router.post(
@@ -114,7 +114,7 @@ def _answer(entry: ScheduleEntry, path: str) -> ScheduleAnswer:
         name=entry.name,
         site=entry.site,
         robot=robot if isinstance(robot, str) else None,
-        definition=parse_schedule(entry),
+        definition=read_definition(entry),
         created=entry.created,
         next_due=entry.next_due,
         firings=f"{path}/{entry.name}/firings",

@@ -7,8 +7,7 @@ from pydantic import Field
 
 from tauscope.server.models import AnswerModel
 from tauscope.server.problems import Problem, ProblemError, make_problem
-from tauscope.server.queue.record import JobProblem
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.record import JobProblem, JobState
 from tauscope.server.queue.workspace import Workspace
 
 

@@ -13,7 +13,7 @@ from pydantic.json_schema import models_json_schema
 from tauscope.server.http.services import Services, ServicesDep
 from tauscope.server.http.tasks.routes import Identifier
 from tauscope.server.problems import problem_responses
-from tauscope.server.queue.events import EndedEvent, ProgressEvent, StateEvent, StepEvent
+from tauscope.server.queue.record import EndedEvent, ProgressEvent, StateEvent, StepEvent
 from tauscope.server.store.event_log import EventLog, LogFollower, LoggedEvent
 
 EVENT_MODELS = (StateEvent, StepEvent, ProgressEvent, EndedEvent)

@@ -24,10 +24,10 @@ from tauscope.server.http.tasks.router import (
 )
 from tauscope.server.http.tasks.submission import Received, RobotRequest, keep_robot, receive_request
 from tauscope.server.problems import ProblemError
-from tauscope.server.queue.queued_job import JobKind
-from tauscope.server.queue.states import JobState
+from tauscope.server.queue.queue import JobKind
+from tauscope.server.queue.record import JobState
 from tauscope.server.queue.task_job import OrderedRecording, TaskWorkspace
-from tauscope.server.store.incoming import KeptFile
+from tauscope.server.store.files import KeptFile
 from tauscope.server.store.recordings import RecordingStore
 
 _SHOWN = ("recordings", "held_out", "simulated", "options")

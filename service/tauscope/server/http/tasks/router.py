@@ -14,7 +14,7 @@ from tauscope.export.formats import ExportFile, ExportFormat
 from tauscope.robot.messages import nearest, one_line, shown
 from tauscope.robot.robot_file import LARGEST_ROBOT_FILE
 from tauscope.robot.urdf_xml import LARGEST_URDF
-from tauscope.server.http.leases.holding import LeaseToken
+from tauscope.server.http.leases.router import LeaseToken
 from tauscope.server.http.openapi import Examples
 from tauscope.server.http.robots.files import check_received_robot
 from tauscope.server.http.robots.models import RobotReportAnswer
@@ -25,7 +25,7 @@ from tauscope.server.http.tasks.routes import ENDINGS, MOTION, SUBMISSION, Ident
 from tauscope.server.http.tasks.submission import RobotRequest, request_body
 from tauscope.server.models import AnswerModel
 from tauscope.server.problems import ProblemError, problem_responses
-from tauscope.server.queue.queued_job import JobKind
+from tauscope.server.queue.queue import JobKind
 from tauscope.server.store.items import ItemStore
 
 HTML = "text/html"
