@@ -24,8 +24,12 @@ os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
 
 from server.queue.paper_files import PAPER_ROBOT, write_recording  # noqa: E402
 from tauscope.server.queue.executors import ClusterExecutor  # noqa: E402
-from tauscope.server.queue.fleet import FleetEntry, FleetResult, analyse_fleet  # noqa: E402
-from tauscope.server.queue.fleet_work import identify_robot  # noqa: E402
+from tauscope.server.queue.fleet import (  # noqa: E402
+    FleetEntry,
+    FleetResult,
+    analyse_fleet,
+    identify_robot,
+)
 
 
 def write_one(folder: Path, seed: int) -> Path:

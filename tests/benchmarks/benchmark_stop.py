@@ -23,7 +23,7 @@ from benchmarks.benchmark_readers import begin, followed, readers  # noqa: E402
 from server.http.serving import served  # noqa: E402
 from tauscope.recording.journal_reading import read_journal  # noqa: E402
 from tauscope.runtime import RunState  # noqa: E402
-from tauscope.server.control.run_workspace import RunWorkspace  # noqa: E402
+from tauscope.server.control.run import RunWorkspace  # noqa: E402
 
 MOTION_S = 60.0
 """Longer than any run is left to move."""

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-import tauscope.cli.identify_run
+import tauscope.tasks.identify
 from cli.conftest import Ended
 from cli.simulated_files import SimulatedFiles
 from tauscope.cli import main
@@ -127,7 +127,7 @@ def test_a_bug_is_one_line_and_1(run: Run, files: SimulatedFiles, monkeypatch: p
     def fail(*_: object) -> None:
         raise KeyError("two\nlines")
 
-    monkeypatch.setattr(tauscope.cli.identify_run, "identify", fail)
+    monkeypatch.setattr(tauscope.tasks.identify, "identify", fail)
     ended = run("identify", files.robot, files.train[0])
     assert ended.status == 1
     assert len(ended.err.splitlines()) == 1
@@ -146,7 +146,7 @@ def test_interruption_is_130(files: SimulatedFiles, monkeypatch: pytest.MonkeyPa
     def interrupt(*_: object) -> None:
         signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(tauscope.cli.identify_run, "identify", interrupt)
+    monkeypatch.setattr(tauscope.tasks.identify, "identify", interrupt)
     before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a server tested earlier may have taken it
     try:
         status = main(["identify", str(files.robot), str(files.train[0])])

@@ -114,7 +114,7 @@ def test_limits_that_allow_no_next_experiment_cost_nobody_the_diagnosis(
     def refused(*_: object, **__: object) -> None:
         raise ExcitationError("joint1: no room; relax its limits")
 
-    monkeypatch.setattr("tauscope.cli.diagnose_run.planned_experiment", refused)
+    monkeypatch.setattr("tauscope.tasks.diagnose.planned_experiment", refused)
     out, motion = tmp_path / "out.json", tmp_path / "next.json"
     status, shown = run(*files[:2], "--json", str(out), "--next-trajectory", str(motion))
     assert status == 1

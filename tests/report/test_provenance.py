@@ -2,14 +2,14 @@
 
 import hashlib
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 
 from tauscope.errors import RecordingError
-from tauscope.report.provenance import input_files, installed_version, record_provenance
+from tauscope.report.provenance import input_files, installed_version
 from tauscope.robot import read_robot
+from tauscope.tasks.task import LocalFiles, record_provenance
 from tauscope_sim.examples import example_robot
 
 
@@ -20,13 +20,8 @@ def test_every_file_is_hashed(tmp_path: Path) -> None:
     (bag / "metadata.yaml").write_bytes(b"x")
     (bag / "data.mcap").write_bytes(b"y")
     robot = replace(read_robot(example_robot("paper_arm")), urdf=recording)
-    made = record_provenance(
-        command=["tauscope"],
-        robot=robot,
-        recordings=[str(recording)],
-        held_out=[str(bag)],
-        created=datetime(2026, 1, 1, tzinfo=UTC),
-    )
+    inputs = {"recordings": [str(recording)], "held_out": [str(bag)]}
+    made = record_provenance(LocalFiles(), ["tauscope"], robot, inputs)
     assert [entry.role for entry in made.inputs] == ["robot", "urdf", "recording", "held out", "held out"]
     assert [Path(entry.path).name for entry in made.inputs[3:]] == ["data.mcap", "metadata.yaml"]
     assert made.inputs[2].sha256 == hashlib.sha256(b"t,q1,tau1\n").hexdigest()

@@ -16,19 +16,22 @@ from ruamel.yaml import YAML
 from tauscope.cli.demo_campaign import run_campaign
 from tauscope.cli.demo_folder import prepare_folder
 from tauscope.cli.demo_page import DATA, LEFT_FOR_S, PORT, PageShown, leave_page, show_page
-from tauscope.cli.identify_run import Outcome, Request, identify_files, write_outcome
 from tauscope.cli.identify_summary import show_identification
 from tauscope.cli.output_files import write_file
-from tauscope.cli.run_session import keep_recording, run_to_end, why_unfinished
-from tauscope.cli.terminal import Told, output, plain, shown_percent, shown_progress, table
+from tauscope.cli.run_session import keep_recording, why_unfinished
+from tauscope.cli.task_run import write_outputs
+from tauscope.cli.terminal import Told, output, plain, shown_progress, table
 from tauscope.diagnosis import DiagnosisDocument
 from tauscope.errors import AcquisitionError
 from tauscope.excitation import ExcitationOptions, OptimiserProgress, design_excitation
+from tauscope.export.formats import EXPORT_FILES
 from tauscope.identification import Identification
 from tauscope.report.quantities import given, with_uncertainty
 from tauscope.report.table import Table
 from tauscope.robot import Robot, read_robot
-from tauscope.runtime import BackendOrder, RunOptions, RunOrder, RunState
+from tauscope.runtime import RunOptions, RunState
+from tauscope.tasks import identify, run
+from tauscope.tasks.task import LocalFiles
 from tauscope.trajectory import write_trajectory
 from tauscope_sim.examples import example_robot
 
@@ -86,24 +89,20 @@ def run_demo(folder: Path, page: PageShown) -> None:
     arm = read_robot(example_robot("paper_arm"))
     write_file(folder / ROBOT, robot_text_without_model(example_robot("paper_arm")).encode())
     write_file(folder / SCENARIO, SCENARIO_TEXT.encode())
-    with shown_percent() as told, TemporaryDirectory(prefix=".runs-", dir=folder) as runs:
+    with shown_progress() as told, TemporaryDirectory(prefix=".runs-", dir=folder) as runs:
         design_motion(folder / ROBOT, folder / TRAIN_TRAJECTORY, TRAIN_MOTION, told)
         design_motion(folder / ROBOT, folder / HELD_OUT_TRAJECTORY, HELD_OUT_MOTION, told)
         for seed, (trajectory, out) in enumerate(((TRAIN_TRAJECTORY, TRAIN), (HELD_OUT_TRAJECTORY, HELD_OUT))):
             run_motion(Path(runs).resolve() / Path(out).stem, folder / trajectory, folder / out, seed, told)
-    request = Request(
-        robot=folder / ROBOT,
-        recordings=(folder / TRAIN,),
-        held_out=(folder / HELD_OUT,),
-        json=folder / RESULT,
-        report=folder / REPORT,
-        exports=tuple(folder / name for name in EXPORTS),
+    request = identify.Request(
+        robot=str(folder / ROBOT), recordings=(str(folder / TRAIN),), held_out=(str(folder / HELD_OUT),)
     )
+    exports = {folder / file.name: file.output for file in EXPORT_FILES.values() if file.name in EXPORTS}
+    outputs = {folder / RESULT: "result.json", folder / REPORT: "report.html", **exports}
     with shown_progress() as progress:
-        outcome = identify_files(request, progress)
-        write_outcome(request, outcome, progress)
+        outcome, _ = write_outputs(identify, request, outputs, progress)
     _show(output(), folder, outcome, compare(arm, outcome.identification))
-    with shown_percent() as told:
+    with shown_progress() as told:
         found = run_campaign(folder / DATA, example_robot("paper_arm"), CONCEALED, told)
     _show_findings(output(), found)
     if page is PageShown.HERE:
@@ -134,18 +133,17 @@ def run_motion(folder: Path, trajectory: Path, out: Path, seed: int, told: Told)
     """
     scenario = folder.with_suffix(".yaml")
     scenario.write_text(f"{SCENARIO_TEXT}seed: {seed}\n", encoding="utf-8")
-    arm = example_robot("paper_arm")
-    order = RunOrder(
-        robot=str(arm),
-        trajectory=str(trajectory.resolve()),
-        backend=BackendOrder(name="sim", settings={"time": "virtual", "scenario": str(scenario)}),
+    request = run.Request(
+        robot=str(example_robot("paper_arm")),
+        scenario=str(scenario),
+        trajectory=str(trajectory),
         # What the arm weighs is the simulation's secret: nobody may feed it forward.
         options=RunOptions(rate_hz=RATE_HZ, feed_forward=False),
     )
-    record = run_to_end(folder, order, read_robot(arm), told)
-    if record.state is not RunState.FINISHED:
-        raise AcquisitionError(why_unfinished(record, None))
-    keep_recording(folder, record, out)
+    result = run.perform(request, LocalFiles({"run": folder}), told)
+    if result.record.state is not RunState.FINISHED:
+        raise AcquisitionError(why_unfinished(result.record, None))
+    keep_recording(result, out)
 
 
 def robot_text_without_model(path: Path) -> str:
@@ -172,7 +170,7 @@ def compare(arm: Robot, identification: Identification) -> list[Comparison]:
     return [Comparison(name, float(truth[name]), float(value), float(error)) for name, value, error in rows]
 
 
-def _show(console: Console, folder: Path, outcome: Outcome, comparisons: list[Comparison]) -> None:
+def _show(console: Console, folder: Path, outcome: identify.Result, comparisons: list[Comparison]) -> None:
     """The result, the truth, and where everything is."""
     show_identification(console, outcome.document, outcome.robot)
     rows = [

@@ -11,15 +11,16 @@ from tauscope.diagnosis import DiagnosisDocument
 from tauscope.errors import TauscopeError
 from tauscope.robot import read_robot
 from tauscope.runtime import RunOptions
-from tauscope.server.control.campaign_order import CampaignOrder, HeldOutMotion
-from tauscope.server.control.campaign_workspace import CampaignWorkspace
-from tauscope.server.control.run_order import BackendChoice
-from tauscope.server.http.campaigns.status import describe, result_of
+from tauscope.server.control.campaign import CampaignOrder, CampaignWorkspace
+from tauscope.server.http.campaigns import describe, result_of
 from tauscope.server.http.services import Services, open_services
 from tauscope.server.http.settings import Settings
-from tauscope.server.queue.diagnosis_order import DiagnosisOptions
-from tauscope.server.queue.excitation_order import ExcitationDesignOptions
 from tauscope.server.queue.record import JobState
+from tauscope.server.queue.task_job import staged_workspace
+from tauscope.tasks.campaign import HeldOutMotion
+from tauscope.tasks.design_excitation import ExcitationDesignOptions
+from tauscope.tasks.diagnose import DiagnosisOptions
+from tauscope.tasks.run import BackendChoice
 
 ROOT = "/api/v1"
 POLL_S = 0.2
@@ -46,11 +47,7 @@ def run_campaign(data: Path, robot_file: Path, scenario: Mapping[str, Any], told
 
 def _begun(services: Services, robot_file: Path, scenario: Mapping[str, Any]) -> str:
     """Hand the campaign in."""
-    items = services.campaigns.items
-    staged = items.stage()
-    try:
-        workspace = CampaignWorkspace(staged)
-        workspace.prepare()
+    with staged_workspace(services.campaigns.items, CampaignWorkspace) as workspace:
         shutil.copy(robot_file, workspace.robot)
         workspace.write_order(
             CampaignOrder(
@@ -63,9 +60,7 @@ def _begun(services: Services, robot_file: Path, scenario: Mapping[str, Any]) ->
                 diagnosis=DiagnosisOptions(),
             )
         )
-        return services.campaigns.submit(staged)
-    finally:
-        items.discard(staged)
+        return services.campaigns.submit(workspace.folder)
 
 
 def _wait_for_end(services: Services, identifier: str, told: Told) -> None:

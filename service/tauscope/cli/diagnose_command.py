@@ -18,13 +18,18 @@ Recordings = Annotated[
     ),
 ]
 Against = Annotated[
-    list[str] | None,
+    list[str],
     typer.Option(
+        default_factory=lambda: ["identified"],
+        show_default=False,
         metavar="identified|model|MODEL.json|SIM...",
         help="What the recordings are compared with: the best model that the data allow (default), the robot file's"
         " model block, a model that --model wrote, or recordings made in your own simulator.",
     ),
 ]
+
+
+TRAJECTORIES = (".json", ".csv")
 
 
 def _output(words: str, metavar: str = "OUT") -> Any:
@@ -37,7 +42,7 @@ def diagnose(
     recordings: Recordings,
     *,
     held_out: HeldOut = None,
-    against: Against = None,
+    against: Against,
     cutoff: Cutoff = "auto",
     json: Annotated[Path | None, _output("Write the result as JSON; - is standard output.")] = None,
     report: Annotated[Path | None, _output("Write a page with verdict, findings and residuals.", "OUT.html")] = None,
@@ -64,25 +69,69 @@ def diagnose(
         ``auto``, ``none`` or a frequency [Hz], for the identification
     """
     cutoff_hz = parse_cutoff(cutoff)
-    from tauscope.cli.diagnose_outputs import OutputRequest
-    from tauscope.cli.diagnose_run import DiagnoseRequest, run_diagnose
-    from tauscope.identification import Options
+    if next_trajectory is not None and next_trajectory.suffix.lower() not in TRAJECTORIES:
+        text = f"{str(next_trajectory)!r}: a trajectory file ends in .json or .csv"
+        raise typer.BadParameter(text, param_hint="--next-trajectory")
+    from tauscope.cli.diagnose_summary import show_diagnosis
+    from tauscope.cli.task_run import export_outputs, make_request, run_task
+    from tauscope.cli.terminal import output
+    from tauscope.export.formats import CODE_FILES
+    from tauscope.tasks import diagnose as task
 
-    run_diagnose(
-        DiagnoseRequest(
-            robot=robot,
-            recordings=tuple(recordings),
-            held_out=tuple(held_out or ()),
-            against=tuple(against or ("identified",)),
-            options=Options(cutoff_hz=cutoff_hz),
-            json=json,
-            outputs=OutputRequest(
-                model=model,
-                code=tuple(export or ()),
-                scenario=scenario,
-                improved_robot=improved_robot,
-                next_trajectory=next_trajectory,
-                report=report,
-            ),
-        )
+    what, simulated, saved = parse_against(against)
+    options = make_request(
+        task.DiagnosisOptions, against=what, cutoff_hz=cutoff_hz, next_trajectory=next_trajectory is not None
     )
+    held, compared = held_out or [], [*simulated, *([] if saved is None else [saved])]
+    request = task.Request(
+        robot=str(robot),
+        recordings=tuple(map(str, recordings)),
+        held_out=tuple(map(str, held)),
+        simulated=tuple(map(str, simulated)),
+        model=None if saved is None else str(saved),
+        options=options,
+    )
+    outputs = [
+        (model, "model.json"),
+        *export_outputs(export or (), CODE_FILES),
+        (scenario, "scenario.yaml"),
+        (improved_robot, "improved-robot.yaml"),
+        (next_trajectory, f"trajectory{next_trajectory.suffix.lower()}" if next_trajectory else ""),
+        (report, "report.html"),
+        (json, "result.json"),
+    ]
+    inputs = (*recordings, *held, *compared)
+    result = run_task(
+        task, request, outputs, inputs, None if json else lambda result: show_diagnosis(output(), result.document)
+    )
+    if result.refusal is not None:  # what was found is kept
+        raise result.refusal
+
+
+def parse_against(words: list[str]) -> tuple[str, list[Path], Path | None]:
+    """Read the values of ``--against``.
+
+    Returns
+    -------
+    str
+        what is compared with, as the request names it
+    list of Path
+        recordings of a simulator
+    Path or None
+        a model that was saved before
+
+    Raises
+    ------
+    typer.BadParameter
+        for a file that does not exist
+    """
+    if words in (["identified"], ["model"]):
+        return words[0], [], None
+    paths = [Path(word) for word in words]
+    for path in paths:
+        if not path.exists():
+            text = f"{str(path)!r} is neither identified, model, a recording nor a saved model"
+            raise typer.BadParameter(text, param_hint="'--against'")
+    if len(paths) == 1 and paths[0].suffix.lower() == ".json":
+        return "saved", [], paths[0]
+    return "simulation", paths, None

@@ -60,6 +60,22 @@ def check_bus(name: str) -> str:
     return _check(name, bus_drivers())
 
 
+def require_options(backend: str, options: Collection[str]) -> None:
+    """Refuse options that a driver does not have.
+
+    Raises
+    ------
+    typer.BadParameter
+        naming the drivers that have the option
+    """
+    from tauscope.runtime.drivers import driver_names, find_driver
+
+    for option in options:
+        owners = [name for name in driver_names() if option in find_driver(name).option_names]
+        if backend not in owners:
+            raise typer.BadParameter(f"--{option} belongs to --backend {' or '.join(owners)}")
+
+
 def _check(name: str, known: Collection[str]) -> str:
     if name not in known:
         raise typer.BadParameter(f"{name!r} is not one of {', '.join(map(repr, known))}.")

@@ -22,6 +22,7 @@ Boxes = Annotated[
     list[str] | None,
     typer.Option(
         "--box",
+        "--boxes",
         metavar="X0,Y0,Z0,X1,Y1,Z1",
         help="Forbidden box in the base frame [m], lower corner first; joint origins and tool stay outside."
         " May be repeated.",
@@ -39,23 +40,41 @@ def excite(
     robot: RobotFile,
     *,
     duration: Annotated[
-        float, typer.Option(metavar="S", min=0.1, max=600.0, help="Length of one period [s]; the period is repeated.")
+        float,
+        typer.Option(
+            "--duration",
+            "--duration-s",
+            metavar="S",
+            min=0.1,
+            max=600.0,
+            help="Length of one period [s]; the period is repeated.",
+        ),
     ] = 10.0,
     harmonics: Annotated[int, typer.Option(metavar="M", min=2, max=30, help="Harmonics of the Fourier series.")] = 5,
     periods: Annotated[int, typer.Option(metavar="P", min=1, max=100, help="How often the period is repeated.")] = 5,
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="Of the optimiser's random starts.")] = 0,
+    starts: Annotated[int, typer.Option(metavar="N", min=1, max=64, help="Random series that are improved.")] = 3,
     criterion: Annotated[
         Literal["cond-f", "log-det", "cond-2"],
         typer.Option(help="What is minimised: Cond_F or -ln det of the normal matrix, or the condition number."),
     ] = "cond-f",
+    scaling: Annotated[
+        Literal["none", "typical"],
+        typer.Option(help="Units in which parameters are counted: SI, or the rms of their columns."),
+    ] = "none",
     floor: Annotated[
         float | None,
         typer.Option(
-            metavar="Z", help="Height in the base frame [m] below which no joint origin and no tool may come."
+            "--floor",
+            "--floor-m",
+            metavar="Z",
+            help="Height in the base frame [m] below which no joint origin and no tool may come.",
         ),
     ] = None,
     box: Boxes = None,
-    tool: Annotated[str, typer.Option(metavar="X,Y,Z", help="Tool point in the last link's frame [m].")] = "0,0,0",
+    tool: Annotated[
+        str, typer.Option("--tool", "--tool-m", metavar="X,Y,Z", help="Tool point in the last link's frame [m].")
+    ] = "0,0,0",
     torque_margin: Annotated[
         float, typer.Option(min=0.0, max=0.99, help="Part of each torque limit kept free for what the model lacks.")
     ] = 0.2,
@@ -63,8 +82,9 @@ def excite(
         float, typer.Option(min=0.01, max=1.0, help="Part of the other limits that is used.")
     ] = 0.95,
     noise_std: NoiseStd = None,
+    slow_postures: Annotated[int, typer.Option(min=0, max=60, help="Postures at which all joints reverse slowly.")] = 3,
     slow_reversals: Annotated[
-        bool, typer.Option("--slow-reversals/--no-slow-reversals", help="Add slow reversals at several postures.")
+        bool, typer.Option("--slow-reversals/--no-slow-reversals", help="None with --no-slow-reversals.")
     ] = True,
     closing_period: Annotated[
         bool, typer.Option("--closing-period/--no-closing-period", help="Repeat the first period at the end.")
@@ -72,7 +92,8 @@ def excite(
     json: Json = None,
     csv: Csv = None,
     rate: Annotated[
-        float, typer.Option(metavar="HZ", min=1.0, max=10_000.0, help="Samples a second of the CSV.")
+        float,
+        typer.Option("--rate", "--rate-hz", metavar="HZ", min=1.0, max=10_000.0, help="Samples a second of the CSV."),
     ] = 500.0,
 ) -> None:
     """Design the motion that tells most about an arm.
@@ -94,26 +115,35 @@ def excite(
     corners = [parse_numbers(text, "--box", 6) for text in box or ()]
     tool_m = parse_numbers(tool, "--tool", 3)
     noise = None if noise_std is None else parse_numbers(noise_std, "--noise-std", None)
-    import numpy as np
+    from tauscope.cli.excite_summary import show_design
+    from tauscope.cli.task_run import make_request, run_task
+    from tauscope.cli.terminal import output
+    from tauscope.tasks import design_excitation as task
 
-    from tauscope.cli.excite_run import Request, run_excite
-    from tauscope.excitation import Box, Criterion, ExcitationOptions, Workspace
-
-    boxes = tuple(Box(np.array(numbers[:3]), np.array(numbers[3:])) for numbers in corners)
-    options = ExcitationOptions(
-        period_s=duration,
+    options = make_request(
+        task.ExcitationDesignOptions,
+        duration_s=duration,
         harmonics=harmonics,
         periods=periods,
-        criterion=Criterion(criterion),
-        noise_std=None if noise is None else np.array(noise),
+        seed=seed,
+        starts=starts,
+        criterion=criterion,
+        scaling=scaling,
         limit_fraction=limit_fraction,
         torque_margin=torque_margin,
-        workspace=Workspace(floor, boxes, np.array(tool_m)),
-        slow_postures=ExcitationOptions.slow_postures if slow_reversals else 0,
+        slow_postures=slow_postures if slow_reversals else 0,
         closing_period=closing_period,
-        seed=seed,
+        floor_m=floor,
+        boxes=tuple(make_request(task.ForbiddenBox, low=tuple(c[:3]), high=tuple(c[3:])) for c in corners),
+        tool_m=tuple(tool_m),
+        noise_std=None if noise is None else tuple(noise),
     )
-    run_excite(Request(robot, options, json, csv, rate))
+    run_task(
+        task,
+        make_request(task.Request, robot=str(robot), options=options, rate_hz=rate),
+        [(json, "result.json"), (csv, "trajectory.csv")],
+        show=None if Path("-") in (json, csv) else lambda result: show_design(output(), result.design, result.robot),
+    )
 
 
 def parse_numbers(text: str, option: str, count: int | None) -> list[float]:

@@ -5,13 +5,20 @@ from pathlib import Path
 from typing import Literal
 
 from tauscope.cli.output_files import require_new
-from tauscope.cli.terminal import output, plain, shown_percent
+from tauscope.cli.terminal import output, plain, shown_progress
 from tauscope.errors import ExportError, IdentificationError
 from tauscope.report.quantities import counted
 from tauscope.server.queue.cluster_executor import ClusterExecutor
 from tauscope.server.queue.executors import open_executor
-from tauscope.server.queue.fleet import FleetResult, analyse_fleet, read_manifest
-from tauscope.server.queue.fleet_work import DIAGNOSIS_COLUMNS, IDENTIFICATION_COLUMNS, diagnose_robot, identify_robot
+from tauscope.server.queue.fleet import (
+    DIAGNOSIS_COLUMNS,
+    IDENTIFICATION_COLUMNS,
+    FleetResult,
+    analyse_fleet,
+    diagnose_robot,
+    identify_robot,
+    read_manifest,
+)
 
 TABLE = "table.csv"
 
@@ -53,7 +60,7 @@ def _run(verb: str, manifest: Path, out: Path, workers: int, total: int) -> int:
     width = executor.width if isinstance(executor, ClusterExecutor) else workers
     failed = done = 0
     try:
-        with shown_percent() as tell, (out / TABLE).open("x", newline="", encoding="utf-8") as file:
+        with shown_progress() as tell, (out / TABLE).open("x", newline="", encoding="utf-8") as file:
             table = csv.writer(file, lineterminator="\n")
             table.writerow(("line", "name", "state", *columns, "seconds", "error"))
             for result in analyse_fleet(read_manifest(manifest.resolve()), work, out, executor, width):

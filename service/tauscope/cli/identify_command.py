@@ -28,7 +28,13 @@ HeldOut = Annotated[
     ),
 ]
 Cutoff = Annotated[
-    str, typer.Option(metavar="auto|none|HZ", help="Band that torque and model share; chosen from the data by default.")
+    str,
+    typer.Option(
+        "--cutoff",
+        "--cutoff-hz",
+        metavar="auto|none|HZ",
+        help="Band that torque and model share; chosen from the data by default.",
+    ),
 ]
 Export = Annotated[
     list[Path] | None,
@@ -70,19 +76,29 @@ def identify(
         ``auto``, ``none`` or a frequency [Hz]
     """
     cutoff_hz = parse_cutoff(cutoff)
-    from tauscope.cli.identify_run import Request, run_identify
-    from tauscope.identification import Estimator, Options
+    from tauscope.cli.identify_summary import show_identification
+    from tauscope.cli.task_run import export_outputs, make_request, run_task
+    from tauscope.cli.terminal import output
+    from tauscope.export.formats import EXPORT_FILES
+    from tauscope.tasks import identify as task
 
-    run_identify(
-        Request(
-            robot=robot,
-            recordings=tuple(recordings),
-            held_out=tuple(held_out or ()),
-            options=Options(Estimator(estimator), cutoff_hz, rotor_inertia),
-            json=json,
-            report=report,
-            exports=tuple(export or ()),
-        )
+    options = make_request(
+        task.IdentificationOptions, estimator=estimator, cutoff_hz=cutoff_hz, rotor_inertia=rotor_inertia
+    )
+    held = held_out or []
+    request = task.Request(
+        robot=str(robot),
+        recordings=tuple(map(str, recordings)),
+        held_out=tuple(map(str, held)),
+        options=options,
+    )
+    outputs = [(json, "result.json"), (report, "report.html"), *export_outputs(export or (), EXPORT_FILES)]
+    run_task(
+        task,
+        request,
+        outputs,
+        (*recordings, *held),
+        None if json else lambda result: show_identification(output(), result.document, result.robot),
     )
 
 

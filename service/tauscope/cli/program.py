@@ -22,6 +22,7 @@ from typer.main import get_command
 from tauscope.cli.audit_command import audit
 from tauscope.cli.backup_command import backup, restore
 from tauscope.cli.bus_command import bus
+from tauscope.cli.campaign_command import campaign
 from tauscope.cli.demo_command import demo
 from tauscope.cli.diagnose_command import diagnose
 from tauscope.cli.doctor_command import doctor
@@ -71,6 +72,7 @@ add_verb(app, excite)
 app.add_typer(robot, name="robot")
 app.add_typer(recording, name="recording")
 add_verb(app, run, DriverCommand)
+add_verb(app, campaign)
 add_verb(app, doctor, DriverCommand)
 app.add_typer(bus, name="bus")
 add_verb(app, serve, DriverCommand)

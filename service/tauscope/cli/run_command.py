@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 import typer
 
 from tauscope.cli.arguments import RobotFile
-from tauscope.cli.driver_choice import DEFAULT_BACKEND, check_backend
+from tauscope.cli.driver_choice import DEFAULT_BACKEND, check_backend, require_options
 
 Trajectory = Annotated[
     Path | None,
@@ -53,12 +53,33 @@ def run(
     ] = "position",
     rate: Annotated[
         float | None,
-        typer.Option(metavar="HZ", min=1.0, max=10_000.0, help="Cycles a second; 500 where possible."),
+        typer.Option(
+            "--rate", "--rate-hz", metavar="HZ", min=1.0, max=10_000.0, help="Cycles a second; 500 where possible."
+        ),
     ] = None,
     stop_policy: Annotated[
         Literal["hold", "damp", "torque_off"] | None,
         typer.Option(help="How the arm is stopped; as the robot file says by default, else hold."),
     ] = None,
+    watchdog_s: Annotated[
+        float, typer.Option(metavar="S", help="Time without a cycle after which the device stops itself.")
+    ] = 0.1,
+    heartbeat_s: Annotated[
+        float, typer.Option(metavar="S", help="Silence of its owner after which a run is interrupted.")
+    ] = 1.0,
+    following_error: Annotated[
+        float | None, typer.Option(help="Allowed distance of arm and target; 0.2 rad or 0.05 m by default.")
+    ] = None,
+    stale_misses: Annotated[int, typer.Option(help="Readings in a row that a joint may not fail to answer.")] = 3,
+    stale_s: Annotated[
+        float, typer.Option(metavar="S", help="Time after which a joint that does not answer counts as lost.")
+    ] = 0.05,
+    temperature_c: Annotated[float, typer.Option(metavar="C", help="Hottest motor that is allowed [°C].")] = 80.0,
+    feed_forward: Annotated[
+        bool, typer.Option("--feed-forward/--no-feed-forward", help="Give the drives the torque of the robot's model.")
+    ] = True,
+    bandwidth_rad_s: Annotated[float, typer.Option(help="Of the host's loop in torque mode [rad/s].")] = 25.0,
+    settle_s: Annotated[float, typer.Option(metavar="S", help="Pause between the ramp and the motion.")] = 0.25,
     seed: Annotated[int, typer.Option(min=0, help="Of the default excitation.")] = 0,
     acknowledge_faults: Annotated[
         bool, typer.Option("--acknowledge-faults", help="Clear the faults that the drives have latched.")
@@ -79,30 +100,44 @@ def run(
         cycles a second [Hz]
     """
     posture = parse_posture(start)
-    from tauscope.cli.run_session import Request, run_arm
+    given = {"scenario": scenario, "start": start, "time": None if time == "virtual" else time}
+    require_options(backend, [name for name, value in given.items() if value is not None])
+    from tauscope.cli.task_run import make_request
     from tauscope.runtime import RunOptions
 
-    options = RunOptions.model_validate(
-        {"mode": mode, "rate_hz": rate, "stop_policy": stop_policy, "acknowledge_faults": acknowledge_faults}
+    options = make_request(
+        RunOptions,
+        mode=mode,
+        rate_hz=rate,
+        stop_policy=stop_policy,
+        watchdog_s=watchdog_s,
+        heartbeat_s=heartbeat_s,
+        following_error=following_error,
+        stale_misses=stale_misses,
+        stale_s=stale_s,
+        temperature_c=temperature_c,
+        feed_forward=feed_forward,
+        bandwidth_rad_s=bandwidth_rad_s,
+        settle_s=settle_s,
+        acknowledge_faults=acknowledge_faults,
     )
     if dry_run:
         from tauscope.cli.bus_summary import show_frames
 
         show_frames(robot, backend, trajectory, options)
         return
-    run_arm(
-        Request(
-            robot=robot,
-            backend=backend,
-            trajectory=trajectory,
-            out=out,
-            scenario=scenario,
-            time=time,
-            start=posture,
-            options=options,
-            seed=seed,
-        )
+    from tauscope.cli.run_session import run_arm
+    from tauscope.tasks import run as task
+
+    request = task.Request(
+        robot=str(robot),
+        backend=make_request(task.BackendChoice, name=backend, time=time, start=posture),
+        scenario=None if scenario is None else str(scenario),
+        trajectory=None if trajectory is None else str(trajectory),
+        seed=seed,
+        options=options,
     )
+    run_arm(request, out)
 
 
 def parse_posture(text: str | None) -> tuple[float, ...] | None:

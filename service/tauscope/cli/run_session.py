@@ -1,74 +1,28 @@
-"""``tauscope run``: design where nothing is given, run in a process of its own, keep the recording, show what came."""
+"""``tauscope run``: perform the task beside the file to make, keep the recording, show what came."""
 
 import shutil
 import tempfile
-from collections.abc import Callable
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 import typer
 
 from tauscope.cli.output_files import keep_file, require_new
 from tauscope.cli.run_summary import show_run
-from tauscope.cli.terminal import Told, output, plain, shown_percent
+from tauscope.cli.terminal import output, plain, shown_progress
 from tauscope.errors import AcquisitionError
-from tauscope.excitation import ExcitationOptions, OptimiserProgress, design_excitation
-from tauscope.robot import Robot, read_robot
 from tauscope.robot.messages import one_line
-from tauscope.runtime import BackendOrder, RunOptions, RunOrder, RunProcess, RunRecord, RunState
-from tauscope.runtime.drivers import driver_names, find_driver
-from tauscope.runtime.record import JOURNAL_FILE, RECORDING_STEM
-from tauscope.trajectory import write_trajectory
+from tauscope.runtime import RunRecord, RunState
+from tauscope.tasks import run
+from tauscope.tasks.task import LocalFiles
 
 SUFFIXES = (".csv", ".parquet", ".mcap")
 """Formats of a recording, by suffix."""
 
 
-@dataclass(frozen=True)
-class Request:
-    """What was asked for on the command line.
-
-    start : tuple of float or None
-        where the simulated arm stands at first [rad or m]
-    """
-
-    robot: Path
-    backend: str
-    trajectory: Path | None = None
-    out: Path | None = None
-    scenario: Path | None = None
-    time: str = "virtual"
-    start: tuple[float, ...] | None = None
-    options: RunOptions = RunOptions()  # noqa: RUF009 - frozen
-    seed: int = 0
-
-    @property
-    def backend_order(self) -> BackendOrder:
-        """The backend with its settings.
-
-        Raises
-        ------
-        typer.BadParameter
-            where an option is given that the backend's driver does not have
-        """
-        settings = {
-            "scenario": self.scenario and str(self.scenario.resolve()),
-            "start": self.start and list(self.start),
-            "time": None if self.time == "virtual" else self.time,
-        }
-        settings = {name: value for name, value in settings.items() if value is not None}
-        for name in settings:
-            if name not in find_driver(self.backend).option_names:
-                owners = [one for one in driver_names() if name in find_driver(one).option_names]
-                raise typer.BadParameter(f"--{name} belongs to --backend {' or '.join(owners)}")
-        return BackendOrder(name=self.backend, settings=settings)
-
-
-def run_arm(request: Request) -> None:
-    """Do what the command line asks for.
+def run_arm(request: run.Request, asked: Path | None) -> None:
+    """Run to the end, keep the recording, and show what came.
 
     Raises
     ------
@@ -77,43 +31,25 @@ def run_arm(request: Request) -> None:
     TauscopeError
         where the run cannot start, or ended before its time
     """
-    backend, robot, out = request.backend_order, read_robot(request.robot), _output(request)
+    out = _output(asked)
     folder, is_settled = _folder_beside(out), False
     try:
-        with shown_percent() as told:
-            trajectory = request.trajectory or _design(robot, request.seed, folder, told)
-            order = RunOrder(
-                robot=str(request.robot.resolve()),
-                trajectory=str(trajectory.resolve()),
-                backend=backend,
-                options=request.options,
-            )
-            record = run_to_end(folder / "run", order, robot, told)
-        made = keep_recording(folder / "run", record, out)
+        with shown_progress() as told:
+            result = run.perform(request, LocalFiles({"run": folder / "run"}), told)
+        made = keep_recording(result, out)
         is_settled = True
     finally:
         # Whatever happened, a journal that nobody has saved stays.
-        if is_settled or not (folder / "run" / JOURNAL_FILE).exists():
+        if is_settled or not run.recording_file(folder / "run", "mcap").exists():
             shutil.rmtree(folder, ignore_errors=True)
-    show_run(output(), record, robot)
+    show_run(output(), result.record, result.robot)
     if made:
         output().print(plain(f"wrote {out}"), soft_wrap=True)
-    if record.state is not RunState.FINISHED:
-        raise AcquisitionError(why_unfinished(record, out if made else None))
+    if result.record.state is not RunState.FINISHED:
+        raise AcquisitionError(why_unfinished(result.record, out if made else None))
 
 
-def run_to_end(folder: Path, order: RunOrder, robot: Robot, told: Told) -> RunRecord:
-    """Run in a process of its own; Ctrl-C stops the arm and is waited for."""
-    process = RunProcess(folder, order, robot, report=lambda event: _report(event, told))
-    while True:
-        try:
-            return process.wait()
-        except KeyboardInterrupt:
-            told("stopping the arm", None)
-            process.stop()
-
-
-def keep_recording(folder: Path, record: RunRecord, out: Path) -> bool:
+def keep_recording(result: run.Result, out: Path) -> bool:
     """Give the recording of a run its place; no file is ever replaced.
 
     Returns
@@ -126,13 +62,10 @@ def keep_recording(folder: Path, record: RunRecord, out: Path) -> bool:
     ExportError
         if there is such a file by now, or it cannot be written
     """
-    suffix = out.suffix.lower()
-    name = JOURNAL_FILE if suffix == ".mcap" else f"{RECORDING_STEM}{suffix}"
-    samples = 0 if record.recording is None else record.recording.samples
-    if not (folder / name).is_file() or not (samples or suffix == ".mcap"):
-        return False
-    keep_file(folder / name, out)
-    return True
+    recording = result.recording(out.suffix.lower().removeprefix("."))
+    if recording is not None:
+        keep_file(recording, out)
+    return recording is not None
 
 
 def why_unfinished(record: RunRecord, recording: Path | None) -> str:
@@ -142,9 +75,9 @@ def why_unfinished(record: RunRecord, recording: Path | None) -> str:
     return one_line(f"the run {record.state}: {reason or 'no reason is known'}; {kept}")
 
 
-def _output(request: Request) -> Path:
+def _output(asked: Path | None) -> Path:
     """The recording to make, refused before any work where it cannot be made."""
-    out = request.out or Path(f"run-{datetime.now(UTC):%Y%m%dT%H%M%SZ}.csv")
+    out = asked or Path(f"run-{datetime.now(UTC):%Y%m%dT%H%M%SZ}.csv")
     if out.suffix.lower() not in SUFFIXES:
         known = ", ".join(SUFFIXES)
         raise typer.BadParameter(f"{str(out)!r}: the suffix names no format; use {known}", param_hint="'--out'")
@@ -162,23 +95,3 @@ def _folder_beside(out: Path) -> Path:
         raise AcquisitionError(
             f"{out}: cannot be written there ({error.strerror or error}); choose another place"
         ) from error
-
-
-def _design(robot: Robot, seed: int, folder: Path, told: Callable[[str, float | None], None]) -> Path:
-    """The default excitation, as a file."""
-
-    def tell(progress: OptimiserProgress) -> None:
-        told("design the motion", 100.0 * progress.fraction)
-
-    told("design the motion", 0.0)
-    design = design_excitation(robot, ExcitationOptions(seed=seed), progress=tell)
-    write_trajectory(design.trajectory, folder / "trajectory.json")
-    return folder / "trajectory.json"
-
-
-def _report(event: Any, told: Told) -> None:
-    """Show what the control process says."""
-    if event["event"] == "progress":
-        told(f"{event['state']}, {event['time_s']:.1f} of {event['duration_s']:.1f} s", float(event["percent"]))
-    elif event["event"] == "state":
-        told(event["state"], None)

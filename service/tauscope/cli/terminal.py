@@ -40,15 +40,15 @@ def table(title: str, view: Table) -> RichTable:
     return made
 
 
-Told = Callable[[str, float | None], None]
+Told = Callable[..., None]
 """Told the step that goes on, and how much of it is done in percent, or None where that is not known."""
 
 
 @contextmanager
-def shown_percent() -> Iterator[Told]:
+def shown_progress() -> Iterator[Told]:
     """A bar on standard error, where that is a terminal."""
     if not sys.stderr.isatty():
-        yield lambda step, percent: None
+        yield lambda *_: None
         return
     columns = (
         SpinnerColumn(),
@@ -60,20 +60,8 @@ def shown_percent() -> Iterator[Told]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task("", total=None)
 
-        def show(step: str, percent: float | None) -> None:
+        def show(step: str, percent: float | None = None, _figures: object = None) -> None:
             total = None if percent is None else 100.0
             progress.update(task, description=one_line(step), total=total, completed=percent or 0.0)
 
         yield show
-
-
-@contextmanager
-def shown_progress() -> Iterator[Callable[[str], None]]:
-    """Steps of long work on standard error, where that is a terminal."""
-    if not sys.stderr.isatty():
-        yield lambda step: None
-        return
-    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task("", total=None)
-        yield lambda step: progress.update(task, description=one_line(step))

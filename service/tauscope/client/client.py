@@ -11,14 +11,14 @@ from pydantic import BaseModel
 
 from tauscope.client.held_lease import HeldLease
 from tauscope.client.transport import Answer, ApiError, Content, Transport, form_content, json_content
-from tauscope.server.http.campaigns.models import CampaignAnswer
-from tauscope.server.http.diagnoses.models import DiagnosisAnswer
-from tauscope.server.http.excitations.models import ExcitationAnswer
-from tauscope.server.http.identifications.models import IdentificationAnswer
+from tauscope.server.http.campaigns import CampaignAnswer
+from tauscope.server.http.diagnoses import DiagnosisAnswer
+from tauscope.server.http.excitations import ExcitationAnswer
+from tauscope.server.http.identifications import IdentificationAnswer
 from tauscope.server.http.leases.models import LeaseAnswer, StopAllAnswer
 from tauscope.server.http.recordings.models import RecordingAnswer
 from tauscope.server.http.robots.models import RobotReportAnswer
-from tauscope.server.http.runs.models import RunAnswer, StopAnswer
+from tauscope.server.http.runs import RunAnswer, StopAnswer
 
 PREFIX = "/api/v1"
 ENDS = frozenset(

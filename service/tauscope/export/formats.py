@@ -43,6 +43,11 @@ class ExportFile:
     name: str
     media_type: str
 
+    @property
+    def output(self) -> str:
+        """Name among the outputs of a task."""
+        return f"exports/{self.name}"
+
 
 EXPORT_FILES: Mapping[ExportFormat, ExportFile] = {
     ExportFormat.JSON: ExportFile("friction.json", "application/json"),
@@ -52,6 +57,25 @@ EXPORT_FILES: Mapping[ExportFormat, ExportFile] = {
     ExportFormat.URDF: ExportFile("model.urdf", "application/xml"),
     ExportFormat.MJCF: ExportFile("model.xml", "application/xml"),
 }
+"""Exports of an identified model."""
+
+CODE_FILES: Mapping[ExportFormat, ExportFile] = {
+    ExportFormat.C: ExportFile("compensation.h", "text/x-c"),
+    ExportFormat.PYTHON: ExportFile("compensation.py", "text/x-python"),
+}
+"""Exports of a model with the findings of a diagnosis."""
+
+SUFFIXES = {
+    ".json": ExportFormat.JSON,
+    ".yaml": ExportFormat.YAML,
+    ".yml": ExportFormat.YAML,
+    ".h": ExportFormat.C,
+    ".py": ExportFormat.PYTHON,
+    ".urdf": ExportFormat.URDF,
+    ".xml": ExportFormat.MJCF,
+    ".mjcf": ExportFormat.MJCF,
+}
+"""Formats by the suffix of a file."""
 
 
 @dataclass(frozen=True, eq=False)

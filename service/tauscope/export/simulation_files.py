@@ -32,12 +32,15 @@ def improved_robot(diagnosis: Diagnosis, source: Path, target: Path) -> str:
         urdf["file"] = os.path.relpath(source.parent / urdf["file"], target.parent)
     model = diagnosis.selection.fit.model
     values = dict(zip(model.structure.names, map(float, model.parameters), strict=True))
-    friction = []
+    friction: list[Entry] = []
+    joints: list[Entry] = data.setdefault("joints", [])
     for joint, terms in zip(diagnosis.robot.joints, model.structure.terms, strict=True):
         stribeck = values.get(f"stribeck {joint.name}", 0.0)
         own = {name: values[f"{name} {joint.name}"] for name in ("stiction", "viscous")}
         friction.append({"stiction": own["stiction"], "stribeck": stribeck, "viscous": own["viscous"]})
-        entry = next(each for each in data["joints"] if each["name"] == joint.name)
+        entry: Entry | None = next((each for each in joints if each["name"] == joint.name), None)
+        if entry is None:  # a URDF's joints need no entry
+            joints.append(entry := {"name": joint.name})
         entry["friction_shape"] = {"k_v": float(terms.k_v)}
         entry["friction_shape"]["delta"] = float(terms.delta if terms.delta is not None else 10.0)
     links = consistent_links(diagnosis)

@@ -2,14 +2,13 @@
 
 import hashlib
 import platform
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from tauscope.errors import RecordingError
-from tauscope.robot import Robot
 
 LIBRARIES = ("tauscope", "numpy", "scipy", "clarabel")
 """Packages whose version can change a figure."""
@@ -41,30 +40,6 @@ class Provenance:
     inputs: tuple[InputFile, ...]
     versions: tuple[tuple[str, str], ...]
     created: datetime
-
-
-def record_provenance(
-    *,
-    command: Sequence[str],
-    robot: Robot,
-    recordings: Sequence[str],
-    held_out: Sequence[str],
-    created: datetime,
-    compared: Sequence[str] = (),
-) -> Provenance:
-    """Hash all inputs and note the versions.
-
-    Raises
-    ------
-    RecordingError
-        where a file cannot be read any more
-    """
-    given = [("robot", str(robot.source))] if robot.source else []
-    given += [("urdf", str(robot.urdf))] if robot.urdf else []
-    given += [("recording", path) for path in recordings] + [("held out", path) for path in held_out]
-    given += [("compared with", path) for path in compared]
-    inputs = tuple(entry for role, path in given for entry in input_files(role, path))
-    return Provenance(tuple(command), inputs, versions(), created)
 
 
 def versions() -> tuple[tuple[str, str], ...]:

@@ -12,25 +12,25 @@ from server.queue.executors import InlineExecutor, ManualExecutor
 from server.queue.waiting import wait_until
 from tauscope.runtime import RunProblem, RunState
 from tauscope.server.control import campaign_runner
+from tauscope.server.control.campaign import CampaignLinks, CampaignOrder, CampaignWorkspace
 from tauscope.server.control.campaign_manager import CampaignManager
-from tauscope.server.control.campaign_order import CampaignLinks, CampaignOrder, HeldOutMotion
 from tauscope.server.control.campaign_runner import CampaignDependencies
-from tauscope.server.control.campaign_workspace import CampaignWorkspace
 from tauscope.server.control.device_claims import BusyError, DeviceClaims
+from tauscope.server.control.run import RunWorkspace
 from tauscope.server.control.run_manager import RunManager
-from tauscope.server.control.run_order import BackendChoice
 from tauscope.server.control.run_supervisor import StartControl
-from tauscope.server.control.run_workspace import RunWorkspace
-from tauscope.server.queue.diagnosis_order import DiagnosisOptions
-from tauscope.server.queue.diagnosis_workspace import DiagnosisWorkspace
-from tauscope.server.queue.excitation_order import ExcitationDesignOptions
-from tauscope.server.queue.excitation_workspace import ExcitationWorkspace
-from tauscope.server.queue.identification_workspace import IdentificationWorkspace
+from tauscope.server.queue.diagnosis import DiagnosisWorkspace
+from tauscope.server.queue.excitation import ExcitationWorkspace
+from tauscope.server.queue.identification import IdentificationWorkspace
 from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.queue.record import JobProblem, JobRecord, JobState
 from tauscope.server.queue.workspace import Workspace
 from tauscope.server.store.items import ItemStore
 from tauscope.server.store.recordings import RecordingStore
+from tauscope.tasks.campaign import HeldOutMotion
+from tauscope.tasks.design_excitation import ExcitationDesignOptions
+from tauscope.tasks.diagnose import DiagnosisOptions
+from tauscope.tasks.run import BackendChoice
 
 
 def design(folder: Path) -> None:
@@ -129,9 +129,7 @@ def test_a_campaign_from_its_beginning_to_its_end(tmp_path: Path) -> None:
     ]
     options = [order.options for order in orders if order is not None]
     assert [(entry.seed, entry.periods, entry.slow_postures) for entry in options] == [(3, 4, 3), (4, 2, 0)]
-    requests = [
-        RunWorkspace(bench.runs.items.folder(run or "")).read_request() for run in (made.run, made.held_out_run)
-    ]
+    requests = [RunWorkspace(bench.runs.items.folder(run or "")).read_order() for run in (made.run, made.held_out_run)]
     assert [request and request.excitation for request in requests] == [made.excitation, made.held_out_excitation]
     assert [request and request.campaign for request in requests] == [campaign, campaign]
     # The sensors' noise is another one in each run, also where the scenario's seed is fixed.

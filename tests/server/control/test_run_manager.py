@@ -11,12 +11,12 @@ from tauscope.errors import AcquisitionError, NotFoundError
 from tauscope.runtime import RunProblem, RunState
 from tauscope.server.control.device_claims import BusyError, DeviceClaims
 from tauscope.server.control.motions import Motion, StepFailedError, ready_motion
+from tauscope.server.control.run import RunRequestRecord, RunWorkspace
 from tauscope.server.control.run_manager import RunManager, run_recording_name
-from tauscope.server.control.run_order import BackendChoice, RunRequestRecord
-from tauscope.server.control.run_workspace import RunWorkspace
 from tauscope.server.queue.record import JobProblem
 from tauscope.server.store.items import ItemStore
 from tauscope.server.store.recordings import RecordingStore
+from tauscope.tasks.run import BackendChoice
 
 
 class Bench:

@@ -15,9 +15,9 @@ from server.queue.controls import HandControls
 from server.queue.executors import InlineExecutor, ManualExecutor
 from server.queue.waiting import wait_until
 from tauscope.runtime import RunProblem, RunState
-from tauscope.server.control.campaign_workspace import CampaignWorkspace
+from tauscope.server.control.campaign import CampaignWorkspace
 from tauscope.server.http import Settings, create_app
-from tauscope.server.queue.excitation_workspace import ExcitationWorkspace
+from tauscope.server.queue.excitation import ExcitationWorkspace
 
 CAMPAIGNS, RUNS = "/api/v1/campaigns", "/api/v1/runs"
 QUICK = {"duration_s": 4.0, "harmonics": 2, "periods": 2, "starts": 1, "slow_postures": 0, "closing_period": False}

@@ -1,6 +1,7 @@
 """Diagnoses over HTTP: handed in, followed, result, figures and model fetched, removed."""
 
 import json
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -14,6 +15,7 @@ from tauscope.diagnosis.extended_model.saved import ModelDocument
 from tauscope.robot import read_robot
 from tauscope.trajectory import parse_trajectory_json
 from tauscope_sim.examples import example_robot
+from tauscope_sim.scenario_file import read_scenario
 
 DIAGNOSES = "/api/v1/diagnoses"
 
@@ -34,7 +36,7 @@ def form(request: dict[str, Any]) -> dict[str, str]:
 
 
 @pytest.mark.usefixtures("drawn_figures")
-def test_uploaded_files_all_the_way(client: TestClient, files: Files) -> None:
+def test_uploaded_files_all_the_way(client: TestClient, files: Files, tmp_path: Path) -> None:
     accepted = client.post(DIAGNOSES, files=files, data=form({"options": {"next_trajectory": True}}))
     assert accepted.status_code == 202
     here = accepted.headers["location"]
@@ -55,11 +57,45 @@ def test_uploaded_files_all_the_way(client: TestClient, files: Files) -> None:
     planned = parse_trajectory_json(text, "planned", read_robot(example_robot("paper_arm")))
     assert planned.duration_s > 5.0
 
+    links = status["links"]
+    arm, scenario = tmp_path / "arm.yaml", tmp_path / "scenario.yaml"
+    arm.write_bytes(client.get(links["improved_robot"]).content)
+    scenario.write_bytes(client.get(links["scenario"]).content)
+    read_scenario(scenario, read_robot(arm))
+    assert set(links["exports"]) == {"c", "python"}
+    compile(client.get(links["exports"]["python"]).content, "compensation.py", "exec")
+    assert_problem(client.get(f"{here}/exports/urdf"), "not-found", 404)
+
     steps = [line for line in client.get(status["links"]["events"]).text.splitlines() if "compare effects" in line]
     assert steps
     assert [entry["id"] for entry in client.get(DIAGNOSES).json()["diagnoses"]] == [status["id"]]
+
+    saved = ("model", ("model.json", client.get(links["model"]).content))
+    for more, fields in (
+        ([saved], {}),
+        ([], {"model": status["id"]}),
+        ([], {"model": model.model_dump(by_alias=True)}),
+    ):
+        request = form({"options": {"against": "saved"}, **fields})
+        again = client.get(client.post(DIAGNOSES, files=[*files, *more], data=request).headers["location"]).json()
+        assert again["state"] == "succeeded", again
+        assert client.get(again["links"]["result"]).json()["verdict"] == found.verdict
+
     assert client.delete(here).status_code == 204
     assert_problem(client.get(here), "not-found", 404)
+
+
+def test_a_saved_model_and_what_is_compared_with_belong_together(client: TestClient, files: Files) -> None:
+    answer = client.post(DIAGNOSES, files=files, data=form({"options": {"against": "saved"}}))
+    assert "model" in assert_problem(answer, "invalid-request", 422)["detail"]
+    saved = ("model", ("model.json", b"{}"))
+    assert_problem(client.post(DIAGNOSES, files=[*files, saved], data=form({})), "invalid-request", 422)
+    request = form({"options": {"against": "saved"}, "model": "20261103T101502Z-1f2e3d4c"})
+    assert_problem(client.post(DIAGNOSES, files=files, data=request), "not-found", 404)
+    request = form({"options": {"against": "saved"}})
+    refused = client.get(client.post(DIAGNOSES, files=[*files, saved], data=request).headers["location"]).json()
+    assert refused["problem"]["code"] == "identification"
+    assert refused["problem"]["detail"].startswith("model.json: ")
 
 
 def test_against_the_model_of_the_robot_file(client: TestClient, files: Files) -> None:

@@ -15,8 +15,8 @@ from server.http.event_stream import Event, read_events
 from server.http.problem_check import assert_problem
 from server.queue.executors import InlineExecutor, ManualExecutor
 from tauscope.server.http import Settings, create_app
-from tauscope.server.http.jobs import events as event_routes
 from tauscope.server.http.services import Services
+from tauscope.server.http.tasks import events as event_routes
 from tauscope.server.queue.workspace import Workspace
 
 

@@ -16,10 +16,10 @@ from server.queue.controls import CSV, WAY, HandControls
 from server.queue.executors import InlineExecutor, ManualExecutor
 from server.queue.waiting import wait_until
 from tauscope.runtime import RunProblem, RunState
-from tauscope.server.control.run_workspace import RunWorkspace
+from tauscope.server.control.run import RunWorkspace
 from tauscope.server.http import Settings, create_app
-from tauscope.server.http.jobs import events as event_routes
-from tauscope.server.queue.excitation_workspace import ExcitationWorkspace
+from tauscope.server.http.tasks import events as event_routes
+from tauscope.server.queue.excitation import ExcitationWorkspace
 from tauscope.server.store.files import KeptFile
 from tauscope.server.store.recordings import RecordingStore, StoredRecording
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from tauscope.runtime import RunProblem, RunRecord, RunState
 from tauscope.runtime.record import RecordingFiles, new_record, write_record
-from tauscope.server.control.run_workspace import RunWorkspace
+from tauscope.server.control.run import RunWorkspace
 
 WAY = (RunState.CONNECTING, RunState.ENABLING, RunState.RAMPING, RunState.RUNNING)
 CSV = "t,q1,tau1\n" + "".join(f"{k},0.1,1.5\n" for k in range(20))
@@ -18,7 +18,7 @@ class HandControl:
     def __init__(self, workspace: RunWorkspace, report: Callable[[Mapping[str, Any]], None]) -> None:
         self.folder, self._report = workspace.control, report
         self.folder.mkdir()
-        request = workspace.read_request()
+        request = workspace.read_order()
         self.record = new_record("arm" if request is None else request.robot_name, "sim", "position")
         write_record(self.folder, self.record)
         self.stops = self.beats = 0

@@ -21,11 +21,10 @@ from server.queue.waiting import wait_until
 from tauscope.errors import StoreError
 from tauscope.server.queue.cluster_executor import SCHEDULER, ClusterExecutor, ClusterUnavailableError
 from tauscope.server.queue.executors import WorkerPool, open_executor
-from tauscope.server.queue.identification_order import IdentificationOrder, OrderedRecording
-from tauscope.server.queue.identification_work import run_identification
-from tauscope.server.queue.identification_workspace import IdentificationWorkspace
+from tauscope.server.queue.identification import IdentificationOrder, IdentificationWorkspace, run_identification
 from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.queue.record import JobState
+from tauscope.server.queue.task_job import OrderedRecording
 from tauscope.server.queue.workspace import Workspace
 from tauscope.server.store.files import hash_file
 from tauscope.server.store.items import ItemStore

@@ -8,11 +8,11 @@ import pytest
 from server.queue.paper_files import PAPER_ROBOT, write_recording
 from tauscope.export.formats import EXPORT_FILES, ExportFormat
 from tauscope.identification import IdentificationDocument
-from tauscope.server.queue import identification_work as work_module
-from tauscope.server.queue.identification_order import IdentificationOptions, IdentificationOrder, OrderedRecording
-from tauscope.server.queue.identification_work import run_identification
-from tauscope.server.queue.identification_workspace import IdentificationWorkspace
+from tauscope.server.queue.identification import IdentificationOrder, IdentificationWorkspace, run_identification
+from tauscope.server.queue.task_job import OrderedRecording
 from tauscope.server.store.files import hash_file
+from tauscope.tasks import identify as task
+from tauscope.tasks.identify import IdentificationOptions
 
 OPTIONS = IdentificationOptions(cutoff_hz=None)
 
@@ -53,7 +53,7 @@ def order(
 
 
 def test_result_exports_and_steps(workspace: IdentificationWorkspace, server: Path) -> None:
-    train = write_recording(workspace.uploads(held_out=False) / "train.csv", seed=1)
+    train = write_recording(workspace.uploads("recordings") / "train.csv", seed=1)
     test = write_recording(server / "test.csv", seed=2)
     order(workspace, train, held_out=(test,))
     assert run_identification(workspace.folder, server) is None
@@ -89,7 +89,7 @@ def test_a_urdf_that_came_with_the_robot_is_patched(workspace: IdentificationWor
         '<limit lower="-1" upper="1" effort="9" velocity="9"/></joint></robot>',
         encoding="utf-8",
     )
-    order(workspace, _slider_recording(workspace.uploads(held_out=False) / "a.csv"))
+    order(workspace, _slider_recording(workspace.uploads("recordings") / "a.csv"))
     assert run_identification(workspace.folder, server) is None
     assert workspace.refused_exports() == {}
     urdf = workspace.read_export("model.urdf").decode()
@@ -121,7 +121,7 @@ def spoil(path: Path, row: int, text: str) -> Path:
 def test_a_broken_recording_is_named_with_line_and_column_and_without_the_servers_folders(
     workspace: IdentificationWorkspace, server: Path, tmp_path: Path
 ) -> None:
-    path = write_recording(workspace.uploads(held_out=False) / "broken.csv", seed=1)
+    path = write_recording(workspace.uploads("recordings") / "broken.csv", seed=1)
     row = path.read_text(encoding="utf-8").splitlines()[99].split(",")
     order(workspace, spoil(path, 100, ",".join([*row[:3], "oops", *row[4:]])))
     problem = run_identification(workspace.folder, server)
@@ -194,7 +194,7 @@ def test_unforeseen_failures_are_not_swallowed(
     def fail(*_: object, **__: object) -> None:
         raise ZeroDivisionError
 
-    monkeypatch.setattr(work_module, "read_robot", fail)
+    monkeypatch.setattr(task, "read_robot", fail)
     with pytest.raises(ZeroDivisionError):
         run_identification(workspace.folder, server)
 

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from tauscope.errors import TauscopeError
+from tauscope.server.control.campaign import CampaignWorkspace
 from tauscope.server.control.campaign_runner import CampaignDependencies, CampaignRunner
-from tauscope.server.control.campaign_workspace import CampaignWorkspace
 from tauscope.server.control.device_claims import BusyError
 from tauscope.server.control.leases import FREE, Permit
 from tauscope.server.control.supervised_threads import Manager

@@ -1,34 +1,47 @@
 """The runner of one campaign: design, run, held-out run, identification and diagnosis, one job or run each."""
 
 import logging
+import shutil
 import threading
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
 
 from tauscope.errors import NotFoundError, TauscopeError
 from tauscope.runtime.record import RunRecord
 from tauscope.runtime.states import RunState
-from tauscope.server.control.campaign_order import CampaignOrder
-from tauscope.server.control.campaign_workspace import CampaignWorkspace
+from tauscope.server.control.campaign import CampaignOrder, CampaignWorkspace
 from tauscope.server.control.leases import FREE, Permit
-from tauscope.server.control.motions import StepFailedError, require_succeeded, wait_for_end
+from tauscope.server.control.motions import (
+    StepFailedError,
+    ready_motion,
+    require_succeeded,
+    take_trajectory,
+    wait_for_end,
+)
+from tauscope.server.control.run import RunRequestRecord, RunWorkspace
 from tauscope.server.control.run_manager import RunManager, run_recording_name
-from tauscope.server.control.run_order import RunRequestRecord
-from tauscope.server.control.run_submission import hand_in_run
-from tauscope.server.control.run_workspace import RunWorkspace
-from tauscope.server.queue.diagnosis_order import DiagnosisOptions
-from tauscope.server.queue.diagnosis_submission import hand_in_diagnosis
-from tauscope.server.queue.excitation_order import ExcitationDesignOptions
-from tauscope.server.queue.excitation_submission import hand_in_excitation
-from tauscope.server.queue.excitation_workspace import ExcitationWorkspace
-from tauscope.server.queue.identification_submission import hand_in_identification
+from tauscope.server.queue.diagnosis import DiagnosisOrder, DiagnosisWorkspace
+from tauscope.server.queue.excitation import ExcitationOrder, ExcitationWorkspace
+from tauscope.server.queue.identification import IdentificationOrder, IdentificationWorkspace
 from tauscope.server.queue.queue import CANCELLED, INTERNAL, INTERRUPTED, JobKind, JobQueue, QueueFullError
 from tauscope.server.queue.record import JobProblem, JobState
+from tauscope.server.queue.task_job import (
+    Order,
+    TaskWorkspace,
+    ordered_on_server,
+    staged_workspace,
+    submit_job,
+)
 from tauscope.server.queue.work import StoppedError
 from tauscope.server.queue.workspace import Workspace
 from tauscope.server.store.recordings import RecordingStore
+from tauscope.tasks.campaign import backend_of_run
+from tauscope.tasks.design_excitation import ExcitationDesignOptions
+from tauscope.tasks.diagnose import DiagnosisOptions
 
 _log = logging.getLogger("tauscope.jobs")
 
@@ -68,7 +81,7 @@ class CampaignRunner:
         self._dependencies = dependencies
         self._release_arm = release_arm
         self._permit = permit
-        self._robot = (order.robot_file, order.robot_name)
+        self._robot: dict[str, Any] = {"robot_file": order.robot_file, "robot_name": order.robot_name}
         self._run_identifier: str | None = None
         self._stop_requested = threading.Event()
         self._is_closing = False
@@ -150,19 +163,23 @@ class CampaignRunner:
 
     def _design(self, options: ExcitationDesignOptions, link: str) -> str:
         """Have a motion designed; returns at once."""
-        jobs, kind, folder = self._dependencies.jobs, self._dependencies.excitations, self._workspace.robot
-        identifier = self._submit_with_retry(lambda: hand_in_excitation(jobs, kind, folder, self._robot, options))
+        order = ExcitationOrder(**self._robot, options=options)
+        identifier = self._submit(self._dependencies.excitations, ExcitationWorkspace, order)
         self._record(**{link: identifier})
         return identifier
 
-    def _submit_with_retry(self, hand_in: Callable[[], str]) -> str:
+    def _submit(self, kind: JobKind, workspace: type[TaskWorkspace[Order]], order: Order) -> str:
         """Hand a job in, as soon as the queue takes one."""
         while True:
             try:
-                return hand_in()
+                return submit_job(self._dependencies.jobs, kind, workspace, order, self._put_robot)
             except QueueFullError:
                 if self._stop_requested.wait(RETRY_S):
                     raise StoppedError from None
+
+    def _put_robot(self, folder: Path) -> None:
+        """Copy the robot's files into a job's or a run's folder."""
+        shutil.copytree(self._workspace.robot, folder, dirs_exist_ok=True)
 
     def _wait(self, workspace: type[Workspace], kind: JobKind, identifier: str, noun: str) -> None:
         """Wait for a job to succeed."""
@@ -175,18 +192,18 @@ class CampaignRunner:
         """Run a motion to its end; the name of its recording."""
         order, dependencies = self._order, self._dependencies
         request = RunRequestRecord(
-            robot_file=order.robot_file,
-            robot_name=order.robot_name,
-            backend=order.backend_of(held_out=link == "held_out_run"),
+            **self._robot,
+            backend=backend_of_run(order.backend, held_out=link == "held_out_run"),
             device=order.backend.device(order.robot_name),
             excitation=excitation,
             campaign=self._workspace.folder.name,
             options=order.run,
         )
-        motion = ExcitationWorkspace(dependencies.excitations.items.folder(excitation))
-        self._run_identifier = hand_in_run(
-            dependencies.runs, self._workspace.robot, request, motion, self.holder, self._permit
-        )
+        with staged_workspace(dependencies.runs.items, RunWorkspace) as staged:
+            self._put_robot(staged.robot)
+            take_trajectory(ExcitationWorkspace(dependencies.excitations.items.folder(excitation)), staged)
+            staged.write_request(request)
+            self._run_identifier = dependencies.runs.submit(staged.folder, ready_motion, self.holder, self._permit)
         self._record(**{link: self._run_identifier})
         if self._stop_requested.is_set():
             dependencies.runs.stop(self._run_identifier)
@@ -210,39 +227,29 @@ class CampaignRunner:
 
     def _identify(self) -> None:
         """From the recordings to the model."""
-        made, dependencies = self._workspace.read_made(), self._dependencies
-        identifier = self._find_submitted(dependencies.identifications, made.identification) or self._submit_with_retry(
-            lambda: hand_in_identification(
-                dependencies.jobs,
-                dependencies.identifications,
-                dependencies.recordings,
-                self._workspace.robot,
-                self._robot,
-                train=made.recordings,
-                held_out=made.held_out,
-                options=self._order.identification,
-            )
-        )
+        dependencies, made = self._dependencies, self._workspace.read_made()
+        identifier = self._find_submitted(dependencies.identifications, made.identification)
+        if identifier is None:
+            order = IdentificationOrder(**self._robot, **self._recordings(), options=self._order.identification)
+            identifier = self._submit(dependencies.identifications, IdentificationWorkspace, order)
         self._record(identification=identifier)
         self._wait(Workspace, dependencies.identifications, identifier, "identification")
 
     def _diagnose(self, options: DiagnosisOptions) -> None:
         """From the same recordings to what the model leaves out."""
-        made, dependencies = self._workspace.read_made(), self._dependencies
-        identifier = self._find_submitted(dependencies.diagnoses, made.diagnosis) or self._submit_with_retry(
-            lambda: hand_in_diagnosis(
-                dependencies.jobs,
-                dependencies.diagnoses,
-                dependencies.recordings,
-                self._workspace.robot,
-                self._robot,
-                train=made.recordings,
-                held_out=made.held_out,
-                options=options,
-            )
-        )
+        dependencies, made = self._dependencies, self._workspace.read_made()
+        identifier = self._find_submitted(dependencies.diagnoses, made.diagnosis)
+        if identifier is None:
+            order = DiagnosisOrder(**self._robot, **self._recordings(), options=options)
+            identifier = self._submit(dependencies.diagnoses, DiagnosisWorkspace, order)
         self._record(diagnosis=identifier)
         self._wait(Workspace, dependencies.diagnoses, identifier, "diagnosis")
+
+    def _recordings(self) -> dict[str, Any]:
+        """The recordings made so far, as an order holds them."""
+        made = self._workspace.read_made()
+        lists = {"recordings": made.recordings, "held_out": made.held_out}
+        return {role: ordered_on_server(self._dependencies.recordings, names) for role, names in lists.items()}
 
     def _find_submitted(self, kind: JobKind, identifier: str | None) -> str | None:
         """The job that this campaign handed in before the service was started again, where that one counts still."""

@@ -4,12 +4,14 @@ import shutil
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from tauscope.errors import AcquisitionError
-from tauscope.server.control.run_workspace import RunWorkspace
-from tauscope.server.queue.excitation_workspace import ExcitationWorkspace
+from tauscope.server.control.run import RunWorkspace
+from tauscope.server.queue.excitation import ExcitationWorkspace
 from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.queue.record import JobProblem, JobRecord, JobState
+from tauscope.server.queue.task_job import TaskWorkspace
 from tauscope.server.queue.workspace import Workspace
 
 Motion = Callable[[RunWorkspace, threading.Event], bool]
@@ -98,7 +100,7 @@ def require_succeeded(record: JobRecord, name: str) -> None:
         raise StepFailedError(problem.model_copy(update={"detail": f"{name}: {problem.detail}"}))
 
 
-def take_trajectory(excitation: ExcitationWorkspace, run: RunWorkspace) -> None:
+def take_trajectory(excitation: TaskWorkspace[Any], run: RunWorkspace) -> None:
     """Give a run the trajectory of an excitation that succeeded.
 
     Raises

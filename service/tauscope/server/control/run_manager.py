@@ -9,8 +9,8 @@ from tauscope.runtime.record import RunRecord
 from tauscope.server.control.device_claims import BusyError, DeviceClaims
 from tauscope.server.control.leases import FREE, Permit
 from tauscope.server.control.motions import Motion
+from tauscope.server.control.run import RunWorkspace
 from tauscope.server.control.run_supervisor import Live, RunSupervisor, StartControl
-from tauscope.server.control.run_workspace import RunWorkspace
 from tauscope.server.control.supervised_threads import Manager
 from tauscope.server.store.files import KeptFile, hash_file
 from tauscope.server.store.items import ItemStore, staged_identifier
@@ -58,7 +58,7 @@ class RunManager(Manager[RunSupervisor]):
             if the arm may not be moved by that leave; the folder stays staged
         """
         workspace = RunWorkspace(staged)
-        request = workspace.read_request()
+        request = workspace.read_order()
         if request is None:
             raise TauscopeError("the run's request.json is missing or damaged; hand the run in again")
         workspace.create(request)

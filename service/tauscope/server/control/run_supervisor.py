@@ -13,7 +13,7 @@ from tauscope.runtime.record import RunProblem, RunRecord
 from tauscope.runtime.states import RunState
 from tauscope.server.control.leases import FREE, Permit
 from tauscope.server.control.motions import Motion, StepFailedError
-from tauscope.server.control.run_workspace import RunWorkspace
+from tauscope.server.control.run import RunWorkspace
 from tauscope.server.queue.record import StateEvent
 
 _log = logging.getLogger("tauscope.jobs")
@@ -127,7 +127,7 @@ class RunSupervisor:
         self._control = control = self._start(self._workspace, self._handle_event)
         if self._stop_requested.is_set():
             control.stop()
-        request = self._workspace.read_request()
+        request = self._workspace.read_order()
         beat_s = BEAT_S if request is None else min(BEAT_S, request.options.heartbeat_s / BEATS_A_HEARTBEAT)
         has_ended = False
         while not has_ended:

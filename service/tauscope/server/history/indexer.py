@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from tauscope.errors import NotFoundError
-from tauscope.server.control.campaign_workspace import CampaignWorkspace
-from tauscope.server.control.run_workspace import RunWorkspace
-from tauscope.server.queue.diagnosis_workspace import DiagnosisWorkspace
-from tauscope.server.queue.excitation_workspace import ExcitationWorkspace
-from tauscope.server.queue.identification_workspace import IdentificationWorkspace
+from tauscope.server.control.campaign import CampaignWorkspace
+from tauscope.server.control.run import RunWorkspace
+from tauscope.server.queue.diagnosis import DiagnosisWorkspace
+from tauscope.server.queue.excitation import ExcitationWorkspace
+from tauscope.server.queue.identification import IdentificationWorkspace
 from tauscope.server.queue.record import JobState
 from tauscope.server.queue.workspace import Workspace
 from tauscope.server.store.database.index import FileMetadata, Index, ItemMetadata, RecordingRole
@@ -160,7 +160,7 @@ def _campaign(folder: Path) -> ItemMetadata:
 def _run(folder: Path) -> ItemMetadata:
     """A run has a record of its own."""
     workspace, mark = RunWorkspace(folder), stamp("run", folder)
-    request, record = workspace.read_request(), workspace.read_run()
+    request, record = workspace.read_order(), workspace.read_run()
     if request is None or record is None:
         return _damaged("run", folder, mark, "request.json" if request is None else "run.json")
     problem = workspace.problem()

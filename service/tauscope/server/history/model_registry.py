@@ -10,12 +10,11 @@ from sqlalchemy.exc import IntegrityError
 
 from tauscope.errors import NotFoundError
 from tauscope.runtime.drivers import driver_names, find_driver
-from tauscope.server.control.run_workspace import RunWorkspace
+from tauscope.server.control.run import RunWorkspace
 from tauscope.server.history.drift import Drift
 from tauscope.server.history.model_history import ModelEntry, ModelHistory
 from tauscope.server.history.model_judgement import Candidate, compare_models
-from tauscope.server.queue.identification_order import IdentificationOrder
-from tauscope.server.queue.identification_workspace import IdentificationWorkspace
+from tauscope.server.queue.identification import IdentificationOrder, IdentificationWorkspace
 from tauscope.server.store.items import ItemStore
 
 _log = logging.getLogger("tauscope.jobs")
@@ -81,7 +80,7 @@ class ModelRegistry:
         """The backend of the run that a recording is of; None where it is of none that is kept here."""
         identifier = recording.removeprefix("run-").removesuffix(".csv")
         try:
-            request = RunWorkspace(self._runs.folder(identifier)).read_request()
+            request = RunWorkspace(self._runs.folder(identifier)).read_order()
         except NotFoundError:
             return None
         return None if request is None else request.backend.name

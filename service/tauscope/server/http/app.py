@@ -11,19 +11,18 @@ from tauscope.server.auth.gate import Gate
 from tauscope.server.control.run_supervisor import StartControl
 from tauscope.server.history.gates import ModelPolicy
 from tauscope.server.http import health, pages
-from tauscope.server.http.campaigns.models import CampaignRequest
-from tauscope.server.http.campaigns.router import router as campaigns
-from tauscope.server.http.diagnoses.models import DiagnosisRequest
-from tauscope.server.http.diagnoses.router import router as diagnoses
-from tauscope.server.http.excitations.models import ExcitationRequest
-from tauscope.server.http.excitations.router import router as excitations
+from tauscope.server.http.campaigns import CampaignRequest
+from tauscope.server.http.campaigns import router as campaigns
+from tauscope.server.http.diagnoses import DiagnosisRequest
+from tauscope.server.http.diagnoses import router as diagnoses
+from tauscope.server.http.excitations import ExcitationRequest
+from tauscope.server.http.excitations import router as excitations
 from tauscope.server.http.heartbeat import notify_systemd
 from tauscope.server.http.history import ReasonRequest
 from tauscope.server.http.history import router as history
-from tauscope.server.http.identifications.models import IdentificationRequest
-from tauscope.server.http.identifications.router import router as identifications
+from tauscope.server.http.identifications import IdentificationRequest
+from tauscope.server.http.identifications import router as identifications
 from tauscope.server.http.items import router as items
-from tauscope.server.http.jobs.events import EVENT_MODELS
 from tauscope.server.http.leases.models import LeaseRequest
 from tauscope.server.http.leases.router import router as leases
 from tauscope.server.http.leases.router import stop_router
@@ -34,16 +33,17 @@ from tauscope.server.http.recordings.router import router as recordings
 from tauscope.server.http.repeated_requests import IdempotentRequests
 from tauscope.server.http.robots.models import RobotCheckRequest
 from tauscope.server.http.robots.router import router as robots
-from tauscope.server.http.runs.models import RunRequest
-from tauscope.server.http.runs.router import router as runs
+from tauscope.server.http.runs import RunRequest
+from tauscope.server.http.runs import router as runs
 from tauscope.server.http.schedules import ScheduleRequest
 from tauscope.server.http.schedules import router as schedules
 from tauscope.server.http.services import open_services
 from tauscope.server.http.settings import Settings
+from tauscope.server.http.tasks.events import EVENT_MODELS
 from tauscope.server.page.router import router as page
 from tauscope.server.problems import Problem
 
-API_VERSION = "1.9.2"
+API_VERSION = "1.10.0"
 """Of the interface, not of the package; a change of tests/server/http/openapi.json goes with a change here."""
 
 PREFIX = "/api/v1"

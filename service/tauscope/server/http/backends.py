@@ -9,10 +9,10 @@ from tauscope.errors import RobotFileError, ScenarioError
 from tauscope.robot import Robot
 from tauscope.robot.messages import one_line
 from tauscope.runtime.drivers import BackendName, find_driver
-from tauscope.server.control.run_order import BackendChoice
 from tauscope.server.http.documents import to_json_text
 from tauscope.server.http.settings import Settings
 from tauscope.server.models import StrictModel
+from tauscope.tasks.run import BackendChoice
 
 
 class BackendRequest(StrictModel):

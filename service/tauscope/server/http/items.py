@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query
 from pydantic import AwareDatetime, Field
 
-from tauscope.server.http.jobs.routes import Limit
 from tauscope.server.http.services import ServicesDep
+from tauscope.server.http.tasks.routes import Limit
 from tauscope.server.models import AnswerModel
 from tauscope.server.problems import problem_responses
 from tauscope.server.store.data_folder import FOLDERS

@@ -47,6 +47,12 @@ def binary_part(description: str) -> dict[str, Any]:
     return {"type": "string", "contentMediaType": "application/octet-stream", "description": description}
 
 
+def binary_parts(description: str) -> dict[str, Any]:
+    """The schema of several files in a form."""
+    item = {"type": "string", "contentMediaType": "application/octet-stream"}
+    return {"type": "array", "items": item, "description": description}
+
+
 def model_reference(model: type[BaseModel]) -> dict[str, str]:
     """A reference to a model of the document."""
     return {"$ref": _REFERENCE.format(model=model.__name__)}

@@ -9,9 +9,9 @@ from starlette.concurrency import run_in_threadpool
 
 from tauscope.server.http.documents import JSON, media_type, read_document, refuse_media_type
 from tauscope.server.http.history import ReasonRequest
-from tauscope.server.http.jobs.routes import Limit, collection
 from tauscope.server.http.openapi import json_body
 from tauscope.server.http.services import Services, ServicesDep
+from tauscope.server.http.tasks.routes import Limit, collection
 from tauscope.server.models import AnswerModel, StrictModel
 from tauscope.server.problems import problem_responses
 from tauscope.server.schedules.definition import ScheduleDefinition

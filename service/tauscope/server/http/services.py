@@ -21,8 +21,8 @@ from tauscope.server.control.campaign_manager import CampaignManager
 from tauscope.server.control.campaign_runner import CampaignDependencies
 from tauscope.server.control.device_claims import DeviceClaims
 from tauscope.server.control.leases import Lease, Leases
+from tauscope.server.control.run import start_control
 from tauscope.server.control.run_manager import RunManager
-from tauscope.server.control.run_start import start_control
 from tauscope.server.control.run_supervisor import StartControl
 from tauscope.server.history.indexer import Indexer, open_index
 from tauscope.server.history.model_history import ModelHistory
@@ -33,11 +33,11 @@ from tauscope.server.http.metrics import Metrics, TimedExecutor
 from tauscope.server.http.repeated_answers import Answers, MemoryAnswers, StoredAnswers
 from tauscope.server.http.settings import Settings
 from tauscope.server.queue.cluster_executor import ClusterExecutor
-from tauscope.server.queue.diagnosis_work import run_diagnosis
-from tauscope.server.queue.excitation_work import run_excitation
+from tauscope.server.queue.diagnosis import run_diagnosis
+from tauscope.server.queue.excitation import run_excitation
 from tauscope.server.queue.executors import WorkerPool, open_executor
 from tauscope.server.queue.housekeeping import Housekeeping
-from tauscope.server.queue.identification_work import run_identification
+from tauscope.server.queue.identification import run_identification
 from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.schedules.repeater import Repeater
 from tauscope.server.schedules.repository import ScheduleRepository

@@ -6,14 +6,21 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
-from tauscope.errors import RecordingError
+from tauscope.errors import RecordingError, TauscopeError
+from tauscope.files import write_atomically
 from tauscope.robot.messages import one_line, shown
 from tauscope.server.queue.cluster_executor import ClusterUnavailableError
 from tauscope.server.store.files import FILE_NAME_RULE, is_file_name
+from tauscope.tasks import diagnose, identify
+from tauscope.tasks.task import LocalFiles
 
 COLUMNS = ("name", "robot", "recordings", "held_out")
 SEPARATOR = ";"
+IDENTIFICATION_COLUMNS = ("relative_error", "held_out_error", "condition_number", "constrained")
+DIAGNOSIS_COLUMNS = ("verdict", "findings")
 LOST = "the process that worked on it ended unexpectedly, perhaps for want of memory; send less data"
 AWAY = "the Dask cluster was away for too long; see to its scheduler, and give this robot once more"
 
@@ -96,6 +103,53 @@ def analyse_fleet(
         yield _result(_submitted(executor, work, entry, folder), entry)
 
 
+def identify_robot(entry: FleetEntry, folder: Path) -> FleetResult:
+    """Identify a robot."""
+    return _timed(identify, entry, folder)
+
+
+def diagnose_robot(entry: FleetEntry, folder: Path) -> FleetResult:
+    """Diagnose a robot, against the best model that its recordings allow."""
+    return _timed(diagnose, entry, folder)
+
+
+def _timed(task: ModuleType, entry: FleetEntry, folder: Path) -> FleetResult:
+    """A result with how long it took."""
+    begin = time.monotonic()
+    return replace(_perform(task, entry, folder), seconds=time.monotonic() - begin)
+
+
+def _perform(task: ModuleType, entry: FleetEntry, folder: Path) -> FleetResult:
+    """Perform a task and write its result; a failure that Tauscope foresees is a row of the table."""
+    try:
+        request = task.Request(
+            robot=str(entry.robot),
+            recordings=tuple(map(str, entry.recordings)),
+            held_out=tuple(map(str, entry.held_out)),
+        )
+        result = task.perform(request, LocalFiles(), lambda *_: None)
+        write_atomically(folder / f"{entry.name}.json", result.outputs["result.json"])
+        return FleetResult(entry, _figures(result.document), None)
+    except TauscopeError as error:
+        return FleetResult(entry, {}, f"{error.code}: {error}")
+    except OSError as error:
+        return FleetResult(entry, {}, f"{error.filename or entry.name}: {error.strerror or error}")
+
+
+def _figures(found: Any) -> dict[str, str]:
+    """The columns of a row."""
+    if hasattr(found, "verdict"):
+        findings = (f"{each.effect}@{each.joint}" if each.joint else each.effect for each in found.findings)
+        return {"verdict": found.verdict, "findings": "; ".join(findings)}
+    judged = found.fit.held_out
+    return {
+        "relative_error": f"{found.fit.train.relative_error:.6g}",
+        "held_out_error": "" if judged is None else f"{judged.relative_error:.6g}",
+        "condition_number": f"{found.condition_number:.6g}",
+        "constrained": str(found.constrained).lower(),
+    }
+
+
 def _submitted(executor: Executor, work: FleetWork, entry: FleetEntry, folder: Path) -> "Future[FleetResult]":
     """A robot in the executor; where that takes nothing, a future that says so."""
     try:
@@ -116,13 +170,6 @@ def _result(future: "Future[FleetResult]", entry: FleetEntry) -> FleetResult:
         return FleetResult(entry, {}, LOST)
     except Exception as error:
         return FleetResult(entry, {}, f"a fault of Tauscope's own ({type(error).__name__}: {one_line(str(error))})")
-
-
-def timed(work: Callable[[], FleetResult]) -> FleetResult:
-    """A result with how long it took."""
-    begin = time.monotonic()
-    result = work()
-    return replace(result, seconds=time.monotonic() - begin)
 
 
 def _entry(path: Path, line: int, row: dict[str, str], names: dict[str, int]) -> FleetEntry:

@@ -9,17 +9,14 @@ from pathlib import Path
 from typing import TypeVar
 
 from tauscope.errors import NotFoundError, TauscopeError
+from tauscope.server.control.campaign import CampaignOrder, CampaignWorkspace
 from tauscope.server.control.campaign_manager import CampaignManager
-from tauscope.server.control.campaign_order import CampaignOrder
 from tauscope.server.control.campaign_runner import CampaignDependencies
-from tauscope.server.control.campaign_workspace import CampaignWorkspace
 from tauscope.server.control.leases import FREE, Permit
-from tauscope.server.queue.diagnosis_order import DiagnosisOrder
-from tauscope.server.queue.diagnosis_workspace import DiagnosisWorkspace
-from tauscope.server.queue.identification_order import IdentificationOrder, OrderedRecording
-from tauscope.server.queue.identification_submission import ordered_on_server
-from tauscope.server.queue.identification_workspace import IdentificationWorkspace
+from tauscope.server.queue.diagnosis import DiagnosisOrder, DiagnosisWorkspace
+from tauscope.server.queue.identification import IdentificationOrder, IdentificationWorkspace
 from tauscope.server.queue.stored import StoredModel
+from tauscope.server.queue.task_job import OrderedRecording, ordered_on_server
 from tauscope.server.queue.workspace import Workspace
 from tauscope.server.schedules.definition import RecordingChoice, ScheduleDefinition
 from tauscope.server.schedules.repository import ScheduleEntry
@@ -168,7 +165,7 @@ def make_schedule(
     order = workspace.read_order()
     if order is None:
         raise NotFoundError(f"{definition.kind} {like}: its order is missing or damaged; name another one")
-    plain = json.loads(order.model_dump_json(exclude={"recordings", "held_out", "simulated"} & _lists(definition)))
+    plain = json.loads(order.model_dump_json(exclude=_lists(definition)))
     if definition.kind != "campaign":
         plain["recordings"] = []
     try:
@@ -182,4 +179,4 @@ def make_schedule(
 
 def _lists(definition: ScheduleDefinition) -> set[str]:
     """Fields of an order that name recordings: a campaign's `held_out` is a motion."""
-    return set() if definition.kind == "campaign" else {"recordings", "held_out", "simulated"}
+    return set() if definition.kind == "campaign" else {"recordings", "held_out", "simulated", "model"}

@@ -9,13 +9,13 @@ from tauscope.errors import TauscopeError
 from tauscope.server.control.device_claims import BusyError
 from tauscope.server.control.interlock import find_objection
 from tauscope.server.control.leases import LeasedError
-from tauscope.server.control.run_order import BackendChoice
 from tauscope.server.queue.queue import QueueFullError
 from tauscope.server.queue.record import without_folders
 from tauscope.server.schedules.definition import ScheduleDefinition
 from tauscope.server.schedules.repeater import NothingToDoError, Repeater
 from tauscope.server.schedules.repository import FiringEntry, ScheduleEntry, ScheduleRepository
 from tauscope.server.store.items import utc_now
+from tauscope.tasks.run import BackendChoice
 
 _log = logging.getLogger("tauscope.jobs")
 

@@ -11,7 +11,6 @@ from tauscope.robot.messages import one_line, shown
 from tauscope.server.auth.gate import find_caller
 from tauscope.server.auth.scopes import Scope
 from tauscope.server.control.leases import Lease, LeaseLostError, Permit
-from tauscope.server.control.run_order import BackendChoice
 from tauscope.server.http.documents import JSON, media_type, read_document, refuse_media_type
 from tauscope.server.http.leases.models import (
     EXAMPLES,
@@ -24,6 +23,7 @@ from tauscope.server.http.leases.models import (
 from tauscope.server.http.openapi import json_body
 from tauscope.server.http.services import Services, ServicesDep
 from tauscope.server.problems import ProblemError, problem_responses
+from tauscope.tasks.run import BackendChoice
 
 LEASE_TOKEN = "Lease-Token"  # noqa: S105 - name of a header
 

@@ -15,7 +15,7 @@ from tauscope.server.http.openapi import binary_part, form_body
 from tauscope.server.http.recordings.models import RecordingAnswer, RecordingListAnswer, RecordingReportAnswer
 from tauscope.server.http.services import ServicesDep
 from tauscope.server.problems import ProblemError, problem_responses
-from tauscope.server.queue.recording_work import check_kept_recording, read_kept_samples
+from tauscope.server.queue.kept_recordings import check_kept_recording, read_kept_samples
 from tauscope.server.store.recordings import StoredRecording
 
 router = APIRouter(prefix="/recordings", tags=["recordings"], responses=problem_responses("invalid-request"))

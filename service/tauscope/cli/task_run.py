@@ -1,0 +1,128 @@
+"""What every verb does around its task: check the files, perform, write the outputs, show the result."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from types import ModuleType
+from typing import Any, TypeVar
+
+import typer
+from pydantic import BaseModel, ValidationError
+
+from tauscope.cli.output_files import STANDARD_OUTPUT, require_distinct, require_free, write_file
+from tauscope.cli.terminal import Told, output, plain, shown_progress
+from tauscope.export.formats import SUFFIXES, ExportFile, ExportFormat
+from tauscope.robot import Robot, Severity, read_robot
+from tauscope.robot.messages import one_line
+from tauscope.tasks.task import LocalFiles
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def make_request(kind: type[Model], **fields: Any) -> Model:
+    """A request or its options.
+
+    Raises
+    ------
+    typer.BadParameter
+        naming the field
+    """
+    try:
+        return kind(**fields)
+    except ValidationError as error:
+        fault = error.errors(include_url=False, include_context=False)[0]
+        option = f"--{fault['loc'][0]}".replace("_", "-") if fault["loc"] else kind.__name__
+        raise typer.BadParameter(f"{fault['msg']}", param_hint=f"'{option}'") from None
+
+
+def run_task(
+    task: ModuleType,
+    request: Any,
+    asked: Sequence[tuple[Path | None, str]],
+    recordings: Sequence[Path] = (),
+    show: Callable[[Any], None] | None = None,
+) -> Any:
+    """Perform a task, write its outputs, and show the result.
+
+    Parameters
+    ----------
+    asked : sequence of (Path or None, str)
+        files to write, each with the name of its output
+    show : callable or None
+        shows the result on the terminal
+
+    Raises
+    ------
+    typer.BadParameter
+        where files are given twice, or an output would destroy an input
+    TauscopeError
+        where the data or the robot cannot answer
+    """
+    outputs = [(path, name) for path, name in asked if path is not None]
+    paths, robot_file = tuple(path for path, _ in outputs), Path(request.robot)
+    require_distinct(recordings)
+    require_free(paths, (robot_file, *recordings))
+    robot = read_robot(robot_file)
+    if robot.urdf is not None:
+        require_free(paths, [robot.urdf])
+    with shown_progress() as progress:
+        result, written = write_outputs(task, request, dict(outputs), progress)
+    if show is not None:
+        show(result)
+    if STANDARD_OUTPUT not in paths:
+        for path in written:
+            output().print(plain(f"wrote {path}"), soft_wrap=True)
+    _show_warnings(robot)
+    return result
+
+
+def write_outputs(
+    task: ModuleType, request: Any, outputs: Mapping[Path, str], progress: Told
+) -> tuple[Any, Iterable[Path]]:
+    """Perform a task and write its outputs: all of them, or none where one cannot be made.
+
+    Returns
+    -------
+    result
+        of the task
+    iterable of Path
+        what was written; an output that the result does not have is left out
+
+    Raises
+    ------
+    TauscopeError
+        where the data or the robot cannot answer, a format cannot hold the model, or a file cannot be written
+    """
+    result = task.perform(request, LocalFiles({name: path for path, name in outputs.items()}), progress)
+    progress("make outputs")
+    made = result.outputs
+    content = {path: made[name] for path, name in outputs.items() if name in made}
+    progress("write files")
+    for path, data in content.items():
+        write_file(path, data)
+    return result, content
+
+
+def export_outputs(paths: Sequence[Path], files: Mapping[ExportFormat, ExportFile]) -> list[tuple[Path, str]]:
+    """The outputs that ``--export`` asks for, by the files' suffixes.
+
+    Raises
+    ------
+    typer.BadParameter
+        where a suffix names no format
+    """
+    made = []
+    for path in paths:
+        kind = SUFFIXES.get(path.suffix.lower())
+        file = None if kind is None else files.get(kind)
+        if file is None:
+            known = ", ".join(suffix for suffix, kind in SUFFIXES.items() if kind in files)
+            raise typer.BadParameter(f"{str(path)!r}: the suffix names no format; use {known}", param_hint="'--export'")
+        made.append((path, file.output))
+    return made
+
+
+def _show_warnings(robot: Robot) -> None:
+    """Warnings of a robot file, on standard error."""
+    for finding in robot.findings:
+        if finding.severity is Severity.WARNING:
+            typer.echo(one_line(f"warning: {finding.where}: {finding.text}"), err=True)

@@ -1,0 +1,187 @@
+"""Runs: what is asked for, what their folder holds, and how their control process is started."""
+
+import json
+import zlib
+from datetime import UTC
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field
+
+from tauscope.errors import AcquisitionError
+from tauscope.runtime.drivers import find_driver
+from tauscope.runtime.options import RunOptions
+from tauscope.runtime.progress import Report
+from tauscope.runtime.record import (
+    RUN_FILE,
+    RunProblem,
+    RunRecord,
+    new_record,
+    read_record,
+    write_record,
+)
+from tauscope.runtime.recovery import recover_run
+from tauscope.runtime.run_process import RunProcess
+from tauscope.runtime.states import RunState
+from tauscope.server.queue.job_folder import JobFolder
+from tauscope.server.queue.record import EndedEvent, JobProblem, without_folders
+from tauscope.server.queue.stored import StoredModel, read_stored, write_stored
+from tauscope.tasks import run
+from tauscope.tasks.run import BackendChoice, recording_file
+from tauscope.tasks.task import LocalFiles
+
+
+class RunRequestRecord(StoredModel):
+    """What was asked for."""
+
+    form: Literal["tauscope.run-request/1"] = Field(
+        default="tauscope.run-request/1", description="name and version of this form"
+    )
+    robot_file: str = Field(description="name of the robot file in the run's robot folder")
+    robot_name: str = Field(description="what the robot file calls the robot")
+    backend: BackendChoice = Field(default=BackendChoice(), description="which arm is moved")
+    device: str = Field(description="names the arm: one run at a time has it")
+    excitation: str | None = Field(
+        default=None, description="identifier of the excitation that is played; null for a trajectory from elsewhere"
+    )
+    campaign: str | None = Field(default=None, description="identifier of the campaign that it belongs to")
+    options: RunOptions = Field(default=RunOptions(), description="how it is run")
+
+
+class RunWorkspace(JobFolder):
+    """Files of a run.
+
+    ``request.json``, ``robot/`` and ``trajectory/`` are its input; ``control/`` belongs to the control process and
+    holds its record, the journal and the recording. Before there is a control process, the record stands beside it.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        """Look at a run's folder; nothing is opened yet."""
+        super().__init__(folder)
+        self.robot = folder / "robot"
+        self.trajectories = folder / "trajectory"
+        self.control = folder / "control"
+        self.scenario = folder / "scenario.json"
+        self._request = folder / "request.json"
+
+    def prepare(self) -> None:
+        """Make the folders that hold a run's input."""
+        self.robot.mkdir()
+        self.trajectories.mkdir()
+
+    @property
+    def trajectory(self) -> Path | None:
+        """The file of the motion; None before there is one."""
+        return next(iter(sorted(self.trajectories.glob("*"))), None)
+
+    def recording(self, format_: str) -> Path:
+        """Where the recording of a format lies; the journal is the MCAP, ramp included."""
+        return recording_file(self.control, format_)
+
+    def read_order(self) -> RunRequestRecord | None:
+        """What was asked for, or None where the file is missing or damaged."""
+        return read_stored(self._request, RunRequestRecord)
+
+    def write_request(self, request: RunRequestRecord) -> None:
+        """Keep what was asked for."""
+        write_stored(self._request, request)
+
+    def create(self, request: RunRequestRecord) -> None:
+        """Write the record of a run that has not begun."""
+        backend, mode = request.backend.name, request.options.mode.value
+        write_record(self.folder, new_record(request.robot_name, backend, mode))
+
+    def read_run(self) -> RunRecord | None:
+        """State and findings of the run, or None where the file is missing or damaged."""
+        try:
+            return read_record(self.control if self._has_begun else self.folder)
+        except AcquisitionError:
+            return None
+
+    def has_ended(self) -> bool:
+        """Whether nothing will happen to the run any more: it has ended, its record is damaged, or it is gone."""
+        record = self.read_run()
+        return record is None or record.state.is_end
+
+    def end_before_start(self, state: RunState, problem: RunProblem | None) -> None:
+        """Write the end of a run that no control process was started for.
+
+        Raises
+        ------
+        OSError
+            if it cannot be written
+        """
+        record = self.read_run()
+        if record is None or record.state.is_end or self._has_begun:
+            return
+        write_record(self.folder, record.moved(RunState.STOPPING).moved(state, problem=problem))
+
+    def recover(self) -> None:
+        """Show a run that nobody carries out any more as interrupted; nothing happens to one that has ended.
+
+        Raises
+        ------
+        AcquisitionError
+            if its record is damaged, or its control process does not end
+        """
+        if self._has_begun:
+            recover_run(self.control)
+            return
+        detail = "the service ended before this run began; hand it in again"
+        self.end_before_start(RunState.INTERRUPTED, RunProblem(code="interrupted", detail=detail))
+
+    def problem(self) -> JobProblem | None:
+        """Why the run did not finish, without the server's folders; None where nothing is known against it."""
+        record = self.read_run()
+        if record is None or record.problem is None:
+            return None
+        return JobProblem(code=record.problem.code, detail=self.in_user_terms(record.problem.detail))
+
+    def in_user_terms(self, text: str) -> str:
+        """A message without the server's folders."""
+        return without_folders(text, self.control, self.trajectories, self.robot, self.folder)
+
+    def tell_end(self) -> None:
+        """Tell that the run has ended, once."""
+        record = self.read_run()
+        if record is not None and record.state.is_end and not self.has_told_end():
+            time = record.history[-1].at.astimezone(UTC)
+            self.tell(EndedEvent(time=time, state=record.state, problem=self.problem()))
+
+    @property
+    def _has_begun(self) -> bool:
+        """Whether the control process has a record of its own."""
+        return (self.control / RUN_FILE).exists()
+
+
+def start_control(workspace: RunWorkspace, report: Report, *, sim_socket: Path | None = None) -> RunProcess:
+    """Start the control process of a run whose folder holds everything that it needs.
+
+    Raises
+    ------
+    RobotFileError
+        if the robot file was damaged meanwhile
+    AcquisitionError
+        if files are missing, or the process cannot be started
+    """
+    order, trajectory = workspace.read_order(), workspace.trajectory
+    if order is None or trajectory is None:
+        raise AcquisitionError("files of the run are missing or damaged; hand it in again")
+    if "scenario" in find_driver(order.backend.name).option_names:  # the noise of a scenario is this run's own
+        scenario = {"seed": zlib.crc32(workspace.folder.name.encode()), **(order.backend.scenario or {})}
+        workspace.scenario.write_text(json.dumps(scenario, ensure_ascii=False), encoding="utf-8")
+    request = run.Request(
+        robot=str(workspace.robot / order.robot_file),
+        backend=order.backend,
+        scenario=str(workspace.scenario),
+        options=order.options,
+    )
+    return run.start(
+        request,
+        LocalFiles(),
+        trajectory,
+        workspace.control,
+        report,
+        sim_socket=sim_socket,
+        beats_by_itself=False,
+    )

@@ -1,0 +1,320 @@
+"""Campaigns: requests, answers and what is special about this resource."""
+
+from collections.abc import Callable, Iterator
+from typing import Any, Literal
+from urllib.parse import quote
+
+from fastapi import Request
+from pydantic import Field
+from starlette.concurrency import run_in_threadpool
+
+from tauscope.diagnosis import DiagnosisDocument
+from tauscope.errors import NotFoundError
+from tauscope.identification import IdentificationDocument
+from tauscope.server.control.campaign import CampaignLinks, CampaignOrder, CampaignWorkspace
+from tauscope.server.control.run import RunWorkspace
+from tauscope.server.http.backends import BackendRequest, chosen_backend
+from tauscope.server.http.diagnoses import DIAGNOSES
+from tauscope.server.http.excitations import EXCITATIONS
+from tauscope.server.http.identifications import IDENTIFICATIONS
+from tauscope.server.http.leases.router import permit_of
+from tauscope.server.http.robots.files import read_received_robot
+from tauscope.server.http.robots.models import EXAMPLE_ROBOT
+from tauscope.server.http.runs import find_run
+from tauscope.server.http.services import Services, ServicesDep
+from tauscope.server.http.tasks.answers import JobAnswer, damaged_fields, job_fields, require_document, require_success
+from tauscope.server.http.tasks.router import Resource, add_stopping, make_router
+from tauscope.server.http.tasks.routes import ENDINGS, Identifier, collection
+from tauscope.server.http.tasks.submission import Received, RobotRequest, keep_robot, receive_request
+from tauscope.server.models import AnswerModel
+from tauscope.server.problems import ProblemError, problem_responses
+from tauscope.server.queue.record import JobState
+from tauscope.tasks.campaign import CampaignOptions
+from tauscope.tasks.run import BackendChoice
+
+
+class CampaignRequest(RobotRequest, CampaignOptions):
+    """Which campaign is wanted."""
+
+    backend: BackendRequest = Field(default=BackendRequest(), description="which arm is moved")
+
+
+EXAMPLES: dict[str, tuple[str, Any]] = {
+    "default": ("Everything as it comes, on the simulated arm", {"robot": EXAMPLE_ROBOT, "backend": {"name": "sim"}}),
+    "options": (
+        "Ordinary least squares from eight periods, without a held-out motion",
+        {
+            "robot": EXAMPLE_ROBOT,
+            "backend": {"name": "sim", "time": "virtual"},
+            "excitation": {"periods": 8, "seed": 3},
+            "held_out": None,
+            "identification": {"estimator": "ls"},
+        },
+    ),
+}
+
+
+class CampaignStepAnswer(AnswerModel):
+    """One step of a campaign."""
+
+    name: Literal["design", "run", "held-out design", "held-out run", "identify", "diagnose"] = Field(
+        description="of the step"
+    )
+    state: str = Field(description="waiting, or the state of its excitation, run, identification or diagnosis")
+    link: str | None = Field(default=None, description="its excitation, run, identification or diagnosis")
+
+
+class CampaignLinksAnswer(AnswerModel):
+    """Where to go on from a campaign."""
+
+    self_: str = Field(alias="self", description="its state")
+    events: str = Field(description="what happens to it, as server-sent events")
+    stop: str = Field(description="where a POST stops it")
+    recordings: tuple[str, ...] = Field(default=(), description="recordings that the model is made from")
+    held_out: tuple[str, ...] = Field(default=(), description="recordings that it is judged by")
+    identification: str | None = Field(default=None, description="its identification, exports included")
+    diagnosis: str | None = Field(default=None, description="its diagnosis, where one was asked for")
+    result: str | None = Field(default=None, description="its result, once it succeeded")
+
+
+class CampaignAnswer(JobAnswer):
+    """The state of a campaign."""
+
+    robot: str | None = Field(default=None, description="name of the robot")
+    backend: BackendChoice | None = Field(default=None, description="which arm is moved")
+    steps: tuple[CampaignStepAnswer, ...] = Field(default=(), description="in their order")
+    links: CampaignLinksAnswer = Field(description="where to go on")
+
+
+class CampaignListAnswer(AnswerModel):
+    """Campaigns that are kept."""
+
+    campaigns: list[CampaignAnswer] = Field(description="the newest first")
+
+
+class CampaignResult(AnswerModel):
+    """What came of a campaign."""
+
+    schema_: Literal["tauscope.campaign/1"] = Field(
+        default="tauscope.campaign/1", alias="schema", description="name and version of this form"
+    )
+    identification: IdentificationDocument = Field(description="the same document as `tauscope identify --json`")
+    diagnosis: DiagnosisDocument | None = Field(
+        default=None, description="the same document as `tauscope diagnose --json`, where one was asked for"
+    )
+    steps: tuple[CampaignStepAnswer, ...] = Field(description="how it came about")
+    links: CampaignLinksAnswer = Field(description="everything that was made on the way")
+
+
+class CampaignStopAnswer(AnswerModel):
+    """What became of the wish to stop a campaign."""
+
+    id: str = Field(description="identifier of the campaign")
+    state: JobState = Field(description="where it stood; it stops unless that is an end state")
+
+
+StepName = Literal["design", "run", "held-out design", "held-out run", "identify", "diagnose"]
+WAITING, GONE = "waiting", "gone"
+
+
+def find_campaign(services: Services, identifier: str) -> CampaignWorkspace:
+    """The folder of a campaign.
+
+    Raises
+    ------
+    NotFoundError
+        if there is none
+    """
+    return CampaignWorkspace(services.campaigns.items.folder(identifier))
+
+
+def describe(services: Services, identifier: str, root: str) -> CampaignAnswer:
+    """The state of a campaign; one whose files are damaged is said to be so.
+
+    Raises
+    ------
+    NotFoundError
+        if there is none
+    """
+    workspace = find_campaign(services, identifier)
+    here, made, order = f"{root}/campaigns/{identifier}", workspace.read_made(), workspace.read_order()
+    if order is None:
+        links = _links(here, root, made, has_result=False)
+        return CampaignAnswer(**damaged_fields(identifier, here), links=links)
+    fields = job_fields(workspace, here)
+    links = _links(here, root, made, has_result=fields["state"] is JobState.SUCCEEDED)
+    steps = tuple(_steps(services, order, made, root))
+    return CampaignAnswer(**fields, robot=order.robot_name, backend=order.backend, steps=steps, links=links)
+
+
+def result_of(services: Services, identifier: str, root: str) -> CampaignResult:
+    """What came of a campaign that succeeded.
+
+    Raises
+    ------
+    NotFoundError
+        if there is none, or its identification was removed
+    ProblemError
+        if it has not succeeded
+    """
+    require_success(find_campaign(services, identifier))
+    answer = describe(services, identifier, root)
+    made = find_campaign(services, identifier).read_made()
+    identification = IDENTIFICATIONS.finished(services, made.identification or "")
+    content = require_document(identification.read_result(), identification.folder.name)
+    document = IdentificationDocument.model_validate_json(content)
+    diagnosis = None
+    if made.diagnosis is not None:
+        found = DIAGNOSES.finished(services, made.diagnosis)
+        content = require_document(found.read_result(), made.diagnosis)
+        diagnosis = DiagnosisDocument.model_validate_json(content)
+    return CampaignResult(identification=document, diagnosis=diagnosis, steps=answer.steps, links=answer.links)
+
+
+def _steps(services: Services, order: CampaignOrder, made: CampaignLinks, root: str) -> Iterator[CampaignStepAnswer]:
+    """Every step with its state."""
+    steps: list[tuple[StepName, str, Callable[[Services, str], Any], str | None, bool]] = [
+        ("design", "excitations", EXCITATIONS.find, made.excitation, True),
+        ("held-out design", "excitations", EXCITATIONS.find, made.held_out_excitation, order.held_out is not None),
+        ("run", "runs", find_run, made.run, True),
+        ("held-out run", "runs", find_run, made.held_out_run, order.held_out is not None),
+        ("identify", "identifications", IDENTIFICATIONS.find, made.identification, True),
+        ("diagnose", "diagnoses", DIAGNOSES.find, made.diagnosis, order.diagnosis is not None),
+    ]
+    for name, plural, find, identifier, is_wanted in steps:
+        if is_wanted and identifier is None:
+            yield CampaignStepAnswer(name=name, state=WAITING)
+        elif is_wanted and identifier is not None:
+            yield CampaignStepAnswer(
+                name=name, state=_state(services, find, identifier), link=f"{root}/{plural}/{identifier}"
+            )
+
+
+def _state(services: Services, find: Callable[[Services, str], Any], identifier: str) -> str:
+    """The state of a step's job or run."""
+    try:
+        folder = find(services, identifier)
+    except NotFoundError:
+        return GONE
+    record = folder.read_run() if isinstance(folder, RunWorkspace) else folder.read_record()
+    return "damaged" if record is None else record.state.value
+
+
+def _links(here: str, root: str, made: CampaignLinks, *, has_result: bool) -> CampaignLinksAnswer:
+    """Where to go on."""
+    identification = made.identification
+    return CampaignLinksAnswer(
+        self=here,
+        events=f"{here}/events",
+        stop=f"{here}/stop",
+        recordings=tuple(f"{root}/recordings/{quote(name)}" for name in made.recordings),
+        held_out=tuple(f"{root}/recordings/{quote(name)}" for name in made.held_out),
+        identification=None if identification is None else f"{root}/identifications/{identification}",
+        diagnosis=None if made.diagnosis is None else f"{root}/diagnoses/{made.diagnosis}",
+        result=f"{here}/result" if has_result else None,
+    )
+
+
+async def submit_campaign(request: Request, services: Services) -> str:
+    """Take a request for a campaign.
+
+    Raises
+    ------
+    ProblemError
+        if the request is not as documented
+    TauscopeError
+        if the robot is not valid, somebody else has the arm, or the lease does not let it move
+    """
+    items = services.campaigns.items
+    staged = await run_in_threadpool(items.stage)
+    try:
+        workspace = CampaignWorkspace(staged)
+        await run_in_threadpool(workspace.prepare)
+        received = await receive_request(request, CampaignRequest, services.settings, workspace.robot)
+        return await run_in_threadpool(_hand_in, received, services, workspace, request)
+    finally:
+        await run_in_threadpool(items.discard, staged)
+
+
+def _hand_in(
+    received: Received[CampaignRequest], services: Services, workspace: CampaignWorkspace, request: Request
+) -> str:
+    """Check what was received, and begin."""
+    document, robot_file = received.document, keep_robot(received, workspace.robot)
+    robot = read_received_robot(workspace.robot, robot_file)
+    backend = chosen_backend(services.settings, document.backend, robot)
+    permit = permit_of(request, services, backend.device(robot.name))
+    workspace.write_order(
+        CampaignOrder(
+            robot_file=robot_file,
+            robot_name=robot.name,
+            backend=backend,
+            **{name: getattr(document, name) for name in CampaignOptions.model_fields},
+        )
+    )
+    return services.campaigns.submit(workspace.folder, permit)
+
+
+CAMPAIGNS = Resource(
+    noun="a campaign",
+    plural="campaigns",
+    models=(CampaignRequest, CampaignAnswer, CampaignListAnswer),
+    examples=EXAMPLES,
+    items=lambda services: services.campaigns.items,
+    find=find_campaign,
+    followed=find_campaign,
+    submit=submit_campaign,
+    describe=describe,
+    summary="Begin a campaign",
+    words="Designs a motion, runs it, runs a second one that the model is judged by, and identifies the arm.\n\n"
+    "The campaign has the arm until its motions are done. Follow `Location` until it has ended, or stop it"
+    " at any time.",
+    moves_arm=True,
+)
+
+router = make_router(CAMPAIGNS)
+
+
+@router.get(
+    "/{identifier}/result",
+    summary="Fetch the result",
+    responses=problem_responses(
+        "not-found",
+        *ENDINGS,
+        "robot-file",
+        "excitation",
+        "scenario",
+        "acquisition",
+        "recording",
+        "identification",
+        "worker-lost",
+        "internal",
+    ),
+)
+def get_result(request: Request, identifier: Identifier, services: ServicesDep) -> CampaignResult:
+    """The identified model, and everything that led to it; else the problem that the campaign ended in."""
+    return result_of(services, identifier, collection(request, 3))
+
+
+def _stop(services: Services, identifier: str) -> CampaignStopAnswer:
+    """Stop a campaign; neither a lock nor a disk is needed for one that goes on."""
+    state = services.campaigns.stop(identifier)
+    if state is not None:
+        return CampaignStopAnswer(id=identifier, state=state)
+    record = find_campaign(services, identifier).read_record()
+    if record is None:
+        raise ProblemError("damaged", f"files of {identifier} are missing or damaged; it does not go on")
+    return CampaignStopAnswer(id=identifier, state=record.state)
+
+
+add_stopping(
+    router,
+    CAMPAIGNS,
+    CampaignStopAnswer,
+    _stop,
+    lambda services, identifier: services.campaigns.remove(identifier),
+    (
+        "Stops the arm first, then everything else of it; legal in every state, any number of times; needs no body.",
+        "One that has ended is removed; its excitations, runs, recordings and identification stay.",
+    ),
+)

@@ -1,1 +1,0 @@
-"""Campaigns: from a robot to an identified model in one request."""

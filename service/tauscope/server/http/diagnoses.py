@@ -1,0 +1,247 @@
+"""Diagnoses: requests, answers and what is special about this resource."""
+
+from pathlib import Path
+from typing import Any, Self
+
+from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from tauscope.diagnosis import DiagnosisDocument
+from tauscope.diagnosis.documents.plots import DiagnosisPlots
+from tauscope.diagnosis.extended_model.saved import LARGEST_FILE, ModelDocument
+from tauscope.errors import IdentificationError
+from tauscope.server.http.documents import to_json_text
+from tauscope.server.http.identifications import Names
+from tauscope.server.http.openapi import binary_part, binary_parts
+from tauscope.server.http.robots.models import EXAMPLE_ROBOT
+from tauscope.server.http.services import Services
+from tauscope.server.http.tasks.answers import JobAnswer, require_document
+from tauscope.server.http.tasks.queued import QueuedTask
+from tauscope.server.http.tasks.router import HTML, JobDocument, text_document
+from tauscope.server.http.tasks.submission import Received, RobotRequest
+from tauscope.server.models import AnswerModel
+from tauscope.server.problems import ProblemError
+from tauscope.server.queue.diagnosis import DiagnosisWorkspace
+from tauscope.server.queue.task_job import SAVED_MODEL, TRAJECTORY, OrderedRecording
+from tauscope.tasks.diagnose import DiagnosisOptions
+from tauscope.trajectory.document import TrajectoryDocument
+
+
+class DiagnosisRequest(RobotRequest):
+    """What is to be diagnosed."""
+
+    recordings: Names | None = Field(
+        default=None,
+        description="names of the recordings that are to be explained: files of this form, or on the server; null: all"
+        " files sent as part `recordings`",
+    )
+    held_out: Names | None = Field(
+        default=None,
+        description="names of the recordings that confirm findings; null: all files sent as part `held_out`",
+    )
+    simulated: Names | None = Field(
+        default=None,
+        description="names of recordings made in your own simulator; null: all files sent as part `simulated`",
+    )
+    model: str | dict[str, Any] | None = Field(
+        default=None,
+        description="model to compare with, for `against` saved: a model document, or the identifier of a diagnosis"
+        " that succeeded; in a form, the part `model` may hold the file instead",
+    )
+    options: DiagnosisOptions = Field(default=DiagnosisOptions(), description="how it is diagnosed")
+
+    @model_validator(mode="after")
+    def _check_once(self) -> Self:
+        """A recording counts once."""
+        for names in (self.recordings or [], self.held_out or [], self.simulated or []):
+            twice = next((name for index, name in enumerate(names) if name in names[:index]), None)
+            if twice is not None:
+                raise PydanticCustomError("twice", "{name} is listed twice; list it once", {"name": twice})
+        return self
+
+
+EXAMPLES: dict[str, tuple[str, Any]] = {
+    "server": (
+        "Recordings that lie on the server",
+        {"robot": EXAMPLE_ROBOT, "recordings": ["monday.csv", "tuesday.csv"], "held_out": ["wednesday.mcap"]},
+    ),
+    "simulation": (
+        "What your own simulation has wrong, and what it lacks",
+        {
+            "robot": EXAMPLE_ROBOT,
+            "recordings": ["monday.csv"],
+            "simulated": ["simulated.csv"],
+            "options": {"against": "simulation"},
+        },
+    ),
+    "saved": (
+        "What has changed since an earlier diagnosis",
+        {
+            "robot": EXAMPLE_ROBOT,
+            "recordings": ["friday.csv"],
+            "model": "20261103T101502Z-1f2e3d4c",
+            "options": {"against": "saved"},
+        },
+    ),
+}
+
+
+class DiagnosisLinksAnswer(AnswerModel):
+    """Where to go on from a diagnosis."""
+
+    self_: str = Field(alias="self", description="its state")
+    events: str = Field(description="what happens to it, as server-sent events")
+    result: str | None = Field(default=None, description="its result, once it succeeded")
+    plots: str | None = Field(default=None, description="data of its figures, once it succeeded")
+    report: str | None = Field(default=None, description="its report as a page, once it succeeded")
+    model: str | None = Field(default=None, description="the model with all findings, once it succeeded")
+    scenario: str | None = Field(default=None, description="its findings for the simulated arm, once it succeeded")
+    improved_robot: str | None = Field(
+        default=None, description="the robot file with what was identified, once it succeeded"
+    )
+    exports: dict[str, str] = Field(default={}, description="its compensation code by format, once it succeeded")
+    next_trajectory: str | None = Field(default=None, description="the motion to record next, where one was planned")
+
+
+class DiagnosisAnswer(JobAnswer):
+    """The state of a diagnosis."""
+
+    robot: str | None = Field(default=None, description="name of the robot")
+    recordings: tuple[OrderedRecording, ...] = Field(default=(), description="what is explained")
+    held_out: tuple[OrderedRecording, ...] = Field(default=(), description="what findings are confirmed by")
+    simulated: tuple[OrderedRecording, ...] = Field(default=(), description="what the user's simulator recorded")
+    options: DiagnosisOptions | None = Field(default=None, description="how it is diagnosed")
+    refused_exports: dict[str, str] = Field(
+        default={}, description="formats that cannot hold this model, each with the reason"
+    )
+    links: DiagnosisLinksAnswer = Field(description="where to go on")
+
+
+class DiagnosisListAnswer(AnswerModel):
+    """Diagnoses that are kept."""
+
+    diagnoses: list[DiagnosisAnswer] = Field(description="the newest first")
+
+
+YAML = "application/yaml"
+MODEL_FILE = "model.json"
+
+
+def compared_model(received: Received[DiagnosisRequest], services: Services, workspace: Any) -> dict[str, str | None]:
+    """Put the model that is compared with into its place; what is compared with and what was sent belong together.
+
+    Raises
+    ------
+    ProblemError
+        where they do not, or the model came twice
+    NotFoundError
+        if there is no diagnosis of that identifier
+    """
+    document, file = received.document, received.form.file("model")
+    against, has_simulated = document.options.against, bool(received.form.files.get("simulated") or document.simulated)
+    if (against == "simulation") != has_simulated:
+        text = "options.against: simulation and recordings of a simulator belong together; send both or neither"
+        raise ProblemError("invalid-request", text)
+    if (against == "saved") != (file is not None or document.model is not None):
+        text = "options.against: saved and a model belong together; send both or neither"
+        raise ProblemError("invalid-request", text)
+    if file is not None and document.model is not None:
+        raise ProblemError("invalid-request", "the model came twice, as part model and in part request; send it once")
+    if file is not None or document.model is None:
+        return {"model": None if file is None else file.name}
+    folder: Path = workspace.uploads(SAVED_MODEL)
+    if isinstance(document.model, str):
+        content = DIAGNOSES.finished(services, document.model).read_output(MODEL_FILE)
+        (folder / MODEL_FILE).write_bytes(require_document(content, document.model))
+    else:
+        text = to_json_text(document.model)
+        if text is None:
+            raise IdentificationError("model: holds NaN, infinity or text that is not Unicode; write plain numbers")
+        (folder / MODEL_FILE).write_text(text, encoding="utf-8")
+    return {"model": MODEL_FILE}
+
+
+DIAGNOSES = QueuedTask(
+    noun="a diagnosis",
+    plural="diagnoses",
+    kind=lambda services: services.diagnoses,
+    workspace=DiagnosisWorkspace,
+    models=(DiagnosisRequest, DiagnosisAnswer, DiagnosisListAnswer),
+    examples=EXAMPLES,
+    summary="Hand in a diagnosis",
+    words="The robot is checked at once, recordings are read by the job: follow `Location` until it has ended.",
+    parts={
+        "recordings": binary_parts("recordings that are to be explained"),
+        "held_out": binary_parts("recordings that findings are confirmed by"),
+        "simulated": binary_parts("recordings made in your own simulator"),
+        "model": binary_part("a model that an earlier diagnosis saved, to compare with"),
+    },
+    further=compared_model,
+    further_parts={"model": (SAVED_MODEL, LARGEST_FILE)},
+    work_problems=(
+        "robot-file",
+        "recording",
+        "recording-mismatch",
+        "identification",
+        "excitation",
+        "invalid-request",
+    ),
+    documents=(
+        JobDocument(
+            "result",
+            "result.json",
+            "Fetch the result",
+            "The result of a diagnosis that succeeded; else the problem that it ended in.",
+            {"model": DiagnosisDocument, "description": "the same document as `tauscope diagnose --json`"},
+        ),
+        JobDocument(
+            "plots",
+            "plots.json",
+            "Fetch the data of its figures",
+            "What figures of the diagnosis are drawn from.",
+            {"model": DiagnosisPlots, "description": "residuals over time and by variable, before and after"},
+        ),
+        text_document(
+            "report",
+            "report.html",
+            HTML,
+            "Fetch the report",
+            "The report as one page: no script, no request to anywhere, ready to print.",
+            "page as `tauscope diagnose --report`",
+        ),
+        JobDocument(
+            "model",
+            MODEL_FILE,
+            "Fetch the model with all findings",
+            "The extended model.",
+            {"model": ModelDocument, "description": "the same document as `tauscope diagnose --model`"},
+        ),
+        text_document(
+            "scenario",
+            "scenario.yaml",
+            YAML,
+            "Fetch the findings for the simulated arm",
+            "A scenario that the simulated arm plays with the improved robot.",
+            "file as `tauscope diagnose --scenario`",
+        ),
+        text_document(
+            "improved-robot",
+            "improved-robot.yaml",
+            YAML,
+            "Fetch the improved robot",
+            "The robot file with the identified links and friction.",
+            "file as `tauscope diagnose --improved-robot`",
+        ),
+        JobDocument(
+            "next-trajectory",
+            TRAJECTORY,
+            "Fetch the motion to record next",
+            "The motion that best separates, or shows, what is open; a problem where none was planned.",
+            {"model": TrajectoryDocument, "description": "a trajectory that `tauscope run` plays"},
+            missing="no motion was planned: nothing is open; ask for one with options.next_trajectory",
+        ),
+    ),
+    export_words="Compensation code of the model with all findings (c, python).",
+)
+
+router = DIAGNOSES.router()

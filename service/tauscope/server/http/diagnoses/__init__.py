@@ -1,1 +1,0 @@
-"""Diagnoses: handed in, followed, their results, figures and models fetched."""

@@ -1,0 +1,110 @@
+"""Excitations: requests, answers and what is special about this resource."""
+
+from typing import Annotated, Any, Literal
+
+from fastapi import Query, Response
+from pydantic import Field
+
+from tauscope.server.http.robots.models import EXAMPLE_ROBOT
+from tauscope.server.http.services import ServicesDep
+from tauscope.server.http.tasks.answers import JobAnswer, require_document
+from tauscope.server.http.tasks.queued import QueuedTask
+from tauscope.server.http.tasks.router import JobDocument
+from tauscope.server.http.tasks.routes import ENDINGS, Identifier
+from tauscope.server.http.tasks.submission import RobotRequest
+from tauscope.server.models import AnswerModel
+from tauscope.server.problems import problem_responses
+from tauscope.server.queue.excitation import ExcitationWorkspace, read_designed_trajectory
+from tauscope.tasks.design_excitation import ExcitationDesignOptions
+
+
+class ExcitationRequest(RobotRequest):
+    """Which motion is wanted."""
+
+    options: ExcitationDesignOptions = Field(
+        default=ExcitationDesignOptions(), description="how the motion is designed"
+    )
+
+
+EXAMPLES: dict[str, tuple[str, Any]] = {
+    "default": ("The default motion", {"robot": EXAMPLE_ROBOT}),
+    "floor": (
+        "Shorter periods, above a floor",
+        {"robot": EXAMPLE_ROBOT, "options": {"duration_s": 8.0, "harmonics": 4, "periods": 6, "floor_m": -0.3}},
+    ),
+}
+
+
+class ExcitationLinks(AnswerModel):
+    """Where to go on from an excitation."""
+
+    self_: str = Field(alias="self", description="its state")
+    events: str = Field(description="what happens to it, as server-sent events")
+    result: str | None = Field(default=None, description="its document, once it succeeded")
+    trajectory: str | None = Field(default=None, description="its trajectory, once it succeeded")
+
+
+class ExcitationAnswer(JobAnswer):
+    """The state of an excitation."""
+
+    robot: str | None = Field(default=None, description="name of the robot")
+    options: ExcitationDesignOptions | None = Field(default=None, description="how the motion is designed")
+    links: ExcitationLinks = Field(description="where to go on")
+
+
+class ExcitationListAnswer(AnswerModel):
+    """Excitations that are kept."""
+
+    excitations: list[ExcitationAnswer] = Field(description="the newest first")
+
+
+TrajectoryFormat = Annotated[
+    Literal["json", "csv"],
+    Query(alias="format", description="json: exact coefficients; csv: samples that any controller can play"),
+]
+Rate = Annotated[float, Query(gt=0.0, le=10_000.0, description="samples a second of the CSV [Hz]")]
+
+EXCITATIONS = QueuedTask(
+    noun="an excitation",
+    plural="excitations",
+    kind=lambda services: services.excitations,
+    workspace=ExcitationWorkspace,
+    models=(ExcitationRequest, ExcitationAnswer, ExcitationListAnswer),
+    examples=EXAMPLES,
+    summary="Have a motion designed",
+    words="The robot is checked at once, the motion is designed by the job: follow `Location` until it has ended.",
+    submission_problems=("queue-full",),
+    work_problems=("excitation", "robot-file"),
+    documents=(
+        JobDocument(
+            "result",
+            "result.json",
+            "Fetch the design",
+            "Criterion, its history, and what is left to every limit; else the problem that the job ended in.",
+            {"content": {"application/json": {}}, "description": "the same document as `tauscope excite --json`"},
+        ),
+    ),
+    links=("trajectory",),
+)
+
+router = EXCITATIONS.router()
+
+
+@router.get(
+    "/{identifier}/trajectory",
+    summary="Fetch the trajectory",
+    response_class=Response,
+    responses={
+        200: {"content": {"application/json": {}, "text/csv": {}}, "description": "the file"},
+        **problem_responses("not-found", *ENDINGS, "excitation", "limit-exceeded", "worker-lost", "internal"),
+    },
+)
+def get_trajectory(
+    identifier: Identifier, services: ServicesDep, format_: TrajectoryFormat = "json", rate_hz: Rate = 500.0
+) -> Response:
+    """The motion for Tauscope itself (json) or for another controller (csv)."""
+    workspace = EXCITATIONS.finished(services, identifier)
+    content = read_designed_trajectory(workspace, None if format_ == "json" else rate_hz)
+    media_type = "application/json" if format_ == "json" else "text/csv"
+    disposition = {"Content-Disposition": f'attachment; filename="trajectory.{format_}"'}
+    return Response(require_document(content, identifier), headers=disposition, media_type=media_type)

@@ -1,1 +1,0 @@
-"""Excitations: motions designed for a robot, followed, fetched as documents and as trajectories."""

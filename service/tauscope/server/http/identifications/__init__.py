@@ -1,1 +1,0 @@
-"""Identifications: handed in, followed, their results and exports fetched."""

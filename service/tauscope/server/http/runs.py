@@ -1,0 +1,450 @@
+"""Runs: requests, answers and what is special about this resource."""
+
+import asyncio
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime
+from functools import partial
+from typing import Annotated, Any, Literal, Self
+
+from fastapi import Query, Request
+from fastapi.responses import FileResponse
+from pydantic import Field, JsonValue, model_validator
+from pydantic_core import PydanticCustomError
+from starlette.concurrency import run_in_threadpool
+
+from tauscope.errors import ExcitationError, NotFoundError
+from tauscope.robot import Robot
+from tauscope.runtime.options import RunOptions
+from tauscope.runtime.record import RunRecord
+from tauscope.runtime.states import RunState
+from tauscope.runtime.timing import RealTime, Timing
+from tauscope.server.control.leases import Permit
+from tauscope.server.control.motions import DesignedMotion, Motion, ready_motion, take_trajectory
+from tauscope.server.control.run import RunRequestRecord, RunWorkspace
+from tauscope.server.control.run_manager import run_recording_name
+from tauscope.server.http.backends import BackendRequest, chosen_backend
+from tauscope.server.http.documents import file_answer, to_json_text
+from tauscope.server.http.excitations import EXCITATIONS
+from tauscope.server.http.form import PartRule
+from tauscope.server.http.leases.router import permit_of
+from tauscope.server.http.openapi import binary_part
+from tauscope.server.http.robots.files import read_received_robot
+from tauscope.server.http.robots.models import EXAMPLE_ROBOT
+from tauscope.server.http.services import Services, ServicesDep
+from tauscope.server.http.tasks.answers import shown_problem
+from tauscope.server.http.tasks.router import Resource, add_stopping, make_router
+from tauscope.server.http.tasks.routes import Identifier
+from tauscope.server.http.tasks.submission import Received, RobotRequest, keep_robot, receive_request
+from tauscope.server.models import AnswerModel
+from tauscope.server.problems import Problem, ProblemError, make_problem, problem_responses
+from tauscope.server.queue.excitation import ExcitationOrder, ExcitationWorkspace, check_trajectory
+from tauscope.server.queue.task_job import submit_job
+from tauscope.server.store.event_log import EventLog
+from tauscope.tasks.design_excitation import ExcitationDesignOptions
+from tauscope.tasks.run import BackendChoice
+
+RecordingFormat = Literal["mcap", "csv", "parquet"]
+
+
+class RunRequest(RunOptions, RobotRequest, strict=True):
+    """Which run is wanted."""
+
+    backend: BackendRequest = Field(default=BackendRequest(), description="which arm is moved")
+    excitation: str | None = Field(
+        default=None,
+        description="identifier of an excitation that succeeded; its robot is taken where none is sent; null, and no"
+        " trajectory: the default motion is designed first",
+    )
+    trajectory: dict[str, Any] | None = Field(
+        default=None, description="a trajectory document; in a form, the part `trajectory` may hold the file instead"
+    )
+
+    seed: int = Field(default=0, ge=0, lt=2**63, description="of the default motion")
+
+    @model_validator(mode="after")
+    def _check_motion(self) -> Self:
+        """One motion at most."""
+        if self.excitation is not None and self.trajectory is not None:
+            raise PydanticCustomError("motions", "excitation and trajectory are both given; give one motion")
+        return self
+
+
+EXAMPLES: dict[str, tuple[str, Any]] = {
+    "default": ("The default motion on the simulated arm", {"robot": EXAMPLE_ROBOT, "backend": {"name": "sim"}}),
+    "options": (
+        "The host closes the loop, 250 times a second, against the clock",
+        {
+            "robot": EXAMPLE_ROBOT,
+            "backend": {"name": "sim", "time": "real"},
+            "mode": "torque",
+            "rate_hz": 250.0,
+            "stop_policy": "damp",
+        },
+    ),
+}
+
+
+class RunLinks(AnswerModel):
+    """Where to go on from a run."""
+
+    self_: str = Field(alias="self", description="its state")
+    events: str = Field(description="what happens to it, as server-sent events")
+    stop: str = Field(description="where a POST stops it")
+    excitation: str | None = Field(default=None, description="the excitation that it plays")
+    recordings: dict[RecordingFormat, str] = Field(default={}, description="its recording by format, once there is one")
+
+
+class RunRecordingAnswer(AnswerModel):
+    """What a run left behind."""
+
+    name: str | None = Field(description="by which identifications refer to it; null where it is not on the server")
+    samples: int = Field(description="samples of the motion, without the ramp")
+    partial: bool = Field(description="whether the motion was not played to its end, or samples were lost")
+    lost_rows: int = Field(description="cycles that could not be written in time; -1 where nobody knows")
+    remarks: tuple[str, ...] = Field(description="what is missing, and why")
+
+
+class RunAnswer(AnswerModel):
+    """The state of a run."""
+
+    id: str = Field(description="identifier", examples=["20261103T101502Z-1f2e3d4c"])
+    state: RunState | Literal["damaged"] = Field(
+        description="where it stands; interrupted: the service ended first; damaged: its files are missing or damaged"
+    )
+    step: str | None = Field(default=None, description="what it waits for, before it moves")
+    percent: float | None = Field(default=None, description="how much of ramp and motion was played")
+    figures: dict[str, JsonValue] = Field(default={}, description="measured last, while it goes on")
+    created: datetime | None = Field(default=None, description="when it was handed in, UTC")
+    ended: datetime | None = Field(default=None, description="when it ended, UTC")
+    robot: str | None = Field(default=None, description="name of the robot")
+    backend: BackendChoice | None = Field(default=None, description="which arm is moved")
+    options: RunOptions | None = Field(default=None, description="how it is run")
+    campaign: str | None = Field(default=None, description="identifier of the campaign that it belongs to")
+    stop_policy: str | None = Field(default=None, description="how the arm is stopped")
+    ramp_s: float | None = Field(default=None, description="time from the first cycle to the motion's start")
+    motion_s: float | None = Field(default=None, description="length of the motion")
+    timing: Timing | None = Field(default=None, description="rate, jitter, missed and stale samples")
+    real_time: RealTime | None = Field(default=None, description="what the control loop was given of what it asked for")
+    worst_following: tuple[float, ...] = Field(
+        default=(), description="largest distance of arm and target, one number a joint"
+    )
+    stop: str | None = Field(default=None, description="who asked for the stop; null where nobody did")
+    problem: Problem | None = Field(default=None, description="why it did not finish")
+    recording: RunRecordingAnswer | None = Field(default=None, description="what it left behind, once it has ended")
+    links: RunLinks = Field(description="where to go on")
+
+
+class RunListAnswer(AnswerModel):
+    """Runs that are kept."""
+
+    runs: list[RunAnswer] = Field(description="the newest first")
+
+
+class StopAnswer(AnswerModel):
+    """What became of the wish to stop a run."""
+
+    id: str = Field(description="identifier of the run")
+    state: RunState = Field(description="where the run stood; it stops unless that is an end state")
+
+
+FORMATS: tuple[RecordingFormat, ...] = ("mcap", "csv", "parquet")
+
+
+def find_run(services: Services, identifier: str) -> RunWorkspace:
+    """The folder of a run.
+
+    Raises
+    ------
+    NotFoundError
+        if there is none
+    """
+    return RunWorkspace(services.runs.items.folder(identifier))
+
+
+@dataclass(frozen=True)
+class FollowedRun:
+    """A run as those see it who follow its events: it ends when the desk has put everything in its place."""
+
+    events: EventLog
+    has_ended: Callable[[], bool]
+
+
+def followed_run(services: Services, identifier: str) -> FollowedRun:
+    """A run whose events are followed.
+
+    Raises
+    ------
+    NotFoundError
+        if there is none
+    """
+    workspace = find_run(services, identifier)
+
+    def has_ended() -> bool:
+        return services.runs.live(identifier) is None and workspace.has_ended()
+
+    return FollowedRun(workspace.events, has_ended)
+
+
+def describe(services: Services, identifier: str, root: str) -> RunAnswer:
+    """The state of a run; one whose files are damaged is said to be so.
+
+    Raises
+    ------
+    NotFoundError
+        if there is none
+    """
+    workspace, live = find_run(services, identifier), services.runs.live(identifier)
+    here = f"{root}/runs/{identifier}"
+    record, request = workspace.read_run(), workspace.read_order()
+    if record is None or request is None:
+        detail = f"files of {identifier} are missing or damaged; remove it and hand it in again"
+        problem = make_problem("damaged", detail, here)
+        return RunAnswer(id=identifier, state="damaged", problem=problem, links=_links(here, None, None, workspace))
+    goes_on = live is not None and not record.state.is_end
+    return RunAnswer(
+        id=identifier,
+        state=record.state,
+        step=workspace.read_step() if goes_on else None,
+        percent=live.percent if live is not None and goes_on else 100.0 * record.played,
+        figures=dict(live.figures) if live is not None and goes_on else {},
+        created=record.history[0].at,
+        ended=record.history[-1].at if record.state.is_end else None,
+        robot=record.robot,
+        backend=request.backend,
+        options=request.options,
+        campaign=request.campaign,
+        stop_policy=record.stop_policy,
+        ramp_s=record.ramp_s,
+        motion_s=record.motion_s,
+        timing=record.timing,
+        real_time=record.real_time,
+        worst_following=record.worst_following,
+        stop=record.stop,
+        problem=shown_problem(workspace.problem(), here),
+        recording=_recording(services, identifier, record),
+        links=_links(here, request.excitation and f"{root}/excitations/{request.excitation}", record, workspace),
+    )
+
+
+def require_recording(services: Services, identifier: str, format_: RecordingFormat) -> RunWorkspace:
+    """The folder of a run that left a recording of a format.
+
+    Raises
+    ------
+    NotFoundError
+        if there is no such run, or no such file
+    ProblemError
+        if the run goes on
+    """
+    workspace = find_run(services, identifier)
+    if not workspace.has_ended() or services.runs.live(identifier) is not None:
+        text = f"{identifier} goes on; ask for its recording when its state is an end state"
+        raise ProblemError("not-finished", text, headers={"Retry-After": "2"})
+    if not workspace.recording(format_).is_file():
+        have = [name for name in FORMATS if workspace.recording(name).is_file()]
+        hint = f"there is {', '.join(have)}" if have else "it ended before the arm moved"
+        raise NotFoundError(f"run {identifier} left no {format_}: {hint}")
+    return workspace
+
+
+def _recording(services: Services, identifier: str, record: RunRecord) -> RunRecordingAnswer | None:
+    """What a run left behind."""
+    left, name = record.recording, run_recording_name(identifier)
+    if left is None:
+        return None
+    is_kept = services.recordings.holds(name)
+    return RunRecordingAnswer(
+        name=name if is_kept else None,
+        samples=left.samples,
+        partial=left.partial,
+        lost_rows=left.lost_rows,
+        remarks=left.remarks,
+    )
+
+
+def _links(here: str, excitation: str | None, record: RunRecord | None, workspace: RunWorkspace) -> RunLinks:
+    """Where to go on: to the recording, once there is one."""
+    has_ended = record is not None and record.state.is_end
+    recordings: dict[RecordingFormat, str] = {
+        name: f"{here}/recording?format={name}" for name in FORMATS if has_ended and workspace.recording(name).is_file()
+    }
+    return RunLinks(
+        self=here, events=f"{here}/events", stop=f"{here}/stop", excitation=excitation, recordings=recordings
+    )
+
+
+LARGEST_TRAJECTORY = 64 * 2**20
+"""Bytes of the largest trajectory file that is accepted."""
+
+
+async def submit_run(request: Request, services: Services) -> str:
+    """Take a request for a run.
+
+    Raises
+    ------
+    ProblemError
+        if the request is not as documented
+    TauscopeError
+        if the robot or the motion is not valid, somebody else has the arm, or the lease does not let it move
+    """
+    items = services.runs.items
+    staged = await run_in_threadpool(items.stage)
+    try:
+        workspace = RunWorkspace(staged)
+        await run_in_threadpool(workspace.prepare)
+        most = min(LARGEST_TRAJECTORY, services.settings.max_upload_bytes)
+        parts = {"trajectory": PartRule(most, workspace.trajectories, default_name="trajectory.json")}
+        received = await receive_request(request, RunRequest, services.settings, workspace.robot, parts)
+        wanted = await run_in_threadpool(_prepare, received, services, workspace)
+        permit = permit_of(request, services, wanted.backend.device(wanted.robot.name))
+        if wanted.uploaded:
+            checked = services.checks.submit(
+                check_trajectory, workspace.trajectories, workspace.robot / wanted.robot_file
+            )
+            await asyncio.wrap_future(checked)
+        return await run_in_threadpool(_hand_in, wanted, services, workspace, permit)
+    finally:
+        await run_in_threadpool(items.discard, staged)
+
+
+@dataclass(frozen=True, eq=False)
+class _Wanted:
+    """A request whose files are in their places."""
+
+    document: RunRequest
+    robot_file: str
+    robot: Robot
+    backend: BackendChoice
+    uploaded: bool
+
+
+def _prepare(received: Received[RunRequest], services: Services, workspace: RunWorkspace) -> _Wanted:
+    """Put robot and trajectory into their places, and check the robot."""
+    document, has_robot = received.document, received.form.file("robot") or received.document.robot
+    if document.excitation is not None and not has_robot:
+        excitation = EXCITATIONS.finished(services, document.excitation)
+        order = excitation.read_order()
+        shutil.copytree(excitation.robot, workspace.robot, dirs_exist_ok=True)
+        robot_file = "robot.yaml" if order is None else order.robot_file
+    else:
+        robot_file = keep_robot(received, workspace.robot)
+    robot = read_received_robot(workspace.robot, robot_file)
+    uploaded = received.form.file("trajectory") is not None
+    if document.trajectory is not None:
+        if uploaded:
+            raise ProblemError("invalid-request", "the trajectory came twice, as a part and in part request; send one")
+        text = to_json_text(document.trajectory)
+        if text is None:
+            raise ExcitationError("trajectory: holds NaN, infinity or text that is not Unicode; write plain numbers")
+        (workspace.trajectories / "trajectory.json").write_text(text, encoding="utf-8")
+        uploaded = True
+    if uploaded and document.excitation is not None:
+        raise ProblemError("invalid-request", "excitation and trajectory were both given; give one motion")
+    backend = chosen_backend(services.settings, document.backend, robot)
+    return _Wanted(document, robot_file, robot, backend, uploaded)
+
+
+def _hand_in(wanted: _Wanted, services: Services, workspace: RunWorkspace, permit: Permit) -> str:
+    """Settle what is moved, and how, and begin."""
+    document, backend = wanted.document, wanted.backend
+    device = backend.device(wanted.robot.name)
+    services.runs.claims.require_free(device)
+    excitation, motion = _motion(wanted, services, workspace)
+    workspace.write_request(
+        RunRequestRecord(
+            robot_file=wanted.robot_file,
+            robot_name=wanted.robot.name,
+            backend=backend,
+            device=device,
+            excitation=excitation,
+            options=RunOptions.model_validate(document.model_dump(include=set(RunOptions.model_fields))),
+        )
+    )
+    try:
+        return services.runs.submit(workspace.folder, motion, permit=permit)
+    except BaseException:
+        if excitation is not None and document.excitation is None:
+            services.jobs.cancel(services.excitations, excitation)
+        raise
+
+
+def _motion(wanted: _Wanted, services: Services, workspace: RunWorkspace) -> tuple[str | None, Motion]:
+    """The excitation that is played, if it is one, and how the run gets its trajectory."""
+    identifier = wanted.document.excitation
+    if wanted.uploaded:
+        return None, ready_motion
+    if identifier is not None:
+        take_trajectory(EXCITATIONS.finished(services, identifier), workspace)
+        return identifier, ready_motion
+    options = ExcitationDesignOptions(seed=wanted.document.seed)
+    order = ExcitationOrder(robot_file=wanted.robot_file, robot_name=wanted.robot.name, options=options)
+    put_robot = partial(shutil.copytree, workspace.robot, dirs_exist_ok=True)
+    identifier = submit_job(services.jobs, services.excitations, ExcitationWorkspace, order, put_robot)
+    return identifier, DesignedMotion(services.jobs, services.excitations, identifier)
+
+
+Format = Annotated[RecordingFormat, Query(alias="format", description="mcap: the journal, ramp included; else columns")]
+
+RUNS = Resource(
+    noun="a run",
+    plural="runs",
+    models=(RunRequest, RunAnswer, RunListAnswer),
+    examples=EXAMPLES,
+    items=lambda services: services.runs.items,
+    find=find_run,
+    followed=followed_run,
+    submit=submit_run,
+    describe=describe,
+    summary="Begin a run",
+    words="The arm moves as soon as there is a motion: follow `Location` until it has ended, or stop it at any time."
+    "\n\n"
+    "One run at a time has an arm. Where somebody has the arm's lease, only they move it; it stops when the lease ends."
+    "\nEvery command passes a guard that keeps the robot file's limits.",
+    problems=("not-found", "not-finished", "excitation", "queue-full"),
+    moves_arm=True,
+    parts={"trajectory": binary_part("the motion: a trajectory document (.json), or samples (.csv)")},
+)
+
+router = make_router(RUNS)
+
+
+def _stop(services: Services, identifier: str) -> StopAnswer:
+    """Stop a run; neither a lock nor a disk is needed for one that goes on."""
+    live = services.runs.stop(identifier)
+    if live is not None:
+        return StopAnswer(id=identifier, state=live.state)
+    record = find_run(services, identifier).read_run()
+    if record is None:
+        raise ProblemError("damaged", f"files of {identifier} are missing or damaged; it does not go on")
+    return StopAnswer(id=identifier, state=record.state)
+
+
+add_stopping(
+    router,
+    RUNS,
+    StopAnswer,
+    _stop,
+    lambda services, identifier: services.runs.remove(identifier),
+    (
+        "Stops the arm by the run's stop policy; legal in every state, any number of times; needs no body.\n\n"
+        "It waits for nothing: neither for other requests nor for jobs. The recording up to the stop is kept.",
+        "One that has ended is removed with all its files; its recording stays among the recordings.",
+    ),
+)
+
+
+@router.get(
+    "/{identifier}/recording",
+    summary="Fetch the recording of a run",
+    response_class=FileResponse,
+    responses={
+        200: {"content": {"application/octet-stream": {}, "text/csv": {}}, "description": "the file"},
+        **problem_responses("not-found", "not-finished"),
+    },
+)
+def get_recording(identifier: Identifier, services: ServicesDep, format_: Format = "csv") -> FileResponse:
+    """What was measured; also of a run that was stopped or interrupted, as far as it came."""
+    workspace = require_recording(services, identifier, format_)
+    return file_answer(workspace.recording(format_), f"run-{identifier}.{format_}")

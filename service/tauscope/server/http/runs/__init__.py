@@ -1,1 +1,0 @@
-"""Runs: begun, followed, stopped at any time, their recordings fetched."""

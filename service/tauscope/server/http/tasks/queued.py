@@ -1,0 +1,230 @@
+"""Resources whose tasks the queue performs: what is special about each is its models, documents and exports."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from fastapi import APIRouter, Request
+from pydantic import BaseModel
+from starlette.concurrency import run_in_threadpool
+
+from tauscope.errors import LimitExceededError
+from tauscope.server.http.form import PartRule
+from tauscope.server.http.openapi import Examples
+from tauscope.server.http.robots.files import read_received_robot
+from tauscope.server.http.services import Services
+from tauscope.server.http.tasks.answers import damaged_fields, job_fields, require_success
+from tauscope.server.http.tasks.router import (
+    JobDocument,
+    Resource,
+    add_cancelling,
+    add_document_route,
+    add_export_route,
+    make_router,
+)
+from tauscope.server.http.tasks.submission import Received, RobotRequest, keep_robot, receive_request
+from tauscope.server.problems import ProblemError
+from tauscope.server.queue.queue import JobKind
+from tauscope.server.queue.record import JobState
+from tauscope.server.queue.task_job import OrderedRecording, TaskWorkspace
+from tauscope.server.store.files import KeptFile
+from tauscope.server.store.recordings import RecordingStore
+
+_SHOWN = ("recordings", "held_out", "simulated", "options")
+"""Fields of an order that its answer shows, where it has them."""
+
+
+def no_further(_received: Received[Any], _services: Services, _workspace: Any) -> dict[str, Any]:
+    """No fields of an order but those that all have."""
+    return {}
+
+
+@dataclass(frozen=True, eq=False)
+class QueuedTask:
+    """What is special about such a resource.
+
+    further : callable
+        checks a request whose recordings are listed, and returns further fields of its order
+    further_parts : mapping of str to (str, int)
+        files of a form that are no recordings: their folder, and the largest size [bytes]
+    links : sequence of str
+        further routes that it links to, once it succeeded
+    """
+
+    noun: str
+    plural: str
+    kind: Callable[[Services], JobKind]
+    workspace: type[TaskWorkspace[Any]]
+    models: tuple[type[RobotRequest], type[BaseModel], type[BaseModel]]
+    examples: Examples
+    summary: str
+    words: str
+    documents: Sequence[JobDocument]
+    submission_problems: Sequence[str] = ("recording", "not-found", "queue-full")
+    work_problems: Sequence[str] = ("robot-file", "recording", "recording-mismatch", "identification")
+    parts: Mapping[str, Any] = field(default_factory=dict)
+    export_words: str = ""
+    links: Sequence[str] = ()
+    further: Callable[[Received[Any], Services, Any], dict[str, Any]] = no_further
+    further_parts: Mapping[str, tuple[str, int]] = field(default_factory=dict)
+
+    def find(self, services: Services, identifier: str) -> TaskWorkspace[Any]:
+        """The folder of a job.
+
+        Raises
+        ------
+        NotFoundError
+            if there is none
+        """
+        return self.workspace(self.kind(services).items.folder(identifier))
+
+    def finished(self, services: Services, identifier: str) -> TaskWorkspace[Any]:
+        """The folder of a job that succeeded.
+
+        Raises
+        ------
+        NotFoundError
+            if there is none
+        ProblemError
+            if it has not succeeded: the problem that it ended in, or that it has not ended
+        """
+        workspace = self.find(services, identifier)
+        require_success(workspace)
+        return workspace
+
+    def router(self) -> APIRouter:
+        """All its routes."""
+        resource = Resource(
+            noun=self.noun,
+            plural=self.plural,
+            models=self.models,
+            examples=self.examples,
+            items=lambda services: self.kind(services).items,
+            find=self.find,
+            followed=self.find,
+            submit=self.submit,
+            describe=self.describe,
+            summary=self.summary,
+            words=self.words,
+            problems=self.submission_problems,
+            parts=self.parts,
+        )
+        router = make_router(resource)
+        add_cancelling(router, resource, self.kind)
+        for document in self.documents:
+            add_document_route(router, self.finished, document, self.work_problems)
+        if self.workspace.formats:
+            add_export_route(router, self.finished, self.workspace.formats, self.export_words)
+        return router
+
+    def describe(self, services: Services, identifier: str, root: str) -> Any:
+        """The state of a job; one whose files are damaged is said to be so.
+
+        Raises
+        ------
+        NotFoundError
+            if there is none
+        """
+        answer, workspace = self.models[1], self.find(services, identifier)
+        here, order = f"{root}/{self.plural}/{identifier}", workspace.read_order()
+        links: dict[str, Any] = {"self": here, "events": f"{here}/events"}
+        if order is None:
+            return answer(**damaged_fields(identifier, here), links=links)
+        fields, refused = job_fields(workspace, here), workspace.refused_exports()
+        if fields["state"] is JobState.SUCCEEDED:
+            there = [e for e in self.documents if e.missing is None or (workspace.folder / e.output).is_file()]
+            names = [*(document.name for document in there), *self.links]
+            links |= {name.replace("-", "_"): f"{here}/{name}" for name in names}
+            made = [k for k, file in workspace.formats.items() if (workspace.exports / file.name).is_file()]
+            if made:
+                links["exports"] = {kind.value: f"{here}/exports/{kind}" for kind in made if kind not in refused}
+        fields |= {name: getattr(order, name) for name in _SHOWN if name in answer.model_fields}
+        fields |= {"refused_exports": refused} if workspace.formats else {}
+        return answer(**fields, robot=order.robot_name, links=links)
+
+    async def submit(self, request: Request, services: Services) -> str:
+        """Take a request: what was sent is kept in a job's folder, and checked as far as that is quick.
+
+        Raises
+        ------
+        ProblemError
+            if the request is not as documented
+        TauscopeError
+            if the robot is not valid, a recording is not there, or something is too large
+        """
+        items, settings = self.kind(services).items, services.settings
+        staged = await run_in_threadpool(items.stage)
+        try:
+            workspace = self.workspace(staged)
+            await run_in_threadpool(workspace.prepare)
+            most, largest = settings.max_recordings, settings.max_upload_bytes
+            rules = {role: PartRule(largest, workspace.uploads(role), most) for role in workspace.roles}
+            for part, (folder, limit) in self.further_parts.items():
+                rules[part] = PartRule(limit, workspace.uploads(folder), default_name=f"{part}.json")
+            received = await receive_request(request, self.models[0], settings, workspace.robot, rules)
+            return await run_in_threadpool(self._hand_in, received, services, workspace)
+        finally:
+            await run_in_threadpool(items.discard, staged)
+
+    def _hand_in(self, received: Received[Any], services: Services, workspace: TaskWorkspace[Any]) -> str:
+        """Check what was received, and queue it."""
+        robot_file = keep_robot(received, workspace.robot)
+        robot = read_received_robot(workspace.robot, robot_file)
+        recordings = {role: ordered_recordings(role, received, services.recordings) for role in workspace.roles}
+        if recordings:
+            check_recordings(recordings, services.settings.max_recordings)
+        given: dict[str, Any] = {"robot_file": robot_file, "robot_name": robot.name, **recordings}
+        given |= {"options": received.document.options, **self.further(received, services, workspace)}
+        workspace.write_order(workspace.order_type(**given))
+        return services.jobs.submit(self.kind(services), workspace.folder)
+
+
+def ordered_recordings(role: str, received: Received[Any], store: RecordingStore) -> tuple[OrderedRecording, ...]:
+    """The recordings of a role: each a file of the form, or else a recording on the server.
+
+    Raises
+    ------
+    ProblemError
+        if a file was sent but is not listed
+    NotFoundError
+        if a recording is neither sent nor on the server
+    """
+    files: dict[str, KeptFile] = {file.name: file for file in received.form.files.get(role, [])}
+    listed: Sequence[str] | None = getattr(received.document, role)
+    names = list(files) if listed is None else listed
+    unlisted = [name for name in files if name not in names]
+    if unlisted:
+        text = f"{role}: the file {unlisted[0]} was sent but is not listed; list it, or leave the list out"
+        raise ProblemError("invalid-request", text)
+    ordered = []
+    for name in names:
+        file = files.get(name)
+        if file is not None:
+            ordered.append(OrderedRecording(name=name, origin="uploaded", sha256=file.sha256))
+        else:
+            ordered.append(OrderedRecording(name=name, origin="server", sha256=store.digest(name)))
+    return tuple(ordered)
+
+
+def check_recordings(recordings: Mapping[str, Sequence[OrderedRecording]], most: int) -> None:
+    """There is something to work on, not too much, and no recording is its own judge.
+
+    Raises
+    ------
+    ProblemError
+        naming the recording
+    LimitExceededError
+        for too many
+    """
+    if not recordings["recordings"]:
+        text = "no recording was sent or named; send part recordings, or name recordings on the server"
+        raise ProblemError("invalid-request", text)
+    entries = [entry for listed in recordings.values() for entry in listed]
+    if len(entries) > most:
+        raise LimitExceededError(f"{len(entries)} recordings are more than the {most} accepted here; send fewer")
+    seen: dict[str, str] = {}
+    for entry in entries:
+        if entry.sha256 in seen:
+            hint = "a recording counts once, and never judges itself"
+            raise ProblemError("invalid-request", f"{seen[entry.sha256]} and {entry.name} hold the same bytes; {hint}")
+        seen[entry.sha256] = entry.name

@@ -1,0 +1,320 @@
+"""One router for every resource that performs a task: handed in, listed, followed, its outputs fetched, removed."""
+
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path as FilePath
+from typing import Annotated, Any, Protocol
+
+from fastapi import APIRouter, Depends, Path, Request, Response
+from pydantic import BaseModel, Field
+from starlette.concurrency import run_in_threadpool
+
+from tauscope.errors import ExportError, NotFoundError
+from tauscope.export.formats import ExportFile, ExportFormat
+from tauscope.robot.messages import nearest, one_line, shown
+from tauscope.robot.robot_file import LARGEST_ROBOT_FILE
+from tauscope.robot.urdf_xml import LARGEST_URDF
+from tauscope.server.http.leases.router import LeaseToken
+from tauscope.server.http.openapi import Examples
+from tauscope.server.http.robots.files import check_received_robot
+from tauscope.server.http.robots.models import RobotReportAnswer
+from tauscope.server.http.services import Services, ServicesDep
+from tauscope.server.http.tasks.answers import require_document
+from tauscope.server.http.tasks.events import Told, add_events_route
+from tauscope.server.http.tasks.routes import ENDINGS, MOTION, SUBMISSION, Identifier, Limit, collection
+from tauscope.server.http.tasks.submission import RobotRequest, request_body
+from tauscope.server.models import AnswerModel
+from tauscope.server.problems import ProblemError, problem_responses
+from tauscope.server.queue.queue import JobKind
+from tauscope.server.store.items import ItemStore
+
+HTML = "text/html"
+
+PAGE_HEADERS = {"Content-Security-Policy": "default-src 'none'; style-src 'unsafe-inline'; sandbox"}
+"""A report brings its style with it, runs no script, and may do nothing in the name of whoever reads it."""
+
+
+class RobotFileAnswer(AnswerModel):
+    """A file of a robot."""
+
+    name: str = Field(description="its bare name")
+    content: str = Field(description="its text")
+
+
+class JobRobotAnswer(AnswerModel):
+    """The robot of a job."""
+
+    report: RobotReportAnswer = Field(description="the robot at a glance")
+    robot_file: str = Field(description="which of the files is the robot file")
+    files: list[RobotFileAnswer] = Field(description="robot file and URDF as they were sent")
+
+
+@dataclass(frozen=True)
+class JobDocument:
+    """An output of a task that has a route of its own.
+
+    output : str
+        its name among the outputs
+    missing : str or None
+        what is said where the task made none; None where it always makes one
+    """
+
+    name: str
+    output: str
+    summary: str
+    description: str
+    answer: dict[str, Any]
+    media_type: str = "application/json"
+    missing: str | None = None
+
+
+def text_document(name: str, output: str, media_type: str, summary: str, words: str, same: str) -> JobDocument:
+    """A document that is no JSON; `same` is the option that writes the same file."""
+    content = {media_type: {"schema": {"type": "string"}}}
+    answer = {"content": content, "description": f"the same {same}"}
+    missing = None if media_type == HTML else f"no {name} is kept here; hand it in again"
+    return JobDocument(name, output, summary, words, answer, media_type, missing)
+
+
+class Folder(Protocol):
+    """What every resource keeps in a folder."""
+
+    robot: FilePath
+
+    def read_order(self) -> Any:
+        """What was asked for; None where that is damaged."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Resource:
+    """What is special about a resource.
+
+    submit : callable
+        takes a request; returns the identifier
+    describe : callable
+        the answer, from services, identifier and the path of the interface
+    followed : callable
+        what has events
+    summary, words : str
+        of handing in
+    parts : mapping
+        files of a form beside the robot's
+    """
+
+    noun: str
+    plural: str
+    models: tuple[type[RobotRequest], type[BaseModel], type[BaseModel]]
+    examples: Examples
+    items: Callable[[Services], ItemStore]
+    find: Callable[[Services, str], Folder]
+    followed: Callable[[Services, str], Told]
+    submit: Callable[[Request, Services], Awaitable[str]]
+    describe: Callable[[Services, str, str], BaseModel]
+    summary: str
+    words: str
+    problems: Sequence[str] = ()
+    moves_arm: bool = False
+    parts: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def singular(self) -> str:
+        """The noun without its article."""
+        return self.noun.rpartition(" ")[2]
+
+
+def make_router(resource: Resource) -> APIRouter:
+    """The routes that every resource has; those that end something are added by its kind."""
+    plural, noun, singular = resource.plural, resource.noun, resource.singular
+    router = APIRouter(prefix=f"/{plural}", tags=[plural], responses=problem_responses("invalid-request"))
+    request_model, answer_model, list_model = resource.models
+
+    @router.post(
+        "",
+        status_code=202,
+        summary=resource.summary,
+        description=resource.words,
+        response_model=answer_model,
+        responses=problem_responses(*SUBMISSION, *(MOTION if resource.moves_arm else ()), *resource.problems),
+        openapi_extra=request_body(request_model, resource.examples, resource.parts),
+        dependencies=[Depends(_lease_header)] if resource.moves_arm else [],
+    )
+    async def hand_in(request: Request, response: Response, services: ServicesDep) -> Any:
+        identifier = await resource.submit(request, services)
+        answer: Any = await run_in_threadpool(resource.describe, services, identifier, collection(request, 1))
+        response.headers["Location"] = answer.links.self_
+        return answer
+
+    @router.get("", name=f"list_{plural}", summary=f"List {plural}", response_model=list_model)
+    def list_items(request: Request, services: ServicesDep, limit: Limit = 100) -> BaseModel:
+        """The newest first."""
+        root, identifiers = collection(request, 1), resource.items(services).identifiers()[:limit]
+        return list_model(**{plural: [resource.describe(services, each, root) for each in identifiers]})
+
+    @router.get(
+        "/{identifier}",
+        name=f"get_{singular}",
+        summary=f"Follow {noun}",
+        response_model=answer_model,
+        responses=problem_responses("not-found"),
+    )
+    def get_item(request: Request, identifier: Identifier, services: ServicesDep) -> BaseModel:
+        """Its state, and where to go on from there."""
+        return resource.describe(services, identifier, collection(request, 2))
+
+    @router.get(
+        "/{identifier}/robot",
+        name=f"get_robot_of_{singular}",
+        summary=f"Fetch the robot of {noun}",
+        responses=problem_responses("not-found", "damaged", "robot-file"),
+    )
+    def get_robot(identifier: Identifier, services: ServicesDep) -> JobRobotAnswer:
+        """Its joints, limits and frames, and the very files that were sent: they can be handed in again."""
+        workspace = resource.find(services, identifier)
+        folder, order = workspace.robot, workspace.read_order()
+        if order is None:
+            raise ProblemError("damaged", f"files of {identifier} are missing or damaged; it has no robot any more")
+        report = RobotReportAnswer.of(check_received_robot(folder, order.robot_file))
+        files = [path for path in sorted(folder.iterdir()) if path.is_file() and not path.is_symlink()]
+        return JobRobotAnswer(report=report, robot_file=order.robot_file, files=[_read(path) for path in files])
+
+    add_events_route(router, noun, resource.followed)
+    return router
+
+
+def add_cancelling(router: APIRouter, resource: Resource, kind: Callable[[Services], JobKind]) -> None:
+    """Give a resource of queued jobs the route ``DELETE /{identifier}``."""
+
+    @router.delete(
+        "/{identifier}",
+        summary=f"Cancel or remove {resource.noun}",
+        response_model=resource.models[1],
+        responses={204: {"description": "it had ended, and was removed"}, **problem_responses("not-found")},
+    )
+    def cancel_or_remove(request: Request, identifier: Identifier, services: ServicesDep) -> BaseModel | Response:
+        """One that waits or runs is cancelled; one that has ended is removed with all its files."""
+        if services.jobs.cancel_or_remove(kind(services), identifier):
+            return Response(status_code=204)
+        return resource.describe(services, identifier, collection(request, 2))
+
+
+def add_stopping(
+    router: APIRouter,
+    resource: Resource,
+    answer: type[BaseModel],
+    stop: Callable[[Services, str], BaseModel],
+    remove: Callable[[Services, str], bool],
+    words: tuple[str, str],
+) -> None:
+    """Give a resource that moves an arm the routes ``POST /{identifier}/stop`` and ``DELETE /{identifier}``.
+
+    Parameters
+    ----------
+    remove : callable
+        False where it goes on
+    words : (str, str)
+        what is said of either route
+    """
+
+    @router.post(
+        "/{identifier}/stop",
+        name=f"stop_{resource.singular}",
+        status_code=202,
+        summary=f"Stop {resource.noun}",
+        description=words[0],
+        response_model=answer,
+        responses={**problem_responses("not-found"), 202: {"description": "it stops, or had ended already"}},
+        openapi_extra={"requestBody": {"required": False, "content": {}}},
+    )
+    async def stop_item(identifier: Identifier, services: ServicesDep) -> BaseModel:
+        # Neither a thread of the pool nor a lock is needed: whatever is stuck, this is not.
+        return stop(services, identifier)
+
+    @router.delete(
+        "/{identifier}",
+        name=f"remove_{resource.singular}",
+        status_code=204,
+        summary=f"Remove {resource.noun}",
+        description=words[1],
+        responses=problem_responses("not-found", "not-finished"),
+    )
+    def remove_item(identifier: Identifier, services: ServicesDep) -> None:
+        if not remove(services, identifier):
+            raise ProblemError("not-finished", f"{identifier} goes on; stop it, and remove it when it has ended")
+
+
+def add_document_route(
+    router: APIRouter, finished: Callable[[Services, str], Any], document: JobDocument, problems: Sequence[str]
+) -> None:
+    """Give a resource the route of a document."""
+
+    @router.get(
+        f"/{{identifier}}/{document.name}",
+        name=f"get_{document.name.replace('-', '_')}",
+        summary=document.summary,
+        description=document.description,
+        response_class=Response,
+        responses={
+            200: document.answer,
+            **problem_responses("not-found", *ENDINGS, *problems, "worker-lost", "internal"),
+        },
+    )
+    def get_document(identifier: Identifier, services: ServicesDep) -> Response:
+        content = finished(services, identifier).read_output(document.output)
+        if content is None and document.missing is not None:
+            raise NotFoundError(document.missing)
+        headers = PAGE_HEADERS if document.media_type == HTML else None
+        return Response(require_document(content, identifier), headers=headers, media_type=document.media_type)
+
+
+def add_export_route(
+    router: APIRouter,
+    finished: Callable[[Services, str], Any],
+    formats: Mapping[ExportFormat, ExportFile],
+    words: str,
+) -> None:
+    """Give a resource the route ``/{identifier}/exports/{format}``."""
+    content: dict[str, Any] = {
+        media_type: {"schema": {"type": "string"}} for media_type in sorted({f.media_type for f in formats.values()})
+    }
+    schema = {"enum": [kind.value for kind in formats]}
+
+    @router.get(
+        "/{identifier}/exports/{format}",
+        summary="Fetch an export",
+        description=words,
+        response_class=Response,
+        responses={
+            200: {"content": content, "description": "the file"},
+            **problem_responses(
+                "not-found", *ENDINGS, "export", "recording", "identification", "worker-lost", "internal"
+            ),
+        },
+    )
+    def get_export(
+        identifier: Identifier,
+        format_: Annotated[
+            str, Path(alias="format", description="what to write", json_schema_extra=schema, examples=["c"])
+        ],
+        services: ServicesDep,
+    ) -> Response:
+        if format_ not in formats:
+            raise NotFoundError(one_line(f"there is no export {shown(format_)}; {nearest(format_, set(formats))}"))
+        workspace = finished(services, identifier)
+        reason = workspace.refused_exports().get(format_)
+        if reason is not None:
+            raise ExportError(reason)
+        file = formats[ExportFormat(format_)]
+        disposition = {"Content-Disposition": f'attachment; filename="{file.name}"'}
+        return Response(workspace.read_export(file.name), headers=disposition, media_type=file.media_type)
+
+
+def _lease_header(_lease: LeaseToken = None) -> None:
+    """The lease that a request comes with; `permit_of` reads it."""
+
+
+def _read(path: FilePath) -> RobotFileAnswer:
+    """A text file, as far as such a file may be long."""
+    with path.open("rb") as file:
+        content = file.read(max(LARGEST_ROBOT_FILE, LARGEST_URDF))
+    return RobotFileAnswer(name=path.name, content=content.decode("utf-8", errors="replace"))

@@ -1,0 +1,81 @@
+"""Recordings of the store as a worker process reads them: a hostile file harms that process at most."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.errors import RecordingError
+from tauscope.recording import RecordingReport, check_recording, read_recording
+from tauscope.recording.recording import Array
+from tauscope.report.decimation import envelope_indices
+from tauscope.server.queue.record import without_folders
+
+
+def check_kept_recording(path: Path, joint_count: int | None) -> RecordingReport:
+    """Report what a recording in the store holds.
+
+    Parameters
+    ----------
+    joint_count : int or None
+        joints that it must have; None where any number is welcome
+
+    Raises
+    ------
+    RecordingError
+        if it cannot be read or breaks a rule; the message calls the file by its name alone
+    """
+    try:
+        report = check_recording(path, joint_count)
+    except RecordingError as error:
+        raise type(error)(without_folders(str(error), path.parent)) from None
+    return replace(report, name=path.name)
+
+
+def read_kept_samples(path: Path, most: int) -> bytes:
+    """Time, positions and effort of a recording in the store, for a plot.
+
+    A recording of more samples than asked for is thinned: of each stretch those are kept at which any joint's position
+    or effort is least or greatest.
+
+    Returns
+    -------
+    bytes
+        length of the header (4 bytes, little-endian), the header (JSON, filled with blanks to a multiple of four), then
+        each column that the header names as 32-bit floats, little-endian; time counts from the first sample [s]
+
+    Raises
+    ------
+    RecordingError
+        if it cannot be read; the message calls the file by its name alone
+    """
+    try:
+        recording = read_recording(path)
+    except RecordingError as error:
+        raise type(error)(without_folders(str(error), path.parent)) from None
+    samples = recording.samples()
+    effort = recording.effort_kind.value
+    values = np.hstack([samples.position, samples.effort])
+    kept = _kept(values, most)
+    joints = range(1, recording.joint_count + 1)
+    header = {
+        "columns": ["t", *(f"q{j}" for j in joints), *(f"{effort}{j}" for j in joints)],
+        "joint_count": recording.joint_count,
+        "effort": effort,
+        "samples": len(samples.time),
+        "shown": len(kept),
+    }
+    text = json.dumps(header).encode()
+    text += b" " * (-len(text) % 4)
+    columns = np.vstack([samples.time[kept] - samples.time[0], values[kept].T]).astype("<f4")
+    return len(text).to_bytes(4, "little") + text + columns.tobytes()
+
+
+def _kept(values: Array, most: int) -> NDArray[np.intp]:
+    """Rows that keep every column's look."""
+    if len(values) <= most:
+        return np.arange(len(values))
+    share = max(most // values.shape[1], 2)
+    return np.unique(np.concatenate([envelope_indices(column, share) for column in values.T]))

@@ -1,0 +1,257 @@
+"""Jobs of the queue that perform a task: their folder, how they are handed in, and how a worker does them."""
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from types import ModuleType
+from typing import Any, ClassVar, Generic, Literal, Protocol, TypeVar
+
+from pydantic import Field
+
+from tauscope.errors import ExportError, NotFoundError, RecordingError, TauscopeError
+from tauscope.export.formats import ExportFile, ExportFormat
+from tauscope.files import write_atomically
+from tauscope.server.queue.queue import JobKind, JobQueue
+from tauscope.server.queue.record import JobProblem, without_folders
+from tauscope.server.queue.stored import StoredModel, read_bytes, read_document, read_stored, write_stored
+from tauscope.server.queue.work import begin_step, do_work, require_wanted
+from tauscope.server.queue.workspace import Workspace
+from tauscope.server.store.files import hash_file
+from tauscope.server.store.items import ItemStore
+from tauscope.server.store.recordings import RecordingStore
+
+TRAJECTORY, SAVED_MODEL = "trajectory.json", "against"
+
+
+class OrderedRecording(StoredModel):
+    """A recording of an order."""
+
+    name: str = Field(description="its file name")
+    origin: Literal["uploaded", "server"] = Field(description="sent with the request, or lying on the server")
+    sha256: str = Field(description="of its bytes when the job was handed in, in hexadecimal")
+
+
+class TaskOrder(StoredModel):
+    """Input of a job: the request of a task, its files by their names in the job's folder."""
+
+    robot_file: str = Field(description="name of the robot file in the job's robot folder")
+    robot_name: str = Field(description="what the robot file calls the robot")
+
+    @property
+    def request(self) -> Any:
+        """The request of the task."""
+        raise NotImplementedError
+
+
+Order = TypeVar("Order", bound=TaskOrder)
+
+
+class TaskWorkspace(Workspace, Generic[Order]):
+    """Files of a job: ``order.json``, ``robot/`` and a folder for each role of recordings; the task's outputs.
+
+    `roles` are the order's lists of recordings; `outputs` the files that the job leaves, each JSON document with its
+    schema; `formats` its exports.
+    """
+
+    order_type: ClassVar[type[TaskOrder]]
+    noun: ClassVar[str]
+    roles: ClassVar[tuple[str, ...]] = ()
+    outputs: ClassVar[Mapping[str, str | None]]
+    formats: ClassVar[Mapping[ExportFormat, ExportFile]] = {}
+
+    def __init__(self, folder: Path) -> None:
+        """Look at a job's folder; nothing is opened yet."""
+        super().__init__(folder)
+        self.robot = folder / "robot"
+        self.exports = folder / "exports"
+        self.result = folder / "result.json"
+        self._order = folder / "order.json"
+
+    @property
+    def trajectory(self) -> Path:
+        """The motion that was designed or planned."""
+        return self.folder / TRAJECTORY
+
+    def prepare(self) -> None:
+        """Make the folders that hold a job's input."""
+        for folder in (self.robot, *map(self.uploads, self.roles)):
+            folder.mkdir()
+
+    def uploads(self, role: str) -> Path:
+        """The folder of files that came with the request."""
+        return self.folder / role
+
+    def read_order(self) -> Order | None:
+        """The job's input, or None where the file is missing or damaged."""
+        return read_stored(self._order, self.order_type)  # type: ignore[return-value]
+
+    def write_order(self, order: Order) -> None:
+        """Keep the job's input."""
+        write_stored(self._order, order)
+
+    def read_output(self, name: str) -> bytes | None:
+        """An output, or None where the file is missing, damaged or of another schema."""
+        schema = self.outputs[name]
+        return read_bytes(self.folder / name) if schema is None else read_document(self.folder / name, schema)
+
+    def read_result(self) -> bytes | None:
+        """The task's document, or None where the file is missing or damaged."""
+        return self.read_output("result.json")
+
+    def refused_exports(self) -> dict[str, str]:
+        """Formats that cannot hold the model, each with the reason; empty before the exports were written."""
+        try:
+            refused = json.loads((self.exports / "refused.json").read_bytes())
+        except (OSError, ValueError, RecursionError):
+            return {}
+        return {str(key): str(reason) for key, reason in refused.items()} if isinstance(refused, dict) else {}
+
+    def read_export(self, file_name: str) -> bytes:
+        """An export.
+
+        Raises
+        ------
+        NotFoundError
+            if it was not written
+        """
+        try:
+            return (self.exports / file_name).read_bytes()
+        except OSError:
+            raise NotFoundError(f"no export {file_name} is kept here; hand the {self.noun} in again") from None
+
+    def write_outputs(self, outputs: Mapping[str, bytes], *folders: Path) -> None:
+        """Keep the outputs, every export that can hold the model, and the reasons of those that cannot."""
+        refused = {}
+        for name in filter(outputs.__contains__, self.outputs):
+            write_atomically(self.folder / name, outputs[name])
+        for export_format, file in self.formats.items():
+            self.exports.mkdir(exist_ok=True)
+            try:
+                write_atomically(self.exports / file.name, outputs[file.output])
+            except ExportError as error:
+                refused[export_format.value] = without_folders(str(error), *folders)
+        if self.formats:
+            write_atomically(self.exports / "refused.json", json.dumps(refused, indent=1).encode())
+
+
+class JobFiles:
+    """Files of a request in a job's folder, or among the recordings of the server with the bytes that were ordered."""
+
+    def __init__(self, workspace: TaskWorkspace[Any], order: TaskOrder, server_recordings: Path) -> None:
+        """Look at the folders; nothing is opened yet."""
+        self._workspace = workspace
+        self._order = order
+        self._server_recordings = server_recordings
+        self._checked: set[Path] = set()
+
+    def find(self, role: str, name: str) -> Path:
+        """Where an input lies.
+
+        Raises
+        ------
+        RecordingError
+            if a recording was changed or removed after the job was handed in
+        """
+        if role in ("robot", "model"):
+            return self._workspace.uploads("robot" if role == "robot" else SAVED_MODEL) / name
+        entry = next(entry for entry in getattr(self._order, role) if entry.name == name)
+        if entry.origin == "uploaded":
+            return self._workspace.uploads(role) / name
+        path = self._server_recordings / name
+        if path not in self._checked and (path.is_symlink() or not path.is_file() or hash_file(path) != entry.sha256):
+            hint = f"hand the {self._workspace.noun} in again"
+            raise RecordingError(f"{name}: was changed or removed after the job was handed in; {hint}")
+        self._checked.add(path)
+        return path
+
+    def show(self, path: Path) -> str:
+        """The bare name: reports tell no path of the server."""
+        return path.name
+
+    def target(self, output: str) -> Path | None:
+        """The bare name of the trajectory, by which a result refers to it."""
+        return Path(output) if output == TRAJECTORY else None
+
+
+def perform_job(task: ModuleType, workspace: TaskWorkspace[Any], server_recordings: Path) -> JobProblem | None:
+    """Do a job, as a worker process does it.
+
+    Returns
+    -------
+    JobProblem or None
+        why there is no result; None where there is one
+    """
+    folders = (*map(workspace.uploads, (*workspace.roles, SAVED_MODEL)), workspace.robot, server_recordings)
+
+    def tell(step: str, percent: float | None = None, figures: Mapping[str, Any] = {}) -> None:
+        if percent is None:
+            begin_step(workspace, without_folders(step, *folders))
+        else:
+            require_wanted(workspace)
+            workspace.write_progress(percent, figures)
+
+    def work() -> None:
+        order = workspace.read_order()
+        if order is None:
+            raise TauscopeError(f"the job's order.json is missing or damaged; hand the {workspace.noun} in again")
+        result = task.perform(order.request, JobFiles(workspace, order, server_recordings), tell)
+        tell("write result and exports")
+        workspace.write_outputs(result.outputs, *folders)
+
+    return do_work(workspace, work, *folders)
+
+
+class Preparable(Protocol):
+    """A folder whose input has places of its own."""
+
+    def prepare(self) -> None:
+        """Make the folders that hold the input."""
+        ...
+
+
+Staged = TypeVar("Staged", bound=Preparable)
+
+
+@contextmanager
+def staged_workspace(items: ItemStore, kind: Callable[[Path], Staged]) -> Iterator[Staged]:
+    """A new folder that is removed in the end, unless it was handed in meanwhile."""
+    staged = items.stage()
+    try:
+        workspace = kind(staged)
+        workspace.prepare()
+        yield workspace
+    finally:
+        items.discard(staged)
+
+
+def submit_job(
+    jobs: JobQueue, kind: JobKind, workspace: type[TaskWorkspace[Order]], order: Order, put_robot: Callable[[Path], Any]
+) -> str:
+    """Hand in a job whose files lie on the server already; returns its identifier.
+
+    Parameters
+    ----------
+    put_robot : callable
+        writes the robot's files into a folder
+
+    Raises
+    ------
+    QueueFullError
+        if too many jobs are waiting
+    """
+    with staged_workspace(kind.items, workspace) as staged:
+        put_robot(staged.robot)
+        staged.write_order(order)
+        return jobs.submit(kind, staged.folder)
+
+
+def ordered_on_server(recordings: RecordingStore, names: Sequence[str]) -> tuple[OrderedRecording, ...]:
+    """Recordings that lie on the server, as an order holds them.
+
+    Raises
+    ------
+    NotFoundError
+        if one does not lie there
+    """
+    return tuple(OrderedRecording(name=name, origin="server", sha256=recordings.digest(name)) for name in names)

@@ -1,0 +1,191 @@
+"""Diagnose: what an arm's model leaves out."""
+
+from dataclasses import dataclass
+from functools import cached_property, partial
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field
+
+from tauscope.diagnosis import (
+    Diagnosis,
+    DiagnosisDocument,
+    against_model,
+    against_saved,
+    against_simulation,
+    diagnose,
+    document,
+)
+from tauscope.diagnosis.documents.plots import diagnosis_plots
+from tauscope.diagnosis.extended_model.saved import model_document, read_model
+from tauscope.diagnosis.next_experiment import PlannedExperiment, planned_experiment
+from tauscope.errors import ExcitationError, IdentificationError
+from tauscope.export.extended_compensation import compensation_code
+from tauscope.export.formats import CODE_FILES, ExportFormat
+from tauscope.export.simulation_files import improved_robot, scenario_text
+from tauscope.identification import Options
+from tauscope.recording import Recording
+from tauscope.report.provenance import Provenance
+from tauscope.robot import read_robot
+from tauscope.tasks.identify import CutoffFrequency
+from tauscope.tasks.task import (
+    Files,
+    Outputs,
+    Progress,
+    TaskModel,
+    command_words,
+    effort_kind,
+    json_text,
+    read_recordings,
+    record_provenance,
+    recording_sources,
+)
+from tauscope.trajectory import trajectory_json
+from tauscope.trajectory.csv_format import trajectory_csv
+from tauscope.trajectory.files import DEFAULT_RATE_HZ
+from tauscope.version import tauscope_version
+
+
+class DiagnosisOptions(TaskModel):
+    """How a diagnosis is done."""
+
+    against: Literal["identified", "model", "simulation", "saved"] = Field(
+        default="identified",
+        description="what the recordings are compared with: the best model that they allow, the robot file's model"
+        " block, recordings of a simulator, or a model that an earlier diagnosis saved",
+    )
+    cutoff_hz: CutoffFrequency | Literal["auto"] | None = Field(
+        default="auto", description="band of the nominal model's identification [Hz]; auto: chosen; null: no filter"
+    )
+    next_trajectory: bool = Field(
+        default=False, description="whether the next motion is planned also where nothing is open"
+    )
+
+
+class Request(TaskModel):
+    """What is to be diagnosed, by the names of its files."""
+
+    robot: str = Field(description="robot file")
+    recordings: tuple[str, ...] = Field(description="recordings that are to be explained")
+    held_out: tuple[str, ...] = Field(default=(), description="recordings that confirm findings")
+    simulated: tuple[str, ...] = Field(default=(), description="recordings made in the user's own simulator")
+    model: str | None = Field(default=None, description="model that an earlier diagnosis saved")
+    options: DiagnosisOptions = Field(default=DiagnosisOptions(), description="how it is diagnosed")
+
+    @property
+    def compared(self) -> dict[str, tuple[str, ...]]:
+        """Files that the recordings are compared with, by role."""
+        return {"simulated": self.simulated, "model": () if self.model is None else (self.model,)}
+
+    @property
+    def command(self) -> tuple[str, ...]:
+        """The command line that does the same."""
+        compared = tuple(name for names in self.compared.values() for name in names)
+        return command_words(
+            "diagnose",
+            self.robot,
+            recordings=self.recordings,
+            held_out=self.held_out,
+            against=compared or (self.options.against,),
+            cutoff=self.options.cutoff_hz,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What came of it.
+
+    refusal : ExcitationError or None
+        why the next motion cannot be planned within the robot's limits
+    """
+
+    request: Request
+    files: Files
+    recordings: tuple[Recording, ...]
+    diagnosis: Diagnosis
+    document: DiagnosisDocument
+    planned: PlannedExperiment | None
+    refusal: ExcitationError | None
+
+    @property
+    def outputs(self) -> Outputs:
+        """Documents, improved robot and scenario, code as in `CODE_FILES`, and the motion where one was planned."""
+        made = {
+            "plots.json": lambda: json_text(diagnosis_plots(self.diagnosis), None),
+            "model.json": lambda: json_text(model_document(self.diagnosis)),
+            "scenario.yaml": lambda: scenario_text(self.diagnosis),
+            "improved-robot.yaml": self._improved_robot,
+            "report.html": self._report,
+            "result.json": lambda: json_text(self.document),
+            **{file.output: partial(self._code, kind) for kind, file in CODE_FILES.items()},
+        }
+        if self.planned is not None:
+            trajectory = self.planned.trajectory
+            made["trajectory.json"] = lambda: trajectory_json(trajectory)
+            made["trajectory.csv"] = lambda: trajectory_csv(trajectory, DEFAULT_RATE_HZ)
+        return Outputs(made)
+
+    @cached_property
+    def provenance(self) -> Provenance:
+        """What the result was made from, and when."""
+        request = self.request
+        given = {"recordings": request.recordings, "held_out": request.held_out, **request.compared}
+        return record_provenance(self.files, request.command, self.diagnosis.robot, given)
+
+    def _improved_robot(self) -> str:
+        source = self.files.find("robot", self.request.robot)
+        target = self.files.target("improved-robot.yaml")
+        return improved_robot(self.diagnosis, source, source if target is None else target)
+
+    def _code(self, export_format: ExportFormat) -> str:
+        return compensation_code(
+            self.diagnosis,
+            Path(CODE_FILES[export_format].name).suffix,
+            sources=recording_sources(self.provenance),
+            created=self.provenance.created,
+            version=tauscope_version(),
+            effort_kind=effort_kind(self.recordings),
+        )
+
+    def _report(self) -> str:
+        from tauscope.report.diagnosis_report import diagnosis_report
+
+        return diagnosis_report(self.diagnosis, self.document, self.provenance, self.planned)
+
+
+def perform(request: Request, files: Files, progress: Progress) -> Result:
+    """Read the files and diagnose the arm.
+
+    Raises
+    ------
+    TauscopeError
+        where the data or the robot cannot answer
+    """
+    if request.options.against == "saved" and request.model is None:
+        raise IdentificationError("against saved: no model was given; give one, or compare with something else")
+    progress("read robot and recordings")
+    robot = read_robot(files.find("robot", request.robot))
+    saved = None if request.model is None else read_model(files.find("model", request.model), robot)
+    recordings = read_recordings(files, "recordings", request.recordings, robot)
+    held_out = read_recordings(files, "held_out", request.held_out, robot)
+    simulated = read_recordings(files, "simulated", request.simulated, robot)
+    options = Options(cutoff_hz=request.options.cutoff_hz)
+    found = diagnose(robot, recordings, held_out, options, progress)
+    if simulated:
+        progress("compare with the simulation")
+        found = against_simulation(found, simulated, options)
+    elif saved is not None:
+        progress("compare with the saved model")
+        found = against_saved(found, saved)
+    elif request.options.against == "model":
+        progress("compare with the model")
+        found = against_model(found)
+    planned, refusal = None, None
+    try:
+        planned = planned_experiment(found, progress, asked=request.options.next_trajectory)
+    except ExcitationError as error:
+        progress(f"no next experiment: {error}")
+        refusal = error
+    target = files.target("trajectory.json") or files.target("trajectory.csv")
+    name = None if planned is None or target is None else str(target)
+    return Result(request, files, recordings, found, document(found, planned, name), planned, refusal)

@@ -1,0 +1,131 @@
+"""Identify: the parameters of an arm from its recordings."""
+
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from tauscope.export.formats import EXPORT_FILES, ExportFormat, ExportInput, make_export
+from tauscope.identification import (
+    Estimator,
+    Identification,
+    IdentificationDocument,
+    Options,
+    document,
+    identify,
+)
+from tauscope.recording import Recording
+from tauscope.report.provenance import Provenance
+from tauscope.robot import Robot, read_robot
+from tauscope.tasks.task import (
+    Files,
+    Outputs,
+    Progress,
+    TaskModel,
+    command_words,
+    effort_kind,
+    json_text,
+    read_recordings,
+    record_provenance,
+    recording_sources,
+)
+
+CutoffFrequency = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+
+
+class IdentificationOptions(TaskModel):
+    """How an identification is done."""
+
+    estimator: Literal["ls", "wls"] = Field(default="wls", description="how the joints' equations are weighted")
+    cutoff_hz: CutoffFrequency | Literal["auto"] | None = Field(
+        default="auto",
+        description="band that torque and regressor share [Hz]; auto: chosen from the data; null: no filter",
+    )
+    rotor_inertia: bool = Field(default=True, description="whether rotors are added where the data ask for them")
+
+
+class Request(TaskModel):
+    """What is to be identified, by the names of its files."""
+
+    robot: str = Field(description="robot file")
+    recordings: tuple[str, ...] = Field(description="recordings that the model is made from")
+    held_out: tuple[str, ...] = Field(default=(), description="recordings that it is judged by")
+    options: IdentificationOptions = Field(default=IdentificationOptions(), description="how it is identified")
+
+    @property
+    def command(self) -> tuple[str, ...]:
+        """The command line that does the same."""
+        options = self.options
+        return command_words(
+            "identify",
+            self.robot,
+            recordings=self.recordings,
+            held_out=self.held_out,
+            estimator=options.estimator,
+            cutoff=options.cutoff_hz,
+            rotor_inertia=options.rotor_inertia,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What came of it."""
+
+    request: Request
+    files: Files
+    robot: Robot
+    recordings: tuple[Recording, ...]
+    held_out: tuple[Recording, ...]
+    identification: Identification
+    document: IdentificationDocument
+
+    @property
+    def outputs(self) -> Outputs:
+        """``result.json``, ``plots.json``, ``report.html``, and ``exports/…`` as in `EXPORT_FILES`."""
+        exports = {file.output: partial(self._export, kind) for kind, file in EXPORT_FILES.items()}
+        documents = {"plots.json": self._plots, "report.html": self._report}
+        return Outputs({**documents, "result.json": partial(json_text, self.document), **exports})
+
+    @cached_property
+    def provenance(self) -> Provenance:
+        """What the result was made from, and when."""
+        given = {"recordings": self.request.recordings, "held_out": self.request.held_out}
+        return record_provenance(self.files, self.request.command, self.robot, given)
+
+    def _plots(self) -> str:
+        from tauscope.report.identification_plots import identification_plots
+
+        return json_text(identification_plots(self.identification, self.recordings, self.held_out), None)
+
+    def _report(self) -> str:
+        from tauscope.report.identification_report import identification_report
+
+        return identification_report(self.identification, self.recordings, self.held_out, self.provenance)
+
+    def _export(self, export_format: ExportFormat) -> bytes:
+        given = ExportInput(
+            identification=self.identification,
+            sources=recording_sources(self.provenance),
+            effort_kind=effort_kind(self.recordings),
+            urdf=None if self.robot.urdf is None else self.robot.urdf.read_bytes(),
+            created=self.provenance.created,
+        )
+        return make_export(export_format, given)
+
+
+def perform(request: Request, files: Files, progress: Progress) -> Result:
+    """Read the files and identify the arm.
+
+    Raises
+    ------
+    TauscopeError
+        where the data or the robot cannot answer
+    """
+    progress("read robot and recordings")
+    robot = read_robot(files.find("robot", request.robot))
+    recordings = read_recordings(files, "recordings", request.recordings, robot)
+    held_out = read_recordings(files, "held_out", request.held_out, robot)
+    options = Options(Estimator(request.options.estimator), request.options.cutoff_hz, request.options.rotor_inertia)
+    found = identify(robot, recordings, held_out, options, progress)
+    return Result(request, files, robot, recordings, held_out, found, document(found))

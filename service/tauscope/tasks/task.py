@@ -1,0 +1,170 @@
+"""What all tasks share: how a request names files, how progress is told, and how outputs are made."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Protocol
+
+from pydantic import BaseModel, ConfigDict
+
+from tauscope.export.compensation import RecordingSource
+from tauscope.recording import EffortKind, Recording, read_recording
+from tauscope.report.provenance import InputFile, Provenance, input_files, versions
+from tauscope.robot import Robot
+
+ROLES = {"recordings": "recording", "held_out": "held out", "simulated": "compared with", "model": "compared with"}
+"""What each list of a request is called in a report."""
+
+
+class TaskModel(BaseModel):
+    """Base of requests and options: no type is converted, no key is overlooked."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+
+class Progress(Protocol):
+    """Hears which step goes on; may raise to end the task."""
+
+    def __call__(self, step: str, percent: float | None = None, figures: Mapping[str, Any] = {}, /) -> None:
+        """Hear of a step, or of how far it is.
+
+        Parameters
+        ----------
+        percent : float or None
+            how much is done; None at the beginning of a step
+        """
+        ...
+
+
+class Files(Protocol):
+    """Where the files of a request lie, and what a result calls them."""
+
+    def find(self, role: str, name: str) -> Path:
+        """Where an input lies; raises RecordingError where it is not what was asked for."""
+        ...
+
+    def show(self, path: Path) -> str:
+        """What reports call an input."""
+        ...
+
+    def target(self, output: str) -> Path | None:
+        """Where an output is written; None where it is not wanted."""
+        ...
+
+
+@dataclass(frozen=True)
+class LocalFiles:
+    """Files by their paths, as on a command line."""
+
+    targets: Mapping[str, Path] = field(default_factory=dict)
+
+    def find(self, role: str, name: str) -> Path:
+        """The path itself."""
+        return Path(name)
+
+    def show(self, path: Path) -> str:
+        """The path itself."""
+        return str(path)
+
+    def target(self, output: str) -> Path | None:
+        """Where an output is written; None where it is not wanted."""
+        return self.targets.get(output)
+
+
+class Outputs(Mapping[str, bytes]):
+    """Files that a task can write, by name; each is made when it is asked for.
+
+    Asking raises ExportError where a format cannot hold the model.
+    """
+
+    def __init__(self, make: Mapping[str, Callable[[], str | bytes]]) -> None:
+        """Take what makes each of them."""
+        self._make = make
+
+    def __getitem__(self, name: str) -> bytes:
+        """Content of an output."""
+        made = self._make[name]()
+        return made.encode() if isinstance(made, str) else made
+
+    def __iter__(self) -> Iterator[str]:
+        """Names of all outputs."""
+        return iter(self._make)
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self._make)
+
+
+def json_text(document: BaseModel, indent: int | None = 1) -> str:
+    """A document as its file holds it."""
+    return document.model_dump_json(by_alias=True, indent=indent) + "\n"
+
+
+def read_recordings(files: Files, role: str, names: Sequence[str], robot: Robot) -> tuple[Recording, ...]:
+    """Recordings of a robot, called as the request calls them."""
+    joints = [joint.name for joint in robot.joints]
+    paths = [files.find(role, name) for name in names]
+    read = [read_recording(path, robot.joint_count, joints) for path in paths]
+    return tuple(
+        recording if str(path) == name else replace(recording, name=name)
+        for recording, path, name in zip(read, paths, names, strict=True)
+    )
+
+
+def record_provenance(
+    files: Files, command: Sequence[str], robot: Robot, inputs: Mapping[str, Sequence[str]]
+) -> Provenance:
+    """Hash all inputs and note the versions.
+
+    Parameters
+    ----------
+    inputs : mapping of str to sequence of str
+        names of the request by role
+
+    Raises
+    ------
+    RecordingError
+        where a file cannot be read any more
+    """
+    paths = [("robot", Path(robot.source))] if robot.source else []
+    paths += [("urdf", robot.urdf)] if robot.urdf else []
+    paths += [(ROLES[role], files.find(role, name)) for role, names in inputs.items() for name in names]
+    hashed = [
+        InputFile(role, files.show(Path(file.path)), file.size_bytes, file.sha256)
+        for role, path in paths
+        for file in input_files(role, str(path))
+    ]
+    return Provenance(tuple(command), tuple(hashed), versions(), datetime.now(UTC))
+
+
+def recording_sources(provenance: Provenance) -> list[RecordingSource]:
+    """The recordings that a model is made from, for its exports."""
+    return [RecordingSource(entry.path, entry.sha256) for entry in provenance.inputs if entry.role == "recording"]
+
+
+def effort_kind(recordings: Sequence[Recording]) -> EffortKind:
+    """Current where any recording holds current."""
+    holds_current = any(recording.effort_kind is EffortKind.CURRENT for recording in recordings)
+    return EffortKind.CURRENT if holds_current else EffortKind.TORQUE
+
+
+def command_words(verb: str, robot: str, **options: Any) -> tuple[str, ...]:
+    """The command line that does the same, with every option spelled out; outputs are left to whoever repeats it.
+
+    Parameters
+    ----------
+    **options
+        by the name of the option; `recordings` has none, an empty tuple is left out
+    """
+    words = ["tauscope", verb, robot]
+    for name, value in options.items():
+        option = f"--{name.replace('_', '-')}"
+        match value:
+            case tuple():
+                words += [*([option] if value and name != "recordings" else []), *map(str, value)]
+            case bool():
+                words.append(option if value else f"--no-{option[2:]}")
+            case _:
+                words += [option, "none" if value is None else str(value)]
+    return tuple(words)
