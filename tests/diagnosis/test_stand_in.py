@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from tauscope.diagnosis.findings.stand_in import LEFT, certainty_as_law
+from tauscope.effects import effect_class
 
 
 def certainty(effect: str, before: Sequence[float], without: Sequence[float], left: Sequence[float]) -> float:
     """Of a finding that touches every joint, beside which nothing but `left` is left."""
     after = [0.0] * len(left)
-    touching: Any = SimpleNamespace(id=effect, touched=range)
+    touching: Any = SimpleNamespace(is_expected=effect_class(effect).is_expected, touched=range)
     nominal, fit, alone = (fitted(each) for each in (before, after, without))
     structured: Any = SimpleNamespace(structured=np.array(left, dtype=float))
     return certainty_as_law(touching, nominal, fit, alone, structured)
