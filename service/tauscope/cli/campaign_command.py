@@ -6,6 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from tauscope.cli.arguments import RobotFile
+from tauscope.cli.driver_choice import check_backend
 
 
 def _step(words: str) -> Any:
@@ -36,7 +37,7 @@ def campaign(
 
     from tauscope.cli.campaign_run import run_campaign
 
-    named = backend if backend.lstrip().startswith("{") else json.dumps({"name": backend})
+    named = backend if backend.lstrip().startswith("{") else json.dumps({"name": check_backend(backend)})
     steps = {
         "backend": named,
         "excitation": excitation,
