@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from tauscope.cli.arguments import RobotFile
-from tauscope.cli.driver_choice import check_backend
+from tauscope.cli.driver_choice import DEFAULT_BACKEND, check_backend
 
 
 def _step(words: str) -> Any:
@@ -21,8 +21,8 @@ def campaign(
         Path, typer.Option(metavar="DIR", file_okay=False, help="New folder for motions, recordings and results.")
     ],
     backend: Annotated[
-        str, typer.Option(metavar="NAME|JSON", help="What moves the arm: sim, dynamixel, canopen, or an object.")
-    ] = "sim",
+        str, typer.Option(metavar="[{backends}|JSON]", help="What moves the arm, by name or as in the REST API.")
+    ] = DEFAULT_BACKEND,
     excitation: Annotated[str, _step("How the training motion is designed")] = "{}",
     held_out: Annotated[str, _step("The motion that the model is judged by")] = "{}",
     run: Annotated[str, _step("How the motions are run")] = "{}",
