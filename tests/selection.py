@@ -54,6 +54,9 @@ NEEDED: dict[str, tuple[str, ...]] = {
 }
 """Path prefix to test files and folders; the longest prefix of a path decides. A quick test is never deselected."""
 
+SITTING_S = 4 * 3600
+"""Longest time over which the commits of one landing are made [s]."""
+
 OPTION = "--changed-only"
 MARKS = ("slow", "system", "realtime")
 
@@ -81,13 +84,15 @@ def is_selected(test_file: str, selected: set[str] | None) -> bool:
 def find_changes(repository: Path) -> list[str] | None:
     """Paths that differ from the merge base with the main branch, files of no commit included; None without a base.
 
-    On the main branch itself the base is the commit before.
+    On the main branch itself the base is the newest commit that is `SITTING_S` older than the last one: what lands
+    together was committed together.
     """
     head = _git(repository, "rev-parse", "HEAD")
     for main in ("origin/main", "main", "origin/master", "master"):
         base = _git(repository, "merge-base", "HEAD", main)
         if base and base == head:
-            base = _git(repository, "rev-parse", "--verify", "--quiet", "HEAD^1")
+            last = int(_git(repository, "log", "-1", "--format=%ct") or 0)
+            base = _git(repository, "rev-list", "-1", f"--before={last - SITTING_S}", "HEAD")
         if base:
             break
     else:

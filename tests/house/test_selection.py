@@ -72,24 +72,26 @@ def test_a_change_of_the_tools_or_of_an_unknown_place_runs_everything(changed: s
     assert is_selected("tests/runtime/test_kill.py", None)
 
 
-def test_changes_are_those_since_the_branch_left_main(tmp_path: Path) -> None:
+def test_changes_are_those_since_the_last_landing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def git(*words: str) -> None:
         who = ["-c", "user.name=n", "-c", "user.email=e"]
         subprocess.run(["git", *who, *words], cwd=tmp_path, check=True, capture_output=True)
 
-    def commit(name: str) -> None:
+    def commit(name: str, hour: int) -> None:
         (tmp_path / name).write_text(name)
         git("add", name)
+        monkeypatch.setenv("GIT_COMMITTER_DATE", f"2026-01-01T{hour:02}:00:00Z")
         git("commit", "--message", name)
 
     assert find_changes(tmp_path) is None
     git("init", "--initial-branch", "main")
-    commit("first")
+    commit("first", hour=1)
     assert find_changes(tmp_path) is None
-    commit("second")
-    assert find_changes(tmp_path) == ["second"]
+    commit("second", hour=10)
+    commit("part", hour=12)
+    assert find_changes(tmp_path) == ["part", "second"]
     git("switch", "--create", "branch")
-    commit("third")
+    commit("third", hour=13)
     git("mv", "first", "moved")
     (tmp_path / "new").write_text("new")
     assert find_changes(tmp_path) == ["first", "moved", "third", "new"]
