@@ -42,7 +42,7 @@ def pulled(arm: SimulatedArm, rigid: Array) -> Array:
 
 @cache
 def found(effect: EffectTorque = pulled) -> Diagnosis:
-    return diagnose(paper_robot(), recordings((1, 2), effect, np.random.default_rng(4)))
+    return diagnose(paper_robot(), recordings((1, 2, 3), effect, np.random.default_rng(4)))
 
 
 @cache
