@@ -19,8 +19,10 @@ from kills import killed_often
 from runtime.control_runs import wait_for
 from runtime.doubles import short_motion
 from tauscope.robot import read_robot
-from tauscope.runtime import BackendOrder, RunOptions, RunOrder, RunState, recover_runs
+from tauscope.runtime.options import BackendOrder, RunOptions, RunOrder
+from tauscope.runtime.recovery import recover_runs
 from tauscope.runtime.run_process import RunProcess
+from tauscope.runtime.states import RunState
 from tauscope.trajectory import write_trajectory
 from tauscope_drivers.canopen.arm import CanopenArm
 from tauscope_sim.canopen_bus.order import CanOrder

@@ -19,7 +19,9 @@ from tauscope.excitation import ExcitationOptions, design_excitation
 from tauscope.identification import document, identify
 from tauscope.recording import read_recording
 from tauscope.robot import read_robot
-from tauscope.runtime import BackendOrder, RunOptions, RunOrder, RunProcess, RunRecord
+from tauscope.runtime.options import BackendOrder, RunOptions, RunOrder
+from tauscope.runtime.record import RunRecord
+from tauscope.runtime.run_process import RunProcess
 from tauscope.trajectory import Trajectory, write_trajectory
 from tauscope_sim.canopen_bus.order import CanOrder
 from tauscope_sim.emulation import EmulatorProcess

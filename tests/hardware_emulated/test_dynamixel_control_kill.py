@@ -16,8 +16,10 @@ from hardware_emulated.dynamixel_bench import SLACK_S, Bench
 from kills import killed_often
 from tauscope.excitation import ExcitationOptions, design_excitation
 from tauscope.robot import Robot, read_robot
-from tauscope.runtime import BackendOrder, RunOptions, RunOrder, RunProcess, RunState
 from tauscope.runtime.drivers import find_driver, to_drive_joints
+from tauscope.runtime.options import BackendOrder, RunOptions, RunOrder
+from tauscope.runtime.run_process import RunProcess
+from tauscope.runtime.states import RunState
 from tauscope.trajectory import write_trajectory
 from tauscope_drivers.dynamixel.arm import DynamixelArm
 from tauscope_sim.dynamixel_bus import DynamixelOrder

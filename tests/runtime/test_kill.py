@@ -24,8 +24,11 @@ from shared_data import REPOSITORY
 from tauscope.recording import read_recording
 from tauscope.recording.journal_reading import read_journal
 from tauscope.robot import read_robot
-from tauscope.runtime import BackendOrder, RunOptions, RunOrder, RunRecord, RunState, read_record, recover_runs
+from tauscope.runtime.options import BackendOrder, RunOptions, RunOrder
 from tauscope.runtime.processes import child_environment
+from tauscope.runtime.record import RunRecord, read_record
+from tauscope.runtime.recovery import recover_runs
+from tauscope.runtime.states import RunState
 from tauscope.trajectory import write_trajectory
 from tauscope_sim.device.activity import COMMANDED
 from tauscope_sim.device.trace import DeviceTrace, read_trace

@@ -9,7 +9,8 @@ from pydantic import Field
 
 from tauscope.errors import AcquisitionError
 from tauscope.files import write_atomically
-from tauscope.runtime import RunOptions, RunState
+from tauscope.runtime.options import RunOptions
+from tauscope.runtime.states import RunState
 from tauscope.tasks import design_excitation, diagnose, identify, run
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
 from tauscope.tasks.diagnose import DiagnosisOptions

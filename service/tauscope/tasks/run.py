@@ -8,10 +8,11 @@ from typing import Any, Literal
 from pydantic import Field, FiniteFloat
 
 from tauscope.robot import Robot, read_robot
-from tauscope.runtime import BackendOrder, RunOptions, RunOrder, RunProcess, RunRecord
 from tauscope.runtime.drivers import DEFAULT_BACKEND, find_driver
+from tauscope.runtime.options import BackendOrder, RunOptions, RunOrder
 from tauscope.runtime.progress import Report
-from tauscope.runtime.record import JOURNAL_FILE, RECORDING_STEM
+from tauscope.runtime.record import JOURNAL_FILE, RECORDING_STEM, RunRecord
+from tauscope.runtime.run_process import RunProcess
 from tauscope.tasks import design_excitation
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
 from tauscope.tasks.task import Files, Progress, TaskModel
