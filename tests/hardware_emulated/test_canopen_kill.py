@@ -13,6 +13,7 @@ import pytest
 
 import tauscope_sim.examples
 from arm_rigs import START
+from emulator_process import EmulatorProcess
 from hardware_emulated.canopen_rig import ANSWER_PATIENCE_S
 from hardware_emulated.canopen_robot import RATED_TORQUE_MNM, drive_joints, write_canopen_robot
 from kills import killed_often
@@ -26,7 +27,6 @@ from tauscope.runtime.states import RunState
 from tauscope.trajectory import write_trajectory
 from tauscope_drivers.canopen.arm import CanopenArm
 from tauscope_sim.canopen_bus.order import CanOrder
-from tauscope_sim.emulation.process import EmulatorProcess
 
 WATCHDOG_S = 0.25
 STANDSTILL_S = 0.4

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from datetime import datetime
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import AwareDatetime, Field, JsonValue, TypeAdapter, ValidationError
+from pydantic import AwareDatetime, Field, JsonValue
 
 from tauscope.server.queue.stored import StoredModel
 
@@ -133,13 +133,3 @@ class EndedEvent(StoredModel):
 
 JobEvent = Annotated[StateEvent | StepEvent | ProgressEvent | EndedEvent, Field(discriminator="kind")]
 """Any of the four."""
-
-_EVENTS: TypeAdapter[JobEvent] = TypeAdapter(JobEvent)
-
-
-def parse_event(content: Mapping[str, Any]) -> JobEvent | None:
-    """The event of a line; None where it is none that we know."""
-    try:
-        return _EVENTS.validate_python(content, strict=False)
-    except ValidationError:
-        return None
