@@ -1,9 +1,9 @@
-"""Optional dependencies: which extra of the distribution installs a module."""
+"""Modules that are not everywhere: which extra installs one, and which need a POSIX system."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
-from tauscope.errors import MissingExtraError
+from tauscope.errors import MissingExtraError, TauscopeError
 
 EXTRAS: Mapping[str, tuple[str, ...]] = {
     "service": (
@@ -28,10 +28,13 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
 }
 """Top-level modules of each extra in pyproject.toml."""
 
+POSIX_ONLY = ("fcntl", "resource", "termios")
+"""Modules of the standard library that Windows lacks."""
+
 
 @contextmanager
 def require_extra(user: str) -> Iterator[None]:
-    """Say in one line what to install, where an import fails because an extra is missing.
+    """Say in one line what is needed, where an import fails because an extra or a POSIX module is missing.
 
     Parameters
     ----------
@@ -42,11 +45,16 @@ def require_extra(user: str) -> Iterator[None]:
     ------
     MissingExtraError
         an optional dependency is not installed
+    TauscopeError
+        the operating system lacks a POSIX module
     """
     try:
         yield
     except ModuleNotFoundError as error:
         module = (error.name or "").partition(".")[0]
+        if module in POSIX_ONLY:
+            needs = "moving arms and serving need a POSIX system, such as Linux"
+            raise TauscopeError(f"{user} cannot run on this system: {needs}") from error
         for extra, modules in EXTRAS.items():
             if module in modules:
                 raise MissingExtraError(f"{user} needs the {extra} extra: pip install 'tauscope[{extra}]'") from error

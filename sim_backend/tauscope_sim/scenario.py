@@ -1,6 +1,5 @@
 """What a simulated arm conceals: effects, noise and delays, as a scenario file states them."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -111,28 +110,3 @@ class Sensors:
         noisy = position + self._position_std * noise[0]
         recorded = np.where(self._coarse, np.rint(noisy / self._step) * self._step, noisy)
         return recorded, torque + self._torque_std * noise[1]
-
-
-def measure_all(sensors: Sensors, time: Array, position: Array, torque: Array) -> tuple[Array, Array]:
-    """What is recorded of a whole motion.
-
-    Parameters
-    ----------
-    time : (N,) float64
-        of the samples, ascending [s]
-    position : (N, n) float64
-        true position [rad or m]
-    torque : (N, n) float64
-        true torque [Nm or N]
-
-    Returns
-    -------
-    position : (N, n) float64
-        as recorded [rad or m]
-    torque : (N, n) float64
-        as recorded [Nm or N]
-    """
-    rows: Sequence[tuple[Array, Array]] = [
-        sensors.measure(float(t), q, u) for t, q, u in zip(time, position, torque, strict=True)
-    ]
-    return np.array([row[0] for row in rows]), np.array([row[1] for row in rows])

@@ -22,7 +22,7 @@ import numpy as np  # noqa: E402
 from benchmarks.benchmark_readers import begin, followed, readers  # noqa: E402
 from server.http.serving import served  # noqa: E402
 from tauscope.recording.journal_reading import read_journal  # noqa: E402
-from tauscope.runtime import RunState  # noqa: E402
+from tauscope.runtime.states import RunState  # noqa: E402
 from tauscope.server.control.run import RunWorkspace  # noqa: E402
 
 MOTION_S = 60.0

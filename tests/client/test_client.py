@@ -15,7 +15,7 @@ from server.queue.waiting import wait_until
 from tauscope.client import ApiError, Client, HeldLease
 from tauscope.client.client import ENDS
 from tauscope.client.transport import Transport, form_content
-from tauscope.runtime import RunState
+from tauscope.runtime.states import RunState
 from tauscope.server.auth.scopes import Scope
 from tauscope.server.http import Settings, create_app
 from tauscope.server.queue.record import JobState

@@ -13,7 +13,7 @@ from arm_rigs import Rig, remote_rigs, virtual_rigs
 from hardware_emulated.canopen_rig import canopen_rigs
 from hardware_emulated.dynamixel_rig import dynamixel_rigs
 from prompt_process import prompt_process
-from tauscope.runtime import driver_names
+from tauscope.runtime.drivers import driver_names
 from tauscope_drivers import StopPolicy
 
 RigMaker = Callable[[Path], AbstractContextManager[Callable[[], Rig]]]

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from arms import random_arm, random_parameters, random_states
 from pinocchio_arm import pinocchio_model
 from tauscope.dynamics.regressor import CHUNK
-from tauscope.dynamics.rigid_body import gravity_torque, inverse_dynamics, kinetic_energy, mass_matrix, potential_energy
-from tauscope.robot.robot import Robot
+from tauscope.dynamics.rigid_body import gravity_torque, inverse_dynamics, mass_matrix
+from tauscope.robot.kinematics import link_placements
+from tauscope.robot.robot import LinkInertia, Robot
 
 SAMPLES = 6
 ARMS = given(seed=st.integers(0, 2**32 - 1), joint_count=st.integers(1, 7))
@@ -23,6 +24,20 @@ def some_arm(seed: int, joint_count: int) -> tuple[Robot, np.ndarray, tuple[np.n
     """A random chain, its parameters, and states."""
     rng = np.random.default_rng(seed)
     return random_arm(rng, joint_count), random_parameters(rng, joint_count), random_states(rng, SAMPLES, joint_count)
+
+
+def kinetic_energy(robot: Robot, parameters: np.ndarray, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
+    """T = ½ q̇ᵀ H(q) q̇ [J]."""
+    return 0.5 * np.einsum("ni,nik,nk->n", qd, mass_matrix(robot, parameters, q), qd)
+
+
+def potential_energy(robot: Robot, parameters: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """U = -gᵀ Σ_j (m_j p_j + R_j m_j s_j), zero at the base frame's origin [J]."""
+    energy = np.zeros(len(q))
+    for vector, placement in zip(parameters.reshape(-1, 10), link_placements(robot, q).swapaxes(0, 1), strict=True):
+        link, rotation, position = LinkInertia.from_vector(vector), placement[:, :3, :3], placement[:, :3, 3]
+        energy -= (link.mass * position + rotation @ link.first_moment) @ robot.gravity
+    return energy
 
 
 def close(actual: np.ndarray, expected: np.ndarray, relative: float = 1e-9) -> None:

@@ -85,3 +85,9 @@ def assert_within_limits(robot: Robot, design: ExcitationDesign, options: Excita
         parameters = np.concatenate([link.to_vector() for link in robot.model.links])
         torque = inverse_dynamics(robot, parameters, samples.position, samples.velocity, samples.acceleration)
         assert (np.abs(torque) <= (1.0 - options.torque_margin) * limits.torque).all()
+
+
+def rest_error(series: FourierSeries) -> tuple[float, float]:
+    """Largest speed and acceleration at the ends of a period: |Σ a_l| and ω_f |Σ l b_l| [rad/s, rad/s²]."""
+    speed, acceleration = np.abs(series.cosine.sum(axis=1)), np.abs(series.sine @ series.frequencies)
+    return float(speed.max(initial=0.0)), float(acceleration.max(initial=0.0))

@@ -8,6 +8,7 @@ import numpy as np
 
 import tauscope_sim.examples
 from arm_rigs import START, Rig, Watched
+from emulator_process import EmulatorProcess
 from hardware_emulated.canopen_robot import COUNTS_PER_TURN, GEAR, RATED_TORQUE_MNM, drive_joints, write_canopen_robot
 from hardware_emulated.emulated_rig import FAULTS, EmulatedRig
 from hardware_emulated.stepped_clock import SteppedClock
@@ -17,7 +18,6 @@ from tauscope_drivers.canopen.arm import CanopenArm
 from tauscope_sim.canopen_bus.order import CanOrder
 from tauscope_sim.device import Injection
 from tauscope_sim.emulation.fault_kit import InjectedFault
-from tauscope_sim.emulation.process import EmulatorProcess
 
 ANSWER_PATIENCE_S = 0.03
 """The machine of a test may be busy."""

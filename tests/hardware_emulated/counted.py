@@ -9,7 +9,8 @@ import pytest
 
 from standstill import STANDSTILL_S, MachineStoodStillError
 from tauscope.recording.journal_reading import read_journal
-from tauscope.runtime import RunRecord, RunState
+from tauscope.runtime.record import RunRecord
+from tauscope.runtime.states import RunState
 
 MOST_UNKNOWN = 0.01
 """Part of the samples whose instant is not known, up to which a machine has kept time."""

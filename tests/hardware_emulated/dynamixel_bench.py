@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from emulator_process import EmulatorProcess
 from prompt_process import prompt_process
 from tauscope_drivers import ArmState, ControlMode, DriveLimits, Setpoint, StopPolicy
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.dynamixel.arm import DynamixelArm
 from tauscope_sim.dynamixel_bus import DynamixelOrder, ServoSpecification
-from tauscope_sim.emulation import EmulatorProcess
 
 TORQUE_PER_MILLIAMPERE = 0.01
 SLACK_S = 0.03

@@ -8,6 +8,7 @@ import numpy as np
 
 import tauscope_sim.examples
 from arm_rigs import START, Rig
+from emulator_process import EmulatorProcess
 from hardware_emulated.emulated_rig import FAULTS, EmulatedRig
 from tauscope.robot import read_robot
 from tauscope_drivers import Backend
@@ -15,7 +16,7 @@ from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.dynamixel.arm import DynamixelArm
 from tauscope_sim.device import Disturbance, Injection
 from tauscope_sim.dynamixel_bus import DynamixelOrder, ServoSpecification
-from tauscope_sim.emulation import EmulatorProcess, FaultKind, InjectedFault
+from tauscope_sim.emulation import FaultKind, InjectedFault
 
 ROBOT = Path(tauscope_sim.examples.__file__).with_name("paper_arm.yaml")
 TORQUE_PER_MILLIAMPERE = 0.005

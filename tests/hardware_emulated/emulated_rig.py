@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 
 from arm_rigs import PATIENCE_S, Watched
+from emulator_process import EmulatorProcess
 from tauscope_drivers import Backend
 from tauscope_sim.device import Disturbance
-from tauscope_sim.emulation import EmulatorProcess, FaultKind
+from tauscope_sim.emulation import FaultKind
 
 GLANCE_NS = 2_000_000
 """Between two looks at the trace: the emulator has its own work to do."""

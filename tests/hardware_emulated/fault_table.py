@@ -12,7 +12,8 @@ import numpy as np
 from hardware_emulated.fault_runs import PHASES, Disturbed, Site
 from shared_data import REPOSITORY
 from tauscope.recording.journal_reading import read_journal
-from tauscope.runtime import RunRecord, RunState
+from tauscope.runtime.record import RunRecord
+from tauscope.runtime.states import RunState
 from tauscope_drivers import Backend
 from tauscope_sim.emulation import FaultKind, InjectedFault
 

@@ -1,6 +1,6 @@
 """The clock of emulated servos whose time passes only when it is told to: no busy machine disturbs a run by it."""
 
-from tauscope_sim.emulation import EmulatorProcess
+from emulator_process import EmulatorProcess
 
 
 class SteppedClock:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from emulator_process import EmulatorProcess
 from hardware_emulated.campaign_arms import assert_within, deviations, six_joints, three_joints
 from hardware_emulated.canopen_robot import GEAR, drive_joints, write_canopen_arm
 from hardware_emulated.stepped_clock import SteppedClock
@@ -18,11 +19,14 @@ from tauscope.excitation import ExcitationOptions, design_excitation
 from tauscope.identification import document, identify
 from tauscope.recording import read_recording
 from tauscope.robot import read_robot
-from tauscope.runtime import RunOptions, RunRecord, RunState, run_trajectory
 from tauscope.runtime.drivers import Connection
+from tauscope.runtime.in_process import run_trajectory
+from tauscope.runtime.options import RunOptions
+from tauscope.runtime.record import RunRecord
+from tauscope.runtime.states import RunState
 from tauscope_drivers.canopen.arm import CanopenArm
 from tauscope_sim.canopen_bus.order import CanOrder
-from tauscope_sim.emulation import EmulatorProcess, FaultKind, InjectedFault
+from tauscope_sim.emulation import FaultKind, InjectedFault
 
 TORQUE_NOISE = 0.5
 """As the seed paper has it [Nm]."""

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from emulator_process import EmulatorProcess
 from hardware_emulated.campaign_arms import three_joints
 from hardware_emulated.canopen_robot import write_canopen_arm
 from hardware_emulated.commands import Tauscope, write_short_motion
@@ -13,7 +14,7 @@ from tauscope.recording import read_recording
 from tauscope.recording.recording import EffortKind
 from tauscope_drivers.inspection import PHASES
 from tauscope_sim.canopen_bus.order import CanOrder
-from tauscope_sim.emulation import EmulatorProcess, FaultKind, InjectedFault
+from tauscope_sim.emulation import FaultKind, InjectedFault
 
 pytestmark = pytest.mark.realtime
 

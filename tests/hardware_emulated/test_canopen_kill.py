@@ -13,18 +13,20 @@ import pytest
 
 import tauscope_sim.examples
 from arm_rigs import START
+from emulator_process import EmulatorProcess
 from hardware_emulated.canopen_rig import ANSWER_PATIENCE_S
 from hardware_emulated.canopen_robot import RATED_TORQUE_MNM, drive_joints, write_canopen_robot
 from kills import killed_often
 from runtime.control_runs import wait_for
 from runtime.doubles import short_motion
 from tauscope.robot import read_robot
-from tauscope.runtime import BackendOrder, RunOptions, RunOrder, RunState, recover_runs
+from tauscope.runtime.options import BackendOrder, RunOptions, RunOrder
+from tauscope.runtime.recovery import recover_runs
 from tauscope.runtime.run_process import RunProcess
+from tauscope.runtime.states import RunState
 from tauscope.trajectory import write_trajectory
 from tauscope_drivers.canopen.arm import CanopenArm
 from tauscope_sim.canopen_bus.order import CanOrder
-from tauscope_sim.emulation.process import EmulatorProcess
 
 WATCHDOG_S = 0.25
 STANDSTILL_S = 0.4

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from emulator_process import EmulatorProcess
 from hardware_emulated.campaign_arms import assert_within, deviations, six_joints, three_joints
 from hardware_emulated.canopen_rig import ANSWER_PATIENCE_S
 from hardware_emulated.canopen_robot import GEAR, write_canopen_arm
@@ -19,10 +20,11 @@ from tauscope.excitation import ExcitationOptions, design_excitation
 from tauscope.identification import document, identify
 from tauscope.recording import read_recording
 from tauscope.robot import read_robot
-from tauscope.runtime import BackendOrder, RunOptions, RunOrder, RunProcess, RunRecord
+from tauscope.runtime.options import BackendOrder, RunOptions, RunOrder
+from tauscope.runtime.record import RunRecord
+from tauscope.runtime.run_process import RunProcess
 from tauscope.trajectory import Trajectory, write_trajectory
 from tauscope_sim.canopen_bus.order import CanOrder
-from tauscope_sim.emulation import EmulatorProcess
 
 RATE_HZ = 200.0
 TORQUE_NOISE = 0.5

@@ -19,7 +19,7 @@ from hardware_emulated.fault_table import outcome
 from hardware_emulated.stepped_clock import SteppedClock
 from tauscope.recording.journal_reading import read_journal
 from tauscope.robot import Robot
-from tauscope.runtime import RunState
+from tauscope.runtime.states import RunState
 from tauscope_drivers.canopen.arm import CanopenArm
 from tauscope_drivers.canopen.glitch_filter import FASTEST, SLACK_S
 from tauscope_sim.canopen_bus.order import CanOrder

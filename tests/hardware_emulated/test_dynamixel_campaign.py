@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from emulator_process import EmulatorProcess
 from hardware_emulated.campaign_arms import (
     TORQUE_PER_MILLIAMPERE,
     assert_within,
@@ -21,18 +22,21 @@ from hardware_emulated.campaign_arms import (
     three_joints,
     write_robot,
 )
+from hardware_emulated.robot_servos import servos_of
 from hardware_emulated.stepped_clock import SteppedClock
 from tauscope.excitation import ExcitationOptions, design_excitation
 from tauscope.identification import document, identify
 from tauscope.recording import read_recording
 from tauscope.robot import read_robot
-from tauscope.runtime import RunOptions, RunRecord, RunState, run_trajectory
 from tauscope.runtime.drivers import Connection, find_driver, to_drive_joints
+from tauscope.runtime.in_process import run_trajectory
+from tauscope.runtime.options import RunOptions
+from tauscope.runtime.record import RunRecord
+from tauscope.runtime.states import RunState
 from tauscope_drivers import ControlMode, StopPolicy
 from tauscope_drivers.dynamixel.arm import DynamixelArm
 from tauscope_sim.dynamixel_bus import DynamixelOrder
-from tauscope_sim.dynamixel_bus.robot_servos import servos_of
-from tauscope_sim.emulation import EmulatorProcess, FaultKind, InjectedFault
+from tauscope_sim.emulation import FaultKind, InjectedFault
 
 NOISE_MA = 100.0
 """0.5 Nm, as the seed paper has it."""

@@ -5,16 +5,17 @@ from pathlib import Path
 
 import pytest
 
+from emulator_process import EmulatorProcess
 from hardware_emulated.campaign_arms import three_joints, write_robot
 from hardware_emulated.commands import Tauscope, write_short_motion
+from hardware_emulated.robot_servos import servos_of
 from tauscope.recording import read_recording
 from tauscope.recording.recording import EffortKind
 from tauscope.robot import read_robot
 from tauscope_drivers.dynamixel.packets import FrameParser
 from tauscope_drivers.inspection import PHASES
 from tauscope_sim.dynamixel_bus import DynamixelOrder
-from tauscope_sim.dynamixel_bus.robot_servos import servos_of
-from tauscope_sim.emulation import EmulatorProcess, FaultKind, InjectedFault
+from tauscope_sim.emulation import FaultKind, InjectedFault
 
 pytestmark = pytest.mark.realtime
 

@@ -11,18 +11,20 @@ from typing import Any
 import numpy as np
 import pytest
 
+from emulator_process import EmulatorProcess
 from hardware_emulated.campaign_arms import three_joints, write_robot
 from hardware_emulated.dynamixel_bench import SLACK_S, Bench
+from hardware_emulated.robot_servos import servos_of
 from kills import killed_often
 from tauscope.excitation import ExcitationOptions, design_excitation
 from tauscope.robot import Robot, read_robot
-from tauscope.runtime import BackendOrder, RunOptions, RunOrder, RunProcess, RunState
 from tauscope.runtime.drivers import find_driver, to_drive_joints
+from tauscope.runtime.options import BackendOrder, RunOptions, RunOrder
+from tauscope.runtime.run_process import RunProcess
+from tauscope.runtime.states import RunState
 from tauscope.trajectory import write_trajectory
 from tauscope_drivers.dynamixel.arm import DynamixelArm
 from tauscope_sim.dynamixel_bus import DynamixelOrder
-from tauscope_sim.dynamixel_bus.robot_servos import servos_of
-from tauscope_sim.emulation import EmulatorProcess
 
 pytestmark = pytest.mark.realtime
 

@@ -11,12 +11,12 @@ import pytest
 from hardware_emulated.campaign_arms import three_joints, write_robot
 from hardware_emulated.fault_runs import Site, fault_site
 from hardware_emulated.fault_table import FaultTable
+from hardware_emulated.robot_servos import servos_of
 from hardware_emulated.stepped_clock import SteppedClock
 from tauscope.robot import Robot
 from tauscope.runtime.drivers import find_driver, to_drive_joints
 from tauscope_drivers.dynamixel.arm import DynamixelArm
 from tauscope_sim.dynamixel_bus import DynamixelOrder
-from tauscope_sim.dynamixel_bus.robot_servos import servos_of
 from tauscope_sim.emulation import FaultKind
 
 

@@ -4,16 +4,17 @@ from pathlib import Path
 
 import pytest
 
+from emulator_process import EmulatorProcess
 from hardware_emulated.campaign_arms import six_joints, write_robot
 from hardware_emulated.counted import against_the_clock, require_all_counted
 from hardware_emulated.dynamixel_bench import SLACK_S
+from hardware_emulated.robot_servos import servos_of
 from tauscope.excitation import ExcitationOptions, design_excitation
 from tauscope.robot import read_robot
-from tauscope.runtime import BackendOrder, RunOptions, RunOrder, RunProcess
+from tauscope.runtime.options import BackendOrder, RunOptions, RunOrder
+from tauscope.runtime.run_process import RunProcess
 from tauscope.trajectory import write_trajectory
 from tauscope_sim.dynamixel_bus import DynamixelOrder
-from tauscope_sim.dynamixel_bus.robot_servos import servos_of
-from tauscope_sim.emulation import EmulatorProcess
 
 pytestmark = pytest.mark.realtime
 

@@ -14,7 +14,7 @@ from hatchling.builders.wheel import WheelBuilder
 from cli.simulated_files import SimulatedFiles, write_files
 from shared_data import REPOSITORY
 from tauscope.errors import MissingExtraError
-from tauscope.extras import EXTRAS, require_extra
+from tauscope.extras import EXTRAS, POSIX_ONLY, require_extra
 
 PACKAGES = {
     "tauscope": REPOSITORY / "service/tauscope",
@@ -22,7 +22,6 @@ PACKAGES = {
     "tauscope_sim": REPOSITORY / "sim_backend/tauscope_sim",
 }
 ABSENT = [module for modules in EXTRAS.values() for module in modules]
-POSIX_ONLY = ["fcntl", "termios", "resource"]
 FOREIGN = ["tauscope.server", "tauscope.runtime", "tauscope_drivers", "tauscope_sim"]
 
 CHILD = """
@@ -114,6 +113,14 @@ def test_a_missing_extra_is_one_line(arm: SimulatedFiles) -> None:
     ended, _ = run_without(ABSENT, [words for words, _ in wanted.values()], arm.robot.parent)
     for (verb, (_, extra)), (status, err) in zip(wanted.items(), ended, strict=True):
         assert (status, err) == (1, f"tauscope {verb} needs the {extra} extra: pip install 'tauscope[{extra}]'\n")
+
+
+def test_moving_and_serving_name_the_system_that_they_need(arm: SimulatedFiles) -> None:
+    verbs = {"run": ["run", str(arm.robot)], "serve": ["serve", "--port", "0"]}
+    ended, _ = run_without([*POSIX_ONLY], list(verbs.values()), arm.robot.parent)
+    for verb, (status, err) in zip(verbs, ended, strict=True):
+        reason = "moving arms and serving need a POSIX system, such as Linux"
+        assert (status, err) == (1, f"tauscope {verb} cannot run on this system: {reason}\n")
 
 
 def test_any_other_missing_module_stays_a_fault() -> None:

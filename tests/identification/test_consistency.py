@@ -6,18 +6,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+from identification.mass_bounds import centre_of_mass_inequalities, mass_inequalities, total_mass_inequalities
 from tauscope.errors import IdentificationError
 from tauscope.identification.consistency import (
     FrictionColumns,
     LinearInequalities,
     Prior,
-    centre_of_mass_inequalities,
     friction_inequalities,
-    mass_inequalities,
     nearest_consistent_parameters,
     plausible_prior,
     program,
-    total_mass_inequalities,
 )
 from tauscope.identification.consistency.triangle import UPPER_TRIANGLE, triangle_of_parameters
 from tauscope.robot import Joint, JointType, LinkInertia, Model, Placement, Robot, Segment, pseudo_inertia

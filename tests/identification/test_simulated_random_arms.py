@@ -15,7 +15,10 @@ from tauscope.identification import Identification, identify
 from tauscope.recording import read_recording
 from tauscope.robot import JointLimits, Model, Robot
 from tauscope.robot.robot import STANDARD_PARAMETERS
-from tauscope.runtime import RunOptions, RunState, make_backend, run_trajectory
+from tauscope.runtime.drivers import make_backend
+from tauscope.runtime.in_process import run_trajectory
+from tauscope.runtime.options import RunOptions
+from tauscope.runtime.states import RunState
 from tauscope.trajectory import FourierSegment, Trajectory
 from tauscope_sim.model import build_model
 

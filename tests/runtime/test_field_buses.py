@@ -11,7 +11,6 @@ from arms import paper_arm
 from emulated_data_sheet import GAIN, sections, write_file
 from tauscope.errors import AcquisitionError
 from tauscope.robot import Robot
-from tauscope.runtime import RunOptions
 from tauscope.runtime.drivers import (
     FrameRequest,
     PlannedFrame,
@@ -21,7 +20,7 @@ from tauscope.runtime.drivers import (
     to_drive_joints,
     translate_driver_errors,
 )
-from tauscope.runtime.options import choose_rate_hz, chosen_stop_policy
+from tauscope.runtime.options import RunOptions, choose_rate_hz, chosen_stop_policy
 from tauscope_drivers import Capabilities, ControlMode, DriveLimits, StopPolicy
 
 

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from device_trace import DeviceTrace, read_trace
 from kills import killed_often
 from runtime.control_runs import wait_for
 from runtime.doubles import point_robot, short_motion
@@ -24,11 +25,13 @@ from shared_data import REPOSITORY
 from tauscope.recording import read_recording
 from tauscope.recording.journal_reading import read_journal
 from tauscope.robot import read_robot
-from tauscope.runtime import BackendOrder, RunOptions, RunOrder, RunRecord, RunState, read_record, recover_runs
+from tauscope.runtime.options import BackendOrder, RunOptions, RunOrder
 from tauscope.runtime.processes import child_environment
+from tauscope.runtime.record import RunRecord, read_record
+from tauscope.runtime.recovery import recover_runs
+from tauscope.runtime.states import RunState
 from tauscope.trajectory import write_trajectory
 from tauscope_sim.device.activity import COMMANDED
-from tauscope_sim.device.trace import DeviceTrace, read_trace
 from tauscope_sim.driver import DeviceProcess, start_device
 
 WATCHDOG_S, HEARTBEAT_S = 0.2, 0.5

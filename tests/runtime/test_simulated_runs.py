@@ -9,7 +9,10 @@ from tauscope.dynamics import friction_torque, inverse_dynamics
 from tauscope.errors import AcquisitionError, ScenarioError
 from tauscope.recording import read_recording
 from tauscope.robot import Robot, read_robot
-from tauscope.runtime import RunOptions, RunState, driver_names, make_backend, run_trajectory
+from tauscope.runtime.drivers import driver_names, make_backend
+from tauscope.runtime.in_process import run_trajectory
+from tauscope.runtime.options import RunOptions
+from tauscope.runtime.states import RunState
 from tauscope.trajectory import FourierSegment, FourierSeries, Trajectory
 from tauscope_sim.examples import example_robot
 

@@ -9,7 +9,7 @@ from typer.core import TyperGroup
 from typer.main import get_command
 
 from tauscope.cli.program import app
-from tauscope.runtime import RunOptions
+from tauscope.runtime.options import RunOptions
 from tauscope.server.http.backends import BackendRequest
 from tauscope.server.http.campaigns import CampaignRequest
 from tauscope.server.http.diagnoses import DIAGNOSES, DiagnosisRequest

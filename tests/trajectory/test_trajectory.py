@@ -1,5 +1,7 @@
 """Trajectories: pieces that join smoothly, samples, period labels, ramps."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -126,12 +128,12 @@ def test_ramps_keep_half_the_limits_and_stay_between_their_ends(
 def test_a_ramp_goes_before_the_trajectory() -> None:
     trajectory = whole_trajectory()
     standing = np.array([1.0, -1.0, 0.3])
-    whole = trajectory.with_ramp_from(standing, LIMITS)
+    whole = replace(trajectory, segments=(ramp(standing, trajectory.start, LIMITS), *trajectory.segments))
     assert np.array_equal(whole.start, standing)
     np.testing.assert_allclose(whole.end, trajectory.end)
     assert whole.duration_s > trajectory.duration_s
     with pytest.raises(ExcitationError, match="3 joints"):
-        trajectory.with_ramp_from(np.array([1.0, np.nan, 0.3]), LIMITS)
+        ramp(np.array([1.0, np.nan, 0.3]), trajectory.start, LIMITS)
 
 
 def test_sampled_motion_meets_its_samples_and_is_smooth_between() -> None:

@@ -10,7 +10,6 @@ from tauscope.cli.terminal import output, plain, shown_progress, table
 from tauscope.errors import AcquisitionError
 from tauscope.report.table import Table
 from tauscope.robot import Robot, read_robot
-from tauscope.runtime import RunOptions
 from tauscope.runtime.drivers import (
     FoundDevice,
     FrameRequest,
@@ -21,6 +20,7 @@ from tauscope.runtime.drivers import (
     translate_driver_errors,
 )
 from tauscope.runtime.guard import guard_limits
+from tauscope.runtime.options import RunOptions
 from tauscope.trajectory import read_trajectory
 
 SHOWN_CYCLES = 3

@@ -29,7 +29,8 @@ from tauscope.identification import Identification
 from tauscope.report.quantities import given, with_uncertainty
 from tauscope.report.table import Table
 from tauscope.robot import Robot, read_robot
-from tauscope.runtime import RunOptions, RunState
+from tauscope.runtime.options import RunOptions
+from tauscope.runtime.states import RunState
 from tauscope.tasks import identify, run
 from tauscope.tasks.task import LocalFiles
 from tauscope.trajectory import write_trajectory

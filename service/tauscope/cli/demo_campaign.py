@@ -10,7 +10,7 @@ from tauscope.cli.terminal import Told
 from tauscope.diagnosis import DiagnosisDocument
 from tauscope.errors import TauscopeError
 from tauscope.robot import read_robot
-from tauscope.runtime import RunOptions
+from tauscope.runtime.options import RunOptions
 from tauscope.server.control.campaign import CampaignOrder, CampaignWorkspace
 from tauscope.server.http.campaigns import describe, result_of
 from tauscope.server.http.services import Services, open_services

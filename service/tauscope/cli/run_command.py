@@ -103,7 +103,7 @@ def run(
     given = {"scenario": scenario, "start": start, "time": None if time == "virtual" else time}
     require_options(backend, [name for name, value in given.items() if value is not None])
     from tauscope.cli.task_run import make_request
-    from tauscope.runtime import RunOptions
+    from tauscope.runtime.options import RunOptions
 
     options = make_request(
         RunOptions,

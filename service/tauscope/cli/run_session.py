@@ -13,7 +13,8 @@ from tauscope.cli.run_summary import show_run
 from tauscope.cli.terminal import output, plain, shown_progress
 from tauscope.errors import AcquisitionError
 from tauscope.robot.messages import one_line
-from tauscope.runtime import RunRecord, RunState
+from tauscope.runtime.record import RunRecord
+from tauscope.runtime.states import RunState
 from tauscope.tasks import run
 from tauscope.tasks.task import LocalFiles
 

@@ -6,7 +6,7 @@ from tauscope.cli.terminal import plain, table
 from tauscope.report.quantities import ABSENT, counted, significant
 from tauscope.report.table import Table
 from tauscope.robot import JointType, Robot
-from tauscope.runtime import RunRecord
+from tauscope.runtime.record import RunRecord
 
 
 def show_run(console: Console, record: RunRecord, robot: Robot) -> None:

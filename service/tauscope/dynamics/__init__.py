@@ -9,7 +9,7 @@ from tauscope.dynamics.friction import (
     smooth_sign_slope,
 )
 from tauscope.dynamics.regressor import TorqueRegressor, torque_regressor
-from tauscope.dynamics.rigid_body import gravity_torque, inverse_dynamics, kinetic_energy, mass_matrix, potential_energy
+from tauscope.dynamics.rigid_body import gravity_torque, inverse_dynamics, mass_matrix
 
 __all__ = [
     "FRICTION_COLUMNS",
@@ -20,9 +20,7 @@ __all__ = [
     "friction_torque",
     "gravity_torque",
     "inverse_dynamics",
-    "kinetic_energy",
     "mass_matrix",
-    "potential_energy",
     "smooth_sign",
     "smooth_sign_slope",
     "torque_regressor",

@@ -1,4 +1,4 @@
-"""Torques, mass matrix and energies of an arm whose standard parameters are given."""
+"""Torques and mass matrix of an arm whose standard parameters are given."""
 
 from collections.abc import Iterator
 
@@ -6,7 +6,6 @@ import numpy as np
 
 from tauscope.dynamics.chain_motion import Array, ChainMotion
 from tauscope.dynamics.regressor import CHUNK
-from tauscope.robot.kinematics import link_placements
 from tauscope.robot.robot import STANDARD_PARAMETERS, LinkInertia, Robot
 
 _LEVI_CIVITA = np.array([[[(i - j) * (j - k) * (k - i) / 2.0 for k in range(3)] for j in range(3)] for i in range(3)])
@@ -92,48 +91,6 @@ def mass_matrix(robot: Robot, parameters: Array, q: Array) -> Array:
             momenta = np.tensordot(inertia, screws, axes=1)
             mass[part, : link + 1, : link + 1] += np.einsum("ain,akn->nik", screws, momenta)
     return mass
-
-
-def kinetic_energy(robot: Robot, parameters: Array, q: Array, qd: Array) -> Array:
-    """Kinetic energy T = ½ q̇ᵀ H(q) q̇.
-
-    Parameters
-    ----------
-    parameters : (10 n,) float64
-        Θ, ten standard parameters a link
-    q : (N, n) float64
-        joint position [rad or m]
-    qd : (N, n) float64
-        joint velocity [rad/s or m/s]
-
-    Returns
-    -------
-    (N,) float64
-        T [J]
-    """
-    return 0.5 * np.einsum("ni,nik,nk->n", qd, mass_matrix(robot, parameters, q), qd)
-
-
-def potential_energy(robot: Robot, parameters: Array, q: Array) -> Array:
-    """Potential energy U = -gᵀ Σ_j (m_j p_j + R_j m_j s_j), zero at the base frame's origin.
-
-    Parameters
-    ----------
-    parameters : (10 n,) float64
-        Θ, ten standard parameters a link
-    q : (N, n) float64
-        joint position [rad or m]
-
-    Returns
-    -------
-    (N,) float64
-        U [J]
-    """
-    energy = np.zeros(len(q))
-    for link, placement in zip(_links(parameters), link_placements(robot, q).swapaxes(0, 1), strict=True):
-        rotation, position = placement[:, :3, :3], placement[:, :3, 3]
-        energy -= (link.mass * position + rotation @ link.first_moment) @ robot.gravity
-    return energy
 
 
 def _links(parameters: Array) -> list[LinkInertia]:

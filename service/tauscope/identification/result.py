@@ -4,22 +4,17 @@ from dataclasses import asdict
 from typing import Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from tauscope.identification.friction_shape import shape_parameters
 from tauscope.identification.identification import Identification
 from tauscope.identification.residuals import Fit
 from tauscope.recording.conditioning import ConditioningSummary
 from tauscope.robot import STANDARD_PARAMETERS, LinkInertia
+from tauscope.strict_model import ResultModel
 
 
-class Document(BaseModel):
-    """Base of all result documents: strict, and closed to unknown keys."""
-
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, ser_json_inf_nan="null")
-
-
-class BaseParameterEntry(Document):
+class BaseParameterEntry(ResultModel):
     """One identifiable combination of the links' standard parameters."""
 
     name: str = Field(description="readable expression, e.g. Ixx2 - Iyy2 - 0.5*msx2")
@@ -30,7 +25,7 @@ class BaseParameterEntry(Document):
     free_value: float = Field(description="the LS or WLS estimate before physical constraints")
 
 
-class FrictionEntry(Document):
+class FrictionEntry(ResultModel):
     """Friction of one joint: τ_s A(K_v q̇) + τ_sc A(δ q̇) + τ_v q̇ + offset, A(x) = (2/π) atan x."""
 
     joint: str = Field(description="name of the joint")
@@ -46,7 +41,7 @@ class FrictionEntry(Document):
     identifiable: dict[str, bool] = Field(description="false for an entry that these data cannot tell")
 
 
-class RotorEntry(Document):
+class RotorEntry(ResultModel):
     """Reflected rotor inertia of one joint, where the data ask for it."""
 
     joint: str = Field(description="name of the joint")
@@ -54,7 +49,7 @@ class RotorEntry(Document):
     std: float | None = Field(description="standard error; null where the recordings are silent")
 
 
-class InertiaEntry(Document):
+class InertiaEntry(ResultModel):
     """Inertia about the link frame's origin [kg m²]."""
 
     xx: float = Field(description="Ixx")
@@ -65,7 +60,7 @@ class InertiaEntry(Document):
     yz: float = Field(description="Iyz")
 
 
-class LinkEntry(Document):
+class LinkEntry(ResultModel):
     """One link of the nearest physically consistent model, in its link frame."""
 
     mass: float = Field(description="m [kg]")
@@ -73,7 +68,7 @@ class LinkEntry(Document):
     inertia: InertiaEntry = Field(description="about the link frame's origin")
 
 
-class FitEntry(Document):
+class FitEntry(ResultModel):
     """How well the model explains some recordings."""
 
     rms: list[float] = Field(description="per joint, residual at the recorded rate, unfiltered [Nm or N]")
@@ -81,7 +76,7 @@ class FitEntry(Document):
     relative_error: float = Field(description="‖τ - τ̂‖ / ‖τ‖ over all joints, in the common band")
 
 
-class FitsEntry(Document):
+class FitsEntry(ResultModel):
     """Fits of the delivered model, and of the physically consistent one where that is another."""
 
     train: FitEntry = Field(description="on the recordings that the model was made from")
@@ -90,7 +85,7 @@ class FitsEntry(Document):
     links_held_out: FitEntry | None = Field(default=None, description="of `links` and its friction, held out")
 
 
-class ConditioningEntry(Document):
+class ConditioningEntry(ResultModel):
     """What was done to one recording, and what was missing in it."""
 
     recording: str = Field(description="name as given")
@@ -108,7 +103,7 @@ class ConditioningEntry(Document):
     )
 
 
-class IdentificationDocument(Document):
+class IdentificationDocument(ResultModel):
     """Result of an identification, schema tauscope.identification/1."""
 
     schema_id: Literal["tauscope.identification/1"] = Field(

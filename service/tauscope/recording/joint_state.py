@@ -136,12 +136,6 @@ def decode_json(message: bytes) -> JointState:
     return JointState(_json_stamp(stamp), tuple(names), *arrays)
 
 
-def as_batch(message: JointState) -> JointStates:
-    """A batch of one."""
-    arrays = (array[None, :] for array in (message.position, message.velocity, message.effort))
-    return JointStates(np.array([message.stamp], dtype=np.int64), message.names, *arrays)
-
-
 def _json_stamp(stamp: object) -> int:
     """Nanoseconds of a stamp, 0 where there is none."""
     if not isinstance(stamp, dict):

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from tauscope.identification import Identification
 from tauscope.recording import Recording
@@ -13,6 +13,7 @@ from tauscope.report.decimation import envelope_indices
 from tauscope.report.friction_curve import friction_curve
 from tauscope.report.series import TorqueSeries, torque_series
 from tauscope.robot import JointType
+from tauscope.strict_model import ResultModel
 
 MOST_POINTS = 4000
 """Points of one joint's torque: more than any screen is wide, so that a zoom shows more."""
@@ -21,13 +22,7 @@ MOST_SERIES = 6
 """Recordings that the friction curves are compared with."""
 
 
-class PlotDocument(BaseModel):
-    """Base: strict, and closed to unknown keys; what was not measured is null."""
-
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, ser_json_inf_nan="null")
-
-
-class TorqueCurve(PlotDocument):
+class TorqueCurve(ResultModel):
     """Measured and predicted torque of one joint along one recording, at the recorded rate, no filter."""
 
     joint: str = Field(description="name of the joint")
@@ -38,7 +33,7 @@ class TorqueCurve(PlotDocument):
     predicted: list[float] = Field(description="torque of the model [Nm or N]")
 
 
-class FrictionPlot(PlotDocument):
+class FrictionPlot(ResultModel):
     """Friction of one joint over its velocity."""
 
     joint: str = Field(description="name of the joint")
@@ -50,7 +45,7 @@ class FrictionPlot(PlotDocument):
     measured_friction: list[float] = Field(description="mean measured less rigid-body torque in it [Nm or N]")
 
 
-class IdentificationPlots(PlotDocument):
+class IdentificationPlots(ResultModel):
     """Data of an identification's figures, schema tauscope.identification-plots/1."""
 
     schema_id: Literal["tauscope.identification-plots/1"] = Field(

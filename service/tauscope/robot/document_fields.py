@@ -4,11 +4,12 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, model_validator
+from pydantic import AfterValidator, BeforeValidator, model_validator
 from pydantic_core import PydanticCustomError
 
 from tauscope.robot.messages import nearest, shown
 from tauscope.robot.robot import JointType
+from tauscope.strict_model import StrictModel
 
 LARGEST_NUMBER = 1e9
 LONGEST_NAME = 200
@@ -20,10 +21,8 @@ def refusal(text: str, key: str | None = None) -> PydanticCustomError:
     return PydanticCustomError("refused", "{text}", {"text": text, "key": key})
 
 
-class Document(BaseModel):
-    """A mapping of the robot file: no type is converted, no key is overlooked."""
-
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+class Document(StrictModel):
+    """A mapping of the robot file."""
 
     @model_validator(mode="before")
     @classmethod

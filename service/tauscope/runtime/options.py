@@ -4,21 +4,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
+from pydantic import Field, FiniteFloat, ValidationError
 
 from tauscope.errors import AcquisitionError
 from tauscope.files import write_atomically
 from tauscope.robot import Joint
 from tauscope.robot.messages import one_line
 from tauscope.runtime.drivers import DEFAULT_BACKEND
+from tauscope.strict_model import StrictModel
 from tauscope_drivers import Capabilities, ControlMode, StopPolicy
-
-
-class StoredModel(BaseModel):
-    """Base of what runs keep as JSON: no type is converted, no key is overlooked."""
-
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
-
 
 DEFAULT_RATE_HZ = 500.0
 """Cycles a second where nothing is stated and the bus allows as many."""
@@ -26,7 +20,7 @@ DEFAULT_RATE_HZ = 500.0
 Positive = Annotated[FiniteFloat, Field(gt=0.0)]
 
 
-class RunOptions(StoredModel, strict=False):
+class RunOptions(StrictModel, strict=False):
     """How a run is to be made."""
 
     mode: ControlMode = Field(default=ControlMode.POSITION, description="who closes the loop: the drives, or the host")
@@ -126,14 +120,14 @@ def _stated_policy(joints: Sequence[Joint]) -> StopPolicy:
 ORDER_FILE = "order.json"
 
 
-class BackendOrder(StoredModel):
+class BackendOrder(StrictModel):
     """Which backend, and its own settings."""
 
     name: str = Field(default=DEFAULT_BACKEND, description="name of a driver")
     settings: dict[str, Any] = Field(default_factory=dict, description="the driver's own options")
 
 
-class RunOrder(StoredModel):
+class RunOrder(StrictModel):
     """One run."""
 
     form: Literal["tauscope.order/1"] = Field(default="tauscope.order/1", description="name and version of this form")

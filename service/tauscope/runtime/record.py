@@ -11,10 +11,10 @@ from pydantic import AwareDatetime, Field, ValidationError
 from tauscope.errors import AcquisitionError
 from tauscope.files import write_atomically
 from tauscope.runtime.guard import Violation
-from tauscope.runtime.options import StoredModel
 from tauscope.runtime.processes import read_process_start
 from tauscope.runtime.states import RunState, may_follow
 from tauscope.runtime.timing import RealTime, Timing
+from tauscope.strict_model import StrictModel
 
 RUN_FILE = "run.json"
 JOURNAL_FILE = "journal.mcap"
@@ -24,7 +24,7 @@ PROCESS_FILE = ".control"
 RECORDING_STEM = "recording"
 
 
-class ProcessName(StoredModel):
+class ProcessName(StrictModel):
     """One process of this machine, told from a later one of the same number."""
 
     pid: int = Field(description="number of the process")
@@ -61,14 +61,14 @@ def read_process(folder: Path) -> ProcessName | None:
         return None
 
 
-class Transition(StoredModel):
+class Transition(StrictModel):
     """When a run came into a state."""
 
     state: RunState = Field(description="the state")
     at: AwareDatetime = Field(description="the moment")
 
 
-class RunProblem(StoredModel):
+class RunProblem(StrictModel):
     """Why a run did not finish."""
 
     code: str = Field(description="code of the error, as in tauscope.errors, or of the way the run ended")
@@ -91,7 +91,7 @@ class RunProblem(StoredModel):
         )
 
 
-class RecordingFiles(StoredModel):
+class RecordingFiles(StrictModel):
     """What a run left behind."""
 
     samples: int = Field(description="samples of the motion, without the ramp")
@@ -103,7 +103,7 @@ class RecordingFiles(StoredModel):
     remarks: tuple[str, ...] = Field(default=(), description="what is missing, and why; one line each")
 
 
-class RunRecord(StoredModel):
+class RunRecord(StrictModel):
     """A run's state and what is known of it."""
 
     form: Literal["tauscope.run/1"] = Field(default="tauscope.run/1", description="name and version of this form")

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from tauscope.runtime.options import StoredModel
+from tauscope.strict_model import StrictModel
 from tauscope_drivers import Clock
 
 PRIORITY = 80
@@ -25,7 +25,7 @@ _TASKS = Path("/proc/self/task")
 _LOCK_CURRENT_AND_FUTURE = 3
 
 
-class RealTime(StoredModel):
+class RealTime(StrictModel):
     """What the loop was given of what it asked for."""
 
     scheduler: str = Field(description="fifo with its priority, or why the ordinary scheduler was used")
@@ -103,7 +103,7 @@ _HISTOGRAM_EDGES_US = (10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_0
 _PERCENTILES = {"p50": 50.0, "p99": 99.0, "p99.9": 99.9, "max": 100.0}
 
 
-class Timing(StoredModel):
+class Timing(StrictModel):
     """How well a run kept its time."""
 
     rate_hz: float = Field(description="cycles a second that were asked for")

@@ -3,13 +3,9 @@
 import math
 from typing import Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict
+from pydantic import BeforeValidator, ConfigDict
 
-
-class StrictModel(BaseModel):
-    """No type is converted, no key is overlooked."""
-
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+from tauscope.strict_model import StrictModel
 
 
 class AnswerModel(StrictModel):

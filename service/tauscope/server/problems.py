@@ -10,7 +10,7 @@ from pydantic import Field, ValidationError
 from starlette.exceptions import HTTPException
 
 from tauscope.robot.messages import one_line
-from tauscope.server.models import StrictModel
+from tauscope.strict_model import StrictModel
 
 MEDIA_TYPE = "application/problem+json"
 TYPE_PREFIX = "/docs/errors/"

@@ -9,16 +9,18 @@ from pydantic import Field
 
 from tauscope.errors import AcquisitionError
 from tauscope.files import write_atomically
-from tauscope.runtime import RunOptions, RunState
+from tauscope.runtime.options import RunOptions
+from tauscope.runtime.states import RunState
+from tauscope.strict_model import StrictModel
 from tauscope.tasks import design_excitation, diagnose, identify, run
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
 from tauscope.tasks.diagnose import DiagnosisOptions
 from tauscope.tasks.identify import IdentificationOptions
 from tauscope.tasks.run import BackendChoice
-from tauscope.tasks.task import Files, LocalFiles, Outputs, Progress, TaskModel
+from tauscope.tasks.task import Files, LocalFiles, Outputs, Progress
 
 
-class HeldOutMotion(TaskModel):
+class HeldOutMotion(StrictModel):
     """The motion that the model is judged by, never made from."""
 
     seed: int | None = Field(
@@ -27,7 +29,7 @@ class HeldOutMotion(TaskModel):
     periods: int = Field(default=2, ge=1, le=100, description="how often its period is repeated")
 
 
-class CampaignOptions(TaskModel):
+class CampaignOptions(StrictModel):
     """How each step of a campaign is done."""
 
     excitation: ExcitationDesignOptions = Field(

@@ -19,21 +19,22 @@ from tauscope.excitation import (
     excitation_document,
 )
 from tauscope.robot import Robot, read_robot
-from tauscope.tasks.task import Files, Outputs, Progress, TaskModel, json_text
+from tauscope.strict_model import StrictModel
+from tauscope.tasks.task import Files, Outputs, Progress, json_text
 from tauscope.trajectory import trajectory_json
 from tauscope.trajectory.csv_format import trajectory_csv
 
 Point = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 
 
-class ForbiddenBox(TaskModel):
+class ForbiddenBox(StrictModel):
     """A box along the axes of the base frame, which the arm keeps clear of."""
 
     low: Point = Field(description="least x, y, z [m]")
     high: Point = Field(description="greatest x, y, z [m]")
 
 
-class ExcitationDesignOptions(TaskModel):
+class ExcitationDesignOptions(StrictModel):
     """How a motion is designed."""
 
     duration_s: Annotated[FiniteFloat, Field(gt=0.0, le=600.0)] = Field(
@@ -98,7 +99,7 @@ class ExcitationDesignOptions(TaskModel):
         )
 
 
-class Request(TaskModel):
+class Request(StrictModel):
     """Which motion is wanted, and for which robot file."""
 
     robot: str = Field(description="robot file")

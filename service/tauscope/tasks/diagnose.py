@@ -27,12 +27,12 @@ from tauscope.identification import Options
 from tauscope.recording import Recording
 from tauscope.report.provenance import Provenance
 from tauscope.robot import read_robot
+from tauscope.strict_model import StrictModel
 from tauscope.tasks.identify import CutoffFrequency
 from tauscope.tasks.task import (
     Files,
     Outputs,
     Progress,
-    TaskModel,
     command_words,
     effort_kind,
     json_text,
@@ -46,7 +46,7 @@ from tauscope.trajectory.files import DEFAULT_RATE_HZ
 from tauscope.version import tauscope_version
 
 
-class DiagnosisOptions(TaskModel):
+class DiagnosisOptions(StrictModel):
     """How a diagnosis is done."""
 
     against: Literal["identified", "model", "simulation", "saved"] = Field(
@@ -62,7 +62,7 @@ class DiagnosisOptions(TaskModel):
     )
 
 
-class Request(TaskModel):
+class Request(StrictModel):
     """What is to be diagnosed, by the names of its files."""
 
     robot: str = Field(description="robot file")

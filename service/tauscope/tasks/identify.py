@@ -18,11 +18,11 @@ from tauscope.identification import (
 from tauscope.recording import Recording
 from tauscope.report.provenance import Provenance
 from tauscope.robot import Robot, read_robot
+from tauscope.strict_model import StrictModel
 from tauscope.tasks.task import (
     Files,
     Outputs,
     Progress,
-    TaskModel,
     command_words,
     effort_kind,
     json_text,
@@ -34,7 +34,7 @@ from tauscope.tasks.task import (
 CutoffFrequency = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
 
-class IdentificationOptions(TaskModel):
+class IdentificationOptions(StrictModel):
     """How an identification is done."""
 
     estimator: Literal["ls", "wls"] = Field(default="wls", description="how the joints' equations are weighted")
@@ -45,7 +45,7 @@ class IdentificationOptions(TaskModel):
     rotor_inertia: bool = Field(default=True, description="whether rotors are added where the data ask for them")
 
 
-class Request(TaskModel):
+class Request(StrictModel):
     """What is to be identified, by the names of its files."""
 
     robot: str = Field(description="robot file")

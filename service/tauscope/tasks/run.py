@@ -8,18 +8,20 @@ from typing import Any, Literal
 from pydantic import Field, FiniteFloat
 
 from tauscope.robot import Robot, read_robot
-from tauscope.runtime import BackendOrder, RunOptions, RunOrder, RunProcess, RunRecord
 from tauscope.runtime.drivers import DEFAULT_BACKEND, find_driver
+from tauscope.runtime.options import BackendOrder, RunOptions, RunOrder
 from tauscope.runtime.progress import Report
-from tauscope.runtime.record import JOURNAL_FILE, RECORDING_STEM
+from tauscope.runtime.record import JOURNAL_FILE, RECORDING_STEM, RunRecord
+from tauscope.runtime.run_process import RunProcess
+from tauscope.strict_model import StrictModel
 from tauscope.tasks import design_excitation
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
-from tauscope.tasks.task import Files, Progress, TaskModel
+from tauscope.tasks.task import Files, Progress
 
 TRAJECTORY = "trajectory.json"
 
 
-class BackendChoice(TaskModel):
+class BackendChoice(StrictModel):
     """Which arm is moved."""
 
     name: str = Field(default=DEFAULT_BACKEND, description="backend: name of a driver, installed or not")
@@ -40,7 +42,7 @@ class BackendChoice(TaskModel):
         return f"{robot_name} on {self.name}"
 
 
-class Request(TaskModel):
+class Request(StrictModel):
     """Which run is wanted, by the names of its files.
 
     A scenario is either a file here, or content of `backend`, which whoever resolves the files has written to one.

@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Protocol
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel
 
 from tauscope.export.compensation import RecordingSource
 from tauscope.recording import EffortKind, Recording, read_recording
@@ -15,12 +15,6 @@ from tauscope.robot import Robot
 
 ROLES = {"recordings": "recording", "held_out": "held out", "simulated": "compared with", "model": "compared with"}
 """What each list of a request is called in a report."""
-
-
-class TaskModel(BaseModel):
-    """Base of requests and options: no type is converted, no key is overlooked."""
-
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
 
 
 class Progress(Protocol):

@@ -90,12 +90,6 @@ class FourierSeries:
             acceleration=cosine @ (self.sine * omega).T - sine @ (self.cosine * omega).T,
         )
 
-    def rest_error(self) -> tuple[float, float]:
-        """Largest speed and acceleration at the ends of a period: |Σ a_l| and ω_f |Σ l b_l| [rad/s, rad/s²]."""
-        speed = np.abs(self.cosine.sum(axis=1))
-        acceleration = np.abs(self.sine @ self.frequencies)
-        return float(speed.max(initial=0.0)), float(acceleration.max(initial=0.0))
-
 
 def between_samples(harmonics: int, samples: int) -> float:
     """Factor by which a trigonometric polynomial may exceed its largest equispaced sample: 1/cos(π M / K).

@@ -1,7 +1,7 @@
 """A trajectory: what a run plays and what trajectory files hold."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -184,16 +184,6 @@ class Trajectory:
         result.velocity[beyond], result.acceleration[beyond] = 0.0, 0.0
         result.period[beyond | (time > self.duration_s - slack)] = np.nan  # the end is the next period's first instant
         return result
-
-    def with_ramp_from(self, posture: Array, limits: MotionLimits) -> "Trajectory":
-        """The same trajectory with a ramp before it, from wherever the arm stands.
-
-        Parameters
-        ----------
-        posture : (n,) float64
-            where the arm stands [rad or m]
-        """
-        return replace(self, segments=(ramp(posture, self.start, limits), *self.segments))
 
 
 def ramp(start: Array, end: Array, limits: MotionLimits, *, fraction: float = RAMP_FRACTION) -> MoveSegment:

@@ -1,6 +1,5 @@
 """What emulated buses have in common: a process of its own, a pseudo terminal, a clock, a trace, a kit of faults."""
 
 from tauscope_sim.emulation.fault_kit import FaultKind, InjectedFault
-from tauscope_sim.emulation.process import EmulatorProcess
 
-__all__ = ["EmulatorProcess", "FaultKind", "InjectedFault"]
+__all__ = ["FaultKind", "InjectedFault"]

@@ -10,7 +10,8 @@ import pytest
 from server.queue.controls import HandControls, finish_at_once
 from server.queue.executors import InlineExecutor, ManualExecutor
 from server.queue.waiting import wait_until
-from tauscope.runtime import RunProblem, RunState
+from tauscope.runtime.record import RunProblem
+from tauscope.runtime.states import RunState
 from tauscope.server.control import campaign_runner
 from tauscope.server.control.campaign import CampaignLinks, CampaignOrder, CampaignWorkspace
 from tauscope.server.control.campaign_manager import CampaignManager

@@ -8,7 +8,8 @@ import pytest
 from server.queue.controls import CSV, WAY, HandControls
 from server.queue.waiting import wait_until
 from tauscope.errors import AcquisitionError, NotFoundError
-from tauscope.runtime import RunProblem, RunState
+from tauscope.runtime.record import RunProblem
+from tauscope.runtime.states import RunState
 from tauscope.server.control.device_claims import BusyError, DeviceClaims
 from tauscope.server.control.motions import Motion, StepFailedError, ready_motion
 from tauscope.server.control.run import RunRequestRecord, RunWorkspace

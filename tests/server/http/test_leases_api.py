@@ -16,7 +16,7 @@ from server.http.problem_check import assert_problem
 from server.queue.controls import HandControls
 from server.queue.executors import InlineExecutor, ManualExecutor
 from server.queue.waiting import wait_until
-from tauscope.runtime import RunState
+from tauscope.runtime.states import RunState
 from tauscope.server.auth.scopes import Scope
 from tauscope.server.control.leases import Lease
 from tauscope.server.http import Settings, create_app

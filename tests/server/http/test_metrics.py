@@ -16,7 +16,7 @@ from server.queue.controls import HandControls
 from server.queue.executors import InlineExecutor, ManualExecutor
 from server.queue.waiting import wait_until
 from snapshots import SNAPSHOTS, unpacked
-from tauscope.runtime import RunState
+from tauscope.runtime.states import RunState
 from tauscope.runtime.timing import Timing
 from tauscope.server.http import Settings, create_app
 from tauscope.server.http.services import Services

@@ -7,7 +7,7 @@ from server.http.page_words import german, sentences, tagged
 from tauscope.diagnosis import Verdict
 from tauscope.effects import catalogue
 from tauscope.robot.robot import JointType
-from tauscope.runtime import RunState
+from tauscope.runtime.states import RunState
 from tauscope.server.page.router import STATIC, assets
 from tauscope.server.queue.record import JobState
 from tauscope.server.store.data_folder import FOLDERS

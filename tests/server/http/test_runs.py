@@ -15,7 +15,8 @@ from server.http.problem_check import assert_problem
 from server.queue.controls import CSV, WAY, HandControls
 from server.queue.executors import InlineExecutor, ManualExecutor
 from server.queue.waiting import wait_until
-from tauscope.runtime import RunProblem, RunState
+from tauscope.runtime.record import RunProblem
+from tauscope.runtime.states import RunState
 from tauscope.server.control.run import RunWorkspace
 from tauscope.server.http import Settings, create_app
 from tauscope.server.http.tasks import events as event_routes

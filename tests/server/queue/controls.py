@@ -4,8 +4,8 @@ import threading
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from tauscope.runtime import RunProblem, RunRecord, RunState
-from tauscope.runtime.record import RecordingFiles, new_record, write_record
+from tauscope.runtime.record import RecordingFiles, RunProblem, RunRecord, new_record, write_record
+from tauscope.runtime.states import RunState
 from tauscope.server.control.run import RunWorkspace
 
 WAY = (RunState.CONNECTING, RunState.ENABLING, RunState.RAMPING, RunState.RUNNING)

@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 from arm_rigs import AT_REST, START, bench_robot, wide_limits
+from device_trace import DeviceTrace, read_trace
 from shared_data import REPOSITORY
 from tauscope.errors import RecordingError
 from tauscope_drivers import ControlMode, DriverError, StopPolicy
 from tauscope_drivers.errors import DriverErrorKind
 from tauscope_sim.device import Activity
-from tauscope_sim.device.trace import DeviceTrace, read_trace
 from tauscope_sim.driver import DeviceProcess, RemoteSimulatedArm, start_device
 
 PATIENCE_S = 30.0

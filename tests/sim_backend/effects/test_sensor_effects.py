@@ -10,7 +10,7 @@ from tauscope.robot.robot import Robot
 from tauscope_sim.effects.time_delay import TimeDelay
 from tauscope_sim.effects.torque_gain_error import TorqueGainError
 from tauscope_sim.effects.torque_saturation import TorqueSaturation
-from tauscope_sim.scenario import Scenario, measure_all
+from tauscope_sim.scenario import Scenario, Sensors
 
 Array = NDArray[np.float64]
 
@@ -22,6 +22,12 @@ def samples() -> tuple[Array, Array, Array]:
     position = np.sin(np.multiply.outer(time, [2.0, 3.0, 5.0]))
     torque = 20.0 * np.cos(np.multiply.outer(time, [4.0, 3.0, 6.0]))
     return time, position, torque
+
+
+def measure_all(sensors: Sensors, time: Array, position: Array, torque: Array) -> tuple[Array, Array]:
+    """Position and torque as recorded of a whole motion."""
+    rows = [sensors.measure(float(t), q, u) for t, q, u in zip(time, position, torque, strict=True)]
+    return np.array([row[0] for row in rows]), np.array([row[1] for row in rows])
 
 
 def recorded(

@@ -10,7 +10,6 @@ import numpy as np
 from pydantic import Field
 
 from tauscope.diagnosis.documents.residual_spectrum import ResidualSpectrum, residual_spectra
-from tauscope.diagnosis.documents.result import Document
 from tauscope.diagnosis.documents.rounded import rounded
 from tauscope.diagnosis.documents.torque_overlay import TorqueOverlay, torque_overlays
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
@@ -19,6 +18,7 @@ from tauscope.diagnosis.observations.observations import Observations
 from tauscope.effects import Signals
 from tauscope.recording.recording import Array
 from tauscope.robot import JointType
+from tauscope.strict_model import ResultModel
 
 MOST_POINTS = 1500
 """Points of one joint's residual, over all recordings."""
@@ -32,7 +32,7 @@ VARIABLES = ("velocity", "position", "load", "acceleration")
 TIME = "time"
 
 
-class ResidualCurve(Document):
+class ResidualCurve(ResultModel):
     """Residual of one joint over time in one recording, in the common band."""
 
     joint: str = Field(description="name of the joint")
@@ -45,7 +45,7 @@ class ResidualCurve(Document):
     )
 
 
-class ResidualHistogram(Document):
+class ResidualHistogram(ResultModel):
     """Residual of one joint by the value of a variable: bins of equal count."""
 
     joint: str = Field(description="name of the joint")
@@ -58,7 +58,7 @@ class ResidualHistogram(Document):
     after: list[float] = Field(description="the same with all findings [Nm or N]")
 
 
-class DiagnosisPlots(Document):
+class DiagnosisPlots(ResultModel):
     """Data of a diagnosis' figures, schema tauscope.diagnosis-plots/1."""
 
     schema_id: Literal["tauscope.diagnosis-plots/1"] = Field(

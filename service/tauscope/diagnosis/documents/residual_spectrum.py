@@ -4,7 +4,6 @@ import numpy as np
 from pydantic import Field
 from scipy import signal
 
-from tauscope.diagnosis.documents.result import Document
 from tauscope.diagnosis.documents.rounded import rounded
 from tauscope.diagnosis.documents.torque_overlay import judging_observations
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
@@ -13,6 +12,7 @@ from tauscope.diagnosis.model.residual import residual_rows
 from tauscope.diagnosis.observations.observations import Observations
 from tauscope.diagnosis.observations.whitening import JointNoise
 from tauscope.recording.recording import Array
+from tauscope.strict_model import ResultModel
 
 LONGEST_SEGMENT = 256
 """Rows of one segment of Welch's method."""
@@ -24,7 +24,7 @@ AVERAGED = 6
 """Segments' worth of rows that a density is the mean of, where there are so many: fewer are mostly chance."""
 
 
-class ResidualSpectrum(Document):
+class ResidualSpectrum(ResultModel):
     """Power spectral density of one joint's residual, one-sided, up to the end of the common band."""
 
     joint: str = Field(description="name of the joint")

@@ -2,16 +2,12 @@
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from tauscope.strict_model import ResultModel
 
 
-class Document(BaseModel):
-    """Base of all result documents: strict, and closed to unknown keys."""
-
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, ser_json_inf_nan="null")
-
-
-class WhereEntry(Document):
+class WhereEntry(ResultModel):
     """The range of a variable in which the excess residual concentrates."""
 
     variable: str = Field(description="velocity, position, load, acceleration, time, temperature or motor_position")
@@ -20,7 +16,7 @@ class WhereEntry(Document):
     recording: str | None = Field(default=None, description="for time: in which recording")
 
 
-class MismatchEntry(Document):
+class MismatchEntry(ResultModel):
     """Excess residual of one joint, before anything is named."""
 
     joint: str = Field(description="name of the joint")
@@ -30,7 +26,7 @@ class MismatchEntry(Document):
     time: WhereEntry | None = Field(description="when; null where always")
 
 
-class QuantityEntry(Document):
+class QuantityEntry(ResultModel):
     """One parameter of a finding."""
 
     name: str = Field(description="in the equation")
@@ -39,7 +35,7 @@ class QuantityEntry(Document):
     unit: str = Field(description="SI")
 
 
-class FindingEntry(Document):
+class FindingEntry(ResultModel):
     """An effect that the nominal model leaves out."""
 
     effect: str = Field(description="id of the effect")
@@ -60,21 +56,21 @@ class FindingEntry(Document):
     held_out_rms_after: list[float] | None = Field(description="the same on held-out recordings")
 
 
-class FitChangeEntry(Document):
+class FitChangeEntry(ResultModel):
     """Residuals without and with all findings."""
 
     rms_before: list[float] = Field(description="per joint, at the recorded rate, no filter [Nm or N]")
     rms_after: list[float] = Field(description="per joint, at the recorded rate, no filter [Nm or N]")
 
 
-class FitChangesEntry(Document):
+class FitChangesEntry(ResultModel):
     """Fits on training and held-out recordings."""
 
     train: FitChangeEntry = Field(description="on the recordings that were explained")
     held_out: FitChangeEntry | None = Field(default=None, description="on recordings that were not used")
 
 
-class MovedEntry(Document):
+class MovedEntry(ResultModel):
     """A parameter that is not the same in two recordings."""
 
     parameter: str = Field(description="name")
@@ -82,14 +78,14 @@ class MovedEntry(Document):
     shift_in_std: float = Field(description="second less first, in standard errors of the difference")
 
 
-class ConstancyEntry(Document):
+class ConstancyEntry(ResultModel):
     """Whether the parameters hold from one recording to the next."""
 
     p_value: float = Field(description="chance of such differences if they do")
     moved: list[MovedEntry] = Field(description="the most clearly moved parameters")
 
 
-class DetectableEntry(Document):
+class DetectableEntry(ResultModel):
     """The smallest size of an effect that these data would have shown."""
 
     effect: str = Field(description="id of the effect")
@@ -99,7 +95,7 @@ class DetectableEntry(Document):
     visible: bool = Field(description="false where no torque and position along this motion can show it")
 
 
-class DifferenceEntry(Document):
+class DifferenceEntry(ResultModel):
     """A parameter that the simulation has wrong."""
 
     parameter: str = Field(description="name")
@@ -109,7 +105,7 @@ class DifferenceEntry(Document):
     difference_in_std: float = Field(description="real less simulation, in standard errors")
 
 
-class ShiftEntry(Document):
+class ShiftEntry(ResultModel):
     """What the left-out effects had been doing to a parameter."""
 
     parameter: str = Field(description="name")
@@ -118,7 +114,7 @@ class ShiftEntry(Document):
     shift_in_std: float = Field(description="in standard errors of the estimate without them")
 
 
-class NextExperimentEntry(Document):
+class NextExperimentEntry(ResultModel):
     """What motion would decide what is open."""
 
     separates: list[str] = Field(description="effects that it tells apart")
@@ -126,7 +122,7 @@ class NextExperimentEntry(Document):
     why: str = Field(description="the motion in words, and what it decides")
 
 
-class DiagnosisDocument(Document):
+class DiagnosisDocument(ResultModel):
     """Result of a diagnosis, schema tauscope.diagnosis/1."""
 
     schema_id: Literal["tauscope.diagnosis/1"] = Field(

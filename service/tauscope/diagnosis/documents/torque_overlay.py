@@ -3,18 +3,18 @@
 import numpy as np
 from pydantic import Field
 
-from tauscope.diagnosis.documents.result import Document
 from tauscope.diagnosis.documents.rounded import rounded
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
 from tauscope.diagnosis.model.residual import predicted_rows
 from tauscope.diagnosis.observations.observations import Observations
 from tauscope.recording.recording import Array
+from tauscope.strict_model import ResultModel
 
 MOST_ROWS = 900
 """Rows of one overlay: about two a pixel."""
 
 
-class TorqueOverlay(Document):
+class TorqueOverlay(ResultModel):
     """Torque of one joint over a stretch of one recording, in the common band."""
 
     joint: str = Field(description="name of the joint")

@@ -8,7 +8,6 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field, ValidationError
 
-from tauscope.diagnosis.documents.result import Document
 from tauscope.diagnosis.extended_model.consistent_links import consistent_links
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
 from tauscope.diagnosis.model.extended import ExtendedModel
@@ -20,6 +19,7 @@ from tauscope.identification.structure import JointTerms, ModelStructure
 from tauscope.robot import Robot
 from tauscope.robot.bounded_file import decode_utf8, read_bounded
 from tauscope.robot.messages import one_line, shown
+from tauscope.strict_model import ResultModel
 
 MODEL_SCHEMA = "tauscope.model/1"
 
@@ -29,14 +29,14 @@ PLACES = ("joint", "grid", "lower", "upper")
 """Fields of every effect; any others are settings of its own."""
 
 
-class NamedValue(Document):
+class NamedValue(ResultModel):
     """A number with its name."""
 
     name: str = Field(description="in the equation, or of the base parameter in full")
     value: float = Field(description="SI")
 
 
-class JointFrictionEntry(Document):
+class JointFrictionEntry(ResultModel):
     """Nominal terms of one joint, in the units of identify's result."""
 
     joint: str = Field(description="name of the joint")
@@ -48,7 +48,7 @@ class JointFrictionEntry(Document):
     delta: float | None = Field(description="slope of the Stribeck term [s/rad or s/m]")
 
 
-class EffectEntry(Document):
+class EffectEntry(ResultModel):
     """One effect beside the nominal model."""
 
     effect: str = Field(description="id of the effect")
@@ -61,7 +61,7 @@ class EffectEntry(Document):
     coefficients: list[NamedValue] = Field(description="linear coefficients")
 
 
-class ModelDocument(Document):
+class ModelDocument(ResultModel):
     """An extended model, schema tauscope.model/1."""
 
     schema_id: Literal["tauscope.model/1"] = Field(default="tauscope.model/1", alias="schema", description="form")

@@ -3,10 +3,7 @@
 from tauscope.identification.consistency.inequalities import (
     FrictionColumns,
     LinearInequalities,
-    centre_of_mass_inequalities,
     friction_inequalities,
-    mass_inequalities,
-    total_mass_inequalities,
 )
 from tauscope.identification.consistency.nearest import ConsistentParameters, nearest_consistent_parameters
 from tauscope.identification.consistency.prior import Prior, plausible_prior
@@ -16,10 +13,7 @@ __all__ = [
     "FrictionColumns",
     "LinearInequalities",
     "Prior",
-    "centre_of_mass_inequalities",
     "friction_inequalities",
-    "mass_inequalities",
     "nearest_consistent_parameters",
     "plausible_prior",
-    "total_mass_inequalities",
 ]

@@ -20,7 +20,7 @@ from tauscope.errors import TauscopeError
 from tauscope.files import write_atomically
 from tauscope.robot.messages import one_line, shown
 from tauscope.server.auth.scopes import Scope
-from tauscope.server.models import StrictModel
+from tauscope.strict_model import StrictModel
 
 KEY_FILE = "keys.json"
 """Name of the file, in the data folder."""

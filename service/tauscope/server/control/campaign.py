@@ -5,13 +5,14 @@ from typing import Literal
 
 from pydantic import Field
 
-from tauscope.server.queue.stored import StoredModel, read_stored, write_stored
+from tauscope.server.queue.stored import read_stored, write_stored
 from tauscope.server.queue.workspace import Workspace
+from tauscope.strict_model import StrictModel
 from tauscope.tasks.campaign import CampaignOptions
 from tauscope.tasks.run import BackendChoice
 
 
-class CampaignOrder(StoredModel, CampaignOptions):
+class CampaignOrder(CampaignOptions):
     """Input of a campaign."""
 
     form: Literal["tauscope.campaign-order/1"] = Field(
@@ -22,7 +23,7 @@ class CampaignOrder(StoredModel, CampaignOptions):
     backend: BackendChoice = Field(default=BackendChoice(), description="which arm is moved")
 
 
-class CampaignLinks(StoredModel):
+class CampaignLinks(StrictModel):
     """What a campaign has made so far; null where it has not come to it."""
 
     excitation: str | None = Field(default=None, description="identifier of the training motion")

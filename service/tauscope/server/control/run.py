@@ -25,13 +25,14 @@ from tauscope.runtime.run_process import RunProcess
 from tauscope.runtime.states import RunState
 from tauscope.server.queue.job_folder import JobFolder
 from tauscope.server.queue.record import EndedEvent, JobProblem, without_folders
-from tauscope.server.queue.stored import StoredModel, read_stored, write_stored
+from tauscope.server.queue.stored import read_stored, write_stored
+from tauscope.strict_model import StrictModel
 from tauscope.tasks import run
 from tauscope.tasks.run import BackendChoice, recording_file
 from tauscope.tasks.task import LocalFiles
 
 
-class RunRequestRecord(StoredModel):
+class RunRequestRecord(StrictModel):
     """What was asked for."""
 
     form: Literal["tauscope.run-request/1"] = Field(

@@ -7,13 +7,14 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, FiniteFloat
 
-from tauscope.identification.result import Document, IdentificationDocument, LinkEntry
+from tauscope.identification.result import IdentificationDocument, LinkEntry
+from tauscope.strict_model import ResultModel
 
 Ratio = Annotated[FiniteFloat, Field(ge=1.0)]
 Positive = Annotated[FiniteFloat, Field(gt=0.0)]
 
 
-class ModelPolicy(Document):
+class ModelPolicy(ResultModel):
     """Bounds for one robot."""
 
     held_out_error: Positive = Field(

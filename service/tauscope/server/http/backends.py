@@ -11,7 +11,7 @@ from tauscope.robot.messages import one_line
 from tauscope.runtime.drivers import BackendName, find_driver
 from tauscope.server.http.documents import to_json_text
 from tauscope.server.http.settings import Settings
-from tauscope.server.models import StrictModel
+from tauscope.strict_model import StrictModel
 from tauscope.tasks.run import BackendChoice
 
 

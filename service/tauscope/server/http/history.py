@@ -20,8 +20,9 @@ from tauscope.server.http.documents import JSON, media_type, read_document, refu
 from tauscope.server.http.openapi import Examples, json_body
 from tauscope.server.http.services import Services, ServicesDep
 from tauscope.server.http.tasks.routes import Identifier, Limit, collection
-from tauscope.server.models import AnswerModel, StrictModel
+from tauscope.server.models import AnswerModel
 from tauscope.server.problems import problem_responses
+from tauscope.strict_model import StrictModel
 
 
 class ReasonRequest(StrictModel):

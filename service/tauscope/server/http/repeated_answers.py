@@ -13,7 +13,7 @@ from pydantic import Field, ValidationError
 from typing_extensions import override
 
 from tauscope.files import sync_folder, write_atomically
-from tauscope.server.models import StrictModel
+from tauscope.strict_model import StrictModel
 
 LIFE_S = 24 * 3600.0
 """How long an answer is kept [s]."""

@@ -12,13 +12,14 @@ from tauscope.server.http.history import ReasonRequest
 from tauscope.server.http.openapi import json_body
 from tauscope.server.http.services import Services, ServicesDep
 from tauscope.server.http.tasks.routes import Limit, collection
-from tauscope.server.models import AnswerModel, StrictModel
+from tauscope.server.models import AnswerModel
 from tauscope.server.problems import problem_responses
 from tauscope.server.schedules.definition import ScheduleDefinition
 from tauscope.server.schedules.repeater import make_schedule
 from tauscope.server.schedules.repository import FiringEntry, ScheduleEntry
 from tauscope.server.schedules.scheduler import read_definition
 from tauscope.server.store.data_folder import FOLDERS
+from tauscope.strict_model import StrictModel
 
 
 class ScheduleRequest(StrictModel):

@@ -4,11 +4,11 @@ from collections.abc import Mapping
 from datetime import datetime
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import AwareDatetime, Field, JsonValue, TypeAdapter, ValidationError
+from pydantic import AwareDatetime, Field, JsonValue
 
-from tauscope.server.queue.stored import StoredModel
+from tauscope.strict_model import StrictModel
 
 
 def without_folders(text: str, *folders: Path) -> str:
@@ -53,14 +53,14 @@ def may_follow(before: JobState, after: JobState) -> bool:
     return after in TRANSITIONS[before]
 
 
-class JobProblem(StoredModel):
+class JobProblem(StrictModel):
     """Why a job did not succeed."""
 
     code: str = Field(description="code of the error, as in tauscope.errors, or of the way the job ended")
     detail: str = Field(description="one line: what is wrong, where, and what to do")
 
 
-class JobRecord(StoredModel):
+class JobRecord(StrictModel):
     """A job's state and times."""
 
     form: Literal["tauscope.job/1"] = Field(default="tauscope.job/1", description="name and version of this form")
@@ -97,7 +97,7 @@ class JobRecord(StoredModel):
         return self.moved(JobState.QUEUED, now).model_copy(update={"attempts": max(0, self.attempts - 1)})
 
 
-class StateEvent(StoredModel):
+class StateEvent(StrictModel):
     """The job came into another state."""
 
     kind: Literal["state"] = Field(default="state", description="kind of the event")
@@ -105,7 +105,7 @@ class StateEvent(StoredModel):
     state: str = Field(description="the state, one that is no end")
 
 
-class StepEvent(StoredModel):
+class StepEvent(StrictModel):
     """Another step of the work began."""
 
     kind: Literal["step"] = Field(default="step", description="kind of the event")
@@ -113,7 +113,7 @@ class StepEvent(StoredModel):
     step: str = Field(description="what is being done, in a few words")
 
 
-class ProgressEvent(StoredModel):
+class ProgressEvent(StrictModel):
     """The work came on."""
 
     kind: Literal["progress"] = Field(default="progress", description="kind of the event")
@@ -122,7 +122,7 @@ class ProgressEvent(StoredModel):
     figures: dict[str, JsonValue] = Field(default={}, description="what is measured meanwhile, by name")
 
 
-class EndedEvent(StoredModel):
+class EndedEvent(StrictModel):
     """The job reached its end; nothing follows."""
 
     kind: Literal["ended"] = Field(default="ended", description="kind of the event")
@@ -133,13 +133,3 @@ class EndedEvent(StoredModel):
 
 JobEvent = Annotated[StateEvent | StepEvent | ProgressEvent | EndedEvent, Field(discriminator="kind")]
 """Any of the four."""
-
-_EVENTS: TypeAdapter[JobEvent] = TypeAdapter(JobEvent)
-
-
-def parse_event(content: Mapping[str, Any]) -> JobEvent | None:
-    """The event of a line; None where it is none that we know."""
-    try:
-        return _EVENTS.validate_python(content, strict=False)
-    except ValidationError:
-        return None

@@ -4,18 +4,12 @@ import json
 from pathlib import Path
 from typing import TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import ValidationError
 
 from tauscope.files import write_atomically
+from tauscope.strict_model import StrictModel
 
-
-class StoredModel(BaseModel):
-    """Base of what jobs keep as JSON: no type is converted, no key is overlooked."""
-
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
-
-
-Stored = TypeVar("Stored", bound=StoredModel)
+Stored = TypeVar("Stored", bound=StrictModel)
 
 
 def read_stored(path: Path, kind: type[Stored]) -> Stored | None:
@@ -26,7 +20,7 @@ def read_stored(path: Path, kind: type[Stored]) -> Stored | None:
         return None
 
 
-def write_stored(path: Path, model: StoredModel) -> None:
+def write_stored(path: Path, model: StrictModel) -> None:
     """Keep a model."""
     write_atomically(path, model.model_dump_json(indent=1).encode())
 

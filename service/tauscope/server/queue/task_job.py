@@ -14,17 +14,18 @@ from tauscope.export.formats import ExportFile, ExportFormat
 from tauscope.files import write_atomically
 from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.queue.record import JobProblem, without_folders
-from tauscope.server.queue.stored import StoredModel, read_bytes, read_document, read_stored, write_stored
+from tauscope.server.queue.stored import read_bytes, read_document, read_stored, write_stored
 from tauscope.server.queue.work import begin_step, do_work, require_wanted
 from tauscope.server.queue.workspace import Workspace
 from tauscope.server.store.files import hash_file
 from tauscope.server.store.items import ItemStore
 from tauscope.server.store.recordings import RecordingStore
+from tauscope.strict_model import StrictModel
 
 TRAJECTORY, SAVED_MODEL = "trajectory.json", "against"
 
 
-class OrderedRecording(StoredModel):
+class OrderedRecording(StrictModel):
     """A recording of an order."""
 
     name: str = Field(description="its file name")
@@ -32,7 +33,7 @@ class OrderedRecording(StoredModel):
     sha256: str = Field(description="of its bytes when the job was handed in, in hexadecimal")
 
 
-class TaskOrder(StoredModel):
+class TaskOrder(StrictModel):
     """Input of a job: the request of a task, its files by their names in the job's folder."""
 
     robot_file: str = Field(description="name of the robot file in the job's robot folder")

@@ -10,7 +10,7 @@ from apscheduler.triggers.interval import IntervalTrigger
 from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from tauscope.server.queue.stored import StoredModel
+from tauscope.strict_model import StrictModel
 
 DAYS = ("mon", "tue", "wed", "thu", "fri", "sat", "sun")
 Day = Literal["mon", "tue", "wed", "thu", "fri", "sat", "sun"]
@@ -27,7 +27,7 @@ def _time_zone(value: str) -> str:
     return value
 
 
-class Window(StoredModel):
+class Window(StrictModel):
     """When work may be started, by the clock on the wall; an `end` before `start` is on the next day."""
 
     days: tuple[Day, ...] = Field(default=DAYS, min_length=1, description="on which the window begins")
@@ -44,7 +44,7 @@ class Window(StoredModel):
         return (today in self.days and now >= start) or (yesterday in self.days and now < end)
 
 
-class RecordingChoice(StoredModel):
+class RecordingChoice(StrictModel):
     """Which recordings on the server an analysis takes: the newest of those that match."""
 
     pattern: str = Field(
@@ -54,7 +54,7 @@ class RecordingChoice(StoredModel):
     held_out: int = Field(default=1, ge=0, le=100, description="how many it is judged by: the newest ones")
 
 
-class ScheduleDefinition(StoredModel):
+class ScheduleDefinition(StrictModel):
     """When a schedule is due."""
 
     kind: Literal["campaign", "identification", "diagnosis"] = Field(description="what is repeated")

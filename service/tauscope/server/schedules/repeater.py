@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 from fnmatch import fnmatchcase
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -15,15 +16,15 @@ from tauscope.server.control.campaign_runner import CampaignDependencies
 from tauscope.server.control.leases import FREE, Permit
 from tauscope.server.queue.diagnosis import DiagnosisOrder, DiagnosisWorkspace
 from tauscope.server.queue.identification import IdentificationOrder, IdentificationWorkspace
-from tauscope.server.queue.stored import StoredModel
-from tauscope.server.queue.task_job import OrderedRecording, ordered_on_server
+from tauscope.server.queue.task_job import OrderedRecording, ordered_on_server, staged_workspace, submit_job
 from tauscope.server.queue.workspace import Workspace
 from tauscope.server.schedules.definition import RecordingChoice, ScheduleDefinition
 from tauscope.server.schedules.repository import ScheduleEntry
 from tauscope.server.store.items import ItemStore
 from tauscope.server.store.recordings import RecordingStore
+from tauscope.strict_model import StrictModel
 
-Order = TypeVar("Order", bound=StoredModel)
+Order = TypeVar("Order", bound=StrictModel)
 
 
 class NothingToDoError(TauscopeError):
@@ -75,36 +76,22 @@ class Repeater:
 
     def _campaign(self, entry: ScheduleEntry) -> str:
         """A campaign like the one that the schedule was made from."""
-        items = self.campaigns.items
-        staged = items.stage()
-        try:
-            workspace = CampaignWorkspace(staged)
-            workspace.prepare()
+        order = _order(entry, CampaignOrder)
+        with staged_workspace(self.campaigns.items, CampaignWorkspace) as workspace:
             write_robot(workspace.robot, entry)
-            order = _order(entry, CampaignOrder)
             workspace.write_order(order)
-            return self.campaigns.submit(staged, self.permit_for(order.backend.device(order.robot_name)))
-        finally:
-            items.discard(staged)
+            return self.campaigns.submit(workspace.folder, self.permit_for(order.backend.device(order.robot_name)))
 
     def _analyse(self, kind: str, entry: ScheduleEntry, recordings: Mapping[str, tuple[OrderedRecording, ...]]) -> str:
         """Submit an identification or a diagnosis of other recordings."""
-        dependencies = self.dependencies
-        job_kind = dependencies.identifications if kind == "identification" else dependencies.diagnoses
-        staged = job_kind.items.stage()
-        try:
-            if kind == "identification":
-                workspace, order = IdentificationWorkspace(staged), _order(entry, IdentificationOrder)
-                workspace.prepare()
-                workspace.write_order(order.model_copy(update=recordings))
-            else:
-                workspace, order = DiagnosisWorkspace(staged), _order(entry, DiagnosisOrder)
-                workspace.prepare()
-                workspace.write_order(order.model_copy(update=recordings))
-            write_robot(workspace.robot, entry)
-            return dependencies.jobs.submit(job_kind, staged)
-        finally:
-            job_kind.items.discard(staged)
+        dependencies, put_robot = self.dependencies, partial(write_robot, entry=entry)
+        if kind == "identification":
+            order = _order(entry, IdentificationOrder).model_copy(update=recordings)
+            return submit_job(
+                dependencies.jobs, dependencies.identifications, IdentificationWorkspace, order, put_robot
+            )
+        order = _order(entry, DiagnosisOrder).model_copy(update=recordings)
+        return submit_job(dependencies.jobs, dependencies.diagnoses, DiagnosisWorkspace, order, put_robot)
 
 
 def newest_recordings(

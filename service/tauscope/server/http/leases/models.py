@@ -7,7 +7,8 @@ from pydantic import Field
 
 from tauscope.runtime.drivers import BackendName
 from tauscope.server.control.leases import LONGEST_TTL_S
-from tauscope.server.models import AnswerModel, StrictModel
+from tauscope.server.models import AnswerModel
+from tauscope.strict_model import StrictModel
 
 
 class LeaseRequest(StrictModel):

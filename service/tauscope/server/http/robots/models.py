@@ -5,7 +5,8 @@ from typing import Any
 from pydantic import Field
 
 from tauscope.robot import JointType, RobotReport, Severity
-from tauscope.server.models import AnswerModel, StrictModel
+from tauscope.server.models import AnswerModel
+from tauscope.strict_model import StrictModel
 
 EXAMPLE_ROBOT: dict[str, Any] = {
     "name": "two-joint-arm",

@@ -13,8 +13,8 @@ from tauscope.server.http.form import FORM, PartRule, ReceivedForm, receive_form
 from tauscope.server.http.openapi import Examples, binary_part, form_body, json_body, model_reference
 from tauscope.server.http.robots.files import keep_inline_robot, robot_part_rules
 from tauscope.server.http.settings import Settings
-from tauscope.server.models import StrictModel
 from tauscope.server.problems import ProblemError
+from tauscope.strict_model import StrictModel
 
 
 class RobotRequest(StrictModel):

@@ -31,10 +31,10 @@ class EmulatorProcess(Generic[_Order]):
 
     def __enter__(self) -> Self:
         command = [sys.executable, "-m", self.order.module, self.order.to_json()]
-        self._process = subprocess.Popen(  # noqa: S603 (our own module with our own arguments)
+        self._process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=process_environment(), start_new_session=True
         )
-        assert self._process.stdout is not None  # noqa: S101 (a pipe was asked for)
+        assert self._process.stdout is not None
         if self._process.stdout.readline().strip() != b"ready":
             self.__exit__(None, None, None)
             raise RuntimeError("the emulator did not start; see what it wrote")
