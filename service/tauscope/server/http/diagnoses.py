@@ -4,14 +4,13 @@ from pathlib import Path
 from typing import Any, Self
 
 from pydantic import Field, model_validator
-from pydantic_core import PydanticCustomError
 
 from tauscope.diagnosis import DiagnosisDocument
 from tauscope.diagnosis.documents.plots import DiagnosisPlots
 from tauscope.diagnosis.extended_model.saved import LARGEST_FILE, ModelDocument
 from tauscope.errors import IdentificationError
 from tauscope.server.http.documents import to_json_text
-from tauscope.server.http.identifications import Names
+from tauscope.server.http.identifications import Names, require_listed_once
 from tauscope.server.http.openapi import binary_part, binary_parts
 from tauscope.server.http.robots.models import EXAMPLE_ROBOT
 from tauscope.server.http.services import Services
@@ -53,10 +52,7 @@ class DiagnosisRequest(RobotRequest):
     @model_validator(mode="after")
     def _check_once(self) -> Self:
         """A recording counts once."""
-        for names in (self.recordings or [], self.held_out or [], self.simulated or []):
-            twice = next((name for index, name in enumerate(names) if name in names[:index]), None)
-            if twice is not None:
-                raise PydanticCustomError("twice", "{name} is listed twice; list it once", {"name": twice})
+        require_listed_once(self.recordings, self.held_out, self.simulated)
         return self
 
 

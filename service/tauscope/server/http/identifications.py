@@ -1,5 +1,6 @@
 """Identifications: requests, answers and what is special about this resource."""
 
+from collections.abc import Sequence
 from typing import Annotated, Any, Self
 
 from pydantic import AfterValidator, Field, model_validator
@@ -31,6 +32,20 @@ FileName = Annotated[str, AfterValidator(_file_name), Field(json_schema_extra={"
 Names = Annotated[list[FileName], Field(max_length=1000)]
 
 
+def require_listed_once(*lists: Sequence[str] | None) -> None:
+    """Refuse a name that stands twice in one of the lists.
+
+    Raises
+    ------
+    PydanticCustomError
+        naming it
+    """
+    for names in filter(None, lists):
+        twice = next((name for index, name in enumerate(names) if name in names[:index]), None)
+        if twice is not None:
+            raise PydanticCustomError("twice", "{name} is listed twice; list it once", {"name": twice})
+
+
 class IdentificationRequest(RobotRequest):
     """What is to be identified."""
 
@@ -48,10 +63,7 @@ class IdentificationRequest(RobotRequest):
     @model_validator(mode="after")
     def _check_once(self) -> Self:
         """A recording counts once."""
-        for names in (self.recordings or [], self.held_out or []):
-            twice = next((name for index, name in enumerate(names) if name in names[:index]), None)
-            if twice is not None:
-                raise PydanticCustomError("twice", "{name} is listed twice; list it once", {"name": twice})
+        require_listed_once(self.recordings, self.held_out)
         return self
 
 
