@@ -36,7 +36,13 @@ NEEDED: dict[str, tuple[str, ...]] = {
     "service/tauscope/export/": ("tests/identification", "tests/diagnosis/test_extended_model.py"),
     "service/tauscope/report/": ("tests/report", "tests/browser/test_report_on_paper.py"),
     # serving it
-    "service/tauscope/tasks/": ("tests/cli", "tests/server", "tests/hardware_emulated/test_canopen_campaign.py"),
+    "service/tauscope/tasks/": (
+        "tests/tasks",
+        "tests/examples",
+        "tests/cli",
+        "tests/server",
+        "tests/hardware_emulated/test_canopen_campaign.py",
+    ),
     "service/tauscope/cli/": ("tests/cli", "tests/hardware_emulated/test_canopen_commands.py"),
     "service/tauscope/client/": ("tests/client", "tests/server"),
     "service/tauscope/server/": SERVICE,
@@ -46,6 +52,7 @@ NEEDED: dict[str, tuple[str, ...]] = {
     "deploy/": ("tests/deploy",),
     # words
     "docs/": ("tests/server/http/test_handbook.py",),
+    "docs/examples/": ("tests/examples",),
     "typings/": (),
     "README.md": (),
     "CHANGELOG.md": (),

@@ -10,6 +10,8 @@ from identification.simulated import Array, SimulatedArm, paper_robot
 from tauscope.diagnosis import diagnose, document
 from tauscope.robot import FrictionCoefficients, Robot
 
+pytestmark = pytest.mark.slow
+
 
 def stating_friction() -> Robot:
     """The paper's arm with a file that states friction, and with it no constant."""

@@ -121,7 +121,7 @@ CASES: dict[str, tuple[EffectTorque, str, str, dict[str, float]]] = {
     "wrist": (wrist, "friction_coupling", "joint3", {"f": 0.6}),
 }
 
-QUICK = {"spring", "load"}
+QUICK = {"spring"}
 EVERY_CASE = [pytest.param(case, marks=() if case in QUICK else pytest.mark.slow) for case in CASES]
 
 OTHERS: dict[str, EffectTorque] = {"unknown": unknown, "bent": bent, "hardening": hardening, "balanced": balanced}

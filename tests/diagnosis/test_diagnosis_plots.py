@@ -44,6 +44,7 @@ def test_coloured_noise_has_the_density_that_its_samples_show() -> None:
     np.testing.assert_allclose(measured[inside], expected[inside], rtol=0.15)
 
 
+@pytest.mark.slow
 def test_what_is_left_without_the_finding_is_far_above_the_noise_at_low_frequency_and_with_it_is_not(
     plots: DiagnosisPlots,
 ) -> None:
@@ -55,6 +56,7 @@ def test_what_is_left_without_the_finding_is_far_above_the_noise_at_low_frequenc
     assert np.median(after / noise) < 2.0
 
 
+@pytest.mark.slow
 def test_an_overlay_shows_the_stretch_in_which_the_findings_help_most(plots: DiagnosisPlots) -> None:
     found = diagnosed("spring")
     observations, held_out = judging_observations(found)
@@ -75,6 +77,7 @@ def test_an_overlay_shows_the_stretch_in_which_the_findings_help_most(plots: Dia
     assert np.all(np.diff(overlay.time) > 0.0)
 
 
+@pytest.mark.slow
 def test_every_joint_has_every_variable_and_bins_are_equally_full(plots: DiagnosisPlots) -> None:
     assert {(each.joint, each.variable) for each in plots.histograms} == {
         (f"joint{number}", variable) for number in (1, 2, 3) for variable in (*VARIABLES, TIME)
@@ -85,6 +88,7 @@ def test_every_joint_has_every_variable_and_bins_are_equally_full(plots: Diagnos
     np.testing.assert_allclose(np.diff(time.edges), np.diff(time.edges).mean(), rtol=0.2)
 
 
+@pytest.mark.slow
 def test_states_go_with_the_residual_they_belong_to(plots: DiagnosisPlots) -> None:
     curve = plots.curves[0]
     assert set(curve.states) == set(VARIABLES)

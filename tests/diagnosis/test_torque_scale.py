@@ -14,6 +14,8 @@ from tauscope.diagnosis.model.residual import predicted_rows
 from tauscope.diagnosis.model.term import Term
 from tauscope.diagnosis.model.torque_scale import covariance_on_the_arm, on_the_arm
 
+pytestmark = pytest.mark.slow
+
 JOINT, GAIN, SIZE = 1, 1.3, 0.8
 
 

@@ -9,6 +9,8 @@ import pytest
 
 from shared_data import REPOSITORY
 
+pytestmark = pytest.mark.slow
+
 EXAMPLES = REPOSITORY / "docs" / "examples"
 
 

@@ -86,7 +86,7 @@ def expected_rows(data: bytes) -> np.ndarray | None:
     if not lines:
         return None
     delimiter = next((mark for mark in ",;\t" if mark in lines[0]), ",")
-    header = [name.strip(' \t"') for name in lines[0].split(delimiter)]
+    header = [name.strip(' \t\r"') for name in lines[0].split(delimiter)]
     rows = [line.split(delimiter) for line in lines[1:]]
     if any(header.count(name) != 1 for name in COLUMNS) or any(len(row) != len(header) for row in rows):
         return None

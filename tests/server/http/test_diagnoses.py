@@ -35,6 +35,7 @@ def form(request: dict[str, Any]) -> dict[str, str]:
     return {"request": json.dumps(request)}
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("drawn_figures")
 def test_uploaded_files_all_the_way(client: TestClient, files: Files, tmp_path: Path) -> None:
     accepted = client.post(DIAGNOSES, files=files, data=form({"options": {"next_trajectory": True}}))
