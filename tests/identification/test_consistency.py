@@ -17,8 +17,12 @@ from tauscope.identification.consistency import (
     plausible_prior,
     program,
 )
+from tauscope.identification.consistency.nearest import MARGIN
 from tauscope.identification.consistency.triangle import UPPER_TRIANGLE, triangle_of_parameters
 from tauscope.robot import Joint, JointType, LinkInertia, Model, Placement, Robot, Segment, pseudo_inertia
+
+WIDTH = 100.0
+"""Of the bodies' prior: it decides nothing that the data say."""
 
 
 def ellipsoid(rng: np.random.Generator, thickness: float = 0.02) -> LinkInertia:
@@ -57,13 +61,19 @@ def information(rng: np.random.Generator, truth: np.ndarray, rank: int, noise: f
     return factor, factor @ truth + noise * rng.normal(size=size)
 
 
-def cvxpy_optimum(factor, target, prior: Prior, inequalities: LinearInequalities, margin: float, width: float) -> float:
+def link_scale(prior: Prior) -> list[tuple[float, float]]:
+    """Mass and length that a link's parameters are scaled by."""
+    inertia = prior.scale[: 10 * prior.link_count : 10]
+    return [(float(mass), float(np.sqrt(each / mass))) for mass, each in zip(prior.masses, inertia, strict=True)]
+
+
+def cvxpy_optimum(factor, target, prior: Prior, inequalities: LinearInequalities, margin: float) -> float:
     """The same problem written with matrices, solved through cvxpy: optimal value of the criterion."""
     cp = pytest.importorskip("cvxpy")
     x = cp.Variable(prior.mean.size)
-    u = (x - prior.mean) / (width * prior.scale)
+    u = prior.root @ (x - prior.mean)
     constraints = [inequalities.matrix @ x <= inequalities.bound] if len(inequalities.bound) else []
-    for j, (mass, length) in enumerate(prior.link_scale):
+    for j, (mass, length) in enumerate(link_scale(prior)):
         xx, yy, zz, xy, xz, yz, m, hx, hy, hz = (x[10 * j + k] for k in range(10))
         trace = 0.5 * (xx + yy + zz)
         rows = [
@@ -84,7 +94,7 @@ def cvxpy_optimum(factor, target, prior: Prior, inequalities: LinearInequalities
 def smallest_scaled_eigenvalues(result, prior: Prior) -> list[float]:
     """Smallest eigenvalue of each pseudo-inertia in units of its link's mass and size."""
     found = []
-    for link, (mass, length) in zip(result.links, prior.link_scale, strict=True):
+    for link, (mass, length) in zip(result.links, link_scale(prior), strict=True):
         unit = np.diag([1.0 / length] * 3 + [1.0]) / np.sqrt(mass)
         found.append(float(np.linalg.eigvalsh(unit @ pseudo_inertia(link) @ unit)[0]))
     return found
@@ -105,14 +115,14 @@ def test_same_optimum_as_cvxpy(seed: int, count: int, noise: float):
     friction = np.tile([2.0, -0.3, 0.5, 0.1], count)
     truth = np.concatenate([*(ellipsoid(rng).to_vector() for _ in range(count)), friction])
     factor, target = information(rng, truth, rank=int(0.7 * truth.size), noise=noise)
-    prior = plausible_prior(chain(count), factor, target, columns(count))
+    prior = plausible_prior(chain(count), factor, target, columns(count)).widen(WIDTH)
     inequalities = friction_inequalities(columns(count), truth.size, names(count))
     inequalities += centre_of_mass_inequalities(0, np.full(3, -0.1), np.full(3, 0.1), truth.size)
     inequalities += total_mass_inequalities(count, 0.5 * count, 3.0 * count, truth.size)
     result = nearest_consistent_parameters(factor, target, prior, inequalities)
-    expected = cvxpy_optimum(factor, target, prior, inequalities, margin=1e-7, width=10.0)
+    expected = cvxpy_optimum(factor, target, prior, inequalities, margin=MARGIN)
     assert result.objective == pytest.approx(expected, rel=1e-5)
-    assert min(smallest_scaled_eigenvalues(result, prior)) >= 0.5e-7 * (1 - 1e-6)
+    assert min(smallest_scaled_eigenvalues(result, prior)) >= 0.5 * MARGIN * (1 - 1e-6)
     assert np.all(inequalities.matrix @ result.parameters <= inequalities.bound + 1e-9)
     assert any(result.active_links)
 
@@ -122,7 +132,7 @@ def test_consistent_truth_is_recovered_from_noise_free_information(seed: int):
     rng = np.random.default_rng(seed)
     truth = np.concatenate([*(ellipsoid(rng).to_vector() for _ in range(3)), np.tile([2.0, -0.3, 0.5, 0.1], 3)])
     factor, target = information(rng, truth, rank=truth.size, noise=0.0)
-    prior = plausible_prior(chain(3), factor, target, columns(3))
+    prior = plausible_prior(chain(3), factor, target, columns(3)).widen(WIDTH)
     result = nearest_consistent_parameters(
         factor, target, prior, friction_inequalities(columns(3), truth.size, names(3))
     )
@@ -135,11 +145,10 @@ def test_interior_optimum_is_the_regularised_least_squares():
     rng = np.random.default_rng(2)
     truth = np.concatenate([*(ellipsoid(rng, thickness=0.2).to_vector() for _ in range(2))])
     factor, target = information(rng, truth, rank=truth.size, noise=0.1)
-    prior = plausible_prior(chain(2), 10 * factor, 10 * target)
+    prior = plausible_prior(chain(2), 10 * factor, 10 * target).widen(WIDTH)
     result = nearest_consistent_parameters(10 * factor, 10 * target, prior)
-    width = np.diag(1.0 / (10.0 * prior.scale))
-    stacked = np.vstack([10 * factor, width])
-    expected = np.linalg.lstsq(stacked, np.concatenate([10 * target, width @ prior.mean]), rcond=None)[0]
+    stacked = np.vstack([10 * factor, prior.root])
+    expected = np.linalg.lstsq(stacked, np.concatenate([10 * target, prior.root @ prior.mean]), rcond=None)[0]
     assert result.status == "interior"
     assert not any(result.active_links)
     np.testing.assert_allclose(result.parameters, expected, rtol=1e-9, atol=1e-12)
@@ -154,7 +163,7 @@ def test_slender_rods_on_the_boundary_are_recovered():
     rod = LinkInertia(mass, np.array([-0.5 * mass * length, 0.0, 0.0]), inertia)
     truth = np.concatenate([rod.to_vector(), rod.to_vector()])
     factor, target = information(np.random.default_rng(3), truth, rank=20, noise=0.0)
-    prior = plausible_prior(chain(2), factor, target)
+    prior = plausible_prior(chain(2), factor, target).widen(WIDTH)
     result = nearest_consistent_parameters(factor, target, prior)
     assert result.active_links == (True, True)
     assert np.abs(factor @ (result.parameters - truth)).max() < 0.02
@@ -167,7 +176,7 @@ def test_impossible_estimate_is_brought_back_and_its_cost_is_told():
     truth = ellipsoid(np.random.default_rng(4)).to_vector()
     truth[6] = -1.0
     factor, target = information(np.random.default_rng(4), truth, rank=10, noise=0.0)
-    prior = plausible_prior(chain(1), factor, target)
+    prior = plausible_prior(chain(1), factor, target).widen(WIDTH)
     result = nearest_consistent_parameters(factor, target, prior)
     assert result.links[0].mass > 0.0
     assert result.free_squared_residual < 1e-6
@@ -184,7 +193,7 @@ def test_prismatic_axis_with_only_its_mass_identifiable():
     truth = np.zeros(size)
     truth[[6, 10, 11]] = 95.11, 20.4, 203.5
     friction = FrictionColumns((10,), (None,), (11,))
-    prior = plausible_prior(chain(1, JointType.PRISMATIC), factor, factor @ truth, friction)
+    prior = plausible_prior(chain(1, JointType.PRISMATIC), factor, factor @ truth, friction).widen(WIDTH)
     result = nearest_consistent_parameters(
         factor, factor @ truth, prior, friction_inequalities(friction, size, ["joint1"])
     )
@@ -201,7 +210,7 @@ def test_link_without_any_information_takes_the_model_of_the_robot_file():
     factor, target = information(rng, truth, rank=20, noise=0.0)
     factor[:, 10:] = 0.0
     target = factor @ truth
-    prior = plausible_prior(chain(2, model=Model(links=believed)), factor, target)
+    prior = plausible_prior(chain(2, model=Model(links=believed)), factor, target).widen(WIDTH)
     result = nearest_consistent_parameters(factor, target, prior)
     np.testing.assert_allclose(result.links[1].to_vector(), believed[1].to_vector(), rtol=1e-6, atol=1e-9)
     assert np.abs(factor @ (result.parameters - truth)).max() < 0.02
@@ -212,7 +221,7 @@ def test_friction_that_would_drive_the_joint_is_set_to_zero():
     factor, target = information(np.random.default_rng(6), truth, rank=14, noise=0.0)
     inequalities = friction_inequalities(columns(1), 14, ["elbow"])
     result = nearest_consistent_parameters(
-        factor, target, plausible_prior(chain(1), factor, target, columns(1)), inequalities
+        factor, target, plausible_prior(chain(1), factor, target, columns(1)).widen(WIDTH), inequalities
     )
     stiction, stribeck, viscous, offset = result.friction
     assert viscous >= 0.0
@@ -233,7 +242,7 @@ def test_what_cannot_be_told_from_the_link_is_credited_to_the_link():
     factor = np.zeros((1, 11))
     factor[0, [6, 10]] = 100.0
     friction = FrictionColumns((None,), (None,), (None,), (10,))
-    prior = plausible_prior(chain(1, JointType.PRISMATIC), factor, np.array([9500.0]), friction)
+    prior = plausible_prior(chain(1, JointType.PRISMATIC), factor, np.array([9500.0]), friction).widen(WIDTH)
     result = nearest_consistent_parameters(
         factor, np.array([9500.0]), prior, friction_inequalities(friction, 11, ["axis"])
     )
@@ -268,7 +277,7 @@ def test_a_solver_that_breaks_down_is_asked_otherwise(panics: int, monkeypatch: 
     truth = ellipsoid(np.random.default_rng(4)).to_vector()
     truth[6] = -1.0
     factor, target = information(np.random.default_rng(4), truth, rank=10, noise=0.0)
-    prior = plausible_prior(chain(1), factor, target)
+    prior = plausible_prior(chain(1), factor, target).widen(WIDTH)
     expected = nearest_consistent_parameters(factor, target, prior)
     left = iter(range(panics))
     whole = program.clarabel.DefaultSolver
@@ -295,7 +304,7 @@ def test_a_solver_that_breaks_down_is_asked_otherwise(panics: int, monkeypatch: 
 def test_information_that_is_not_finite_is_refused():
     rng = np.random.default_rng(9)
     factor, target = information(rng, ellipsoid(rng).to_vector(), rank=10, noise=0.0)
-    prior = plausible_prior(chain(1), factor, target)
+    prior = plausible_prior(chain(1), factor, target).widen(WIDTH)
     broken = factor.copy()
     broken[0, 3] = np.nan
     with pytest.raises(IdentificationError, match="parameter 4 is not finite"):
@@ -333,10 +342,10 @@ def test_seven_joint_arm_under_realistic_information(seed: int):
     regressor = np.vstack(rows)
     orthogonal, factor = np.linalg.qr(regressor)
     target = orthogonal.T @ (regressor @ truth + rng.normal(size=len(regressor)))
-    prior = plausible_prior(chain(count), factor, target, columns(count))
+    prior = plausible_prior(chain(count), factor, target, columns(count)).widen(WIDTH)
     inequalities = friction_inequalities(columns(count), truth.size, names(count))
     result = nearest_consistent_parameters(factor, target, prior, inequalities)
-    assert min(smallest_scaled_eigenvalues(result, prior)) >= 0.5e-7 * (1 - 1e-6)
+    assert min(smallest_scaled_eigenvalues(result, prior)) >= 0.5 * MARGIN * (1 - 1e-6)
     assert result.duality_gap < 1e-6
     # The truth is feasible, so the consistent optimum fits at least as well as the truth, but for the prior.
     true_fit = float(np.sum((factor @ truth - target) ** 2))
@@ -344,7 +353,7 @@ def test_seven_joint_arm_under_realistic_information(seed: int):
     assert result.objective <= true_fit + true_distance + 1e-6
     # Consistency costs the fit less than the truth itself does.
     assert result.residual_increase < true_fit
-    expected = cvxpy_optimum(factor, target, prior, inequalities, margin=1e-7, width=10.0)
+    expected = cvxpy_optimum(factor, target, prior, inequalities, margin=MARGIN)
     assert result.objective == pytest.approx(expected, rel=1e-5)
 
 
@@ -356,7 +365,7 @@ def test_long_recording_of_an_arm_that_is_far_from_rigid(seed: int):
     truth = np.concatenate([*(ellipsoid(rng).to_vector() for _ in range(count)), np.tile([2.0, -0.3, 0.5, 0.1], count)])
     factor, target = information(rng, truth, rank=truth.size, noise=100.0)
     factor, target = 1e3 * factor, 1e3 * target
-    prior = plausible_prior(chain(count), factor, target, columns(count))
+    prior = plausible_prior(chain(count), factor, target, columns(count)).widen(WIDTH)
     inequalities = friction_inequalities(columns(count), truth.size, names(count))
     result = nearest_consistent_parameters(factor, target, prior, inequalities)
     assert result.residual_increase > 1e6

@@ -48,9 +48,9 @@ def autoregressive(arm: SimulatedArm, std: Array, coefficient: float, rng: np.ra
 def runs_of(
     arm: SimulatedArm, count: int, draw: Callable[[np.random.Generator], Recording], seed: int = 1
 ) -> list[Identification]:
-    """Identifications of recordings that differ by their noise alone."""
+    """Free estimates from recordings that differ by their noise alone."""
     rng = np.random.default_rng(seed)
-    return [identify(arm.robot, [draw(rng)]) for _ in range(count)]
+    return [identify(arm.robot, [draw(rng)], options=Options(prior=False)) for _ in range(count)]
 
 
 def scores(results: list[Identification], arm: SimulatedArm) -> Array:

@@ -1,9 +1,9 @@
 """Standard errors that stay right when the residual is autocorrelated.
 
-cov Θ̂ = B M B,  B = (Σ_j w_j² A_jᵀ A_j)⁻¹,  M = Σ_j w_j⁴ A_jᵀ Ω_j A_j,
+cov Θ̂ = B M B,  B = (Σ_j w_j² A_jᵀ A_j + P⁻¹)⁻¹,  M = Σ_j w_j⁴ A_jᵀ Ω_j A_j + P⁻¹,
 
 with Ω_j the covariance of joint j's residual by its autoregressive model and w_j = 1/σ_j (WLS) or 1 (LS). For white
-residuals this is (LᵀΣ⁻¹L)⁻¹. Estimated shape constants of the friction enter as columns of their own, so that what they
+residuals this is (LᵀΣ⁻¹L + P⁻¹)⁻¹; P⁻¹ is the prior's precision, zero for the free estimate. Estimated shape constants of the friction enter as columns of their own, so that what they
 leave uncertain shows in the coefficients.
 """
 
@@ -15,6 +15,7 @@ from tauscope.identification.autocorrelation import Autoregression
 from tauscope.identification.dataset import PreparedMotion
 from tauscope.identification.least_squares import JointFactor
 from tauscope.identification.shape_sensitivity import ShapeParameter, columns_with_shapes, pseudo_inverse
+from tauscope.identification.posterior import Posterior
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array
 
@@ -30,6 +31,7 @@ def parameter_covariance(
     weight: Array,
     autoregressions: Sequence[Autoregression],
     shapes: Sequence[ShapeParameter] = (),
+    posterior: Posterior | None = None,
 ) -> Array:
     """Covariance of all parameters, with the estimated shape constants appended.
 
@@ -47,6 +49,9 @@ def parameter_covariance(
     """
     size = structure.size + len(shapes)
     bread, meat = np.zeros((size, size)), np.zeros((size, size))
+    if posterior is not None:
+        own = np.s_[: structure.size, : structure.size]
+        bread[own] = meat[own] = posterior.precision
     extended = {joint for joint, _ in shapes}
     passed = [joint for joint, model in enumerate(autoregressions) if model.order > 0 or joint in extended]
     for joint, (factor, model) in enumerate(zip(factors, autoregressions, strict=True)):
@@ -67,5 +72,6 @@ def parameter_covariance(
             meat[place] += weight[joint] ** 4 * (coloured @ coloured.T)
     # The parameters took their degrees of freedom out of the residual where it is strongest; coloured rows count less.
     rows = sum(f.rows / model.long_run_ratio for f, model in zip(factors, autoregressions, strict=True))
+    taken = size if posterior is None else posterior.freedom + len(shapes)
     inverse = pseudo_inverse(bread)
-    return rows / max(rows - size, MOST_FREEDOM_LOST * rows) * inverse @ meat @ inverse
+    return rows / max(rows - taken, MOST_FREEDOM_LOST * rows) * inverse @ meat @ inverse

@@ -48,6 +48,10 @@ def _noise_std(factors: tuple[JointFactor, ...], squares: list[float], size: int
     """σ_j with the degrees of freedom that the parameters took, shared by rows; never below `FINEST_TORQUE`."""
     total = sum(factor.rows for factor in factors)
     freedom = np.array([factor.rows * max(1.0 - size / total, 1e-3) for factor in factors])
-    torque = np.sqrt([np.sum(factor.triangle[:, -1] ** 2) / factor.rows for factor in factors])
-    finest = FINEST_TORQUE * np.maximum(torque, FINEST_TORQUE * torque.max()) + np.finfo(float).tiny
-    return np.maximum(np.sqrt(np.array(squares) / freedom), finest)
+    return np.maximum(np.sqrt(np.array(squares) / freedom), FINEST_TORQUE * torque_rms(factors))
+
+
+def torque_rms(factors: tuple[JointFactor, ...]) -> Array:
+    """Root mean square of each joint's torque, (n,); positive also where a joint has none."""
+    rms = np.sqrt([np.sum(factor.triangle[:, -1] ** 2) / factor.rows for factor in factors])
+    return np.maximum(rms, FINEST_TORQUE * rms.max()) + np.finfo(float).tiny

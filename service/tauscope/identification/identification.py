@@ -19,6 +19,7 @@ from tauscope.identification.friction_shape import EstimatedShape, shape_paramet
 from tauscope.identification.least_squares import JointFactor, Solution, condition_number
 from tauscope.identification.model_terms import choose_model
 from tauscope.identification.physical_estimate import consistent_estimate, in_model_columns, is_rejected
+from tauscope.identification.posterior import Posterior, infer
 from tauscope.identification.preconditions import require_motion
 from tauscope.identification.residuals import Fit, ResidualStatistics, evaluate
 from tauscope.identification.structure import ModelStructure
@@ -39,11 +40,14 @@ class Options:
 
     cutoff_hz : float, None or "auto"
         band that torque and regressor share [Hz]; None for no filter; chosen from the data by default
+    prior : bool
+        whether the most probable bodies are delivered, or the free least-squares estimate
     """
 
     estimator: Estimator = Estimator.WLS
     cutoff_hz: float | Literal["auto"] | None = "auto"
     rotor_inertia: bool = True
+    prior: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,13 +55,15 @@ class Identification:
     """A model of the arm with what is known about its uncertainty.
 
     parameters : (p,) float64
-        the model that is delivered: the free estimate, or the consistent one where physics rejects the free one
+        the model that is delivered
     free_parameters : (p,) float64
-        the LS or WLS estimate
+        the LS or WLS estimate, without prior and without bodies
     consistent_parameters : (p,) float64
-        the nearest physically consistent parameters in the same columns
+        the most probable bodies and friction, in the same columns
+    constrained : bool
+        whether no body can have the free estimate
     covariance : (p + s, p + s) float64
-        of the free estimate, and of the logarithms of the estimated shape constants
+        of the parameters, and of the logarithms of the estimated shape constants
     undetermined : (p,) bool
         parameters about which the recordings say nothing
     """
@@ -68,17 +74,18 @@ class Identification:
     free_parameters: Array
     consistent_parameters: Array
     constrained: bool
+    posterior: Posterior
     covariance: Array
     undetermined: np.ndarray
     shapes: tuple[EstimatedShape, ...]
     consistent: ConsistentParameters
     condition_number: float
     residuals: ResidualStatistics
-    consistent_fit: Fit
+    free_fit: Fit
     held_out: Fit | None
-    held_out_consistent: Fit | None
+    held_out_free: Fit | None
     cutoff_hz: float | None
-    estimator: Estimator
+    options: Options
     conditioning: tuple[ConditioningSummary, ...]
     held_out_conditioning: tuple[ConditioningSummary, ...]
     identifiable: tuple[dict[str, bool], ...]
@@ -122,36 +129,48 @@ def identify(
         structure, shapes, factors = choose_model(motions, robot, base, rotor_inertia=options.rotor_inertia)
         progress("estimate parameters")
         weights, solution = estimate(factors, structure.size, options.estimator)
-        consistent = consistent_estimate(structure, solution)
-    estimates = (solution.parameters, in_model_columns(structure, consistent.parameters))
+        coloured = infer(structure, factors, np.ones(robot.joint_count), options.estimator)
+        free, believed = evaluate(motions, structure, [solution.parameters, coloured.mean])
+        ratios = [model.long_run_ratio for model in believed.autoregressions]
+        posterior = infer(structure, factors, ratios, options.estimator)
+        consistent = consistent_estimate(structure, posterior.factor, posterior.target, posterior.prior)
+    consistent_parameters = in_model_columns(structure, consistent.parameters)
+    parameters = consistent_parameters if options.prior else solution.parameters
     progress("evaluate residuals")
-    free, bound = evaluate(motions, structure, estimates)
+    (residuals,) = evaluate(motions, structure, [parameters]) if options.prior else (free,)
     progress("estimate uncertainty")
     covariance = parameter_covariance(
-        motions, structure, solution.parameters, factors, weights, free.autoregressions, shape_parameters(shapes)
+        motions,
+        structure,
+        parameters,
+        factors,
+        posterior.weights if options.prior else weights,
+        residuals.autoregressions,
+        shape_parameters(shapes),
+        posterior if options.prior else None,
     )
-    constrained = is_rejected(consistent, free)
     progress("evaluate held-out recordings")
     held_conditioners = [Conditioner.survey(recording, robot) for recording in held_out]
-    held_free, held_bound = _held_out_fits(held_conditioners, structure, cutoff, estimates)
+    held_fits = _held_out_fits(held_conditioners, structure, cutoff, [parameters, solution.parameters])
     return Identification(
         robot=robot,
         structure=structure,
-        parameters=estimates[constrained],
-        free_parameters=estimates[0],
-        consistent_parameters=estimates[1],
-        constrained=constrained,
+        parameters=parameters,
+        free_parameters=solution.parameters,
+        consistent_parameters=consistent_parameters,
+        constrained=is_rejected(consistent),
+        posterior=posterior,
         covariance=covariance,
         undetermined=solution.undetermined,
         shapes=shapes,
         consistent=consistent,
         condition_number=condition_number(factors, structure.size),
-        residuals=bound if constrained else free,
-        consistent_fit=bound.fit,
-        held_out=held_bound if constrained else held_free,
-        held_out_consistent=held_bound,
+        residuals=residuals,
+        free_fit=free.fit,
+        held_out=held_fits[0],
+        held_out_free=held_fits[1],
         cutoff_hz=cutoff,
-        estimator=options.estimator,
+        options=options,
         conditioning=tuple(conditioner.summary(cutoff) for conditioner in conditioners),
         held_out_conditioning=tuple(conditioner.summary(cutoff) for conditioner in held_conditioners),
         identifiable=_identifiable(structure, factors, covariance, solution, shapes),
@@ -168,17 +187,13 @@ def _naming(recordings: Sequence[Recording]) -> Iterator[None]:
 
 
 def _held_out_fits(
-    conditioners: Sequence[Conditioner],
-    structure: ModelStructure,
-    cutoff_hz: float | None,
-    estimates: tuple[Array, Array],
-) -> tuple[Fit | None, Fit | None]:
-    """Fits of both estimates on recordings that were not used."""
+    conditioners: Sequence[Conditioner], structure: ModelStructure, cutoff_hz: float | None, estimates: Sequence[Array]
+) -> list[Fit] | list[None]:
+    """Fits of several estimates on recordings that were not used."""
     if not conditioners:
-        return None, None
+        return [None] * len(estimates)
     motions = Dataset(conditioners, structure.robot, structure.base, cutoff_hz)
-    free, bound = evaluate(motions, structure, estimates)
-    return free.fit, bound.fit
+    return [statistics.fit for statistics in evaluate(motions, structure, estimates)]
 
 
 def _identifiable(

@@ -14,6 +14,10 @@ from tauscope.robot import STANDARD_PARAMETERS, LinkInertia
 from tauscope.strict_model import ResultModel
 
 
+DETERMINED = 0.9
+"""Share of the prior's variance that data take from a parameter which they determine."""
+
+
 class BaseParameterEntry(ResultModel):
     """One identifiable combination of the links' standard parameters."""
 
@@ -22,7 +26,10 @@ class BaseParameterEntry(ResultModel):
     value: float = Field(description="estimate [kg m², kg m or kg, by its terms]")
     std: float | None = Field(description="standard error of the free estimate; null where the recordings are silent")
     independent: bool = Field(description="whether it is one standard parameter by itself")
-    free_value: float = Field(description="the LS or WLS estimate before physical constraints")
+    free_value: float = Field(description="the LS or WLS estimate, without prior and without bodies")
+    determined_by: Literal["data", "prior", "both"] = Field(
+        description="which of the two the value rests on: data took nine tenths of the prior's variance, a tenth, or between"
+    )
 
 
 class FrictionEntry(ResultModel):
@@ -81,8 +88,8 @@ class FitsEntry(ResultModel):
 
     train: FitEntry = Field(description="on the recordings that the model was made from")
     held_out: FitEntry | None = Field(default=None, description="on recordings that were not used")
-    links_train: FitEntry = Field(description="of `links` and its friction, on the same recordings")
-    links_held_out: FitEntry | None = Field(default=None, description="of `links` and its friction, held out")
+    free_train: FitEntry = Field(description="of the free least-squares estimate, on the same recordings")
+    free_held_out: FitEntry | None = Field(default=None, description="of the free least-squares estimate, held out")
 
 
 class ConditioningEntry(ResultModel):
@@ -143,7 +150,7 @@ def document(identification: Identification) -> IdentificationDocument:
     return IdentificationDocument(
         robot=result.robot.name,
         joints=[joint.name for joint in result.robot.joints],
-        estimator=result.estimator.value,
+        estimator=result.options.estimator.value,
         constrained=result.constrained,
         cutoff_hz=result.cutoff_hz,
         noise_std=_floats(result.residuals.noise_std),
@@ -159,8 +166,8 @@ def document(identification: Identification) -> IdentificationDocument:
         fit=FitsEntry(
             train=_fit(result.residuals.fit),
             held_out=None if result.held_out is None else _fit(result.held_out),
-            links_train=_fit(result.consistent_fit),
-            links_held_out=None if result.held_out_consistent is None else _fit(result.held_out_consistent),
+            free_train=_fit(result.free_fit),
+            free_held_out=None if result.held_out_free is None else _fit(result.held_out_free),
         ),
         conditioning=[_conditioning(summary) for summary in result.conditioning],
         held_out_conditioning=[_conditioning(summary) for summary in result.held_out_conditioning],
@@ -178,13 +185,14 @@ def _standard_names(joint_count: int) -> list[str]:
 def _std(result: Identification) -> list[float | None]:
     """Standard errors of all parameters, then of the shape constants' logarithms."""
     errors: list[float | None] = [*_floats(np.sqrt(np.maximum(np.diag(result.covariance), 0.0)))]
+    believed = result.structure.base_count if result.options.prior else 0
     for column in np.flatnonzero(result.undetermined):
-        errors[column] = None
+        errors[column] = errors[column] if column < believed else None
     return errors
 
 
 def _base_parameters(result: Identification) -> list[BaseParameterEntry]:
-    base, std = result.structure.base, _std(result)
+    base, std, learnt = result.structure.base, _std(result), result.posterior.learnt
     return [
         BaseParameterEntry(
             name=base.expressions[place],
@@ -193,9 +201,17 @@ def _base_parameters(result: Identification) -> list[BaseParameterEntry]:
             std=std[place],
             independent=bool(base.is_independent(place)),
             free_value=float(result.free_parameters[place]),
+            determined_by=_determined_by(float(learnt[place])),
         )
         for place in range(result.structure.base_count)
     ]
+
+
+def _determined_by(learnt: float) -> Literal["data", "prior", "both"]:
+    """Whose value it is, from the share of the prior's variance that the data took."""
+    if learnt >= DETERMINED:
+        return "data"
+    return "prior" if learnt <= 1.0 - DETERMINED else "both"
 
 
 def _friction(result: Identification, parameters: np.ndarray) -> list[FrictionEntry]:

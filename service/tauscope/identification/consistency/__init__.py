@@ -4,6 +4,7 @@ from tauscope.identification.consistency.inequalities import (
     FrictionColumns,
     LinearInequalities,
     friction_inequalities,
+    mass_inequalities,
 )
 from tauscope.identification.consistency.nearest import ConsistentParameters, nearest_consistent_parameters
 from tauscope.identification.consistency.prior import Prior, plausible_prior
@@ -14,6 +15,7 @@ __all__ = [
     "LinearInequalities",
     "Prior",
     "friction_inequalities",
+    "mass_inequalities",
     "nearest_consistent_parameters",
     "plausible_prior",
 ]

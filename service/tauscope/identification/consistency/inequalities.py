@@ -1,10 +1,12 @@
-"""Linear inequalities G x ≤ h on the full parameters: friction dissipates."""
+"""Linear inequalities G x ≤ h on the full parameters: friction dissipates, and no link weighs next to nothing."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from tauscope.robot import STANDARD_PARAMETERS
 
 Array = NDArray[np.float64]
 
@@ -70,3 +72,17 @@ def friction_inequalities(columns: FrictionColumns, size: int, joints: Sequence[
     for row, (_, indices) in zip(matrix, demands, strict=True):
         row[indices] = -1.0
     return LinearInequalities(matrix, np.zeros(len(demands)), tuple(name for name, _ in demands))
+
+
+def mass_inequalities(least: Array, size: int) -> LinearInequalities:
+    """No link weighs less than this.
+
+    Parameters
+    ----------
+    least : (n,) float64
+        smallest mass of every link [kg]
+    """
+    matrix = np.zeros((len(least), size))
+    matrix[np.arange(len(least)), 10 * np.arange(len(least)) + STANDARD_PARAMETERS.index("m")] = -1.0
+    names = tuple(f"mass of link {link + 1} ≥ {mass:.3g} kg" for link, mass in enumerate(least))
+    return LinearInequalities(matrix, -least, names)

@@ -1,13 +1,11 @@
 """The nearest physically consistent parameters, by one convex conic program.
 
-    minimise    ‖R x - z‖² + Σ ((x_i - μ_i) / (w s_i))²
+    minimise    ‖R x - z‖² + ‖W (x - μ)‖²
     subject to  pseudo-inertia of every link ⪰ ε (tiny, relative to the link's mass and size),   G x ≤ h
 
 ‖R x - z‖² is the weighted least-squares criterion in units of the noise: a step of 1 is one standard deviation. The
-second sum decides only where the data do not. Its width is w = 10 times the magnitude s_i that a parameter may be
-expected to have, so a combination known to a standard deviation σ moves by about (σ / (w s))² of its distance to μ:
-one known to 10 % of its magnitude moves by 1e-4 of that distance, 0.001 σ; one that the data leave open takes its most
-plausible value. The metric is Euclidean in scaled parameters, which keeps the program quadratic.
+prior decides only where the data do not: of a combination known to σ and believed to s, it takes (σ / s)² of the way
+to μ. Both terms are quadratic in x, so the program is convex.
 """
 
 from dataclasses import dataclass
@@ -23,11 +21,8 @@ from tauscope.robot import LinkInertia
 
 Array = NDArray[np.float64]
 
-MARGIN = 1e-7
-"""ε: smallest eigenvalue of a scaled pseudo-inertia. A link of 0.3 m keeps 0.1 mm of thickness."""
-
-PRIOR_WIDTH = 10.0
-"""w: standard deviation of the prior in units of the expected magnitudes."""
+MARGIN = 1e-8
+"""ε: smallest eigenvalue of a scaled pseudo-inertia. A link of 0.3 m keeps 0.03 mm of thickness."""
 
 _ACTIVE = 10.0
 """A constraint counts as active where less than this many margins are left."""
@@ -74,11 +69,10 @@ def nearest_consistent_parameters(
     inequalities: LinearInequalities | None = None,
     *,
     margin: float = MARGIN,
-    prior_width: float = PRIOR_WIDTH,
 ) -> ConsistentParameters:
     """Nearest x to a weighted least-squares estimate such that every link can exist and G x ≤ h.
 
-    min ‖R x - z‖² + Σ ((x_i - μ_i) / (w s_i))², pseudo-inertia ⪰ ε, G x ≤ h; see the module for w, s and ε. The program
+    min ‖R x - z‖² + ‖W (x - μ)‖², pseudo-inertia ⪰ ε, G x ≤ h; see the module for ε. The program
     is convex: there is one answer, and `duality_gap` certifies it.
 
     Parameters
@@ -97,11 +91,11 @@ def nearest_consistent_parameters(
     """
     inequalities = inequalities or LinearInequalities.none(prior.mean.size)
     _check_input(factor, target, prior, inequalities)
-    program = assemble(factor, target, prior, inequalities, margin=margin, prior_width=prior_width)
+    program = assemble(factor, target, prior, inequalities, margin=margin)
     scaled, status, gap = solve(program)
     parameters = scaled * prior.scale
     squared_residual = float(np.sum((factor @ parameters - target) ** 2))
-    distance = float(np.sum(((parameters - prior.mean) / (prior_width * prior.scale)) ** 2))
+    distance = prior.squared_distance(parameters)
     felt = program.slacks(scaled) <= _ACTIVE * margin
     least = program.smallest_eigenvalues(scaled)
     return ConsistentParameters(

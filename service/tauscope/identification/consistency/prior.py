@@ -1,12 +1,13 @@
 """What is plausible before any measurement: it decides only where the data do not."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 
 from tauscope.identification.consistency.inequalities import FrictionColumns
-from tauscope.identification.consistency.triangle import parameter_scale
+from tauscope.identification.consistency.triangle import congruence, parameter_scale, triangle_of_parameters
 from tauscope.robot import LinkInertia, Robot
 
 Array = NDArray[np.float64]
@@ -14,36 +15,74 @@ Array = NDArray[np.float64]
 _GYRATION = 0.25
 """Radius of gyration of a default link over its length: between a slender rod (0.29) and a compact housing."""
 
+_REACH = 0.5
+"""Radius of gyration, over the link's length, of the body that deviations are measured by, at least: mass may lie
+anywhere along the link and as far beside it."""
+
+_LIGHTEST = 0.1
+"""A link is believed to weigh at least this share of the heaviest."""
+
 _SMALLEST_LENGTH = 0.05
 """Size of a link whose frames coincide in a chain that has no length at all, such as one joint by itself [m]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """A plausible parameter vector and the magnitude that each parameter may be expected to have.
+    """A normal distribution of all parameters: ‖W (x - μ)‖² is χ² of as many degrees of freedom.
 
     mean : (p,) float64
-        standard parameters of all links, then friction coefficients
+        μ: standard parameters of all links, then friction coefficients
+    root : (p, p) float64
+        W
     scale : (p,) float64
-        expected magnitudes, positive; the program is scaled by them
-    link_scale : (n, 2) float64
-        mass [kg] and length [m] behind the scale of each link
+        expected magnitudes, positive; the conic program is scaled by them
+    masses : (n,) float64
+        mass that each link may be expected to have [kg]
     """
 
     mean: Array
+    root: Array
     scale: Array
-    link_scale: Array
+    masses: Array
+
+    @property
+    def link_count(self) -> int:
+        """Number of links n."""
+        return len(self.masses)
+
+    def widen(self, width: float) -> "Prior":
+        """The same bodies, believed so many times less.
+
+        Parameters
+        ----------
+        width : float
+            factor of the links' standard deviations
+        """
+        links = np.arange(len(self.mean)) < 10 * self.link_count
+        return replace(self, root=np.where(links[:, None], self.root / width, self.root))
+
+    def squared_distance(self, parameters: Array) -> float:
+        """‖W (x - μ)‖².
+
+        Parameters
+        ----------
+        parameters : (p,) float64
+            x
+        """
+        return float(np.sum((self.root @ (parameters - self.mean)) ** 2))
 
 
 def plausible_prior(robot: Robot, factor: Array, target: Array, friction: FrictionColumns | None = None) -> Prior:
-    """A plausible point for the directions that torque data leave open.
+    """Bodies and friction that are plausible before any measurement.
 
     The links are those of the robot file's model where it has them. Otherwise each link is a compact body half-way
     between its two joints, as large as their distance, and all have one common mass: the one that explains the data
-    best. Friction is expected to be absent. A coefficient's magnitude is ‖z‖ / ‖R_i‖: that coefficient alone would
-    explain all torque. It is a tenth of that for τ_sc and the rotor's inertia, so that a motion that cannot tell τ_sc
-    from τ_s (never slow enough) credits τ_s, and what cannot be told from the link's own inertia is credited to the
-    link.
+    best. A link's deviation is measured by its own body: ‖A⁻¹ (J - J₀) A⁻ᵀ‖_F with A Aᵀ = J₀ the pseudo-inertia, made
+    at least as thick as a compact body, so that it does not depend on units or on the frame (Lee & Park 2018, to second
+    order). Friction is expected to be absent; a coefficient's standard deviation is ‖z‖ / ‖R_i‖: that coefficient alone
+    would explain all torque. It is a tenth of that for τ_sc and the rotor's inertia, so that a motion that cannot tell
+    τ_sc from τ_s (never slow enough) credits τ_s, and what cannot be told from the link's own inertia is credited to
+    the link.
 
     Parameters
     ----------
@@ -52,31 +91,60 @@ def plausible_prior(robot: Robot, factor: Array, target: Array, friction: Fricti
     target : (r,) float64
         z
     """
+    count = robot.joint_count
     lengths = link_lengths(robot)
-    friction_scale = _friction_scale(factor[:, 10 * robot.joint_count :], target)
+    friction_scale = _friction_scale(factor[:, 10 * count :], target)
     if friction is not None:
         doubtful = (*friction.stribeck, *friction.rotor_inertia)
-        friction_scale[[index - 10 * robot.joint_count for index in doubtful if index is not None]] *= 0.1
+        friction_scale[[index - 10 * count for index in doubtful if index is not None]] *= 0.1
     if robot.model.links is not None:
         links = robot.model.links
         heaviest = max(link.mass for link in links)
-        masses = np.array([max(link.mass, 0.1 * heaviest) for link in links])
+        masses = np.array([max(link.mass, _LIGHTEST * heaviest) for link in links])
         lengths = np.maximum(lengths, [_extent(link) for link in links])
     else:
-        unit_links = tuple(_default_link(robot, index, lengths[index]) for index in range(robot.joint_count))
+        unit_links = tuple(_default_link(robot, index, lengths[index]) for index in range(count))
         rotors = () if friction is None else tuple(index for index in friction.rotor_inertia if index is not None)
         mass = _common_mass(unit_links, np.delete(factor, rotors, axis=1), target)
         links = tuple(LinkInertia.from_vector(mass * link.to_vector()) for link in unit_links)
-        masses = np.full(robot.joint_count, mass)
+        masses = np.full(count, mass)
     if not np.all(masses > 0.0):
-        masses = np.ones(robot.joint_count)
+        masses = np.ones(count)
     mean = np.concatenate([*(link.to_vector() for link in links), np.zeros(friction_scale.size)])
     scale = np.concatenate([*map(parameter_scale, masses, lengths), friction_scale])
-    return Prior(mean, scale, np.column_stack([masses, lengths]))
+    root = np.diag(np.concatenate([np.zeros(10 * count), 1.0 / friction_scale]))
+    for index, (link, mass, length) in enumerate(zip(links, masses, lengths, strict=True)):
+        own = slice(10 * index, 10 * index + 10)
+        root[own, own] = _deviation(link, mass, length)
+    return Prior(mean, root, scale, masses)
+
+
+def _deviation(link: LinkInertia, mass: float, length: float) -> Array:
+    """W of one link: svec(A⁻¹ J A⁻ᵀ) as a linear map of its parameters, (10, 10).
+
+    Parameters
+    ----------
+    mass : float
+        mass of the body that measures it, at least the link's own [kg]
+    length : float
+        size of the link [m]
+    """
+    centre = link.first_moment / link.mass if link.mass > 0.0 else np.zeros(3)
+    second_moment = np.zeros((3, 3))
+    if link.mass > 0.0:
+        about_origin = 0.5 * np.trace(link.inertia) * np.eye(3) - link.inertia
+        second_moment = about_origin / link.mass - np.outer(centre, centre)
+    values, axes = np.linalg.eigh(second_moment)
+    thick = (axes * np.maximum(values, (_REACH * length) ** 2)) @ axes.T
+    body = np.block([[thick + np.outer(centre, centre), centre[:, None]], [centre, 1.0]])
+    inverse = solve_triangular(np.linalg.cholesky(mass * body), np.eye(4), lower=True)
+    return congruence(inverse) @ triangle_of_parameters()
 
 
 def link_lengths(robot: Robot) -> Array:
-    """Size of each link: the distance of its two joints, at least a quarter of the chain's mean such distance.
+    """Size of each link: the distance of its two joints, and at least the chain's mean such distance.
+
+    Housings are as large where axes meet.
 
     Returns
     -------
@@ -85,7 +153,7 @@ def link_lengths(robot: Robot) -> Array:
     """
     spans = np.array([np.linalg.norm(np.subtract(*_joint_positions(robot, j))) for j in range(robot.joint_count)])
     apart = spans[spans > 0.0]
-    smallest = 0.25 * float(apart.mean()) if apart.size else 0.0
+    smallest = float(apart.mean()) if apart.size else 0.0
     return np.maximum(spans, max(smallest, _SMALLEST_LENGTH))
 
 

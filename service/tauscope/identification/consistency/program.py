@@ -116,7 +116,6 @@ def assemble(
     inequalities: LinearInequalities,
     *,
     margin: float,
-    prior_width: float,
 ) -> ConicProgram:
     """Put information, prior and constraints together, in parameters scaled by the prior's magnitudes.
 
@@ -127,9 +126,9 @@ def assemble(
     target : (r,) float64
         z
     """
-    size, link_count = prior.mean.size, len(prior.link_scale)
+    size, link_count = prior.mean.size, prior.link_count
     information = np.column_stack([factor * prior.scale, target])
-    belief = np.column_stack([np.eye(size), prior.mean / prior.scale]) / prior_width
+    belief = np.column_stack([prior.root * prior.scale, prior.root @ prior.mean])
     stacked = np.array(qr(np.vstack([information, belief]), mode="r")[0], dtype=np.float64)
     rows = inequalities.matrix * prior.scale
     norms: Array = np.sqrt(np.sum(rows**2, axis=1))

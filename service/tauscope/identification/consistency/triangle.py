@@ -33,6 +33,25 @@ def triangle_of_parameters() -> Array:
     return np.stack([weight * unit[_ROWS, _COLUMNS] for unit in units], axis=1)
 
 
+def congruence(transform: Array) -> Array:
+    """Matrix K with svec(T X Tᵀ) = K svec(X).
+
+    Parameters
+    ----------
+    transform : (4, 4) float64
+        T
+
+    Returns
+    -------
+    (10, 10) float64
+        K; rows and columns in the order of `UPPER_TRIANGLE`
+    """
+    weight = np.where(_ROWS == _COLUMNS, 1.0, np.sqrt(2.0))
+    both = transform[_ROWS][:, _ROWS] * transform[_COLUMNS][:, _COLUMNS]
+    crossed = transform[_ROWS][:, _COLUMNS] * transform[_COLUMNS][:, _ROWS]
+    return np.outer(weight, 1.0 / weight) * np.where(_ROWS == _COLUMNS, both, both + crossed)
+
+
 def identity_triangle() -> Array:
     """Scaled upper triangle of the 4x4 identity.
 

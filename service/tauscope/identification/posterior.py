@@ -1,0 +1,147 @@
+"""Bodies and friction after the data: a normal posterior whose noise and width of prior the evidence chooses.
+
+    y_j = A_j Θ + e_j,   e_j of long-run variance ρ_j σ_j²,   Θ ~ N(μ, P(w))
+
+A residual that is coloured counts for fewer rows: ρ_j is its spectral density at frequency zero over that of white
+noise. σ_j is estimated as by expectation maximisation, N_j σ_j² = ‖A_j Θ - y_j‖² + tr(A_j S A_jᵀ), S the posterior
+covariance: no joint takes the freedom that its parameters took for precision. The width w of the bodies' prior is the
+one under which the data are most probable (MacKay 1992), and never narrow. Data that
+determine a parameter overrule the prior; a parameter that they leave open stays at what was believed.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import qr, solve_triangular, svd
+
+from tauscope.identification.consistency import Prior, plausible_prior
+from tauscope.identification.estimate import FINEST_TORQUE, Estimator, torque_rms
+from tauscope.identification.full_parameters import FullParameters
+from tauscope.identification.least_squares import JointFactor, stacked_factor
+from tauscope.identification.structure import ModelStructure
+from tauscope.recording.recording import Array
+
+WIDTHS = np.geomspace(2.0, 32.0, 9)
+"""Candidates of w. At 2 a link is believed to as much as all of its mass, and no stated body is believed more."""
+
+ROUNDS = 20
+"""Most rounds of noise, width and parameters…"""
+
+SETTLED = 1e-3
+"""…which end where no joint's noise changes by more than this share."""
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """What prior and data together say of the parameters, before bodies and friction restrict them.
+
+    noise_std : (n,) float64
+        σ_j of a row in the common band
+    weights : (n,) float64
+        1/(σ_j √ρ_j), by which the joints' equations are multiplied
+    factor, target : (p, p), (p,) float64
+        R and z of the data's weighted equations
+    mean : (p,) float64
+        of the posterior, before bodies and friction restrict it
+    covariance, precision : (p, p) float64
+        S of the posterior, and P⁻¹ of the prior
+    """
+
+    prior: Prior
+    width: float
+    noise_std: Array
+    weights: Array
+    factor: Array
+    target: Array
+    mean: Array
+    covariance: Array
+    precision: Array
+
+    @property
+    def learnt(self) -> Array:
+        """Share of every parameter's prior variance that the data took away, (p,)."""
+        return 1.0 - np.diag(self.covariance) / np.diag(np.linalg.inv(self.precision))
+
+    @property
+    def freedom(self) -> float:
+        """Number of parameters that the data determine: p - tr(S P⁻¹)."""
+        return float(len(self.mean) - np.sum(self.covariance * self.precision))
+
+
+def infer(
+    structure: ModelStructure, factors: tuple[JointFactor, ...], ratios: Sequence[float], estimator: Estimator
+) -> Posterior:
+    """The posterior of all parameters.
+
+    Parameters
+    ----------
+    ratios : sequence of float, length n
+        ρ_j, long-run over white variance of each joint's residual
+    """
+    full = FullParameters.of(structure)
+    colour = np.sqrt(np.asarray(ratios))
+    std = torque_rms(factors)  # from above: beside a noise of nothing every parameter looks determined
+    prior = None
+    for _ in range(ROUNDS):
+        triangle = stacked_factor(factors, structure.size, std * colour)
+        factor, target = triangle[:-1, :-1], triangle[:-1, -1]
+        if prior is None:  # its magnitudes hang on the data's, not on their noise
+            prior = plausible_prior(structure.robot, factor @ full.map, target, full.friction)
+        width, mean, covariance, precision = _most_probable(full, prior, factor, target)
+        before, std = std, _noise_std(factors, mean, covariance, estimator)
+        if np.all(np.abs(std - before) <= SETTLED * before):
+            break
+    weights = 1.0 / (before * colour)
+    return Posterior(prior.widen(width), width, before, weights, factor, target, mean, covariance, precision)
+
+
+def _most_probable(
+    full: FullParameters, prior: Prior, factor: Array, target: Array
+) -> tuple[float, Array, Array, Array]:
+    """Width of highest evidence, and mean, covariance and prior precision with it.
+
+    Friction is eliminated first: its prior does not depend on w. What is left is diagonal in the singular vectors of
+    R C, with C Cᵀ the prior covariance of the base parameters at w = 1, and every width costs a sum.
+    """
+    bodies = full.base_count
+    mean = full.map @ prior.mean
+    spread = np.linalg.inv(prior.root) @ np.linalg.inv(prior.root).T
+    covariance = full.map @ spread @ full.map.T
+    root = np.linalg.cholesky(covariance)  # block diagonal: friction has no covariance with bodies
+    white = np.column_stack([factor @ root, target - factor @ mean])
+    friction = white[:, bodies:-1]
+    size = friction.shape[1]
+    rows = np.block(
+        [
+            [friction, white[:, :bodies], white[:, -1:]],
+            [np.eye(size), np.zeros((size, bodies + 1))],
+        ]
+    )
+    reduced = np.asarray(qr(rows, mode="r", pivoting=False)[0])[size:, size:]
+    left, singular, _ = svd(reduced[:, :-1], full_matrices=False)
+    along = left.T @ reduced[:, -1]
+    gain = 1.0 + np.outer(WIDTHS**2, singular**2)
+    evidence = -0.5 * np.sum(along**2 / gain + np.log(gain), axis=1)
+    width = float(WIDTHS[int(np.argmax(evidence))])
+    scale = np.append(np.full(bodies, width), np.ones(size))
+    root = root * scale
+    stacked = np.vstack([factor @ root, np.eye(len(mean))])
+    whole = np.column_stack([stacked, np.append(target - factor @ mean, np.zeros(len(mean)))])
+    triangle = np.asarray(qr(whole, mode="r")[0])[: len(mean)]
+    inverse = root @ solve_triangular(triangle[:, :-1], np.eye(len(mean)))
+    precision_root = solve_triangular(root, np.eye(len(mean)), lower=True)
+    return width, mean + inverse @ triangle[:, -1], inverse @ inverse.T, precision_root.T @ precision_root
+
+
+def _noise_std(factors: tuple[JointFactor, ...], parameters: Array, covariance: Array, estimator: Estimator) -> Array:
+    """σ_j by expectation maximisation, (n,); one for all joints where they are not weighted."""
+    squares = []
+    for factor in factors:
+        columns = factor.triangle[:, :-1]
+        own = covariance[np.ix_(factor.columns, factor.columns)]
+        squares.append(factor.squared_residual(parameters) + np.sum((columns @ own) * columns))
+    rows = np.array([factor.rows for factor in factors])
+    if estimator is Estimator.LS:
+        return np.full(len(factors), np.sqrt(sum(squares) / rows.sum()))
+    return np.maximum(np.sqrt(squares / rows), FINEST_TORQUE * torque_rms(factors))
