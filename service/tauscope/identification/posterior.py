@@ -10,7 +10,7 @@ determine a parameter overrule the prior; a parameter that they leave open stays
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import qr, solve_triangular, svd

@@ -13,7 +13,6 @@ from tauscope.recording.conditioning import ConditioningSummary
 from tauscope.robot import STANDARD_PARAMETERS, LinkInertia
 from tauscope.strict_model import ResultModel
 
-
 DETERMINED = 0.9
 """Share of the prior's variance that data take from a parameter which they determine."""
 
@@ -28,7 +27,7 @@ class BaseParameterEntry(ResultModel):
     independent: bool = Field(description="whether it is one standard parameter by itself")
     free_value: float = Field(description="the LS or WLS estimate, without prior and without bodies")
     determined_by: Literal["data", "prior", "both"] = Field(
-        description="which of the two the value rests on: data took nine tenths of the prior's variance, a tenth, or between"
+        description="data took at least nine tenths of the prior's variance, at most a tenth, or between"
     )
 
 
