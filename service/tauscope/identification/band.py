@@ -20,9 +20,9 @@ from scipy import signal
 from tauscope.dynamics.base_parameters import BaseParameters
 from tauscope.dynamics.regressor import torque_regressor
 from tauscope.identification.dataset import Dataset, PreparedMotion, rms_speed
-from tauscope.identification.estimate import Estimator, estimate
 from tauscope.identification.friction_shape import ORDINARY
 from tauscope.identification.least_squares import factorise
+from tauscope.identification.posterior import infer
 from tauscope.identification.structure import JointTerms, ModelStructure
 from tauscope.recording.conditioning import Conditioner, Motion, Source
 from tauscope.recording.conditioning.common_band import Decimator
@@ -157,7 +157,7 @@ def _bounds(conditioners: Sequence[Conditioner], robot: Robot, base: BaseParamet
     motions = Dataset(conditioners, robot, base, cutoff_hz)
     structure = ModelStructure(robot, base, preliminary_terms(motions, robot))
     factors = factorise(motions, structure)
-    parameters = estimate(factors, structure.size, Estimator.WLS)[1].parameters
+    parameters = infer(structure, factors).mean
     residual_std = np.sqrt([f.squared_residual(parameters) / f.rows for f in factors]) + np.finfo(float).tiny
     bounds = [_quiet_band(conditioners, motions, structure, parameters, residual_std)]
     crossing = _crossing(motions, structure, parameters, residual_std)

@@ -3,8 +3,8 @@
 cov Θ̂ = B M B,  B = (Σ_j w_j² A_jᵀ A_j + P⁻¹)⁻¹,  M = Σ_j w_j⁴ A_jᵀ Ω_j A_j + P⁻¹,
 
 with Ω_j the covariance of joint j's residual by its autoregressive model, w_j = 1/σ_j (WLS) or 1 (LS), and P⁻¹ the
-prior's precision, zero for the free estimate. For white residuals this is (LᵀΣ⁻¹L + P⁻¹)⁻¹. Estimated shape constants of
-the friction enter as columns of their own, so that what they leave uncertain shows in the coefficients.
+prior's precision, zero for the free estimate. For white residuals this is (LᵀΣ⁻¹L + P⁻¹)⁻¹. Estimated shape constants
+of the friction enter as columns of their own, so that what they leave uncertain shows in the coefficients.
 """
 
 from collections.abc import Iterable, Sequence

@@ -22,6 +22,7 @@ from tauscope.identification.physical_estimate import consistent_estimate, in_mo
 from tauscope.identification.posterior import Posterior, infer
 from tauscope.identification.preconditions import require_motion
 from tauscope.identification.residuals import Fit, ResidualStatistics, evaluate
+from tauscope.identification.signs import reversed_joints
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.conditioning import Conditioner, ConditioningSummary
 from tauscope.recording.recording import Array, Recording
@@ -62,6 +63,8 @@ class Identification:
         the most probable bodies and friction, in the same columns
     constrained : bool
         whether no body can have the free estimate
+    reversed_joints : tuple of int
+        joints whose torque fits much better with the other sign, which is not used
     covariance : (p + s, p + s) float64
         of the parameters, and of the logarithms of the estimated shape constants
     undetermined : (p,) bool
@@ -74,6 +77,7 @@ class Identification:
     free_parameters: Array
     consistent_parameters: Array
     constrained: bool
+    reversed_joints: tuple[int, ...]
     posterior: Posterior
     covariance: Array
     undetermined: np.ndarray
@@ -129,11 +133,13 @@ def identify(
         structure, shapes, factors = choose_model(motions, robot, base, rotor_inertia=options.rotor_inertia)
         progress("estimate parameters")
         weights, solution = estimate(factors, structure.size, options.estimator)
-        coloured = infer(structure, factors, np.ones(robot.joint_count), options.estimator)
+        coloured = infer(structure, factors, estimator=options.estimator)
         free, believed = evaluate(motions, structure, [solution.parameters, coloured.mean])
         ratios = [model.long_run_ratio for model in believed.autoregressions]
         posterior = infer(structure, factors, ratios, options.estimator)
         consistent = consistent_estimate(structure, posterior.factor, posterior.target, posterior.prior)
+        progress("compare signs")
+        reversed_ = reversed_joints(motions, structure, factors, ratios, posterior, consistent)
     consistent_parameters = in_model_columns(structure, consistent.parameters)
     parameters = consistent_parameters if options.prior else solution.parameters
     progress("evaluate residuals")
@@ -159,6 +165,7 @@ def identify(
         free_parameters=solution.parameters,
         consistent_parameters=consistent_parameters,
         constrained=is_rejected(consistent),
+        reversed_joints=reversed_,
         posterior=posterior,
         covariance=covariance,
         undetermined=solution.undetermined,

@@ -10,9 +10,10 @@ from tauscope.dynamics.base_parameters import BaseParameters
 from tauscope.identification.band import preliminary_terms
 from tauscope.identification.covariance import parameter_covariance
 from tauscope.identification.dataset import Dataset, rms_speed
-from tauscope.identification.estimate import FINEST_TORQUE, Estimator, estimate, single_joint_std
+from tauscope.identification.estimate import FINEST_TORQUE, single_joint_std
 from tauscope.identification.friction_shape import EstimatedShape, estimate_shapes, shape_parameters
 from tauscope.identification.least_squares import JointFactor, factorise, restricted
+from tauscope.identification.posterior import infer
 from tauscope.identification.residuals import evaluate
 from tauscope.identification.rotor import kept_columns, needed_rotors, separable_rotors
 from tauscope.identification.shape_sensitivity import refined_structure
@@ -93,8 +94,8 @@ def _refined(
     if not estimated:
         return shapes
     structure = _with_shapes(structure, shapes)
-    weights, solution = estimate(factorise(motions, structure), structure.size, Estimator.WLS)
-    refined = refined_structure(motions, structure, solution.parameters, weights, estimated, speed)
+    posterior = infer(structure, factorise(motions, structure))
+    refined = refined_structure(motions, structure, posterior.mean, posterior.weights, estimated, speed)
     return tuple(
         replace(shape, k_v=terms.k_v, delta=terms.delta) for shape, terms in zip(shapes, refined.terms, strict=True)
     )
@@ -109,14 +110,14 @@ def _judged(
     `noise_std`²; and which of its shape constants have a small standard error.
     """
     factors = factorise(motions, structure)
-    weights, solution = estimate(factors, structure.size, Estimator.WLS)
-    (statistics,) = evaluate(motions, structure, [solution.parameters])
-    given = (motions, structure, solution.parameters, factors, weights, statistics.autoregressions)
+    posterior = infer(structure, factors)
+    (statistics,) = evaluate(motions, structure, [posterior.mean])
+    given = (motions, structure, posterior.mean, factors, posterior.weights, statistics.autoregressions)
     # With δ held: how uncertain δ itself is says nothing about whether the term is there.
-    held = parameter_covariance(*given)
-    gains = np.array([_stribeck_gain(structure, solution.parameters, held, joint) for joint in range(len(shapes))])
+    held = parameter_covariance(*given, posterior=posterior)
+    gains = np.array([_stribeck_gain(structure, posterior.mean, held, joint) for joint in range(len(shapes))])
     estimated = shape_parameters(shapes)
-    errors = np.sqrt(np.diag(parameter_covariance(*given, estimated))[structure.size :])
+    errors = np.sqrt(np.diag(parameter_covariance(*given, estimated, posterior))[structure.size :])
     tight: list[set[str]] = [set() for _ in shapes]
     for (joint, name), error in zip(estimated, errors, strict=True):
         if 0.0 < error < TIGHT[name]:
@@ -167,7 +168,6 @@ def _preliminary_residual(
     motions: Dataset, structure: ModelStructure, factors: tuple[JointFactor, ...]
 ) -> tuple[Array, Array]:
     """Residual standard deviation in the band and its inflation by autocorrelation, (n,) each."""
-    _, solution = estimate(factors, structure.size, Estimator.WLS)
-    (statistics,) = evaluate(motions, structure, [solution.parameters])
+    (statistics,) = evaluate(motions, structure, [infer(structure, factors).mean])
     inflation = np.array([model.long_run_ratio for model in statistics.autoregressions])
     return np.maximum(statistics.fit.band_rms, np.finfo(float).tiny), inflation

@@ -70,17 +70,20 @@ class Posterior:
 
 
 def infer(
-    structure: ModelStructure, factors: tuple[JointFactor, ...], ratios: Sequence[float], estimator: Estimator
+    structure: ModelStructure,
+    factors: tuple[JointFactor, ...],
+    ratios: Sequence[float] | None = None,
+    estimator: Estimator = Estimator.WLS,
 ) -> Posterior:
     """The posterior of all parameters.
 
     Parameters
     ----------
-    ratios : sequence of float, length n
-        ρ_j, long-run over white variance of each joint's residual
+    ratios : sequence of float, length n, or None
+        ρ_j, long-run over white variance of each joint's residual; ones where it is not known
     """
     full = FullParameters.of(structure)
-    colour = np.sqrt(np.asarray(ratios))
+    colour = np.ones(len(factors)) if ratios is None else np.sqrt(ratios)
     std = torque_rms(factors)  # from above: beside a noise of nothing every parameter looks determined
     prior = None
     for _ in range(ROUNDS):

@@ -1,0 +1,41 @@
+"""How well a model may be expected to predict a motion: noise, and what the covariance of its parameters adds."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from tauscope.identification.dataset import PreparedMotion
+from tauscope.identification.shape_sensitivity import ShapeParameter, columns_with_shapes
+from tauscope.identification.structure import ModelStructure
+from tauscope.recording.recording import Array
+
+
+def uncertain_torque(
+    motions: Iterable[PreparedMotion],
+    structure: ModelStructure,
+    parameters: Array,
+    shapes: Sequence[ShapeParameter],
+    covariance: Array,
+) -> Array:
+    """Root mean square of the torque that the parameters leave uncertain, √(mean of a S aᵀ) over the rows a of a joint.
+
+    Parameters
+    ----------
+    parameters : (p,) float64
+        the coefficients, for the amplitudes of the shape constants
+    covariance : (p + s, p + s) float64
+        S, of the parameters and of the logarithms of the estimated shape constants
+
+    Returns
+    -------
+    (n,) float64
+        in the common band [Nm or N]
+    """
+    squares, count = np.zeros(structure.robot.joint_count), np.zeros(structure.robot.joint_count)
+    for prepared in motions:
+        for joint, used in enumerate(prepared.used):
+            columns, index = columns_with_shapes(prepared, structure, joint, parameters, shapes)
+            columns = columns if used.all() else columns[:, used]
+            squares[joint] += np.sum((covariance[np.ix_(index, index)] @ columns) * columns)
+            count[joint] += columns.shape[1]
+    return np.sqrt(np.maximum(squares, 0.0) / np.maximum(count, 1))

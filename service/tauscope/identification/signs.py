@@ -1,0 +1,97 @@
+"""Joints whose torque is recorded with the wrong sign.
+
+A free fit cannot tell: with the torque of all joints its parameters change their sign too. Bodies and friction can:
+masses are positive and friction takes power. So the most probable bodies are estimated for each joint's sign, and for
+all, and the signs under which they explain the torque best are found one after the other.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from tauscope.identification.consistency import ConsistentParameters
+from tauscope.identification.dataset import PreparedMotion
+from tauscope.identification.least_squares import JointFactor
+from tauscope.identification.physical_estimate import consistent_estimate, in_model_columns, is_rejected
+from tauscope.identification.posterior import Posterior, infer
+from tauscope.identification.residuals import evaluate
+from tauscope.identification.structure import ModelStructure
+from tauscope.recording.recording import Array
+
+CLEARLY = 5.0
+"""Log likelihood by which another sign has to explain the torque better: one arm in a hundred is wired so, and the odds
+are then even or better by chance alone in none."""
+
+
+def reversed_joints(
+    motions: Iterable[PreparedMotion],
+    structure: ModelStructure,
+    factors: tuple[JointFactor, ...],
+    ratios: Sequence[float],
+    posterior: Posterior,
+    consistent: ConsistentParameters,
+) -> tuple[int, ...]:
+    """Indices of the joints whose torque explains itself much better with the other sign.
+
+    Parameters
+    ----------
+    ratios : sequence of float, length n
+        ρ_j, long-run over white variance of each joint's residual
+    """
+    if not (is_rejected(consistent) or _produces_power(structure, posterior)):
+        return ()
+    signs = np.ones(structure.robot.joint_count)
+    parameters = in_model_columns(structure, consistent.parameters)
+    while True:
+        tried = [(other, _estimate(structure, factors, ratios, other)) for other in _neighbours(signs)]
+        other, best = max(tried, key=lambda each: _log_likelihood(factors, ratios, *each))
+        # Beside a wrong sign the residual is as coloured as the motion: the whiter hypothesis tells the noise.
+        left = evaluate(motions, structure, [best, -best])
+        white = [left[int(sign < 0.0)].autoregressions[joint].long_run_ratio for joint, sign in enumerate(other)]
+        colour = np.minimum(ratios, white)
+        gain = _log_likelihood(factors, colour, other, best) - _log_likelihood(factors, colour, signs, parameters)
+        if gain <= CLEARLY:
+            return tuple(int(joint) for joint in np.flatnonzero(signs < 0.0))
+        signs, ratios = other, colour
+        parameters = _estimate(structure, factors, ratios, signs)
+
+
+def _neighbours(signs: Array) -> Iterator[Array]:
+    """The signs with one joint turned round, and all of them."""
+    for joint in range(len(signs)):
+        yield np.where(np.arange(len(signs)) == joint, -signs, signs)
+    yield -signs
+
+
+def _produces_power(structure: ModelStructure, posterior: Posterior) -> bool:
+    """Whether some joint's friction is negative: beside a wrong sign its uncertainty is large, so that says little."""
+    columns = [
+        structure.coefficient(j, name) for j in range(structure.robot.joint_count) for name in ("stiction", "viscous")
+    ]
+    return any(posterior.mean[column] < 0.0 for column in columns if column is not None)
+
+
+def _estimate(
+    structure: ModelStructure, factors: tuple[JointFactor, ...], ratios: Sequence[float], signs: Array
+) -> Array:
+    """The most probable bodies if these are the torques' signs, (p,)."""
+    turned = tuple(_turn(factor, sign) for factor, sign in zip(factors, signs, strict=True))
+    posterior = infer(structure, turned, ratios)
+    found = consistent_estimate(structure, posterior.factor, posterior.target, posterior.prior)
+    return in_model_columns(structure, found.parameters)
+
+
+def _turn(factor: JointFactor, sign: float) -> JointFactor:
+    """The equations of a joint for its torque times ±1."""
+    return replace(factor, triangle=np.column_stack([factor.triangle[:, :-1], sign * factor.triangle[:, -1]]))
+
+
+def _log_likelihood(
+    factors: tuple[JointFactor, ...], ratios: Sequence[float], signs: Array, parameters: Array
+) -> float:
+    """-Σ N_j / ρ_j log σ_j, with σ_j what these parameters leave."""
+    turned = [_turn(factor, sign) for factor, sign in zip(factors, signs, strict=True)]
+    left = [np.sqrt(factor.squared_residual(parameters) / factor.rows) for factor in turned]
+    rows = [factor.rows / ratio for factor, ratio in zip(factors, ratios, strict=True)]
+    return -float(np.dot(rows, np.log(np.maximum(left, np.finfo(float).tiny))))
