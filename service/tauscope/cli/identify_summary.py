@@ -16,6 +16,8 @@ def show_identification(console: Console, document: IdentificationDocument, robo
     console.print(
         plain(f"Robot {document.robot}: {counted(len(document.joints), 'joint')}, {document.estimator.upper()}")
     )
+    for sentence in cautions(document):
+        console.print(plain(f"! {sentence}"), soft_wrap=True)
     console.print(table("Base parameters", base_parameter_table(document)))
     if document.unidentifiable:
         names = ", ".join(document.unidentifiable)
@@ -28,8 +30,6 @@ def show_identification(console: Console, document: IdentificationDocument, robo
     console.print(table("Whole arm", _whole_arm(document)))
     for sentence in fit_sentences(document):
         console.print(plain(sentence), soft_wrap=True)
-    for sentence in cautions(document):
-        console.print(plain(f"! {sentence}"), soft_wrap=True)
 
 
 def _whole_arm(document: IdentificationDocument) -> Table:

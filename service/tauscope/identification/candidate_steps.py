@@ -82,7 +82,7 @@ def projected_grids(
             kept = np.isin(index, shared)
             place = np.searchsorted(shared, index[kept])
             velocity = prepared.motion.velocity[:, joint]
-            weight = prepared.used[joint] * (prepared.row_weight / noise_std[joint])
+            weight = prepared.row_weights(joint) / noise_std[joint]
             candidates = np.vstack([smooth_sign(velocity, slopes[joint][:, None]), velocity * np.abs(velocity)])
             steps = weight * prepared.motion.band.reduce(candidates)
             common = weight * columns[kept]

@@ -1,10 +1,11 @@
 """Standard errors that stay right when the residual is autocorrelated.
 
-cov Θ̂ = B M B,  B = (Σ_j w_j² A_jᵀ A_j + P⁻¹)⁻¹,  M = Σ_j w_j⁴ A_jᵀ Ω_j A_j + P⁻¹,
+cov Θ̂ = B M B,  B = (Σ_j w_j² A_jᵀ A_j + P⁻¹)⁻¹,  M = Σ_j w_j⁴ A_jᵀ Ω_j A_j + D P⁻¹ D,
 
-with Ω_j the covariance of joint j's residual by its autoregressive model, w_j = 1/σ_j (WLS) or 1 (LS), and P⁻¹ the
-prior's precision, zero for the free estimate. For white residuals this is (LᵀΣ⁻¹L + P⁻¹)⁻¹. Estimated shape constants
-of the friction enter as columns of their own, so that what they leave uncertain shows in the coefficients.
+with Ω_j the covariance of joint j's residual by its autoregressive model, w_j = 1/σ_j (WLS) or 1 (LS), P⁻¹ the prior's
+precision, zero for the free estimate, and D the deviation from the prior that the data show. For white residuals this
+is (LᵀΣ⁻¹L + P⁻¹)⁻¹ where D = 1. Estimated shape constants of the friction enter as columns of their own, so that what
+they leave uncertain shows in the coefficients.
 """
 
 from collections.abc import Iterable, Sequence
@@ -51,7 +52,8 @@ def parameter_covariance(
     bread, meat = np.zeros((size, size)), np.zeros((size, size))
     if posterior is not None:
         own = np.s_[: structure.size, : structure.size]
-        bread[own] = meat[own] = posterior.precision
+        bread[own] = posterior.precision
+        meat[own] = posterior.precision * np.outer(posterior.doubt, posterior.doubt)
     extended = {joint for joint, _ in shapes}
     passed = [joint for joint, model in enumerate(autoregressions) if model.order > 0 or joint in extended]
     for joint, (factor, model) in enumerate(zip(factors, autoregressions, strict=True)):
@@ -64,8 +66,7 @@ def parameter_covariance(
     for prepared in motions if passed else ():
         for joint in passed:
             columns, index = columns_with_shapes(prepared, structure, joint, parameters, shapes)
-            used = prepared.used[joint]
-            columns = prepared.row_weight * (columns if used.all() else columns * used)
+            columns = columns * prepared.row_weights(joint)
             coloured = autoregressions[joint].colour(columns)
             place = np.ix_(index, index)
             bread[place] += weight[joint] ** 2 * (columns @ columns.T)

@@ -4,16 +4,25 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy import ndimage
 
 from tauscope.dynamics.base_parameters import BaseParameters
 from tauscope.dynamics.regressor import TorqueRegressor
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.conditioning import Conditioner, Mask, Motion
+from tauscope.recording.conditioning.common_band import HarmonicBand
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
 MEMORY_LIMIT = 256 * 1024 * 1024
 """Bytes of columns that are kept between passes; beyond, every pass conditions the recording again."""
+
+
+REST_S = 0.1
+"""A joint that moves by no more than its encoder resolves for so long stands still [s]."""
+
+FEWEST_AT_REST = 3
+"""Samples that tell rest from a turning point."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +37,10 @@ class PreparedMotion:
         measured torque in the common band, mean of the repetitions
     used : (n, M) bool
         rows that rest on measured torque
+    at_rest : (n, M) float64
+        share of each row's samples at which the joint stands still
+    rest_variance : (n,) float64
+        variance of friction at rest over that of a row's noise
     """
 
     motion: Motion
@@ -35,12 +48,26 @@ class PreparedMotion:
     reduced_rigid: tuple[Array, ...]
     reduced_torque: Array
     used: Mask
+    at_rest: Array
+    rest_variance: Array
     recording: int
 
     @property
     def row_weight(self) -> float:
         """√P: a mean of P repetitions has 1/P of the noise variance."""
         return float(np.sqrt(self.motion.repetitions))
+
+    def row_weights(self, joint: int) -> Array:
+        """1/σ of a joint's rows, relative to one of a single repetition in motion, (M,); zero where none was measured.
+
+        At rest friction takes any value up to the breakaway torque: such a row says little.
+
+        Parameters
+        ----------
+        joint : int
+            joint index, from 0
+        """
+        return self.used[joint] * self.row_weight / np.sqrt(1.0 + self.rest_variance[joint] * self.at_rest[joint])
 
     @property
     def nbytes(self) -> int:
@@ -122,13 +149,14 @@ class Dataset:
     robot: Robot
     base: BaseParameters
     cutoff_hz: float | None
+    rest_variance: Array | None = None
     _kept: list[PreparedMotion] | None = field(default=None, repr=False)
     _too_large: bool = field(default=False, repr=False)
 
     def __iter__(self) -> Iterator[PreparedMotion]:
         """The pieces in the order of the recordings; computed once where they fit into `MEMORY_LIMIT`."""
         if self._kept is not None:
-            yield from self._kept
+            yield from map(self._with_rest, self._kept)
             return
         kept: list[PreparedMotion] = []
         size = 0
@@ -139,19 +167,32 @@ class Dataset:
                 kept.clear()
             else:
                 kept.append(prepared)
-            yield prepared
+            yield self._with_rest(prepared)
         if not self._too_large:
             self._kept = kept
+
+    def _with_rest(self, prepared: PreparedMotion) -> PreparedMotion:
+        """The piece with what is known of friction at rest."""
+        return prepared if self.rest_variance is None else replace(prepared, rest_variance=self.rest_variance)
 
     def _prepare(self) -> Iterator[PreparedMotion]:
         """Condition, evaluate the regressor, and reduce."""
         for index, conditioner in enumerate(self.conditioners):
             for measured in conditioner.motions(self.cutoff_hz):
-                yield prepared_motion(_without_jitter(measured, conditioner.moving), self.robot, self.base, index)
+                motion = _without_jitter(measured, conditioner.moving)
+                yield prepared_motion(motion, self.robot, self.base, index, conditioner.resolution)
 
 
-def prepared_motion(motion: Motion, robot: Robot, base: BaseParameters, recording: int) -> PreparedMotion:
-    """One piece of motion with its rigid-body columns, at the recorded rate and in the common band."""
+def prepared_motion(
+    motion: Motion, robot: Robot, base: BaseParameters, recording: int, resolution: Array | None = None
+) -> PreparedMotion:
+    """One piece of motion with its rigid-body columns, at the recorded rate and in the common band.
+
+    Parameters
+    ----------
+    resolution : (n,) float64 or None
+        change of position that is told from noise [rad or m]; None where rest is not looked for
+    """
     regressor = TorqueRegressor(robot, columns=base.independent_columns)
     whole = np.empty((robot.joint_count, regressor.column_count, len(motion.position)))
     regressor.write_shares(motion.position, motion.velocity, motion.acceleration, whole)
@@ -163,8 +204,22 @@ def prepared_motion(motion: Motion, robot: Robot, base: BaseParameters, recordin
         tuple(reduce(columns) for columns in rigid),
         reduce(np.ascontiguousarray(motion.mean_torque.T)),
         motion.band.reduce_mask(np.asarray(motion.measured.any(axis=0)).T),
+        _at_rest(motion, resolution),
+        np.zeros(robot.joint_count),
         recording,
     )
+
+
+def _at_rest(motion: Motion, resolution: Array | None) -> Array:
+    """Share of each row's samples within a stretch of `REST_S` in which a joint moves by no more than it resolves."""
+    window = round(REST_S * motion.rate_hz) + 1
+    shape = (motion.position.shape[1], len(motion.position))
+    if resolution is None or window < FEWEST_AT_REST or isinstance(motion.band, HarmonicBand):
+        return np.zeros_like(motion.band.reduce(np.zeros(shape)))
+    position = motion.position.T
+    span = ndimage.maximum_filter1d(position, window, axis=1) - ndimage.minimum_filter1d(position, window, axis=1)
+    still = ndimage.maximum_filter1d((span <= resolution[:, None]).astype(float), window, axis=1)
+    return np.clip(motion.band.reduce(still), 0.0, 1.0)
 
 
 def _without_jitter(motion: Motion, moving: Mask) -> Motion:

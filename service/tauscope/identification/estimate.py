@@ -10,6 +10,9 @@ from tauscope.recording.recording import Array
 REWEIGHTINGS = 1
 """Rounds of estimating σ_j from the common solution's residual, after a first one from each joint alone."""
 
+SMALLEST_TORQUE = 1e-9
+"""Torque below which a recording has none [Nm or N]."""
+
 FINEST_TORQUE = 1e-6
 """Share of a joint's torque that counts as its noise at least: no sensor resolves more, and weights stay finite."""
 
@@ -52,6 +55,6 @@ def _noise_std(factors: tuple[JointFactor, ...], squares: list[float], size: int
 
 
 def torque_rms(factors: tuple[JointFactor, ...]) -> Array:
-    """Root mean square of each joint's torque, (n,); positive also where a joint has none."""
+    """Root mean square of each joint's torque, (n,); positive also where a joint, or every one, has none."""
     rms = np.sqrt([np.sum(factor.triangle[:, -1] ** 2) / factor.rows for factor in factors])
-    return np.maximum(rms, FINEST_TORQUE * rms.max()) + np.finfo(float).tiny
+    return np.maximum(rms, FINEST_TORQUE * max(rms.max(), SMALLEST_TORQUE))

@@ -15,12 +15,14 @@ from tauscope.identification.consistency import ConsistentParameters
 from tauscope.identification.covariance import parameter_covariance
 from tauscope.identification.dataset import Dataset
 from tauscope.identification.estimate import Estimator, estimate
+from tauscope.identification.excitation import Excitation, measure_excitation
 from tauscope.identification.friction_shape import EstimatedShape, shape_parameters
 from tauscope.identification.least_squares import JointFactor, Solution, condition_number
 from tauscope.identification.model_terms import choose_model
 from tauscope.identification.physical_estimate import consistent_estimate, in_model_columns, is_rejected
 from tauscope.identification.posterior import Posterior, infer
 from tauscope.identification.preconditions import require_motion
+from tauscope.identification.prediction import uncertain_torque
 from tauscope.identification.residuals import Fit, ResidualStatistics, evaluate
 from tauscope.identification.signs import reversed_joints
 from tauscope.identification.structure import ModelStructure
@@ -69,6 +71,10 @@ class Identification:
         of the parameters, and of the logarithms of the estimated shape constants
     undetermined : (p,) bool
         parameters about which the recordings say nothing
+    predicted_train, predicted_held_out : (n,) float64
+        residual at the recorded rate that noise and covariance lead to expect [Nm or N]
+    extrapolation : (n,) float64 or None
+        share of the held-out torque's rms that training leaves uncertain
     """
 
     robot: Robot
@@ -86,8 +92,13 @@ class Identification:
     condition_number: float
     residuals: ResidualStatistics
     free_fit: Fit
+    predicted_train: Array
     held_out: Fit | None
     held_out_free: Fit | None
+    predicted_held_out: Array | None
+    excitation: Excitation
+    held_out_excitation: Excitation | None
+    extrapolation: Array | None
     cutoff_hz: float | None
     options: Options
     conditioning: tuple[ConditioningSummary, ...]
@@ -135,7 +146,7 @@ def identify(
         weights, solution = estimate(factors, structure.size, options.estimator)
         coloured = infer(structure, factors, estimator=options.estimator)
         free, believed = evaluate(motions, structure, [solution.parameters, coloured.mean])
-        ratios = [model.long_run_ratio for model in believed.autoregressions]
+        ratios = np.array([model.long_run_ratio for model in believed.autoregressions])
         posterior = infer(structure, factors, ratios, options.estimator)
         consistent = consistent_estimate(structure, posterior.factor, posterior.target, posterior.prior)
         progress("compare signs")
@@ -155,9 +166,25 @@ def identify(
         shape_parameters(shapes),
         posterior if options.prior else None,
     )
+    outside = np.maximum(residuals.fit.rms**2 - residuals.fit.band_rms**2, 0.0)
+    left = np.sqrt([factor.squared_residual(posterior.mean) / factor.rows for factor in factors])
+    noise = residuals.fit.band_rms * posterior.noise_std / np.maximum(left, np.finfo(float).tiny)
+
+    def predict(others: Dataset) -> tuple[Array, Array]:
+        """Expected residual of a motion, and what of it the parameters leave uncertain, (n,) each."""
+        uncertain = uncertain_torque(others, structure, parameters, shape_parameters(shapes), covariance, noise)
+        return np.sqrt(outside + noise**2 + uncertain**2), uncertain
+
     progress("evaluate held-out recordings")
     held_conditioners = [Conditioner.survey(recording, robot) for recording in held_out]
-    held_fits = _held_out_fits(held_conditioners, structure, cutoff, [parameters, solution.parameters])
+    held: Sequence[Fit | None] = (None, None)
+    predicted = beyond = held_excitation = None
+    if held_out:
+        unseen = Dataset(held_conditioners, robot, base, cutoff, motions.rest_variance)
+        held = [each.fit for each in evaluate(unseen, structure, [parameters, solution.parameters])]
+        predicted, uncertain = predict(unseen)
+        held_excitation = measure_excitation(unseen)
+        beyond = uncertain / np.maximum(held[0].torque_rms, np.finfo(float).tiny)
     return Identification(
         robot=robot,
         structure=structure,
@@ -174,8 +201,13 @@ def identify(
         condition_number=condition_number(factors, structure.size),
         residuals=residuals,
         free_fit=free.fit,
-        held_out=held_fits[0],
-        held_out_free=held_fits[1],
+        predicted_train=predict(motions)[0],
+        held_out=held[0],
+        held_out_free=held[1],
+        predicted_held_out=predicted,
+        excitation=measure_excitation(motions),
+        held_out_excitation=held_excitation,
+        extrapolation=beyond,
         cutoff_hz=cutoff,
         options=options,
         conditioning=tuple(conditioner.summary(cutoff) for conditioner in conditioners),
@@ -191,16 +223,6 @@ def _naming(recordings: Sequence[Recording]) -> Iterator[None]:
         yield
     except IdentificationError as error:
         raise IdentificationError(f"{', '.join(recording.name for recording in recordings)}: {error}") from error
-
-
-def _held_out_fits(
-    conditioners: Sequence[Conditioner], structure: ModelStructure, cutoff_hz: float | None, estimates: Sequence[Array]
-) -> list[Fit] | list[None]:
-    """Fits of several estimates on recordings that were not used."""
-    if not conditioners:
-        return [None] * len(estimates)
-    motions = Dataset(conditioners, structure.robot, structure.base, cutoff_hz)
-    return [statistics.fit for statistics in evaluate(motions, structure, estimates)]
 
 
 def _identifiable(

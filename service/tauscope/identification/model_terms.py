@@ -37,6 +37,7 @@ def choose_model(
     given = [joint.friction_shape for joint in robot.joints]
     separable = separable_rotors(robot, base) if rotor_inertia else (False,) * robot.joint_count
     structure = _with_rotors(ModelStructure(robot, base, preliminary_terms(motions, robot)), separable)
+    _doubt_friction_at_rest(motions, structure)
     if any(shape.k_v is None or shape.delta is None for shape in given):
         speed = rms_speed(motions)
         shapes = _refined(motions, structure, _estimated_shapes(motions, structure, speed), speed)
@@ -47,6 +48,27 @@ def choose_model(
     needed = _needed_rotors(motions, complete, factors) if any(separable) else separable
     keep = kept_columns(complete, {joint for joint, is_needed in enumerate(needed) if is_needed})
     return _with_rotors(complete, needed), shapes, restricted(factors, keep)
+
+
+def _doubt_friction_at_rest(motions: Dataset, structure: ModelStructure) -> None:
+    """Give rows at rest the variance that friction has there: it holds with any torque up to its breakaway torque.
+
+    What it holds with is estimated by a model that doubts these rows: one whose friction is anywhere up to breakaway.
+    """
+    if not any(prepared.at_rest.any() for prepared in motions):
+        return
+    posterior = infer(structure, factorise(motions, structure))
+    columns = [structure.coefficient(joint, "stiction") for joint in range(structure.robot.joint_count)]
+    stiction = np.array([0.0 if column is None else max(posterior.mean[column], 0.0) for column in columns])
+    motions.rest_variance = stiction**2 / 3.0 / posterior.noise_std**2
+    posterior = infer(structure, factorise(motions, structure))
+    held, weight = np.zeros(len(columns)), np.full(len(columns), np.finfo(float).tiny)
+    for prepared in motions:
+        share = prepared.at_rest * prepared.used * prepared.motion.repetitions
+        left = prepared.reduced_torque - prepared.predicted_rows(structure, posterior.mean)
+        held += np.sum(share * (left**2 - posterior.noise_std[:, None] ** 2 / prepared.motion.repetitions), axis=1)
+        weight += share.sum(axis=1)
+    motions.rest_variance = np.clip(held / weight, 0.0, stiction**2) / posterior.noise_std**2
 
 
 def _estimated_shapes(motions: Dataset, structure: ModelStructure, speed: Array) -> tuple[EstimatedShape, ...]:

@@ -9,7 +9,6 @@ one under which the data are most probable (MacKay 1992), and never narrow. Data
 determine a parameter overrule the prior; a parameter that they leave open stays at what was believed.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,8 +21,12 @@ from tauscope.identification.least_squares import JointFactor, stacked_factor
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array
 
-WIDTHS = np.geomspace(2.0, 32.0, 9)
-"""Candidates of w. At 2 a link is believed to as much as all of its mass, and no stated body is believed more."""
+WIDTHS = np.geomspace(0.25, 32.0, 15)
+"""Candidates of w: at 2 a link's mass is believed to as much as all of itself."""
+
+WIDE = 2.0
+"""The estimate believes no body more than this, however well the stated ones agree with the data so far: w is at least
+as large in it, while its uncertainty is that of the w which the data show."""
 
 ROUNDS = 20
 """Most rounds of noise, width and parameters…"""
@@ -32,10 +35,16 @@ SETTLED = 1e-3
 """…which end where no joint's noise changes by more than this share."""
 
 
+DETERMINED = 0.9
+"""Share of the prior's variance that data take from a parameter which they determine."""
+
+
 @dataclass(frozen=True, eq=False)
 class Posterior:
     """What prior and data together say of the parameters, before bodies and friction restrict them.
 
+    doubt : (p,) float64
+        deviation from the prior that the data show, in its standard deviations
     noise_std : (n,) float64
         σ_j of a row in the common band
     weights : (n,) float64
@@ -50,6 +59,7 @@ class Posterior:
 
     prior: Prior
     width: float
+    doubt: Array
     noise_std: Array
     weights: Array
     factor: Array
@@ -72,37 +82,44 @@ class Posterior:
 def infer(
     structure: ModelStructure,
     factors: tuple[JointFactor, ...],
-    ratios: Sequence[float] | None = None,
+    ratios: Array | None = None,
     estimator: Estimator = Estimator.WLS,
 ) -> Posterior:
     """The posterior of all parameters.
 
     Parameters
     ----------
-    ratios : sequence of float, length n, or None
+    ratios : (n,) float64 or None
         ρ_j, long-run over white variance of each joint's residual; ones where it is not known
     """
     full = FullParameters.of(structure)
     colour = np.ones(len(factors)) if ratios is None else np.sqrt(ratios)
     std = torque_rms(factors)  # from above: beside a noise of nothing every parameter looks determined
-    prior = None
+    factor, target = _stack(factors, structure.size, std * colour)
+    prior = plausible_prior(structure.robot, factor @ full.map, target, full.friction)
     for _ in range(ROUNDS):
-        triangle = stacked_factor(factors, structure.size, std * colour)
-        factor, target = triangle[:-1, :-1], triangle[:-1, -1]
-        if prior is None:  # its magnitudes hang on the data's, not on their noise
-            prior = plausible_prior(structure.robot, factor @ full.map, target, full.friction)
-        width, mean, covariance, precision = _most_probable(full, prior, factor, target)
+        width, evident, mean, covariance, precision = _most_probable(full, prior, factor, target)
         before, std = std, _noise_std(factors, mean, covariance, estimator)
+        factor, target = _stack(factors, structure.size, std * colour)
         if np.all(np.abs(std - before) <= SETTLED * before):
             break
-    weights = 1.0 / (before * colour)
-    return Posterior(prior.widen(width), width, before, weights, factor, target, mean, covariance, precision)
+    width, evident, mean, covariance, precision = _most_probable(full, prior, factor, target)
+    doubt = np.ones(len(mean))
+    doubt[: structure.base_count] = evident / width
+    weights = 1.0 / (std * colour)
+    return Posterior(prior.widen(width), width, doubt, std, weights, factor, target, mean, covariance, precision)
+
+
+def _stack(factors: tuple[JointFactor, ...], size: int, std: Array) -> tuple[Array, Array]:
+    """R and z of the weighted equations of all joints."""
+    triangle = stacked_factor(factors, size, std)
+    return triangle[:-1, :-1], triangle[:-1, -1]
 
 
 def _most_probable(
     full: FullParameters, prior: Prior, factor: Array, target: Array
-) -> tuple[float, Array, Array, Array]:
-    """Width of highest evidence, and mean, covariance and prior precision with it.
+) -> tuple[float, float, Array, Array, Array]:
+    """Width of the prior, width of highest evidence, and mean, covariance and prior precision.
 
     Friction is eliminated first: its prior does not depend on w. What is left is diagonal in the singular vectors of
     R C, with C Cᵀ the prior covariance of the base parameters at w = 1, and every width costs a sum.
@@ -126,15 +143,16 @@ def _most_probable(
     along = left.T @ reduced[:, -1]
     gain = 1.0 + np.outer(WIDTHS**2, singular**2)
     evidence = -0.5 * np.sum(along**2 / gain + np.log(gain), axis=1)
-    width = float(WIDTHS[int(np.argmax(evidence))])
+    evident = float(WIDTHS[int(np.argmax(evidence))])
+    width = max(evident, WIDE)
     scale = np.append(np.full(bodies, width), np.ones(size))
     root = root * scale
     stacked = np.vstack([factor @ root, np.eye(len(mean))])
     whole = np.column_stack([stacked, np.append(target - factor @ mean, np.zeros(len(mean)))])
     triangle = np.asarray(qr(whole, mode="r")[0])[: len(mean)]
     inverse = root @ solve_triangular(triangle[:, :-1], np.eye(len(mean)))
-    precision_root = solve_triangular(root, np.eye(len(mean)), lower=True)
-    return width, mean + inverse @ triangle[:, -1], inverse @ inverse.T, precision_root.T @ precision_root
+    root_precision = solve_triangular(root, np.eye(len(mean)), lower=True)
+    return width, evident, mean + inverse @ triangle[:, -1], inverse @ inverse.T, root_precision.T @ root_precision
 
 
 def _noise_std(factors: tuple[JointFactor, ...], parameters: Array, covariance: Array, estimator: Estimator) -> Array:

@@ -16,8 +16,11 @@ def uncertain_torque(
     parameters: Array,
     shapes: Sequence[ShapeParameter],
     covariance: Array,
+    noise_std: Array,
 ) -> Array:
-    """Root mean square of the torque that the parameters leave uncertain, √(mean of a S aᵀ) over the rows a of a joint.
+    """Root mean square of the torque that parameters and friction at rest leave uncertain, √(mean of a S aᵀ + v σ²).
+
+    a are the rows of a joint, v is what `PreparedMotion` says of friction at rest.
 
     Parameters
     ----------
@@ -25,6 +28,8 @@ def uncertain_torque(
         the coefficients, for the amplitudes of the shape constants
     covariance : (p + s, p + s) float64
         S, of the parameters and of the logarithms of the estimated shape constants
+    noise_std : (n,) float64
+        σ of a row [Nm or N]
 
     Returns
     -------
@@ -37,5 +42,7 @@ def uncertain_torque(
             columns, index = columns_with_shapes(prepared, structure, joint, parameters, shapes)
             columns = columns if used.all() else columns[:, used]
             squares[joint] += np.sum((covariance[np.ix_(index, index)] @ columns) * columns)
+            resting = prepared.rest_variance[joint] * prepared.at_rest[joint][used]
+            squares[joint] += noise_std[joint] ** 2 * resting.sum()
             count[joint] += columns.shape[1]
     return np.sqrt(np.maximum(squares, 0.0) / np.maximum(count, 1))

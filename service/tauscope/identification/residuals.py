@@ -34,10 +34,13 @@ class Fit:
         root mean square of the torque residual at the recorded rate, no filter [Nm or N]
     band_rms : (n,) float64
         the same in the common band
+    torque_rms : (n,) float64
+        root mean square of the measured torque in the common band [Nm or N]
     """
 
     rms: Array
     band_rms: Array
+    torque_rms: Array
     relative_error: float
 
 
@@ -161,7 +164,9 @@ class _Sums:
         """The sums, turned into what they stand for."""
         band_rms = np.sqrt(self._band_squares / np.maximum(self._band_count, 1))
         relative = np.sqrt(self._band_squares.sum() / max(self._torque_squares.sum(), np.finfo(float).tiny))
-        fit = Fit(np.sqrt(self._raw_squares / np.maximum(self._raw_count, 1)), band_rms, float(relative))
+        torque_rms = np.sqrt(self._torque_squares / np.maximum(self._band_count, 1))
+        rms = np.sqrt(self._raw_squares / np.maximum(self._raw_count, 1))
+        fit = Fit(rms, band_rms, torque_rms, float(relative))
         by_periods = bool((self._period_count >= FEWEST_PERIOD_SAMPLES).all())
         noise = np.sqrt(self._period_squares / self._period_count) if by_periods else None
         raw_lags = self._band_lags if self._unfiltered and self._unaveraged else self._raw_lags

@@ -8,13 +8,13 @@ from pydantic import Field
 
 from tauscope.identification.friction_shape import shape_parameters
 from tauscope.identification.identification import Identification
+from tauscope.identification.posterior import DETERMINED
 from tauscope.identification.residuals import Fit
+from tauscope.identification.warnings import identification_warnings, weak_points
 from tauscope.recording.conditioning import ConditioningSummary
+from tauscope.result_warning import ResultWarning
 from tauscope.robot import STANDARD_PARAMETERS, LinkInertia
 from tauscope.strict_model import ResultModel
-
-DETERMINED = 0.9
-"""Share of the prior's variance that data take from a parameter which they determine."""
 
 
 class BaseParameterEntry(ResultModel):
@@ -80,6 +80,9 @@ class FitEntry(ResultModel):
     rms: list[float] = Field(description="per joint, residual at the recorded rate, unfiltered [Nm or N]")
     band_rms: list[float] = Field(description="per joint, residual in the common band [Nm or N]")
     relative_error: float = Field(description="‖τ - τ̂‖ / ‖τ‖ over all joints, in the common band")
+    predicted_rms: list[float] | None = Field(
+        default=None, description="per joint, the `rms` that noise and the covariance of the parameters lead to expect"
+    )
 
 
 class FitsEntry(ResultModel):
@@ -89,6 +92,26 @@ class FitsEntry(ResultModel):
     held_out: FitEntry | None = Field(default=None, description="on recordings that were not used")
     free_train: FitEntry = Field(description="of the free least-squares estimate, on the same recordings")
     free_held_out: FitEntry | None = Field(default=None, description="of the free least-squares estimate, held out")
+
+
+class JointExcitationEntry(ResultModel):
+    """How one joint moves, and what of it that does not tell."""
+
+    joint: str = Field(description="name of the joint")
+    range: list[float] = Field(description="lowest and highest position [rad or m]")
+    speed: float = Field(description="top speed, which one sample in a hundred exceeds [rad/s or m/s]")
+    reversals: int = Field(description="how often it turns round")
+    weak: list[str] = Field(description="what the recordings hardly tell, each with the motion that would")
+
+
+class ExcitationEntry(ResultModel):
+    """What the recordings excite."""
+
+    joints: list[JointExcitationEntry] = Field(description="one a joint")
+    extrapolation: list[float] | None = Field(
+        default=None,
+        description="per joint, share of the held-out torque that training leaves uncertain; null without any",
+    )
 
 
 class ConditioningEntry(ResultModel):
@@ -115,6 +138,7 @@ class IdentificationDocument(ResultModel):
     schema_id: Literal["tauscope.identification/1"] = Field(
         default="tauscope.identification/1", alias="schema", description="name and version of this document's form"
     )
+    warnings: list[ResultWarning] = Field(description="what to know before the numbers, the gravest first")
     robot: str = Field(description="name of the robot")
     joints: list[str] = Field(description="names of its joints, in chain order")
     estimator: Literal["ls", "wls"] = Field(description="how the joints' equations were weighted")
@@ -138,6 +162,7 @@ class IdentificationDocument(ResultModel):
     links: list[LinkEntry] = Field(description="nearest physically consistent full parameter set")
     links_friction: list[FrictionEntry] = Field(description="friction that belongs to `links`")
     fit: FitsEntry = Field(description="how well it explains the torque")
+    excitation: ExcitationEntry = Field(description="what the recordings excite")
     conditioning: list[ConditioningEntry] = Field(description="one a recording used")
     held_out_conditioning: list[ConditioningEntry] = Field(description="one a held-out recording")
 
@@ -147,6 +172,7 @@ def document(identification: Identification) -> IdentificationDocument:
     result = identification
     names = _standard_names(result.robot.joint_count)
     return IdentificationDocument(
+        warnings=identification_warnings(result),
         robot=result.robot.name,
         joints=[joint.name for joint in result.robot.joints],
         estimator=result.options.estimator.value,
@@ -163,11 +189,12 @@ def document(identification: Identification) -> IdentificationDocument:
         links=[_link(link) for link in result.consistent.links],
         links_friction=_friction(result, result.consistent_parameters),
         fit=FitsEntry(
-            train=_fit(result.residuals.fit),
-            held_out=None if result.held_out is None else _fit(result.held_out),
+            train=_fit(result.residuals.fit, result.predicted_train),
+            held_out=None if result.held_out is None else _fit(result.held_out, result.predicted_held_out),
             free_train=_fit(result.free_fit),
             free_held_out=None if result.held_out_free is None else _fit(result.held_out_free),
         ),
+        excitation=_excitation(result),
         conditioning=[_conditioning(summary) for summary in result.conditioning],
         held_out_conditioning=[_conditioning(summary) for summary in result.held_out_conditioning],
     )
@@ -269,8 +296,29 @@ def _link(link: LinkInertia) -> LinkEntry:
     )
 
 
-def _fit(fit: Fit) -> FitEntry:
-    return FitEntry(rms=_floats(fit.rms), band_rms=_floats(fit.band_rms), relative_error=fit.relative_error)
+def _fit(fit: Fit, predicted: np.ndarray | None = None) -> FitEntry:
+    return FitEntry(
+        rms=_floats(fit.rms),
+        band_rms=_floats(fit.band_rms),
+        relative_error=fit.relative_error,
+        predicted_rms=None if predicted is None else _floats(predicted),
+    )
+
+
+def _excitation(result: Identification) -> ExcitationEntry:
+    found = result.excitation
+    joints = [
+        JointExcitationEntry(
+            joint=each.name,
+            range=[float(found.lowest[joint]), float(found.highest[joint])],
+            speed=float(found.speed[joint]),
+            reversals=int(found.reversals[joint]),
+            weak=weak_points(result, joint),
+        )
+        for joint, each in enumerate(result.robot.joints)
+    ]
+    extrapolation = None if result.extrapolation is None else _floats(result.extrapolation)
+    return ExcitationEntry(joints=joints, extrapolation=extrapolation)
 
 
 def _conditioning(summary: ConditioningSummary) -> ConditioningEntry:

@@ -135,8 +135,8 @@ def _normal_equations(
     for prepared in motions:
         for joint in range(structure.robot.joint_count):
             columns, index = columns_with_shapes(prepared, structure, joint, parameters, shapes)
-            scale = weight[joint] * prepared.row_weight
-            columns = columns * (scale * prepared.used[joint])
+            scale = weight[joint] * prepared.row_weights(joint)
+            columns = columns * scale
             gram[np.ix_(index, index)] += columns @ columns.T
             target[index] += columns @ (scale * prepared.reduced_torque[joint])
     return gram, target

@@ -5,7 +5,7 @@ masses are positive and friction takes power. So the most probable bodies are es
 all, and the signs under which they explain the torque best are found one after the other.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -28,7 +28,7 @@ def reversed_joints(
     motions: Iterable[PreparedMotion],
     structure: ModelStructure,
     factors: tuple[JointFactor, ...],
-    ratios: Sequence[float],
+    ratios: Array,
     posterior: Posterior,
     consistent: ConsistentParameters,
 ) -> tuple[int, ...]:
@@ -36,7 +36,7 @@ def reversed_joints(
 
     Parameters
     ----------
-    ratios : sequence of float, length n
+    ratios : (n,) float64
         ρ_j, long-run over white variance of each joint's residual
     """
     if not (is_rejected(consistent) or _produces_power(structure, posterior)):
@@ -72,9 +72,7 @@ def _produces_power(structure: ModelStructure, posterior: Posterior) -> bool:
     return any(posterior.mean[column] < 0.0 for column in columns if column is not None)
 
 
-def _estimate(
-    structure: ModelStructure, factors: tuple[JointFactor, ...], ratios: Sequence[float], signs: Array
-) -> Array:
+def _estimate(structure: ModelStructure, factors: tuple[JointFactor, ...], ratios: Array, signs: Array) -> Array:
     """The most probable bodies if these are the torques' signs, (p,)."""
     turned = tuple(_turn(factor, sign) for factor, sign in zip(factors, signs, strict=True))
     posterior = infer(structure, turned, ratios)
@@ -87,9 +85,7 @@ def _turn(factor: JointFactor, sign: float) -> JointFactor:
     return replace(factor, triangle=np.column_stack([factor.triangle[:, :-1], sign * factor.triangle[:, -1]]))
 
 
-def _log_likelihood(
-    factors: tuple[JointFactor, ...], ratios: Sequence[float], signs: Array, parameters: Array
-) -> float:
+def _log_likelihood(factors: tuple[JointFactor, ...], ratios: Array, signs: Array, parameters: Array) -> float:
     """-Σ N_j / ρ_j log σ_j, with σ_j what these parameters leave."""
     turned = [_turn(factor, sign) for factor, sign in zip(factors, signs, strict=True)]
     left = [np.sqrt(factor.squared_residual(parameters) / factor.rows) for factor in turned]

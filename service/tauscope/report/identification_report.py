@@ -13,7 +13,7 @@ from tauscope.report.friction_figure import friction_figure
 from tauscope.report.page import Drawing, KeyFigure, Numbers, Page, Part, Section, render
 from tauscope.report.parameter_figure import parameter_figure
 from tauscope.report.provenance import Provenance
-from tauscope.report.quantities import ABSENT, counted, percent, significant, torque_unit, velocity_unit
+from tauscope.report.quantities import counted, percent, significant, torque_unit, velocity_unit
 from tauscope.report.residual_figure import residual_figure
 from tauscope.report.series import TorqueSeries, torque_series
 from tauscope.report.tables import (
@@ -168,18 +168,12 @@ def _parameter_section(result: IdentificationDocument) -> Section:
 
 
 def _link_section(result: IdentificationDocument) -> Section:
-    """The nearest physically consistent model."""
-    fit = result.fit
-    errors = [
-        percent(fit.links_train.relative_error),
-        percent(fit.links_held_out.relative_error if fit.links_held_out else None),
-    ]
+    """The full parameter set."""
     sentence = (
-        "The nearest full parameter set that rigid bodies can have: every pseudo-inertia positive definite, friction"
-        f" not negative. Relative error {errors[0]} on its own recordings, {errors[1]} held out. Torque and position do"
-        " not determine all of these numbers one by one: their base parameters they do."
+        "The most probable full parameter set: every pseudo-inertia positive definite, friction not negative."
+        " Data determine their base parameters; the prior determines the rest of each."
     )
-    return Section("links", "Links", [Part(table=link_table(result))], [sentence.replace(f", {ABSENT} held out", "")])
+    return Section("links", "Links", [Part(table=link_table(result))], [sentence])
 
 
 def _data_section(result: IdentificationDocument) -> Section:

@@ -26,15 +26,6 @@ _RESIDUAL_LEVELS = {
 }
 """Without repeated periods, what is correlated over time and what the sensor does cannot be told apart for certain."""
 
-_CONSTANTS = {
-    "stiction": "stiction",
-    "stribeck": "Stribeck coefficient",
-    "viscous": "viscous coefficient",
-    "offset": "offset",
-    "k_v": "slope K_v",
-    "delta": "slope δ",
-}
-
 
 def fit_sentences(document: IdentificationDocument) -> list[str]:
     """How well the model explains the torque."""
@@ -55,8 +46,8 @@ def fit_sentences(document: IdentificationDocument) -> list[str]:
 
 
 def cautions(document: IdentificationDocument) -> list[str]:
-    """What a reader has to know before using the numbers."""
-    return [*_about_parameters(document), *_about_friction(document), *_about_samples(document)]
+    """What a reader has to know before using the numbers, each with what to do about it."""
+    return [f"{each.text}; {each.remedy}." if each.remedy else f"{each.text}." for each in document.warnings]
 
 
 def noise_words(document: IdentificationDocument) -> str:
@@ -105,39 +96,6 @@ def _about_held_out(document: IdentificationDocument) -> Iterator[str]:
             f"On held-out recordings the residual of {_listed(worse)} is larger than on the model's own: the model does"
             " not carry over to that motion; identify from recordings that move the joints in more ways."
         )
-
-
-def _about_parameters(document: IdentificationDocument) -> Iterator[str]:
-    """Constraints, and parameters that the motion does not show."""
-    if document.constrained:
-        yield "No rigid bodies can have the free estimate; the values are the nearest physically consistent ones."
-    if document.undetermined:
-        yield f"These recordings say nothing about {_listed(document.undetermined)}: excite the joints more."
-
-
-def _about_friction(document: IdentificationDocument) -> Iterator[str]:
-    """Coefficients that the data cannot tell; δ only where there is a Stribeck term."""
-    for name, words in _CONSTANTS.items():
-        entries = [entry for entry in document.friction if not entry.identifiable.get(name, True)]
-        if name in ("stribeck", "delta"):
-            entries = [entry for entry in entries if entry.delta is not None]
-        if entries:
-            yield f"These data cannot tell the friction's {words} at {_listed([entry.joint for entry in entries])}."
-
-
-def _about_samples(document: IdentificationDocument) -> Iterator[str]:
-    """Samples that were missing, and what was done about it."""
-    for entry in (*document.conditioning, *document.held_out_conditioning):
-        counts = {
-            "without a position": entry.missed_positions,
-            "without a torque": sum(entry.missed_torques),
-            "in pieces too short to filter": entry.dropped,
-        }
-        parts = [f"{count} {what}" for what, count in counts.items() if count]
-        if parts:
-            yield f"{entry.recording}: masked samples: {', '.join(parts)}, of {entry.samples}."
-        if entry.gaps:
-            yield f"{entry.recording}: split at {entry.gaps} {'gap' if entry.gaps == 1 else 'gaps'} in the clock."
 
 
 def _listed(names: list[str], most: int = 8) -> str:

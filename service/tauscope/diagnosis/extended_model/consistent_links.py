@@ -3,8 +3,10 @@
 import numpy as np
 
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
-from tauscope.identification.least_squares import Solution
+from tauscope.identification.consistency import plausible_prior
+from tauscope.identification.full_parameters import FullParameters
 from tauscope.identification.physical_estimate import consistent_estimate
+from tauscope.identification.posterior import WIDE
 from tauscope.robot import LinkInertia
 
 SMALLEST = 1e-12
@@ -20,7 +22,7 @@ def consistent_links(diagnosis: Diagnosis) -> tuple[LinkInertia, ...]:
     values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
     known = values > SMALLEST * values[-1]
     factor = (vectors[:, known] / np.sqrt(values[known])).T / scale
-    spread = scale[:, None] * vectors[:, known] * np.sqrt(values[known])
-    parameters = fit.model.parameters
-    solution = Solution(parameters, factor, factor @ parameters, spread, np.zeros(size, dtype=bool))
-    return consistent_estimate(structure, solution).links
+    target = factor @ fit.model.parameters
+    full = FullParameters.of(structure)
+    prior = plausible_prior(structure.robot, factor @ full.map, target, full.friction).widen(WIDE)
+    return consistent_estimate(structure, factor, target, prior).links

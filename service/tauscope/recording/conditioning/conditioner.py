@@ -44,6 +44,13 @@ PERIOD_SPARE = 4
 """Rows read beyond the periods on either side, so that interpolation has neighbours."""
 
 
+RESOLVED_STEPS = 2.0
+"""Steps of an encoder that are motion."""
+
+RESOLVED_STD = 4.0
+"""Standard deviations of a position's noise that are motion."""
+
+
 @dataclass(frozen=True, eq=False)
 class Conditioner:
     """One recording, surveyed once, from which conditioned motion can be drawn at any band.
@@ -86,6 +93,11 @@ class Conditioner:
             cut-off of the motion's own smoothing, joint by joint [Hz]; by the common band's where None
         """
         return replace(self, timing=replace(self.timing, runs=()), state_hz=state_hz)
+
+    @property
+    def resolution(self) -> Array:
+        """Change of position that is told from noise and from the encoder's step, (n,) [rad or m]."""
+        return np.maximum(RESOLVED_STEPS * self.noise.step, RESOLVED_STD * self.position_noise_std)
 
     @property
     def position_noise_std(self) -> Array:

@@ -35,8 +35,8 @@ class NamedParameter:
 def extract_parameters(document: IdentificationDocument) -> tuple[NamedParameter, ...]:
     """The parameters of an identification that its recordings tell.
 
-    Base parameters are those of the free estimate: their standard errors belong to it. The shape constants K_v and δ
-    are left out: they describe the same curve as stiction and Stribeck friction, and wander with them.
+    The shape constants K_v and δ are left out: they describe the same curve as stiction and Stribeck friction, and
+    wander with them.
     """
     return (*_base(document), *_friction(document), *_rotors(document))
 
@@ -49,8 +49,8 @@ def _base(document: IdentificationDocument) -> Iterator[NamedParameter]:
         match = _LINK.search(next(iter(entry.terms), ""))
         link = int(match.group()) if match else 1
         joint = document.joints[min(max(link, 1), len(document.joints)) - 1]
-        scale = max(abs(entry.free_value), 3.0 * entry.std)
-        yield NamedParameter(entry.name, joint, entry.free_value, entry.std, scale)
+        scale = max(abs(entry.value), 3.0 * entry.std)
+        yield NamedParameter(entry.name, joint, entry.value, entry.std, scale)
 
 
 def _friction(document: IdentificationDocument) -> Iterator[NamedParameter]:

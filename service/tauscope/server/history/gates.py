@@ -24,7 +24,8 @@ class ModelPolicy(ResultModel):
         default=1.5, description="largest residual on held-out recordings, in residuals of the training (or its noise)"
     )
     consistency_ratio: Ratio = Field(
-        default=1.2, description="largest residual of the physically consistent model, in residuals of the best one"
+        default=1.2,
+        description="largest residual of the model with bodies, in residuals of the free estimate",
     )
     condition_number: Ratio = Field(default=500.0, description="largest condition number of the regressor")
     drift_std: Positive = Field(
@@ -78,10 +79,10 @@ def _consistency(document: IdentificationDocument, policy: ModelPolicy) -> Gate:
     for number, link in enumerate(document.links, start=1):
         if not is_physical(link):
             return Gate("consistency", False, f"link {number}: no real body has this mass and inertia; identify anew")
-    fit, free = document.fit.links_held_out or document.fit.links_train, document.fit.held_out or document.fit.train
+    fit, free = document.fit.held_out or document.fit.train, document.fit.free_held_out or document.fit.free_train
     worst, joint = max(_ratios(fit.rms, free.rms, document.joints))
     found = (
-        f"{joint}: residual of the physically consistent model {worst:.2f} times that of the free one,"
+        f"{joint}: residual of the model with bodies {worst:.2f} times that of the free one,"
         f" allowed {policy.consistency_ratio:.2f}"
     )
     if worst > policy.consistency_ratio:

@@ -1,0 +1,54 @@
+"""What the recordings excite, and what held-out motion asks for beyond it."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from tauscope.identification.dataset import PreparedMotion
+from tauscope.recording.recording import Array
+
+TURNING = 0.05
+"""Share of a joint's top speed that it passes on both sides of a reversal: less is noise at rest."""
+
+TOP = 0.99
+"""Share of the samples that are slower than the top speed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Excitation:
+    """How the joints move.
+
+    lowest, highest : (n,) float64
+        positions [rad or m]
+    speed : (n,) float64
+        top speed, which one sample in a hundred exceeds [rad/s or m/s]
+    reversals : (n,) int
+        how often the joints turn round
+    """
+
+    lowest: Array
+    highest: Array
+    speed: Array
+    reversals: np.ndarray
+
+
+def measure_excitation(motions: Iterable[PreparedMotion]) -> Excitation:
+    """Ranges, speeds and reversals of all motions together."""
+    pieces = [(prepared.motion.position, prepared.motion.velocity) for prepared in motions]
+    speed = np.quantile(np.abs(np.concatenate([velocity for _, velocity in pieces])), TOP, axis=0)
+    return Excitation(
+        np.min([position.min(axis=0) for position, _ in pieces], axis=0),
+        np.max([position.max(axis=0) for position, _ in pieces], axis=0),
+        speed,
+        np.sum([_count_reversals(velocity, TURNING * speed) for _, velocity in pieces], axis=0),
+    )
+
+
+def _count_reversals(velocity: Array, threshold: Array) -> np.ndarray:
+    """How often each joint's velocity changes its sign beyond a threshold, (n,)."""
+    counts = []
+    for column, least in zip(velocity.T, threshold, strict=True):
+        moving = column[np.abs(column) > least]
+        counts.append(int(np.count_nonzero(np.diff(np.sign(moving)))))
+    return np.array(counts)

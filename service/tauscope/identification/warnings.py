@@ -1,0 +1,148 @@
+"""Warnings of an identification: what a reader must know before its numbers."""
+
+from collections.abc import Iterator
+
+from tauscope.identification.identification import Identification
+from tauscope.identification.posterior import DETERMINED
+from tauscope.recording.conditioning import ConditioningSummary
+from tauscope.result_warning import ResultWarning
+from tauscope.robot import JointType
+
+FEWEST_REVERSALS = 2
+"""A joint turns round at least so often where friction is to be told from a constant torque."""
+
+UNSEEN = 0.1
+"""Share of a joint's held-out torque that training leaves uncertain, above which held-out motion extrapolates."""
+
+BEYOND = 1.25
+"""Times the top speed of training at which held-out motion is another motion."""
+
+MOST_NAMES = 4
+"""Names in a sentence."""
+
+_FRICTION = {
+    "stiction": "Coulomb friction: turn the joint round more often",
+    "viscous": "viscous friction: move at three or more speeds",
+    "offset": "constant torque: turn the joint round more often",
+}
+
+
+def identification_warnings(result: Identification) -> list[ResultWarning]:
+    """All warnings, the gravest first."""
+    return [
+        *_signs(result),
+        *_bodies(result),
+        *_excitation(result),
+        *_extrapolation(result),
+        *_samples((*result.conditioning, *result.held_out_conditioning)),
+    ]
+
+
+def weak_points(result: Identification, joint: int) -> list[str]:
+    """What the recordings do not tell of a joint and of its link, each with the motion that would.
+
+    Parameters
+    ----------
+    joint : int
+        joint index, from 0
+    """
+    if result.excitation.speed[joint] == 0.0:
+        return ["it stands still: move it through its range"]
+    known = result.identifiable[joint]
+    weak = [text for name, text in _FRICTION.items() if not known.get(name, True)]
+    if result.excitation.reversals[joint] < FEWEST_REVERSALS:
+        weak.append(f"it turns round {result.excitation.reversals[joint]} times: move it to and fro")
+    open_ = [name for name, learnt in _own_bodies(result, joint) if learnt < DETERMINED]
+    if open_:
+        weak.append(f"{_listed(open_)}: move it faster together with the joints before it, in more postures")
+    return weak
+
+
+def _own_bodies(result: Identification, joint: int) -> Iterator[tuple[str, float]]:
+    """Base parameters that lead with a joint's link, and how much the data say of each."""
+    base = result.structure.base
+    for place, column in enumerate(base.independent_columns):
+        if column // 10 == joint:
+            yield base.names[place], float(result.posterior.learnt[place])
+
+
+def _signs(result: Identification) -> Iterator[ResultWarning]:
+    """Torques with the wrong sign."""
+    joints = result.robot.joints
+    for joint in result.reversed_joints:
+        sign = "-1" if joints[joint].sign > 0 else "1"
+        yield ResultWarning(
+            code="wrong-sign",
+            joint=joints[joint].name,
+            text=f"{joints[joint].name}: the torque has the wrong sign: bodies and friction fit it far better reversed",
+            remedy=f"look at the drive, then set `sign: {sign}` for {joints[joint].name} in the robot file",
+        )
+
+
+def _bodies(result: Identification) -> Iterator[ResultWarning]:
+    """A free estimate that no body can have."""
+    if result.constrained:
+        yield ResultWarning(
+            code="no-body",
+            text=f"no bodies can have the least-squares estimate: {100 * result.free_fit.relative_error:.3g} % error,"
+            f" {100 * result.residuals.fit.relative_error:.3g} % with bodies; physics is missing, or a unit, sign or"
+            " dimension is wrong",
+            remedy="diagnose the same recordings",
+        )
+
+
+def _excitation(result: Identification) -> Iterator[ResultWarning]:
+    """Joints of which the recordings leave something open."""
+    for joint, each in enumerate(result.robot.joints):
+        weak = weak_points(result, joint)
+        if weak:
+            yield ResultWarning(
+                code="poor-excitation",
+                joint=each.name,
+                text=f"{each.name}: these recordings hardly tell {'; '.join(weak)}",
+                remedy="record the motion of `tauscope excite`",
+            )
+
+
+def _extrapolation(result: Identification) -> Iterator[ResultWarning]:
+    """Held-out motion beyond what training excites."""
+    if result.held_out_excitation is None or result.extrapolation is None:
+        return
+    own, other = result.excitation, result.held_out_excitation
+    for joint, each in enumerate(result.robot.joints):
+        if other.speed[joint] > BEYOND * own.speed[joint]:
+            unit = "m/s" if each.type is JointType.PRISMATIC else "rad/s"
+            reason = f"it moves at up to {other.speed[joint]:.3g} {unit}, in training at {own.speed[joint]:.3g}"
+        elif result.extrapolation[joint] > UNSEEN:
+            reason = f"training leaves {100 * result.extrapolation[joint]:.2g} % of its torque uncertain"
+        else:
+            continue
+        yield ResultWarning(
+            code="extrapolation",
+            joint=each.name,
+            text=f"{each.name}: held-out motion is beyond what training excites: {reason}",
+            remedy="train on motion as fast and as wide as the held-out motion",
+        )
+
+
+def _samples(summaries: tuple[ConditioningSummary, ...]) -> Iterator[ResultWarning]:
+    """Samples that were missing, and gaps of the clock."""
+    for each in summaries:
+        counts = {
+            "without a position": each.missed_positions,
+            "without a torque": sum(each.missed_torques),
+            "in pieces too short to filter": each.dropped,
+        }
+        parts = [f"{count} {what}" for what, count in counts.items() if count]
+        if parts:
+            text = f"{each.recording}: samples left out: {', '.join(parts)}, of {each.samples}"
+            yield ResultWarning(code="missing-samples", text=text, remedy="look for lost messages or a full disk")
+        if each.gaps:
+            text = f"{each.recording}: split at {each.gaps} {'gap' if each.gaps == 1 else 'gaps'} in the clock"
+            yield ResultWarning(code="clock-gaps", text=text, remedy="record without a pause")
+
+
+def _listed(names: list[str]) -> str:
+    """Names in a sentence, not all of them where there are many."""
+    shown = ", ".join(names[:MOST_NAMES])
+    return shown if len(names) <= MOST_NAMES else f"{shown} and {len(names) - MOST_NAMES} more"
