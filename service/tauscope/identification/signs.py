@@ -12,6 +12,7 @@ import numpy as np
 
 from tauscope.identification.consistency import ConsistentParameters
 from tauscope.identification.dataset import PreparedMotion
+from tauscope.identification.estimate import torque_rms
 from tauscope.identification.least_squares import JointFactor
 from tauscope.identification.physical_estimate import consistent_estimate, in_model_columns, is_rejected
 from tauscope.identification.posterior import Posterior, infer
@@ -20,8 +21,13 @@ from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array
 
 CLEARLY = 5.0
-"""Log likelihood by which another sign has to explain the torque better: one arm in a hundred is wired so, and the odds
-are then even or better by chance alone in none."""
+"""Log likelihood by which another sign has to explain the torque better: odds of 150 for one joint in a hundred."""
+
+UNEXPLAINED = 0.2
+"""Share of a joint's torque that a wrong sign leaves unexplained at least…"""
+
+COLOURED = 1.2
+"""…and by how much the long-run variance of that exceeds white noise's; without both no other sign is tried."""
 
 
 def reversed_joints(
@@ -39,7 +45,8 @@ def reversed_joints(
     ratios : (n,) float64
         ρ_j, long-run over white variance of each joint's residual
     """
-    if not (is_rejected(consistent) or _produces_power(structure, posterior)):
+    unexplained = (posterior.noise_std > UNEXPLAINED * torque_rms(factors)) & (ratios > COLOURED)
+    if not (is_rejected(consistent) or unexplained.any()):
         return ()
     signs = np.ones(structure.robot.joint_count)
     parameters = in_model_columns(structure, consistent.parameters)
@@ -62,14 +69,6 @@ def _neighbours(signs: Array) -> Iterator[Array]:
     for joint in range(len(signs)):
         yield np.where(np.arange(len(signs)) == joint, -signs, signs)
     yield -signs
-
-
-def _produces_power(structure: ModelStructure, posterior: Posterior) -> bool:
-    """Whether some joint's friction is negative: beside a wrong sign its uncertainty is large, so that says little."""
-    columns = [
-        structure.coefficient(j, name) for j in range(structure.robot.joint_count) for name in ("stiction", "viscous")
-    ]
-    return any(posterior.mean[column] < 0.0 for column in columns if column is not None)
 
 
 def _estimate(structure: ModelStructure, factors: tuple[JointFactor, ...], ratios: Array, signs: Array) -> Array:
