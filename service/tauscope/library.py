@@ -65,6 +65,7 @@ def identify(
     estimator: Literal["ls", "wls"] = "wls",
     cutoff_hz: float | Literal["auto"] | None = "auto",
     rotor_inertia: bool = True,
+    prior: bool = True,
     progress: Callable[[str], None] = _ignore,
 ) -> "IdentificationResult":
     """Identify an arm's parameters from recordings.
@@ -73,6 +74,8 @@ def identify(
     ----------
     cutoff_hz : float, "auto" or None
         band that torque and regressor share [Hz]; None filters nothing
+    prior : bool
+        whether the most probable bodies are delivered, or the free least-squares estimate
 
     Raises
     ------
@@ -84,7 +87,7 @@ def identify(
 
     arm = _robot(robot)
     train, judge = _recordings(recordings, arm), _recordings(held_out, arm)
-    options = identification.Options(identification.Estimator(estimator), cutoff_hz, rotor_inertia)
+    options = identification.Options(identification.Estimator(estimator), cutoff_hz, rotor_inertia, prior)
     return IdentificationResult(identification.identify(arm, train, judge, options, progress), train, judge)
 
 

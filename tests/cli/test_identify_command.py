@@ -78,7 +78,7 @@ def test_masked_samples_are_counted(run: Run, files: SimulatedFiles, tmp_path: P
     recording.write_text("\n".join([header, *rows, ""]), encoding="utf-8")
     ended = run("identify", files.robot, recording)
     assert ended.status == 0
-    assert f"{recording}: masked samples: 3 without a torque, of 1000." in ended.out
+    assert f"! {recording}: samples left out: 3 without a torque, of 1000; " in ended.out
 
 
 def test_cutoff_and_rotor_options_reach_the_identification(run: Run, files: SimulatedFiles) -> None:

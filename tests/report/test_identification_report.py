@@ -110,7 +110,14 @@ def test_it_is_small_and_the_same_on_every_run(case: Case, page: str) -> None:
 
 
 def test_without_held_out_recordings_it_says_so(case: Case) -> None:
-    alone = replace(case.identification, held_out=None, held_out_consistent=None, held_out_conditioning=())
+    alone = replace(
+        case.identification,
+        held_out=None,
+        held_out_free=None,
+        predicted_held_out=None,
+        extrapolation=None,
+        held_out_conditioning=(),
+    )
     page = replace(case, identification=alone, held_out=()).page()
     text = "".join(Reading(page).text)
     assert "hold a recording out" in text

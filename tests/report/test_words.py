@@ -5,6 +5,7 @@ import pytest
 from report.conftest import JOINTS, Case
 from tauscope.identification import IdentificationDocument, document
 from tauscope.report.words import band_words, cautions, fit_sentences, noise_ratio
+from tauscope.result_warning import ResultWarning
 
 
 @pytest.fixture
@@ -48,22 +49,13 @@ def test_a_model_that_does_not_carry_over_is_told(result: IdentificationDocument
     assert "does not carry over" not in fit_sentences(with_rms(result, (1.0, 1.0, 1.0), held=1.2))[-1]
 
 
-def test_cautions(result: IdentificationDocument) -> None:
-    assert cautions(result) == [
-        f"{entry.recording}: masked samples: 20 without a torque, of {entry.samples}."
-        for entry in (*result.conditioning, *result.held_out_conditioning)
+def test_a_caution_says_what_to_do(result: IdentificationDocument) -> None:
+    warning = ResultWarning(code="wrong-sign", joint=JOINTS[0], text="it is reversed", remedy="turn it round")
+    plain = warning.model_copy(update={"remedy": None})
+    assert cautions(result.model_copy(update={"warnings": [warning, plain]})) == [
+        "it is reversed; turn it round.",
+        "it is reversed.",
     ]
-    entry = result.friction[1]
-    unknown = entry.model_copy(
-        update={"identifiable": entry.identifiable | {"k_v": False, "delta": False}, "delta": None}
-    )
-    changed = result.model_copy(
-        update={"friction": [unknown], "constrained": True, "undetermined": [f"p{n}" for n in range(12)]}
-    )
-    first, second, third, *_ = cautions(changed)
-    assert "nearest physically consistent" in first
-    assert "p7 and 4 more" in second
-    assert third == f"These data cannot tell the friction's slope K_v at {JOINTS[1]}."
 
 
 def test_ratio_and_band(result: IdentificationDocument) -> None:

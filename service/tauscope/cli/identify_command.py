@@ -57,6 +57,12 @@ def identify(
     rotor_inertia: Annotated[
         bool, typer.Option("--rotor-inertia/--no-rotor-inertia", help="Add rotors where the data ask for them.")
     ] = True,
+    prior: Annotated[
+        bool,
+        typer.Option(
+            "--prior/--no-prior", help="Deliver the most probable bodies, or the free least-squares estimate."
+        ),
+    ] = True,
     json: Annotated[
         Path | None, typer.Option(metavar="OUT", dir_okay=False, help="Write the result as JSON; - is standard output.")
     ] = None,
@@ -83,7 +89,11 @@ def identify(
     from tauscope.tasks import identify as task
 
     options = make_request(
-        task.IdentificationOptions, estimator=estimator, cutoff_hz=cutoff_hz, rotor_inertia=rotor_inertia
+        task.IdentificationOptions,
+        estimator=estimator,
+        cutoff_hz=cutoff_hz,
+        rotor_inertia=rotor_inertia,
+        prior=prior,
     )
     held = held_out or []
     request = task.Request(

@@ -8,6 +8,7 @@ from scipy import stats
 
 from tauscope.dynamics.base_parameters import BaseParameters
 from tauscope.identification.band import preliminary_terms
+from tauscope.identification.consistency import LEAST_COULOMB
 from tauscope.identification.covariance import parameter_covariance
 from tauscope.identification.dataset import Dataset, rms_speed
 from tauscope.identification.estimate import FINEST_TORQUE, single_joint_std
@@ -152,16 +153,16 @@ def _judged(
 def _stribeck_gain(structure: ModelStructure, parameters: Array, covariance: Array, joint: int) -> float:
     """What a joint's Stribeck term takes off the criterion [noise variances]; 0 where friction does not fall.
 
-    (τ_sc/σ)², less what it costs to raise τ_s + τ_sc to zero where it is below: no friction goes there.
+    (τ_sc/σ)², less what it costs to raise τ_s + τ_sc to `LEAST_COULOMB` of τ_s where it is below.
     """
     stiction, stribeck = (structure.coefficient(joint, name) for name in ("stiction", "stribeck"))
     if stiction is None or stribeck is None or parameters[stribeck] >= 0.0:
         return 0.0
-    pair = [stiction, stribeck]
-    impossible = min(parameters[pair].sum(), 0.0)
+    pair, factors = [stiction, stribeck], np.array([1.0 - LEAST_COULOMB, 1.0])
+    impossible = min(float(factors @ parameters[pair]), 0.0)
     smallest = np.finfo(float).tiny
     gain = parameters[stribeck] ** 2 / max(covariance[stribeck, stribeck], smallest)
-    return float(gain - impossible**2 / max(covariance[np.ix_(pair, pair)].sum(), smallest))
+    return float(gain - impossible**2 / max(factors @ covariance[np.ix_(pair, pair)] @ factors, smallest))
 
 
 def _with_shapes(structure: ModelStructure, shapes: Sequence[EstimatedShape]) -> ModelStructure:

@@ -161,7 +161,7 @@ def _noise_std(factors: tuple[JointFactor, ...], parameters: Array, covariance: 
     for factor in factors:
         columns = factor.triangle[:, :-1]
         own = covariance[np.ix_(factor.columns, factor.columns)]
-        squares.append(factor.squared_residual(parameters) + np.sum((columns @ own) * columns))
+        squares.append(factor.squared_residual(parameters) + max(float(np.sum((columns @ own) * columns)), 0.0))
     rows = np.array([factor.rows for factor in factors])
     if estimator is Estimator.LS:
         return np.full(len(factors), np.sqrt(sum(squares) / rows.sum()))

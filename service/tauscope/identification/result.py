@@ -1,10 +1,10 @@
 """The identification as a document: what ``identify --json`` writes and the REST API returns (CONTRACT.md)."""
 
 from dataclasses import asdict
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from tauscope.identification.friction_shape import shape_parameters
 from tauscope.identification.identification import Identification
@@ -23,11 +23,11 @@ class BaseParameterEntry(ResultModel):
     name: str = Field(description="readable expression, e.g. Ixx2 - Iyy2 - 0.5*msx2")
     terms: dict[str, float] = Field(description="coefficient of every standard parameter in it, to full precision")
     value: float = Field(description="estimate [kg m², kg m or kg, by its terms]")
-    std: float | None = Field(description="standard error of the free estimate; null where the recordings are silent")
+    std: float | None = Field(description="standard error; null where nothing is known of it")
     independent: bool = Field(description="whether it is one standard parameter by itself")
     free_value: float = Field(description="the LS or WLS estimate, without prior and without bodies")
-    determined_by: Literal["data", "prior", "both"] = Field(
-        description="data took at least nine tenths of the prior's variance, at most a tenth, or between"
+    determined_by: Literal["data", "prior", "both"] | None = Field(
+        default=None, description="data took at least nine tenths of the prior's variance, at most a tenth, or between"
     )
 
 
@@ -67,7 +67,7 @@ class InertiaEntry(ResultModel):
 
 
 class LinkEntry(ResultModel):
-    """One link of the nearest physically consistent model, in its link frame."""
+    """One link of the most probable bodies, in its link frame."""
 
     mass: float = Field(description="m [kg]")
     first_moment: list[float] = Field(description="m s [kg m]")
@@ -90,8 +90,14 @@ class FitsEntry(ResultModel):
 
     train: FitEntry = Field(description="on the recordings that the model was made from")
     held_out: FitEntry | None = Field(default=None, description="on recordings that were not used")
-    free_train: FitEntry = Field(description="of the free least-squares estimate, on the same recordings")
-    free_held_out: FitEntry | None = Field(default=None, description="of the free least-squares estimate, held out")
+    free_train: FitEntry | None = Field(default=None, description="of the free estimate, in training")
+    free_held_out: FitEntry | None = Field(default=None, description="of the free estimate, held out")
+
+    @model_validator(mode="before")
+    @classmethod
+    def forget_links(cls, data: Any) -> Any:
+        """Read documents of versions that judged `links` apart from the delivered model."""
+        return {key: data[key] for key in data if not key.startswith("links_")} if isinstance(data, dict) else data
 
 
 class JointExcitationEntry(ResultModel):
@@ -138,13 +144,15 @@ class IdentificationDocument(ResultModel):
     schema_id: Literal["tauscope.identification/1"] = Field(
         default="tauscope.identification/1", alias="schema", description="name and version of this document's form"
     )
-    warnings: list[ResultWarning] = Field(description="what to know before the numbers, the gravest first")
+    warnings: list[ResultWarning] = Field(default=[], description="what to know before the numbers, the gravest first")
     robot: str = Field(description="name of the robot")
     joints: list[str] = Field(description="names of its joints, in chain order")
     estimator: Literal["ls", "wls"] = Field(description="how the joints' equations were weighted")
+    prior: bool = Field(
+        default=True, description="true where the most probable bodies are delivered; false: the free estimate"
+    )
     constrained: bool = Field(
-        description="true where no rigid bodies can have the free estimate, so that the delivered values are the"
-        " nearest physically consistent ones"
+        description="true where no rigid bodies can have the free estimate, beyond what noise explains"
     )
     cutoff_hz: float | None = Field(
         description="band shared by torque and regressor [Hz]; null where nothing was filtered"
@@ -159,10 +167,10 @@ class IdentificationDocument(ResultModel):
     undetermined: list[str] = Field(description="parameters that these recordings, unlike others, say nothing about")
     friction: list[FrictionEntry] = Field(description="one a joint")
     rotor_inertia: list[RotorEntry] = Field(description="joints whose rotor the data ask for")
-    links: list[LinkEntry] = Field(description="nearest physically consistent full parameter set")
+    links: list[LinkEntry] = Field(description="most probable full parameter set; the base parameters are its own")
     links_friction: list[FrictionEntry] = Field(description="friction that belongs to `links`")
     fit: FitsEntry = Field(description="how well it explains the torque")
-    excitation: ExcitationEntry = Field(description="what the recordings excite")
+    excitation: ExcitationEntry | None = Field(default=None, description="what the recordings excite")
     conditioning: list[ConditioningEntry] = Field(description="one a recording used")
     held_out_conditioning: list[ConditioningEntry] = Field(description="one a held-out recording")
 
@@ -176,6 +184,7 @@ def document(identification: Identification) -> IdentificationDocument:
         robot=result.robot.name,
         joints=[joint.name for joint in result.robot.joints],
         estimator=result.options.estimator.value,
+        prior=result.options.prior,
         constrained=result.constrained,
         cutoff_hz=result.cutoff_hz,
         noise_std=_floats(result.residuals.noise_std),

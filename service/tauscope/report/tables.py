@@ -50,13 +50,12 @@ def rotor_table(document: IdentificationDocument) -> Table:
 
 
 def base_parameter_table(document: IdentificationDocument) -> Table:
-    """Base parameters with standard errors."""
-    undetermined = set(document.undetermined)
+    """Base parameters with standard errors, and whose values they are."""
     rows = []
     for entry in document.base_parameters:
-        pair = (ABSENT, ABSENT) if entry.name in undetermined else with_uncertainty(entry.value, entry.std)
-        rows.append([entry.name, *pair, base_parameter_unit(entry.terms)])
-    return Table(("parameter", "value", "± std", "unit"), rows)
+        pair = (ABSENT, ABSENT) if entry.std is None else with_uncertainty(entry.value, entry.std)
+        rows.append([entry.name, *pair, base_parameter_unit(entry.terms), entry.determined_by or ABSENT])
+    return Table(("parameter", "value", "± std", "unit", "determined by"), rows)
 
 
 def link_table(document: IdentificationDocument) -> Table:

@@ -43,6 +43,10 @@ class IdentificationOptions(StrictModel):
         description="band that torque and regressor share [Hz]; auto: chosen from the data; null: no filter",
     )
     rotor_inertia: bool = Field(default=True, description="whether rotors are added where the data ask for them")
+    prior: bool = Field(
+        default=True,
+        description="whether the most probable bodies are delivered; false: the free least-squares estimate",
+    )
 
 
 class Request(StrictModel):
@@ -65,6 +69,7 @@ class Request(StrictModel):
             estimator=options.estimator,
             cutoff=options.cutoff_hz,
             rotor_inertia=options.rotor_inertia,
+            prior=options.prior,
         )
 
 
@@ -126,6 +131,7 @@ def perform(request: Request, files: Files, progress: Progress) -> Result:
     robot = read_robot(files.find("robot", request.robot))
     recordings = read_recordings(files, "recordings", request.recordings, robot)
     held_out = read_recordings(files, "held_out", request.held_out, robot)
-    options = Options(Estimator(request.options.estimator), request.options.cutoff_hz, request.options.rotor_inertia)
+    asked = request.options
+    options = Options(Estimator(asked.estimator), asked.cutoff_hz, asked.rotor_inertia, asked.prior)
     found = identify(robot, recordings, held_out, options, progress)
     return Result(request, files, robot, recordings, held_out, found, document(found))

@@ -1,6 +1,7 @@
 """The nearest physically consistent parameters: links that can exist, friction that dissipates."""
 
 from tauscope.identification.consistency.inequalities import (
+    LEAST_COULOMB,
     FrictionColumns,
     LinearInequalities,
     friction_inequalities,
@@ -10,6 +11,7 @@ from tauscope.identification.consistency.nearest import ConsistentParameters, ne
 from tauscope.identification.consistency.prior import Prior, plausible_prior
 
 __all__ = [
+    "LEAST_COULOMB",
     "ConsistentParameters",
     "FrictionColumns",
     "LinearInequalities",

@@ -11,6 +11,10 @@ from tauscope.robot import STANDARD_PARAMETERS
 Array = NDArray[np.float64]
 
 
+LEAST_COULOMB = 0.25
+"""Share of the stiction that Coulomb friction is at least: dry friction falls by half with speed, hardly by more."""
+
+
 @dataclass(frozen=True, eq=False)
 class LinearInequalities:
     """Rows of G x ≤ h.
@@ -50,27 +54,27 @@ class FrictionColumns:
 
 
 def friction_inequalities(columns: FrictionColumns, size: int, joints: Sequence[str]) -> LinearInequalities:
-    """Friction that only dissipates: τ_s ≥ 0, τ_s + τ_sc ≥ 0, τ_v ≥ 0 for every joint, and I_a ≥ 0 for every rotor.
+    """Friction that only dissipates: τ_s ≥ 0, τ_s + τ_sc ≥ c τ_s, τ_v ≥ 0 for every joint, and I_a ≥ 0 for every rotor.
 
-    τ_sc, the difference of Coulomb friction and stiction, may be negative by itself, and an offset is free.
+    τ_sc is the difference of Coulomb friction and stiction, c is `LEAST_COULOMB`; an offset is free.
     """
-    demands: list[tuple[str, list[int]]] = []
+    demands: list[tuple[str, dict[int, float]]] = []
     rotors = columns.rotor_inertia or (None,) * len(joints)
     for name, stiction, stribeck, viscous, rotor in zip(
         joints, columns.stiction, columns.stribeck, columns.viscous, rotors, strict=True
     ):
         if stiction is not None:
-            demands.append((f"stiction of {name} ≥ 0", [stiction]))
+            demands.append((f"stiction of {name} ≥ 0", {stiction: 1.0}))
         if stribeck is not None:
-            sliding = [stribeck] if stiction is None else [stiction, stribeck]
-            demands.append((f"Coulomb friction of {name} ≥ 0", sliding))
+            sliding = {stribeck: 1.0} if stiction is None else {stiction: 1.0 - LEAST_COULOMB, stribeck: 1.0}
+            demands.append((f"Coulomb friction of {name} ≥ {LEAST_COULOMB} of its stiction", sliding))
         if viscous is not None:
-            demands.append((f"viscous friction of {name} ≥ 0", [viscous]))
+            demands.append((f"viscous friction of {name} ≥ 0", {viscous: 1.0}))
         if rotor is not None:
-            demands.append((f"rotor inertia of {name} ≥ 0", [rotor]))
+            demands.append((f"rotor inertia of {name} ≥ 0", {rotor: 1.0}))
     matrix = np.zeros((len(demands), size))
-    for row, (_, indices) in zip(matrix, demands, strict=True):
-        row[indices] = -1.0
+    for row, (_, factors) in zip(matrix, demands, strict=True):
+        row[list(factors)] = [-factor for factor in factors.values()]
     return LinearInequalities(matrix, np.zeros(len(demands)), tuple(name for name, _ in demands))
 
 

@@ -15,9 +15,9 @@ Array = NDArray[np.float64]
 _GYRATION = 0.25
 """Radius of gyration of a default link over its length: between a slender rod (0.29) and a compact housing."""
 
-_REACH = 0.5
-"""Radius of gyration, over the link's length, of the body that deviations are measured by, at least: mass may lie
-anywhere along the link and as far beside it."""
+_REACH = 1.0
+"""Radius of gyration, over the link's length, of the body that deviations are measured by, at least: a link's mass may
+lie anywhere along it and as far beside it."""
 
 _LIGHTEST = 0.1
 """A link is believed to weigh at least this share of the heaviest."""

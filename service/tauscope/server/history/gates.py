@@ -80,6 +80,7 @@ def _consistency(document: IdentificationDocument, policy: ModelPolicy) -> Gate:
         if not is_physical(link):
             return Gate("consistency", False, f"link {number}: no real body has this mass and inertia; identify anew")
     fit, free = document.fit.held_out or document.fit.train, document.fit.free_held_out or document.fit.free_train
+    free = free or fit
     worst, joint = max(_ratios(fit.rms, free.rms, document.joints))
     found = (
         f"{joint}: residual of the model with bodies {worst:.2f} times that of the free one,"
