@@ -22,7 +22,7 @@ from tauscope.identification.consistency.nearest import MARGIN
 from tauscope.identification.consistency.triangle import UPPER_TRIANGLE, triangle_of_parameters
 from tauscope.robot import Joint, JointType, LinkInertia, Model, Placement, Robot, Segment, pseudo_inertia
 
-WIDTH = 100.0
+WIDTH = 60.0
 """Of a prior that decides nothing which the data say."""
 
 

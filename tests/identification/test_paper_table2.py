@@ -144,7 +144,7 @@ def monte_carlo(arm: SimulatedArm, runs: int) -> MonteCarlo:
     for _ in range(runs):
         recording = arm.recording(arm.white(PAPER_NOISE, rng))
         for estimator in Estimator:
-            result = identify(arm.robot, [recording], options=Options(estimator=estimator))
+            result = identify(arm.robot, [recording], options=Options(estimator=estimator, prior=False))
             assert result.structure.size == 27, "terms were invented or dropped"
             found[estimator.value].append(result.free_parameters)
             found[f"{estimator.value}_std"].append(standard_errors(result))
@@ -261,3 +261,13 @@ def test_one_identification_says_the_same_through_its_document(paper_arm: Simula
     assert [entry.free_value for entry in found.base_parameters] == list(result.free_parameters[:15])
     assert [entry.std for entry in found.base_parameters] == list(standard_errors(result)[:15])
     assert np.abs(z_scores(result, paper_arm.robot)).max() < 4.5
+
+
+def test_on_a_rich_recording_the_prior_changes_nothing_but_what_bodies_demand(paper_arm: SimulatedArm) -> None:
+    """The paper's links are rods, on the boundary of what can be: there and nowhere else bodies may move the estimate."""
+    noise = paper_arm.white(PAPER_NOISE, np.random.default_rng(0))
+    result = identify(paper_arm.robot, [paper_arm.recording(noise)])
+    posterior = result.posterior
+    std = np.sqrt(np.diag(posterior.covariance))
+    assert (np.abs(posterior.mean - result.free_parameters) / std).max() < 0.1
+    assert not result.constrained

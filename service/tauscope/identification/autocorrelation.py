@@ -34,6 +34,9 @@ UNBROKEN_SHARE = 0.3
 """Where samples are missing, orders end where fewer than this share of so many consecutive samples are all there: what
 pairs at longer lags say no longer fits together."""
 
+SMALLEST_SHARE = 1e-3
+"""…and at least so many are: a share of none has no logarithm."""
+
 
 @dataclass(frozen=True, eq=False)
 class Autoregression:
@@ -146,8 +149,8 @@ class AutocovarianceSum:
         # The mean over the pairs at hand, shrunk as if divided by N at every lag: the sequence stays positive definite.
         taper = self._sums.spans / self._sums.spans[0]
         covariance = taper * self._sums.products / np.maximum(self._sums.counts, 1.0)
-        present = count / self._sums.spans[0]
-        unbroken = np.inf if present == 1.0 else np.log(UNBROKEN_SHARE) / np.log(present)
+        follows = min(_following_share(self._sums), 1.0)
+        unbroken = np.inf if follows == 1.0 else np.log(UNBROKEN_SHARE) / np.log(max(follows, SMALLEST_SHARE))
         reach = int(min(len(covariance) - 1, count // 10, unbroken))
         whitener = np.ones(1)
         if self._white[1:].any():
@@ -159,6 +162,12 @@ class AutocovarianceSum:
         coefficients, variance = orders[int(np.argmin(scores))]
         both = np.convolve(whitener, np.append(1.0, -coefficients))
         return Autoregression(-both[1:], variance, variance=float(covariance[0]))
+
+
+def _following_share(sums: LaggedProducts) -> float:
+    """How often a sample follows that was measured too: all but the gaps' own ends where what is missing is together."""
+    pairs = sums.spans[1] * sums.counts[0] / sums.spans[0]
+    return float(sums.counts[1] / pairs) if pairs > 0.0 else 0.0
 
 
 def _levinson(covariance: Array, largest: int) -> Iterator[tuple[Array, float]]:

@@ -7,6 +7,7 @@ one pass. What is left are Gram matrices of the candidates.
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,11 +83,12 @@ def projected_grids(
             kept = np.isin(index, shared)
             place = np.searchsorted(shared, index[kept])
             velocity = prepared.motion.velocity[:, joint]
-            weight = prepared.row_weights(joint) / noise_std[joint]
             candidates = np.vstack([smooth_sign(velocity, slopes[joint][:, None]), velocity * np.abs(velocity)])
-            steps = weight * prepared.motion.band.reduce(candidates)
-            common = weight * columns[kept]
-            residual = weight * prepared.reduced_torque[joint] - solution.parameters[place] @ common
+            whiten = partial(prepared.whiten, joint)
+            steps = whiten(prepared.motion.band.reduce(candidates)) / noise_std[joint]
+            common = whiten(columns[kept]) / noise_std[joint]
+            torque = whiten(prepared.reduced_torque[None, joint])[0] / noise_std[joint]
+            residual = torque - solution.parameters[place] @ common
             gram[joint] += steps @ steps.T
             cross[joint][place] += common @ steps.T
             target[joint] += steps @ residual

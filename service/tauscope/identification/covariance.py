@@ -66,7 +66,7 @@ def parameter_covariance(
     for prepared in motions if passed else ():
         for joint in passed:
             columns, index = columns_with_shapes(prepared, structure, joint, parameters, shapes)
-            columns = columns * prepared.row_weights(joint)
+            columns = prepared.whiten(joint, columns)
             coloured = autoregressions[joint].colour(columns)
             place = np.ix_(index, index)
             bread[place] += weight[joint] ** 2 * (columns @ columns.T)

@@ -21,6 +21,12 @@ MEMORY_LIMIT = 256 * 1024 * 1024
 REST_S = 0.1
 """A joint that moves by no more than its encoder resolves for so long stands still [s]."""
 
+STOP_S = 0.5
+"""A joint that stands so long is held by its friction; a shorter rest is a turning point [s]."""
+
+MOSTLY = 0.1
+"""Share of a row's samples at rest from which on it says little of the noise in motion."""
+
 FEWEST_AT_REST = 3
 """Samples that tell rest from a turning point."""
 
@@ -57,17 +63,42 @@ class PreparedMotion:
         """√P: a mean of P repetitions has 1/P of the noise variance."""
         return float(np.sqrt(self.motion.repetitions))
 
-    def row_weights(self, joint: int) -> Array:
-        """1/σ of a joint's rows, relative to one of a single repetition in motion, (M,); zero where none was measured.
+    def whiten(self, joint: int, rows: Array) -> Array:
+        """Rows of a joint's equations (k, M) in units of their noise; zero where none was measured.
 
-        At rest friction takes any value up to the breakaway torque: such a row says little.
+        At rest friction holds with any torque up to breakaway, the same one throughout a stop: the covariance of its L
+        rows is σ² (1 + v 1 1ᵀ), so their mean counts for 1 / √(1 + v L) of itself and their differences for all.
 
         Parameters
         ----------
         joint : int
             joint index, from 0
         """
-        return self.used[joint] * self.row_weight / np.sqrt(1.0 + self.rest_variance[joint] * self.at_rest[joint])
+        white = rows * (self.used[joint] * self.row_weight)
+        if self.rest_variance[joint] > 0.0:
+            for stop in (stop for owner, stop in self.stops if owner == joint):
+                kept = 1.0 / np.sqrt(1.0 + self.rest_variance[joint] * (stop.stop - stop.start))
+                white[:, stop] -= (1.0 - kept) * white[:, stop].mean(axis=1, keepdims=True)
+        return white
+
+    @property
+    def stops(self) -> list[tuple[int, slice]]:
+        """Joint and consecutive rows of every stop that is longer than a turning point."""
+        least = STOP_S * self.motion.band.rate_hz
+        resting = self.used & (self.at_rest >= MOSTLY)
+        edges = [np.flatnonzero(np.diff(each, prepend=False, append=False)) for each in resting]
+        return [
+            (joint, slice(int(begin), int(end)))
+            for joint, own in enumerate(edges)
+            for begin, end in zip(own[::2], own[1::2], strict=True)
+            if end - begin >= least
+        ]
+
+    @property
+    def moving(self) -> Mask:
+        """Rows that tell of noise: of a joint that never moves all, else those in which it mostly moves, (n, M)."""
+        moving = self.used & (self.at_rest < MOSTLY)
+        return np.where(moving.any(axis=1, keepdims=True), moving, self.used)
 
     @property
     def nbytes(self) -> int:

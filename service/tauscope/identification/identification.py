@@ -168,7 +168,7 @@ def identify(
     )
     outside = np.maximum(residuals.fit.rms**2 - residuals.fit.band_rms**2, 0.0)
     left = np.sqrt([factor.squared_residual(posterior.mean) / factor.rows for factor in factors])
-    noise = residuals.fit.band_rms * posterior.noise_std / np.maximum(left, np.finfo(float).tiny)
+    noise = residuals.fit.moving_rms * posterior.noise_std / np.maximum(left, np.finfo(float).tiny)
 
     def predict(others: Dataset) -> tuple[Array, Array]:
         """Expected residual of a motion, and what of it the parameters leave uncertain, (n,) each."""

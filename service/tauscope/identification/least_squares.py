@@ -108,7 +108,8 @@ def factorise(motions: Iterable[PreparedMotion], structure: ModelStructure) -> t
     for prepared in motions:
         for joint in joints:
             equations = *prepared.joint_column_groups(structure, joint), prepared.reduced_torque[None, joint]
-            _append(triangles[joint], equations, prepared.row_weights(joint))
+            white = [prepared.whiten(joint, columns) for columns in equations]
+            _append(triangles[joint], white, prepared.used[joint])
             rows[joint] += int(prepared.used[joint].sum())
     factors = []
     for joint in joints:
@@ -179,14 +180,12 @@ def condition_number(factors: tuple[JointFactor, ...], size: int) -> float:
     return float(singular[0] / max(singular[-1], singular[0] * np.finfo(float).eps, np.finfo(float).tiny))
 
 
-def _append(triangle: Array, equations: Sequence[Array], weights: Array) -> None:
+def _append(triangle: Array, equations: Sequence[Array], used: NDArray[np.bool_]) -> None:
     """Replace R, in place, by that of the rows so far and of new ones: groups of columns (k, M) with time last."""
-    used = weights > 0.0
     whole = bool(used.all())
     for start in range(0, len(used), ROWS_AT_ONCE):
         rows = slice(start, start + ROWS_AT_ONCE)
         block = np.concatenate([columns[:, rows] for columns in equations])
-        block *= weights[rows]
         if not whole:
             block = block[:, used[rows]]
         if block.size:

@@ -63,13 +63,14 @@ def _doubt_friction_at_rest(motions: Dataset, structure: ModelStructure) -> None
     stiction = np.array([0.0 if column is None else max(posterior.mean[column], 0.0) for column in columns])
     motions.rest_variance = stiction**2 / 3.0 / posterior.noise_std**2
     posterior = infer(structure, factorise(motions, structure))
-    held, weight = np.zeros(len(columns)), np.full(len(columns), np.finfo(float).tiny)
+    held, rows = np.zeros(len(columns)), np.full(len(columns), np.finfo(float).tiny)
     for prepared in motions:
-        share = prepared.at_rest * prepared.used * prepared.motion.repetitions
         left = prepared.reduced_torque - prepared.predicted_rows(structure, posterior.mean)
-        held += np.sum(share * (left**2 - posterior.noise_std[:, None] ** 2 / prepared.motion.repetitions), axis=1)
-        weight += share.sum(axis=1)
-    motions.rest_variance = np.clip(held / weight, 0.0, stiction**2) / posterior.noise_std**2
+        for joint, stop in prepared.stops:
+            count = stop.stop - stop.start
+            held[joint] += count * left[joint, stop].mean() ** 2 - posterior.noise_std[joint] ** 2
+            rows[joint] += count
+    motions.rest_variance = np.clip(held / rows, 0.0, stiction**2) / posterior.noise_std**2
 
 
 def _estimated_shapes(motions: Dataset, structure: ModelStructure, speed: Array) -> tuple[EstimatedShape, ...]:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import qr, solve_triangular, svd
 
+from tauscope.dynamics.friction import FRICTION_COLUMNS
 from tauscope.identification.consistency import Prior, plausible_prior
 from tauscope.identification.estimate import FINEST_TORQUE, Estimator, torque_rms
 from tauscope.identification.full_parameters import FullParameters
@@ -21,7 +22,7 @@ from tauscope.identification.least_squares import JointFactor, stacked_factor
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array
 
-WIDTHS = np.geomspace(0.25, 32.0, 15)
+WIDTHS = np.geomspace(1 / 16, 32.0, 19)
 """Candidates of w: at 2 a link's mass is believed to as much as all of itself."""
 
 WIDE = 2.0
@@ -104,10 +105,31 @@ def infer(
         if np.all(np.abs(std - before) <= SETTLED * before):
             break
     width, evident, mean, covariance, precision = _most_probable(full, prior, factor, target)
-    doubt = np.ones(len(mean))
+    learnt = 1.0 - np.diag(covariance) * np.diag(precision)
+    doubt = _friction_doubt(structure, mean * np.sqrt(np.diag(precision)), learnt)
     doubt[: structure.base_count] = evident / width
     weights = 1.0 / (std * colour)
     return Posterior(prior.widen(width), width, doubt, std, weights, factor, target, mean, covariance, precision)
+
+
+def _friction_doubt(structure: ModelStructure, deviation: Array, learnt: Array) -> Array:
+    """Deviation from the prior that coefficients of a kind show at the joints whose data determine them, (p,).
+
+    Parameters
+    ----------
+    deviation : (p,) float64
+        of the mean from the prior's, in its standard deviations
+    learnt : (p,) float64
+        share of the prior's variance that the data took away
+    """
+    doubt = np.ones(structure.size)
+    joints = range(structure.robot.joint_count)
+    for name in FRICTION_COLUMNS:
+        columns = [column for joint in joints if (column := structure.coefficient(joint, name)) is not None]
+        known = [column for column in columns if learnt[column] > DETERMINED]
+        if known:
+            doubt[columns] = min(np.sqrt(np.mean(deviation[known] ** 2)), 1.0)
+    return doubt
 
 
 def _stack(factors: tuple[JointFactor, ...], size: int, std: Array) -> tuple[Array, Array]:
@@ -143,8 +165,9 @@ def _most_probable(
     along = left.T @ reduced[:, -1]
     gain = 1.0 + np.outer(WIDTHS**2, singular**2)
     evidence = -0.5 * np.sum(along**2 / gain + np.log(gain), axis=1)
-    evident = float(WIDTHS[int(np.argmax(evidence))])
-    width = max(evident, WIDE)
+    width = max(float(WIDTHS[int(np.argmax(evidence))]), WIDE)
+    weight = np.exp(evidence - evidence.max())
+    evident = float(np.sqrt(weight @ WIDTHS**2 / weight.sum()))
     scale = np.append(np.full(bodies, width), np.ones(size))
     root = root * scale
     stacked = np.vstack([factor @ root, np.eye(len(mean))])

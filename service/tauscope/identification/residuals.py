@@ -34,12 +34,15 @@ class Fit:
         root mean square of the torque residual at the recorded rate, no filter [Nm or N]
     band_rms : (n,) float64
         the same in the common band
+    moving_rms : (n,) float64
+        the same in the common band, of rows in which the joint moves
     torque_rms : (n,) float64
         root mean square of the measured torque in the common band [Nm or N]
     """
 
     rms: Array
     band_rms: Array
+    moving_rms: Array
     torque_rms: Array
     relative_error: float
 
@@ -117,6 +120,7 @@ class _Sums:
         zeros = np.zeros(joint_count)
         self._raw_squares, self._raw_count = zeros.copy(), zeros.copy()
         self._band_squares, self._band_count = zeros.copy(), zeros.copy()
+        self._moving_squares, self._moving_count = zeros.copy(), zeros.copy()
         self._torque_squares = zeros.copy()
         self._period_squares, self._period_count = zeros.copy(), zeros.copy()
         self._raw_lags = tuple(AutocovarianceSum() for _ in range(joint_count))
@@ -132,12 +136,14 @@ class _Sums:
         filtered_white = motion.band.filtered_white(FILTERED_LAGS)
         lags = LARGEST_ORDER if filtered_white is None else FILTERED_LAGS
         lagged = [
-            LaggedProducts.of(row * prepared.row_weight, used, lags)
-            for row, used in zip(band, prepared.used, strict=True)
+            LaggedProducts.of(row * prepared.row_weight, moving, lags)
+            for row, moving in zip(band, prepared.moving, strict=True)
         ]
         for total, products in zip(self._band_lags, lagged, strict=True):
             total.add(products, filtered_white)
         self._band_squares += motion.repetitions * _squares(band, prepared.used)
+        self._moving_squares += motion.repetitions * _squares(band, prepared.moving)
+        self._moving_count += motion.repetitions * prepared.moving.sum(axis=1)
         self._torque_squares += motion.repetitions * _squares(prepared.reduced_torque, prepared.used)
         self._band_count += motion.repetitions * prepared.used.sum(axis=1)
         self._add_raw(prepared, predicted, lagged)
@@ -166,7 +172,8 @@ class _Sums:
         relative = np.sqrt(self._band_squares.sum() / max(self._torque_squares.sum(), np.finfo(float).tiny))
         torque_rms = np.sqrt(self._torque_squares / np.maximum(self._band_count, 1))
         rms = np.sqrt(self._raw_squares / np.maximum(self._raw_count, 1))
-        fit = Fit(rms, band_rms, torque_rms, float(relative))
+        moving_rms = np.sqrt(self._moving_squares / np.maximum(self._moving_count, 1))
+        fit = Fit(rms, band_rms, moving_rms, torque_rms, float(relative))
         by_periods = bool((self._period_count >= FEWEST_PERIOD_SAMPLES).all())
         noise = np.sqrt(self._period_squares / self._period_count) if by_periods else None
         raw_lags = self._band_lags if self._unfiltered and self._unaveraged else self._raw_lags

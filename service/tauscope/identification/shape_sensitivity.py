@@ -135,10 +135,10 @@ def _normal_equations(
     for prepared in motions:
         for joint in range(structure.robot.joint_count):
             columns, index = columns_with_shapes(prepared, structure, joint, parameters, shapes)
-            scale = weight[joint] * prepared.row_weights(joint)
-            columns = columns * scale
+            columns = weight[joint] * prepared.whiten(joint, columns)
+            torque = weight[joint] * prepared.whiten(joint, prepared.reduced_torque[None, joint])[0]
             gram[np.ix_(index, index)] += columns @ columns.T
-            target[index] += columns @ (scale * prepared.reduced_torque[joint])
+            target[index] += columns @ torque
     return gram, target
 
 

@@ -11,7 +11,7 @@ from tauscope.robot import STANDARD_PARAMETERS
 Array = NDArray[np.float64]
 
 
-LEAST_COULOMB = 0.25
+LEAST_COULOMB = 1 / 3
 """Share of the stiction that Coulomb friction is at least: dry friction falls by half with speed, hardly by more."""
 
 

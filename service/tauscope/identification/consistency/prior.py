@@ -8,7 +8,7 @@ from scipy.linalg import solve_triangular
 
 from tauscope.identification.consistency.inequalities import FrictionColumns
 from tauscope.identification.consistency.triangle import congruence, parameter_scale, triangle_of_parameters
-from tauscope.robot import LinkInertia, Robot
+from tauscope.robot import JointType, LinkInertia, Robot
 
 Array = NDArray[np.float64]
 
@@ -18,6 +18,9 @@ _GYRATION = 0.25
 _REACH = 1.0
 """Radius of gyration, over the link's length, of the body that deviations are measured by, at least: a link's mass may
 lie anywhere along it and as far beside it."""
+
+_ORDINARY_SPEED = {JointType.REVOLUTE: 1.0, JointType.PRISMATIC: 0.3}
+"""Speed that a joint is made for where its file does not say [rad/s or m/s]."""
 
 _LIGHTEST = 0.1
 """A link is believed to weigh at least this share of the heaviest."""
@@ -80,9 +83,9 @@ def plausible_prior(robot: Robot, factor: Array, target: Array, friction: Fricti
     best. A link's deviation is measured by its own body: ‖A⁻¹ (J - J₀) A⁻ᵀ‖_F with A Aᵀ = J₀ the pseudo-inertia, made
     at least as thick as a compact body, so that it does not depend on units or on the frame (Lee & Park 2018, to second
     order). Friction is expected to be absent; a coefficient's standard deviation is ‖z‖ / ‖R_i‖: that coefficient alone
-    would explain all torque. It is a tenth of that for τ_sc and the rotor's inertia, so that a motion that cannot tell
-    τ_sc from τ_s (never slow enough) credits τ_s, and what cannot be told from the link's own inertia is credited to
-    the link.
+    would explain all torque, and viscous friction would at the speed that the joint is made for. It is a tenth of that
+    for τ_sc and the rotor's inertia, so that a motion that cannot tell τ_sc from τ_s (never slow enough) credits τ_s,
+    and what cannot be told from the link's own inertia is credited to the link.
 
     Parameters
     ----------
@@ -97,6 +100,12 @@ def plausible_prior(robot: Robot, factor: Array, target: Array, friction: Fricti
     if friction is not None:
         doubtful = (*friction.stribeck, *friction.rotor_inertia)
         friction_scale[[index - 10 * count for index in doubtful if index is not None]] *= 0.1
+        for joint, stiction, viscous in zip(robot.joints, friction.stiction, friction.viscous, strict=True):
+            if stiction is not None and viscous is not None:
+                moving, step = (np.linalg.norm(factor[:, index]) for index in (viscous, stiction))
+                made_for = joint.limits.velocity or _ORDINARY_SPEED[joint.type]
+                if moving > 0.0 and step > 0.0:
+                    friction_scale[viscous - 10 * count] *= min(moving / (step * made_for), 1.0)
     if robot.model.links is not None:
         links = robot.model.links
         heaviest = max(link.mass for link in links)
