@@ -31,7 +31,6 @@ def identified(friction: dict[str, float] | None = None, **changes: Any) -> Iden
     """An identification of one joint, ``shoulder``; its friction terms and its fields as given."""
     data = json.loads(_content())
     data["friction"][0] |= friction or {}
-    data["fit"].setdefault("free_held_out", dict(data["fit"]["held_out"]))
     for path, value in changes.items():
         *steps, last = path.split("__")
         place = data

@@ -19,7 +19,7 @@ Rows = list[list[str]]
 ARM = simulate(paper_robot(), seed=1)
 NAMES = ["t", "q1", "q2", "q3", "tau1", "tau2", "tau3", "period"]
 ROWS = 400
-MAY_BE_NULL = ("std", "delta", "cutoff_hz", "held_out", "free_held_out", "joint", "extrapolation", "predicted_rms")
+MAY_BE_NULL = ("std", "delta", "cutoff_hz", "held_out", "joint", "extrapolation", "predicted_rms")
 
 
 def table() -> Rows:

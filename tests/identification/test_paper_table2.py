@@ -258,7 +258,7 @@ def test_one_identification_says_the_same_through_its_document(paper_arm: Simula
     noise = paper_arm.white(PAPER_NOISE, np.random.default_rng(5))
     result = identify(paper_arm.robot, [paper_arm.recording(noise)])
     found = document(result)
-    assert [entry.free_value for entry in found.base_parameters] == list(result.free_parameters[:15])
+    assert [entry.value for entry in found.base_parameters] == list(result.parameters[:15])
     assert [entry.std for entry in found.base_parameters] == list(standard_errors(result)[:15])
     assert np.abs(z_scores(result, paper_arm.robot)).max() < 4.5
 

@@ -38,12 +38,13 @@ def within(values: Array) -> float:
 
 @pytest.mark.parametrize("kind", MOTIONS)
 def test_poor_motion_gives_no_nonsense(kind: str, tmp_path: Path) -> None:
-    found = poor(1, kind, tmp_path)
+    robot, train, held_out = poor_arm(1, kind, tmp_path)
+    result = identify(robot, [train], [held_out])
+    assert result.held_out is not None
+    assert result.held_out_free is not None
+    assert result.held_out.relative_error < 1.15 * result.held_out_free.relative_error
+    found = document(result)
     assert np.all(ratios(found) < 3.0)
-    assert found.fit.held_out is not None
-    assert found.fit.free_held_out is not None
-    assert found.fit.held_out.relative_error < 1.15 * found.fit.free_held_out.relative_error
-    assert found.excitation is not None
     for link, entry in zip(found.links, found.friction, strict=True):
         assert 0.02 < link.mass < 60.0
         assert min(entry.stiction, entry.viscous, entry.stiction + entry.stribeck) >= 0.0

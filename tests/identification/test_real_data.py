@@ -156,9 +156,9 @@ def test_links_are_possible_and_nearly_as_good(name: str) -> None:
         assert entry.stiction >= 0.0
         assert entry.viscous >= 0.0
         assert entry.stiction + entry.stribeck >= 0.0
-    assert found.fit.held_out is not None
-    assert found.fit.free_held_out is not None
-    assert found.fit.held_out.relative_error <= found.fit.free_held_out.relative_error + 0.01
+    assert result.held_out is not None
+    assert result.held_out_free is not None
+    assert result.held_out.relative_error <= result.held_out_free.relative_error + 0.01
 
 
 @pytest.mark.parametrize("name", HELD_OUT_BOUNDS)

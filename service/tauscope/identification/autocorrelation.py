@@ -165,7 +165,7 @@ class AutocovarianceSum:
 
 
 def _following_share(sums: LaggedProducts) -> float:
-    """How often a sample follows that was measured too: all but the gaps' own ends where what is missing is together."""
+    """Share of the measured samples that another one follows: near 1 where what is missing lies together."""
     pairs = sums.spans[1] * sums.counts[0] / sums.spans[0]
     return float(sums.counts[1] / pairs) if pairs > 0.0 else 0.0
 

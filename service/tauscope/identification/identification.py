@@ -17,6 +17,7 @@ from tauscope.identification.dataset import Dataset
 from tauscope.identification.estimate import Estimator, estimate
 from tauscope.identification.excitation import Excitation, measure_excitation
 from tauscope.identification.friction_shape import EstimatedShape, shape_parameters
+from tauscope.identification.gravity_scale import gravity_scale
 from tauscope.identification.least_squares import JointFactor, Solution, condition_number
 from tauscope.identification.model_terms import choose_model
 from tauscope.identification.physical_estimate import consistent_estimate, in_model_columns, is_rejected
@@ -65,6 +66,10 @@ class Identification:
         the most probable bodies and friction, in the same columns
     constrained : bool
         whether no body can have the free estimate
+    price_of_bodies : (n,) float64
+        training residual over that of the free estimate
+    gravity_scale : float or None
+        torque of gravity over that of the stated links; None where it cannot be told
     reversed_joints : tuple of int
         joints whose torque fits much better with the other sign, which is not used
     covariance : (p + s, p + s) float64
@@ -84,6 +89,7 @@ class Identification:
     consistent_parameters: Array
     constrained: bool
     reversed_joints: tuple[int, ...]
+    gravity_scale: float | None
     posterior: Posterior
     covariance: Array
     undetermined: np.ndarray
@@ -92,6 +98,7 @@ class Identification:
     condition_number: float
     residuals: ResidualStatistics
     free_fit: Fit
+    price_of_bodies: Array
     predicted_train: Array
     held_out: Fit | None
     held_out_free: Fit | None
@@ -193,6 +200,7 @@ def identify(
         consistent_parameters=consistent_parameters,
         constrained=is_rejected(consistent),
         reversed_joints=reversed_,
+        gravity_scale=gravity_scale(motions, structure, parameters),
         posterior=posterior,
         covariance=covariance,
         undetermined=solution.undetermined,
@@ -201,6 +209,7 @@ def identify(
         condition_number=condition_number(factors, structure.size),
         residuals=residuals,
         free_fit=free.fit,
+        price_of_bodies=residuals.fit.band_rms / np.maximum(free.fit.band_rms, np.finfo(float).tiny),
         predicted_train=predict(motions)[0],
         held_out=held[0],
         held_out_free=held[1],

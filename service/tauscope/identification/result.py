@@ -1,7 +1,7 @@
 """The identification as a document: what ``identify --json`` writes and the REST API returns (CONTRACT.md)."""
 
 from dataclasses import asdict
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -17,15 +17,27 @@ from tauscope.robot import STANDARD_PARAMETERS, LinkInertia
 from tauscope.strict_model import ResultModel
 
 
-class BaseParameterEntry(ResultModel):
+class Entry(ResultModel):
+    """A part of the document; keys that earlier versions wrote and this one does not are passed over."""
+
+    retired: ClassVar[frozenset[str]] = frozenset()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _pass_over(cls, data: Any) -> Any:
+        return {key: data[key] for key in data if key not in cls.retired} if isinstance(data, dict) else data
+
+
+class BaseParameterEntry(Entry):
     """One identifiable combination of the links' standard parameters."""
+
+    retired = frozenset({"free_value"})
 
     name: str = Field(description="readable expression, e.g. Ixx2 - Iyy2 - 0.5*msx2")
     terms: dict[str, float] = Field(description="coefficient of every standard parameter in it, to full precision")
     value: float = Field(description="estimate [kg m², kg m or kg, by its terms]")
     std: float | None = Field(description="standard error; null where nothing is known of it")
     independent: bool = Field(description="whether it is one standard parameter by itself")
-    free_value: float = Field(description="the LS or WLS estimate, without prior and without bodies")
     determined_by: Literal["data", "prior", "both"] | None = Field(
         default=None, description="data took at least nine tenths of the prior's variance, at most a tenth, or between"
     )
@@ -85,19 +97,17 @@ class FitEntry(ResultModel):
     )
 
 
-class FitsEntry(ResultModel):
-    """Fits of the delivered model, and of the physically consistent one where that is another."""
+class FitsEntry(Entry):
+    """How well the model explains what it was made from, and what was held out."""
+
+    retired = frozenset({"links_train", "links_held_out"})
 
     train: FitEntry = Field(description="on the recordings that the model was made from")
     held_out: FitEntry | None = Field(default=None, description="on recordings that were not used")
-    free_train: FitEntry | None = Field(default=None, description="of the free estimate, in training")
-    free_held_out: FitEntry | None = Field(default=None, description="of the free estimate, held out")
-
-    @model_validator(mode="before")
-    @classmethod
-    def forget_links(cls, data: Any) -> Any:
-        """Read documents of versions that judged `links` apart from the delivered model."""
-        return {key: data[key] for key in data if not key.startswith("links_")} if isinstance(data, dict) else data
+    price_of_bodies: list[float] | None = Field(
+        default=None,
+        description="per joint, training residual with bodies over that of the free least-squares estimate",
+    )
 
 
 class JointExcitationEntry(ResultModel):
@@ -200,8 +210,7 @@ def document(identification: Identification) -> IdentificationDocument:
         fit=FitsEntry(
             train=_fit(result.residuals.fit, result.predicted_train),
             held_out=None if result.held_out is None else _fit(result.held_out, result.predicted_held_out),
-            free_train=_fit(result.free_fit),
-            free_held_out=None if result.held_out_free is None else _fit(result.held_out_free),
+            price_of_bodies=_floats(result.price_of_bodies),
         ),
         excitation=_excitation(result),
         conditioning=[_conditioning(summary) for summary in result.conditioning],
@@ -235,7 +244,6 @@ def _base_parameters(result: Identification) -> list[BaseParameterEntry]:
             value=float(result.parameters[place]),
             std=std[place],
             independent=bool(base.is_independent(place)),
-            free_value=float(result.free_parameters[place]),
             determined_by=_determined_by(float(learnt[place])),
         )
         for place in range(result.structure.base_count)

@@ -17,6 +17,9 @@ UNSEEN = 0.1
 BEYOND = 1.25
 """Times the top speed of training at which held-out motion is another motion."""
 
+FAR_OFF = 3.0
+"""Factor between recorded and stated weight beyond which a unit is wrong rather than a mass."""
+
 MOST_NAMES = 4
 """Names in a sentence."""
 
@@ -31,6 +34,7 @@ def identification_warnings(result: Identification) -> list[ResultWarning]:
     """All warnings, the gravest first."""
     return [
         *_signs(result),
+        *_scale(result),
         *_bodies(result),
         *_excitation(result),
         *_extrapolation(result),
@@ -76,6 +80,17 @@ def _signs(result: Identification) -> Iterator[ResultWarning]:
             joint=joints[joint].name,
             text=f"{joints[joint].name}: the torque has the wrong sign: bodies and friction fit it far better reversed",
             remedy=f"look at the drive, then set `sign: {sign}` for {joints[joint].name} in the robot file",
+        )
+
+
+def _scale(result: Identification) -> Iterator[ResultWarning]:
+    """Torque that is far from what the stated masses weigh."""
+    scale = result.gravity_scale
+    if scale is not None and not 1.0 / FAR_OFF < scale < FAR_OFF:
+        yield ResultWarning(
+            code="torque-scale",
+            text=f"gravity's torque is {scale:.3g} times what the masses of the robot file weigh: is the torque in Nm?",
+            remedy="check `torque_constant` and `gear_ratio`, or the masses",
         )
 
 

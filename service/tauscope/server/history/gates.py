@@ -79,9 +79,8 @@ def _consistency(document: IdentificationDocument, policy: ModelPolicy) -> Gate:
     for number, link in enumerate(document.links, start=1):
         if not is_physical(link):
             return Gate("consistency", False, f"link {number}: no real body has this mass and inertia; identify anew")
-    fit, free = document.fit.held_out or document.fit.train, document.fit.free_held_out or document.fit.free_train
-    free = free or fit
-    worst, joint = max(_ratios(fit.rms, free.rms, document.joints))
+    price = document.fit.price_of_bodies or [1.0] * len(document.joints)
+    worst, joint = max(zip(price, document.joints, strict=True))
     found = (
         f"{joint}: residual of the model with bodies {worst:.2f} times that of the free one,"
         f" allowed {policy.consistency_ratio:.2f}"
