@@ -263,8 +263,8 @@ def test_one_identification_says_the_same_through_its_document(paper_arm: Simula
     assert np.abs(z_scores(result, paper_arm.robot)).max() < 4.5
 
 
-def test_on_a_rich_recording_the_prior_changes_nothing_but_what_bodies_demand(paper_arm: SimulatedArm) -> None:
-    """The paper's links are rods, on the boundary of what can be: there and nowhere else bodies may move the estimate."""
+def test_on_a_rich_recording_the_prior_changes_nothing(paper_arm: SimulatedArm) -> None:
+    """Before bodies restrict it: the paper's links are rods, on the boundary of what can be."""
     noise = paper_arm.white(PAPER_NOISE, np.random.default_rng(0))
     result = identify(paper_arm.robot, [paper_arm.recording(noise)])
     posterior = result.posterior

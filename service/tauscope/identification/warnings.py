@@ -86,7 +86,7 @@ def _signs(result: Identification) -> Iterator[ResultWarning]:
 def _scale(result: Identification) -> Iterator[ResultWarning]:
     """Torque that is far from what the stated masses weigh."""
     scale = result.gravity_scale
-    if scale is not None and not 1.0 / FAR_OFF < scale < FAR_OFF:
+    if scale is not None and not result.reversed_joints and not 1.0 / FAR_OFF < scale < FAR_OFF:
         yield ResultWarning(
             code="torque-scale",
             text=f"gravity's torque is {scale:.3g} times what the masses of the robot file weigh: is the torque in Nm?",
