@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from tauscope.errors import RecordingError, RecordingMismatchError
 from tauscope.recording.columns import table_columns
+from tauscope.recording.intake import RowIntake
 from tauscope.recording.joint_state import JointState, JointStateLayout, JointStates, decode_cdr, decode_json
 from tauscope.recording.recording import EffortKind, Recording
-from tauscope.recording.row_check import RowCheck, require_rows
-from tauscope.recording.table import SPOOL_ABOVE_BYTES, TableBuilder
+from tauscope.recording.table import SPOOL_ABOVE_BYTES
+from tauscope.recording.units import Reading
 from tauscope.recording.words import listed, reason
 
 _MESSAGES_AT_ONCE = 4096
@@ -35,6 +36,7 @@ class Choice:
     joint_count: int | None = None
     joint_names: tuple[str, ...] | None = None
     spool_above_bytes: int = SPOOL_ABOVE_BYTES
+    reading: Reading = Reading()
 
 
 class JointStateTopic:
@@ -148,14 +150,14 @@ class _Rows:
         self.joint_names = joint_names
         self._name, self._topic = choice.file, topic
         self._joint_count, self._has_velocity = joint_count, has_velocity
-        self._columns = table_columns(joint_count, EffortKind.TORQUE, ("qd",) if has_velocity else ())
-        self._builder = TableBuilder(self._columns, spool_above_bytes=choice.spool_above_bytes)
-        self._check = RowCheck(choice.file, self._columns)
+        columns = table_columns(joint_count, EffortKind.TORQUE, ("qd",) if has_velocity else ())
+        spool = choice.spool_above_bytes
+        self._intake = RowIntake(choice.file, columns, EffortKind.TORQUE, choice.reading, spool_above_bytes=spool)
         self._origin: int | None = None
         self._by_log_time = False
 
     def __len__(self) -> int:
-        return len(self._builder)
+        return len(self._intake)
 
     def append(self, states: JointStates, order: Sequence[int], log_time: NDArray[np.int64], number: int) -> None:
         """Add messages; the clock is the header stamp, or the log's where the first batch has no stamps at all."""
@@ -176,12 +178,10 @@ class _Rows:
         time = (clock - self._origin).astype(np.float64) * 1e-9
         parts = [time[:, None], states.position[:, order], states.effort[:, order]]
         block = np.hstack([*parts, states.velocity[:, order]] if self._has_velocity else parts)
-        self._check(block, lambda row: f"topic {self._topic}, message {number + row}")
-        self._builder.append(block)
+        self._intake.add(block, lambda row: f"topic {self._topic}, message {number + row}")
 
     def finish(self) -> Recording:
-        require_rows(len(self._builder), self._name)
-        return Recording(self._name, self._joint_count, EffortKind.TORQUE, self._builder.finish())
+        return self._intake.finish(self._joint_count)
 
 
 def _layout_of(state: JointState) -> tuple[tuple[str, ...], int, int, int]:
