@@ -114,7 +114,9 @@ class RowIntake:
         order = np.argsort(time, kind="stable")
         if np.abs(order - np.arange(len(order))).max() > LATE_ROWS or time[order[0]] < self._last:
             row = int(np.argmax(np.diff(time, prepend=self._last) < 0))
-            require_rising(time[row:], self._last if row == 0 else float(time[row - 1]), self._file, lambda _: place(row))
+            require_rising(
+                time[row:], self._last if row == 0 else float(time[row - 1]), self._file, lambda _: place(row)
+            )
         late = np.flatnonzero(np.diff(time, prepend=self._last) < 0)
         block = block[order]
         is_new = np.diff(block[:, 0], prepend=self._last) > 0
@@ -137,7 +139,4 @@ class RowIntake:
             rows = "1 row has" if self._repeated == 1 else f"{self._repeated} rows have"
             text = f"{rows} the time of the row before, first at t = {self._first_repeated:.6g} s; left out"
             found.append((text, "write t with more digits, or record each message once"))
-        return [
-            ResultWarning(code="time-stamps", text=f"{self._file}: column t: {text}", remedy=remedy)
-            for text, remedy in found
-        ]
+        return [ResultWarning(code="time-stamps", text=f"column t: {text}", remedy=remedy) for text, remedy in found]

@@ -20,7 +20,7 @@ __all__ = ["Array", "EffortKind", "Recording", "Samples", "Table"]
 class Recording:
     """One continuous motion as it was measured.
 
-    warnings : tuple of ResultWarning
+    notes : tuple of ResultWarning
         what was mended in it
     is_examined : bool
         whether units and samples were looked at, so that they need not be again
@@ -31,12 +31,17 @@ class Recording:
     effort_kind: EffortKind
     table: Table
     ignored_columns: tuple[str, ...] = ()
-    warnings: tuple[ResultWarning, ...] = ()
+    notes: tuple[ResultWarning, ...] = ()
     is_examined: bool = False
 
     def __len__(self) -> int:
         """Number of samples N."""
         return len(self.table)
+
+    @property
+    def warnings(self) -> tuple[ResultWarning, ...]:
+        """What was mended in it, each beginning with its name."""
+        return tuple(note.model_copy(update={"text": f"{self.name}: {note.text}"}) for note in self.notes)
 
     def samples(self, start: int = 0, stop: int | None = None) -> Samples:
         """Samples start:stop, as read-only views of the table where its columns allow.

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+from tauscope.recording.examination.mending import mend_recording
 from tauscope.recording.examination.plausibility import require_plausible
 from tauscope.recording.reading import read_recording
 from tauscope.recording.recording import Recording
@@ -35,4 +36,4 @@ def examine_recording(recording: Recording, robot: Robot | None = None, *, trust
         return recording
     if not trust_units:
         require_plausible(recording, robot)
-    return replace(recording, is_examined=True)
+    return replace(mend_recording(recording, robot), is_examined=True)

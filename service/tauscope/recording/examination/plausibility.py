@@ -139,7 +139,11 @@ def _velocity_ratios(sketch: Sketch) -> np.ndarray:
         return ratios
     for joint, (slope, velocity) in enumerate(zip(sketch.slope.T, sketch.velocity.T, strict=True)):
         known = np.isfinite(slope) & np.isfinite(velocity)
-        fast = known & (np.abs(velocity) > FAST_PART * np.percentile(np.abs(velocity[known]), 99.0)) if known.any() else known
+        fast = (
+            known & (np.abs(velocity) > FAST_PART * np.percentile(np.abs(velocity[known]), 99.0))
+            if known.any()
+            else known
+        )
         if fast.sum() < FEWEST_ROWS:
             continue
         low, middle, high = np.percentile(slope[fast] / velocity[fast], [25, 50, 75])
@@ -215,9 +219,7 @@ def _doubt_angle(sketch: Sketch, types: list[JointType], robot: Robot | None) ->
     return None
 
 
-def _beyond_limits(
-    sketch: Sketch, kind: np.ndarray, factor: float, robot: Robot | None
-) -> tuple[int, str] | None:
+def _beyond_limits(sketch: Sketch, kind: np.ndarray, factor: float, robot: Robot | None) -> tuple[int, str] | None:
     """A joint that is beyond its limits most of the time, where another unit would keep all joints within theirs."""
     limits = [None if robot is None else joint.limits.position for joint in robot.joints] if robot else []
     beyond, judged = [], 0

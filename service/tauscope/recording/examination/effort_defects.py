@@ -1,0 +1,78 @@
+"""Efforts that no drive measured: stuck values, and spikes."""
+
+import numpy as np
+
+from tauscope.recording.examination.edits import NO_NUMBERS, Numbers
+from tauscope.recording.examination.scales import NEIGHBOURS, EffortScale, distance_beyond, neighbour_windows
+from tauscope.recording.samples import Array
+
+SURPRISE = 20.0
+"""Multiple of the usual distance beyond the neighbours' range above which a sample is a spike."""
+
+SPAN = 0.1
+"""Share of the effort's usual range that this distance exceeds, too."""
+
+STUCK_ROWS = 10
+"""Rows for which a stuck value is repeated, at least."""
+
+STUCK_RUNS = 5
+"""Multiple of the rows for which values usually are."""
+
+LEAST_MOVE = 0.01
+"""Distance above which a joint moves within some rows [rad or m]."""
+
+
+def find_stuck(rows: Numbers, effort: Array, position: Array, scale: EffortScale) -> Numbers:
+    """Rows of a block in which one joint's effort is stuck.
+
+    Parameters
+    ----------
+    rows : (N,) int64
+        row of each value within the recording
+    effort : (N,) float64
+        in the recording's own unit, finite
+    position : (N,) float64
+        q of the same rows [rad or m]
+    """
+    edges = np.flatnonzero(np.diff(effort) != 0.0) + 1
+    starts, stops = np.concatenate([[0], edges]), np.concatenate([edges, [len(effort)]])
+    level = effort[starts]
+    is_long = stops - starts >= max(STUCK_ROWS, STUCK_RUNS * scale.run)
+    is_long &= (level > scale.low) & (level < scale.high)  # a clipped value is not stuck
+    found = [
+        rows[start + 1 : stop]  # the first of them was measured
+        for start, stop in zip(starts[is_long], stops[is_long], strict=True)
+        if is_moving(position[start:stop, None])
+    ]
+    return np.concatenate([NO_NUMBERS, *found])
+
+
+def find_spikes(rows: Numbers, effort: Array, scale: EffortScale) -> Numbers:
+    """Rows of a block in which one joint's effort is far from all of its neighbours.
+
+    Parameters
+    ----------
+    rows : (N,) int64
+        row of each value within the recording
+    effort : (N,) float64
+        in the recording's own unit, finite
+    """
+    least = max(SURPRISE * scale.surprise, SPAN * (scale.high - scale.low))
+    large = np.flatnonzero(np.abs(np.diff(effort)) > least)
+    # Most blocks have no change as large, and neighbours are dear: only the surroundings are looked at.
+    if not len(large) or least == 0.0 or len(effort) < 2 * NEIGHBOURS + 1:
+        return NO_NUMBERS
+    near = np.unique(large[:, None] + np.arange(2))
+    return rows[near[distance_beyond(neighbour_windows(effort)[near]) > least]]
+
+
+def is_moving(position: Array) -> bool:
+    """Whether any joint moves within some rows.
+
+    Parameters
+    ----------
+    position : (N, n) float64
+        q [rad or m]
+    """
+    low, high = np.fmin.reduce(position, axis=0), np.fmax.reduce(position, axis=0)
+    return bool((high - low > LEAST_MOVE).any())

@@ -1,0 +1,124 @@
+"""Positions that no encoder measured: spikes, frozen values, and jumps by a constant."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tauscope.recording.examination.scales import ONE_TURN, PositionScale, neighbours_median, unwrap_steps
+from tauscope.recording.examination.sketch import BREAK
+from tauscope.recording.samples import Array
+
+SURPRISE = 20.0
+"""Multiple of the usual surprise above which a step is looked at: 26 standard deviations of noise."""
+
+SHARE_OF_MOVE = 0.1
+"""Share of the largest usual step above which it is: motion has small surprises where noise has none."""
+
+STEPS = 5.0
+"""Encoder steps above which it is: one or two are its rounding."""
+
+LONGEST_SPIKE = 5
+"""Rows after which a position that jumped is back, where it was a spike."""
+
+RETURN = 0.3
+"""Largest difference between the way out and the way back of a spike, relative to them."""
+
+JUMP = 5.0
+"""Multiple of the largest usual step that a jump exceeds; a joint that hits an end stop does not."""
+
+LEAST_JUMP = 0.01
+"""Smallest jump that is called one [rad or m]."""
+
+FROZEN_ROWS = 3
+"""Repeated rows, at least, before a step that makes up for them."""
+
+MAKES_UP = 1.6
+"""Largest speed of that step over the rows that it makes up for, relative to the speed before and after."""
+
+CATCHES_UP = 2.0
+"""Least size of that step, relative to those that follow: a joint that starts to move goes on as it starts."""
+
+
+@dataclass
+class PositionDefects:
+    """Rows of one joint, counted from the first row of the recording.
+
+    spikes, frozen : list of int
+        rows whose position was never measured
+    jumps, wraps : list of (int, float)
+        first row behind a jump, and its height [rad or m]
+    """
+
+    spikes: list[int] = field(default_factory=list)
+    frozen: list[int] = field(default_factory=list)
+    jumps: list[tuple[int, float]] = field(default_factory=list)
+    wraps: list[tuple[int, float]] = field(default_factory=list)
+
+
+def scan_position(
+    rows: Array, time: Array, position: Array, scale: PositionScale, interval: float, core: tuple[int, int]
+) -> PositionDefects:
+    """Defects of a block of one joint's known positions.
+
+    Parameters
+    ----------
+    rows : (N,) int64
+        row of each value within the recording
+    time : (N,) float64
+        stamps [s]
+    position : (N,) float64
+        q [rad or m], finite
+    interval : float
+        usual time from row to row [s]
+    core : (int, int)
+        rows that this block answers for; the others are neighbours
+    """
+    found = PositionDefects()
+    if len(position) < 8:
+        return found
+    plain = np.diff(position)
+    steps = unwrap_steps(plain, is_wrapped=scale.is_wrapped)
+    is_core = (rows[1:] >= core[0]) & (rows[1:] < core[1])
+    for k in np.flatnonzero((plain != steps) & is_core):
+        found.wraps.append((int(rows[k + 1]), float(ONE_TURN * np.rint((plain[k] - steps[k]) / ONE_TURN))))
+    least = max(SURPRISE * scale.surprise, STEPS * scale.step, SHARE_OF_MOVE * scale.move)
+    if least == 0.0 or np.abs(steps).max() <= least:
+        return found
+    surprise = steps - neighbours_median(steps)
+    large = np.flatnonzero(np.abs(surprise) > least)
+    whole = np.diff(time) < (BREAK + LONGEST_SPIKE) * interval
+    index = 0
+    while index < len(large):
+        a = int(large[index])
+        partner = next((int(b) for b in large[index + 1 : index + 4] if _returns(surprise, a, int(b))), None)
+        index += 1
+        if partner is not None:
+            found.spikes += [int(row) for row in rows[a + 1 : partner + 1] if core[0] <= row < core[1]]
+            index = int(np.searchsorted(large, partner)) + 1
+        elif is_core[a]:
+            frozen = _frozen_rows(steps, a)
+            if frozen:
+                found.frozen += [int(row) for row in rows[a - frozen + 1 : a + 1]]
+            elif abs(surprise[a]) > max(JUMP * scale.move, LEAST_JUMP) and whole[a]:
+                found.jumps.append((int(rows[a + 1]), float(surprise[a])))
+    return found
+
+
+def _returns(surprise: Array, a: int, b: int) -> bool:
+    """Whether a second step takes a first one back."""
+    out, back = float(surprise[a]), float(surprise[b])
+    return b - a <= LONGEST_SPIKE and abs(out + back) < RETURN * max(abs(out), abs(back))
+
+
+def _frozen_rows(steps: Array, k: int) -> int:
+    """Repeated rows before a step that makes up for them; 0 where it does not."""
+    moved = np.flatnonzero(steps[:k])
+    rest = k - 1 - (int(moved[-1]) if len(moved) else -1)
+    if rest < FROZEN_ROWS:
+        return 0
+    before = np.abs(steps[moved[-5:]]) if len(moved) else np.zeros(0)
+    around = np.concatenate([before, np.abs(steps[k + 1 : k + 6])])
+    speed = float(np.max(around, initial=0.0))
+    after = float(np.max(np.abs(steps[k + 1 : k + 6]), initial=0.0))
+    step = abs(float(steps[k]))
+    return rest if CATCHES_UP * after <= step <= MAKES_UP * (rest + 1) * speed else 0

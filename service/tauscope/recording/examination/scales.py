@@ -1,0 +1,187 @@
+"""Typical sizes of a recording's steps, joint by joint: what a sample is judged against."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from tauscope.recording.examination.sketch import Sketch
+from tauscope.recording.samples import Array
+from tauscope.robot.robot import JointType
+
+ONE_TURN = 2.0 * np.pi
+
+TURN_SPARE = 0.01
+"""Beyond one turn by this, an angle is not wrapped [rad]."""
+
+STEPS_OF_A_MOVE = 4.0
+"""A value that moves by so many of its own steps in one row is sampled too coarsely to rest in the next."""
+
+HELD_SHARE = 0.5
+"""Share of such moves followed by a rest above which the source holds its values."""
+
+FEWEST_MOVES = 30
+
+LONGEST_HOLD = 64
+"""Rows of the longest hold: a source of 30 Hz on a topic of 2 kHz."""
+
+NEIGHBOURS = 3
+"""Rows on either side that a row is judged by."""
+
+
+@dataclass(frozen=True)
+class PositionScale:
+    """Typical steps of one joint's position.
+
+    step : float
+        encoder's step, or the least noise [rad or m]
+    move : float
+        95th percentile of the change from row to row, while the joint moves [rad or m]
+    surprise : float
+        90th percentile of the change beyond what the neighbours foretell, while the joint moves [rad or m]
+    hold : int
+        rows for which the source holds a value; 1 where it does not
+    """
+
+    is_wrapped: bool
+    step: float
+    move: float
+    surprise: float
+    hold: int
+
+
+@dataclass(frozen=True)
+class EffortScale:
+    """Typical steps of one joint's effort, in its own unit.
+
+    low, high : float
+        1st and 99th percentile
+    change : float
+        90th percentile of the change from row to row
+    surprise : float
+        90th percentile of the distance beyond the range of the neighbours, of efforts beyond it
+    run : int
+        99th percentile of the rows for which a value is repeated
+    """
+
+    low: float
+    high: float
+    change: float
+    surprise: float
+    run: int
+    hold: int
+
+
+def measure_positions(sketch: Sketch, types: list[JointType]) -> list[PositionScale]:
+    """Scales of every joint's position."""
+    scales = []
+    for joint, kind in enumerate(types):
+        pieces = [_steady(window.time, window.position[:, joint], sketch.interval) for window in sketch.windows]
+        values = sketch.position[:, joint]
+        values = values[np.isfinite(values)]
+        low, high = np.percentile(values, [0.1, 99.9]) if len(values) else (0.0, 0.0)
+        wrapped = kind is JointType.REVOLUTE and np.pi < high - low < ONE_TURN + TURN_SPARE
+        steps = np.concatenate([unwrap_steps(np.diff(piece), is_wrapped=wrapped) for piece in pieces])
+        step, _, hold = _measure_holds(pieces)
+        moves = np.abs(steps) > step / 2.0
+        surprises = np.abs(steps - neighbours_median(steps))
+        move, surprise = _percentile(np.abs(steps[moves]), 95.0), _percentile(surprises[moves], 90.0)
+        scales.append(PositionScale(bool(wrapped), step, move, surprise, hold))
+    return scales
+
+
+def measure_efforts(sketch: Sketch) -> list[EffortScale]:
+    """Scales of every joint's effort."""
+    scales = []
+    for values in sketch.effort.T:
+        known = values[np.isfinite(values)]
+        if len(known) < 2:
+            scales.append(EffortScale(0.0, 0.0, 0.0, 0.0, 1, 1))
+            continue
+        _, run, hold = _measure_holds([known])
+        changes = np.abs(np.diff(known))
+        low, high = np.percentile(known, [1.0, 99.0])
+        beyond = distance_beyond(neighbour_windows(known))
+        change, surprise = _percentile(changes[changes > 0.0], 90.0), _percentile(beyond[beyond > 0.0], 90.0)
+        scales.append(EffortScale(float(low), float(high), change, surprise, run, hold))
+    return scales
+
+
+def unwrap_steps(steps: Array, *, is_wrapped: bool) -> Array:
+    """Steps of an angle without whole turns.
+
+    Parameters
+    ----------
+    steps : (N,) float64
+        changes from row to row [rad]
+    """
+    return steps - ONE_TURN * np.rint(steps / ONE_TURN) if is_wrapped else steps
+
+
+def neighbours_median(values: Array) -> Array:
+    """Median of the seven values around each one, (N,); the ends are repeated.
+
+    Parameters
+    ----------
+    values : (N,) float64
+        a signal
+    """
+    return median_filter(values, size=2 * NEIGHBOURS + 1, mode="nearest")
+
+
+def neighbour_windows(values: Array) -> Array:
+    """Each value with its neighbours, (N, 7); the ends are repeated.
+
+    Parameters
+    ----------
+    values : (N,) float64
+        a signal
+    """
+    return np.lib.stride_tricks.sliding_window_view(np.pad(values, NEIGHBOURS, mode="edge"), 2 * NEIGHBOURS + 1)
+
+
+def distance_beyond(windows: Array) -> Array:
+    """Distance of the middle value of every window beyond the range of the others, (N,); 0 within it.
+
+    The range leaves the highest and the lowest neighbour out, which may be a spike, too. A step lies within it.
+
+    Parameters
+    ----------
+    windows : (N, 7) float64
+        values and their neighbours
+    """
+    values = windows[:, NEIGHBOURS]
+    others = np.sort(np.delete(windows, NEIGHBOURS, axis=1), axis=1)
+    return np.maximum(np.maximum(values - others[:, -2], others[:, 1] - values), 0.0)
+
+
+def _steady(time: Array, values: Array, interval: float) -> Array:
+    """A joint's known values without the rows before which the clock stands."""
+    known = np.isfinite(values)
+    time, values = time[known], values[known]
+    return values[np.diff(time, prepend=-np.inf) > 0.1 * interval]
+
+
+def _measure_holds(pieces: list[Array]) -> tuple[float, int, int]:
+    """Least step of some signals, usual length of a run of one value, and rows of a zero-order hold."""
+    steps, lengths = [], []
+    for values in pieces:
+        changes = np.flatnonzero(np.diff(values) != 0.0) + 1
+        if len(changes) > 1:
+            steps.append(np.abs(values[changes] - values[changes - 1]))
+            lengths.append(np.diff(changes))
+    if not steps:
+        return 0.0, max((len(values) for values in pieces), default=1), 1
+    step = float(np.percentile(np.concatenate(steps), 1.0))
+    bold = [sizes >= STEPS_OF_A_MOVE * step for sizes in steps]
+    moves = np.concatenate([runs[large[:-1] & large[1:]] for runs, large in zip(lengths, bold, strict=True)])
+    usual = int(np.percentile(np.concatenate(lengths), 99.0))
+    if len(moves) < FEWEST_MOVES or np.mean(moves > 1) < HELD_SHARE:
+        return step, usual, 1
+    hold = int(np.median(moves))
+    return step, usual, hold if hold <= LONGEST_HOLD else 1
+
+
+def _percentile(values: Array, share: float) -> float:
+    """A percentile, 0 of nothing."""
+    return float(np.percentile(values, share)) if len(values) else 0.0
