@@ -14,7 +14,7 @@ from tauscope.recording.csv_numbers import Clock, is_number, parse_number, parse
 from tauscope.recording.intake import RowIntake
 from tauscope.recording.recording import Array, Recording
 from tauscope.recording.table import SPOOL_ABOVE_BYTES
-from tauscope.recording.units import Reading
+from tauscope.recording.units import SI, Reading
 
 _CHUNK_BYTES = 2**18
 _LONGEST_LINE_BYTES = 2**20
@@ -28,7 +28,7 @@ def read_csv(
     name: str,
     joint_count: int | None = None,
     spool_above_bytes: int = SPOOL_ABOVE_BYTES,
-    reading: Reading = Reading(),
+    reading: Reading = SI,
 ) -> Recording:
     """Read a CSV recording, in time linear and in memory bounded in its number of lines.
 

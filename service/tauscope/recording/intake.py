@@ -9,7 +9,7 @@ from tauscope.recording.recording import Recording
 from tauscope.recording.row_check import RowCheck, require_rising, require_rows
 from tauscope.recording.samples import Array, EffortKind
 from tauscope.recording.table import SPOOL_ABOVE_BYTES, TableBuilder
-from tauscope.recording.units import Conversion, Reading
+from tauscope.recording.units import SI, Conversion, Reading
 from tauscope.result_warning import ResultWarning
 
 LATE_ROWS = 8
@@ -28,7 +28,7 @@ class RowIntake:
         file: str,
         names: Sequence[str],
         effort_kind: EffortKind,
-        reading: Reading = Reading(),
+        reading: Reading = SI,
         expected_rows: int = 0,
         spool_above_bytes: int = SPOOL_ABOVE_BYTES,
     ) -> None:
@@ -92,8 +92,8 @@ class RowIntake:
         require_rows(len(self._builder), self._file)
         if self._repeated > REPEATED_SHARE * self._rows:
             raise RecordingError(
-                f"{self._file}: column t: {self._repeated} of {self._rows} rows repeat the time of another row, first at"
-                f" t = {self._first_repeated:.6g} s; write t with more digits"
+                f"{self._file}: column t: {self._repeated} of {self._rows} rows repeat the time of another row, first"
+                f" at t = {self._first_repeated:.6g} s; write t with more digits"
             )
         kind, table = self._conversion.effort_kind, self._builder.finish()
         return Recording(self._file, joint_count, kind, table, ignored, tuple(self._warnings()))

@@ -14,7 +14,7 @@ from tauscope.recording.intake import RowIntake
 from tauscope.recording.joint_state import JointState, JointStateLayout, JointStates, decode_cdr, decode_json
 from tauscope.recording.recording import EffortKind, Recording
 from tauscope.recording.table import SPOOL_ABOVE_BYTES
-from tauscope.recording.units import Reading
+from tauscope.recording.units import SI, Reading
 from tauscope.recording.words import listed, reason
 
 _MESSAGES_AT_ONCE = 4096
@@ -36,7 +36,7 @@ class Choice:
     joint_count: int | None = None
     joint_names: tuple[str, ...] | None = None
     spool_above_bytes: int = SPOOL_ABOVE_BYTES
-    reading: Reading = Reading()
+    reading: Reading = SI
 
 
 class JointStateTopic:

@@ -15,7 +15,7 @@ from tauscope.recording.inflation import require_plausible_inflation
 from tauscope.recording.intake import RowIntake
 from tauscope.recording.recording import Array, Recording
 from tauscope.recording.table import SPOOL_ABOVE_BYTES
-from tauscope.recording.units import Reading
+from tauscope.recording.units import SI, Reading
 from tauscope.recording.words import printable, reason
 
 PARQUET_MAGIC = b"PAR1"
@@ -29,7 +29,7 @@ def read_parquet(
     name: str,
     joint_count: int | None = None,
     spool_above_bytes: int = SPOOL_ABOVE_BYTES,
-    reading: Reading = Reading(),
+    reading: Reading = SI,
 ) -> Recording:
     """Read a Parquet recording batch by batch; null is a missed sample.
 

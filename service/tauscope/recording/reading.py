@@ -12,7 +12,7 @@ from tauscope.recording.mcap_format import MCAP_MAGIC, read_mcap
 from tauscope.recording.parquet_format import PARQUET_MAGIC, read_parquet
 from tauscope.recording.recording import Recording
 from tauscope.recording.rosbag2_format import SQLITE_MAGIC, read_database, read_rosbag2
-from tauscope.recording.units import Reading
+from tauscope.recording.units import SI, Reading
 from tauscope.recording.words import printable
 
 _LONGEST_PATH = 4096
@@ -36,7 +36,7 @@ def read_recording(
     path: str | Path,
     joint_count: int | None = None,
     joint_names: Sequence[str] | None = None,
-    reading: Reading = Reading(),
+    reading: Reading = SI,
 ) -> Recording:
     """Read a recording: CSV, Parquet, MCAP, or a rosbag2 folder or database; told apart by content.
 

@@ -60,6 +60,10 @@ class Reading:
         return replace(self, units=units, rate_hz=rate_hz, joint_types=types)
 
 
+SI = Reading()
+"""A file in SI units."""
+
+
 @dataclass(frozen=True, eq=False)
 class Conversion:
     """Turns rows of a file into SI.
@@ -81,10 +85,7 @@ class Conversion:
     def design(names: Sequence[str], effort_kind: EffortKind, reading: Reading) -> "Conversion":
         """The conversion of a table's columns."""
         time = reading.units.get("t", "s")
-        if time == "index":
-            seconds = 1.0 / (reading.rate_hz or 1.0)
-        else:
-            seconds = SECONDS[time]
+        seconds = 1.0 / (reading.rate_hz or 1.0) if time == "index" else SECONDS[time]
         torque = reading.units.get("tau")
         kind = effort_kind if torque is None else EffortKind.CURRENT if torque in CURRENTS else EffortKind.TORQUE
         columns, factors = [], []
@@ -126,12 +127,12 @@ def _factor(group: str, number: str, reading: Reading) -> float:
     if root is None:
         return 1.0
     units = reading.units
-    unit = units.get(f"{root}{number}", units.get(root))
-    if unit is None and root == "qd":  # a file in degrees holds degrees a second
-        unit = units.get(f"q{number}", units.get("q"))
+    unit = units.get(f"{root}{number}", units.get(root, ""))
+    if not unit and root == "qd":  # a file in degrees holds degrees a second
+        unit = units.get(f"q{number}", units.get("q", ""))
     joint = None if reading.joint_types is None or not number else reading.joint_types[int(number) - 1]
     if unit in RADIANS:
         return RADIANS[unit] if joint is not JointType.PRISMATIC else 1.0
     if unit in METRES:
         return METRES[unit] if joint is not JointType.REVOLUTE else 1.0
-    return CURRENTS.get(unit or "", 1.0)
+    return CURRENTS.get(unit, 1.0)

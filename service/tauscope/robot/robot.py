@@ -185,7 +185,7 @@ class Robot:
     urdf: Path | None = None
     urdf_links: tuple[tuple[str, ...], ...] = ()
     findings: tuple[Finding, ...] = ()
-    recording: RecordingLayout = RecordingLayout()
+    recording: RecordingLayout = field(default_factory=RecordingLayout)
 
     @property
     def joint_count(self) -> int:

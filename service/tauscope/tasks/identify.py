@@ -23,6 +23,7 @@ from tauscope.tasks.task import (
     Files,
     Outputs,
     Progress,
+    ReadingOptions,
     command_words,
     effort_kind,
     json_text,
@@ -34,7 +35,7 @@ from tauscope.tasks.task import (
 CutoffFrequency = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
 
-class IdentificationOptions(StrictModel):
+class IdentificationOptions(ReadingOptions):
     """How an identification is done."""
 
     estimator: Literal["ls", "wls"] = Field(default="wls", description="how the joints' equations are weighted")
@@ -65,6 +66,7 @@ class Request(StrictModel):
             estimator=options.estimator,
             cutoff=options.cutoff_hz,
             rotor_inertia=options.rotor_inertia,
+            **options.words,
         )
 
 
@@ -124,8 +126,8 @@ def perform(request: Request, files: Files, progress: Progress) -> Result:
     """
     progress("read robot and recordings")
     robot = read_robot(files.find("robot", request.robot))
-    recordings = read_recordings(files, "recordings", request.recordings, robot)
-    held_out = read_recordings(files, "held_out", request.held_out, robot)
+    recordings = read_recordings(files, "recordings", request.recordings, robot, request.options)
+    held_out = read_recordings(files, "held_out", request.held_out, robot, request.options)
     options = Options(Estimator(request.options.estimator), request.options.cutoff_hz, request.options.rotor_inertia)
     found = identify(robot, recordings, held_out, options, progress)
     return Result(request, files, robot, recordings, held_out, found, document(found))

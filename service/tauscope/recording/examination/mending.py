@@ -2,17 +2,13 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from typing import Literal
 
-import numpy as np
-
-from tauscope.errors import RecordingError
 from tauscope.recording.examination.edits import NO_NUMBERS, ColumnEdit, EditedTable, Numbers, row_numbers
 from tauscope.recording.examination.scan import Defects, JointDefects, find_defects
 from tauscope.recording.recording import Recording
 from tauscope.result_warning import ResultWarning
 from tauscope.robot.robot import JointType, Robot
-
-ROWS_AT_ONCE = 1 << 15
 
 FILLED_ROWS = 4
 """Rows without an effort that are filled in where positions and efforts come in rows of their own."""
@@ -21,14 +17,7 @@ BUS = "check the bus for lost reads and damaged frames"
 
 
 def mend_recording(recording: Recording, robot: Robot | None = None) -> Recording:
-    """Mask or repair the samples of a recording that were never measured, and say so in its notes.
-
-    Raises
-    ------
-    RecordingError
-        a joint has no effort at all
-    """
-    _require_effort(recording)
+    """Mask or repair the samples of a recording that were never measured, and say so in its notes."""
     types = [JointType.REVOLUTE] * recording.joint_count if robot is None else [joint.type for joint in robot.joints]
     names = [None] * len(types) if robot is None else [joint.name for joint in robot.joints]
     defects = find_defects(recording, types)
@@ -39,25 +28,10 @@ def mend_recording(recording: Recording, robot: Robot | None = None) -> Recordin
     return replace(recording, table=EditedTable(recording.table, edits), notes=notes)
 
 
-def _require_effort(recording: Recording) -> None:
-    """Refuse a recording in which a joint's effort is NaN throughout."""
-    n, kind = recording.joint_count, recording.effort_kind.value
-    seen = np.zeros(n, dtype=bool)
-    for start in range(0, len(recording), ROWS_AT_ONCE):
-        seen |= np.isfinite(recording.samples(start, start + ROWS_AT_ONCE).effort).any(axis=0)
-        if seen.all():
-            return
-    many = not seen.any() and n > 1
-    columns = f"columns {kind}1 to {kind}{n} are" if many else f"column {kind}{np.argmin(seen) + 1} is"
-    raise RecordingError(
-        f"{recording.name}: {columns} NaN throughout: no effort was recorded; record torques or currents of every joint"
-    )
-
-
 def _edits(recording: Recording, defects: Defects) -> dict[int, ColumnEdit]:
     """What is mended, by column."""
     edits: dict[int, ColumnEdit] = {}
-    n, names = recording.joint_count, recording.table.names
+    n = recording.joint_count
     for joint, found in enumerate(defects.joints):
         # A row without one joint's position is left out as a whole.
         position = found.position_edit(len(recording), defects.bunched if joint == 0 else NO_NUMBERS)
@@ -86,39 +60,47 @@ def _warnings(recording: Recording, defects: Defects, joints: Sequence[str | Non
         text = "positions and efforts stand in rows of their own; efforts are interpolated to the rows of the positions"
         yield ResultWarning(code="held-samples", text=text, remedy="record both at the same instants")
     kind = recording.effort_kind.value
-    for number, (joint, name) in enumerate(zip(defects.joints, joints, strict=True), 1):
-        for code, text, remedy in _joint_texts(joint, f"q{number}", f"{kind}{number}", begin):
-            yield ResultWarning(code=code, joint=name, text=f"column {text}", remedy=remedy)
+    alike: dict[tuple[str, str, str | None], list[int]] = {}
+    for number, joint in enumerate(defects.joints, 1):
+        for column, code, text, remedy in _joint_texts(joint, begin):
+            alike.setdefault((code, f"{column}: {text}", remedy), []).append(number)
+    for (code, text, remedy), numbers in alike.items():
+        group, _, words = text.partition(": ")
+        columns = [f"{kind if group == 'effort' else 'q'}{number}" for number in numbers]
+        many = "column" if len(columns) == 1 else "columns"
+        joint = joints[numbers[0] - 1] if len(numbers) == 1 else None
+        yield ResultWarning(code=code, joint=joint, text=f"{many} {', '.join(columns)}: {words}", remedy=remedy)
 
 
 def _joint_texts(
-    joint: JointDefects, q: str, effort: str, begin: Callable[[int], str]
-) -> Iterator[tuple[str, str, str | None]]:
-    """Code, text and remedy of each kind of defect of one joint."""
+    joint: JointDefects, begin: Callable[[int], str]
+) -> Iterator[tuple[Literal["q", "effort"], str, str, str | None]]:
+    """Column, code, text and remedy of each kind of defect of one joint."""
     if joint.wraps:
         first, times = min(joint.wraps)[0], "once" if len(joint.wraps) == 1 else f"{len(joint.wraps)} times"
-        yield "wrapped-angle", f"{q}: wraps by 2π {times}, {begin(first)}; unwrapped", None
+        yield "q", "wrapped-angle", f"wraps by 2π {times}, {begin(first)}; unwrapped", None
     if joint.jumps:
         jumps = sorted(joint.jumps)
         heights = ", ".join(f"{step:.4g}" for _, step in jumps[:3]) + (", …" if len(jumps) > 3 else "")
-        text = f"{q}: jumps by {heights}, {begin(jumps[0][0])}; taken out, the longest piece is kept as it is"
-        yield "encoder-reset", text, "home the encoder before the recording, and not within it"
+        text = f"jumps by {heights}, {begin(jumps[0][0])}; taken out, the longest piece is kept as it is"
+        yield "q", "encoder-reset", text, "home the encoder before the recording, and not within it"
     slow = "record at the rate of the controller"
     if len(joint.repeated):
-        text = f"{q}: holds each value for about {joint.hold} rows; {_counted(joint.repeated)} masked"
-        yield "held-samples", text, slow
+        text = f"each value is held for about {joint.hold} rows; {_counted(joint.repeated)} masked"
+        yield "q", "held-samples", text, slow
     if joint.effort_hold > 1:
-        text = f"{effort}: holds each value for about {joint.effort_hold} rows; interpolated from change to change"
-        yield "held-samples", text, slow
-    for code, column, rows, words in (
-        ("spikes", q, joint.spikes, "away from the neighbours by a jump and back"),
-        ("stuck-samples", q, joint.frozen, "with a repeated value that the next one makes up for"),
-        ("effort-dropouts", effort, row_numbers(joint.zeros), "of exactly zero between others that are not"),
-        ("stuck-samples", effort, joint.stuck, "with a repeated value while the joint moves"),
-        ("spikes", effort, joint.effort_spikes, "far from all of their neighbours"),
-    ):
+        text = f"each value is held for about {joint.effort_hold} rows; interpolated from change to change"
+        yield "effort", "held-samples", text, slow
+    masked: tuple[tuple[Literal["q", "effort"], str, Numbers, str], ...] = (
+        ("q", "spikes", joint.spikes, "away from the neighbours by a jump and back"),
+        ("q", "stuck-samples", joint.frozen, "with a repeated value that the next one makes up for"),
+        ("effort", "effort-dropouts", row_numbers(joint.zeros), "of exactly zero between others that are not"),
+        ("effort", "stuck-samples", joint.stuck, "with a repeated value while the joint moves"),
+        ("effort", "spikes", joint.effort_spikes, "far from all of their neighbours"),
+    )
+    for column, code, rows, words in masked:
         if len(rows):
-            yield code, f"{column}: {_counted(rows)} {words}, {begin(int(rows[0]))}; masked", BUS
+            yield column, code, f"{_counted(rows)} {words}, {begin(int(rows[0]))}; masked", BUS
 
 
 def _counted(rows: Numbers) -> str:

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tauscope.errors import RecordingError
 from tauscope.recording.examination.plausible_torque import find_implausible_torque
 from tauscope.recording.examination.sketch import Sketch
 from tauscope.recording.recording import Recording
@@ -69,25 +68,15 @@ class _Doubt:
     units: str
 
 
-def require_plausible(recording: Recording, robot: Robot | None = None) -> None:
-    """Refuse a recording of which a column can hardly be in the stated unit.
-
-    Raises
-    ------
-    RecordingError
-        one line naming file, column, evidence, and the option that mends it
-    """
+def find_implausible(recording: Recording, robot: Robot | None = None) -> str | None:
+    """A column that can hardly be in the stated unit: its name, the evidence, and the option that mends it."""
     sketch = Sketch.of(recording)
     types = _joint_types(recording, robot)
     doubt = _doubt_velocity(sketch, types) or _doubt_time(sketch) or _doubt_angle(sketch, types, robot)
     if doubt is not None:
         mend = f"read it with --units {doubt.units}" if doubt.units else "write it in SI units"
-        raise RecordingError(
-            f"{recording.name}: column {doubt.column}: {doubt.evidence}; {mend}, or go on with --trust-units"
-        )
-    fault = find_implausible_torque(recording, sketch, robot)
-    if fault is not None:
-        raise RecordingError(f"{recording.name}: {fault}, or go on with --trust-units")
+        return f"column {doubt.column}: {doubt.evidence}; {mend}"
+    return find_implausible_torque(recording, sketch, robot)
 
 
 def _joint_types(recording: Recording, robot: Robot | None) -> list[JointType]:

@@ -116,8 +116,8 @@ def _find_magnitude(recording: Recording, sketch: Sketch) -> str | None:
         if episodes >= FEWEST_TOUCHES and ways[0].any() and ways[1].any():
             column = f"{recording.effort_kind.value}{joint + 1}"
             return (
-                f"column {column}: never negative, though joint {joint + 1} moves both ways and the torque comes down to"
-                f" zero {episodes} times at speed: this is a magnitude; record torque with its sign"
+                f"column {column}: never negative, though joint {joint + 1} moves both ways and its torque comes down"
+                f" to zero {episodes} times at speed: this is a magnitude; record torque with its sign"
             )
     return None
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tauscope.recording.examination.edits import Numbers
 from tauscope.recording.examination.scales import ONE_TURN, PositionScale, neighbours_median, unwrap_steps
 from tauscope.recording.examination.sketch import BREAK
 from tauscope.recording.samples import Array
@@ -56,7 +57,7 @@ class PositionDefects:
 
 
 def scan_position(
-    rows: Array, time: Array, position: Array, scale: PositionScale, interval: float, core: tuple[int, int]
+    rows: Numbers, time: Array, position: Array, scale: PositionScale, interval: float, core: tuple[int, int]
 ) -> PositionDefects:
     """Defects of a block of one joint's known positions.
 
