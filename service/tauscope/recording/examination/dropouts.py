@@ -72,7 +72,7 @@ class ZeroRuns:
 
 
 def _drops(recording: Recording, run: tuple[int, int]) -> NDArray[np.float64]:
-    """By how much every joint's effort falls to zero and comes back, the lesser of both, (n,).
+    """By how much every joint's effort falls to zero and comes back, the lesser of both, (n,); 0 where the sign changes.
 
     A run that is open on one side counts where the arm stands still in it, as on its brakes: an arm that moves without
     effort swings freely.
@@ -84,5 +84,6 @@ def _drops(recording: Recording, run: tuple[int, int]) -> NDArray[np.float64]:
         return none
     if len(sides) == 1 and (stop - start < OPEN_ROWS or is_moving(recording.samples(start, stop).position)):
         return none
-    efforts = np.abs([recording.samples(row, row + 1).effort[0] for row in sides])
-    return np.nan_to_num(efforts.min(axis=0), nan=0.0)
+    efforts = np.array([recording.samples(row, row + 1).effort[0] for row in sides])
+    drops = np.where(efforts[0] * efforts[-1] > 0.0, np.abs(efforts).min(axis=0), 0.0)
+    return np.nan_to_num(drops, nan=0.0)

@@ -18,6 +18,9 @@ STUCK_ROWS = 10
 STUCK_RUNS = 5
 """Multiple of the rows for which values usually are."""
 
+USUAL_RUN = 3
+"""Rows for which noise lets no value be repeated: where it does, the effort comes in coarse steps and may rest."""
+
 LEAST_MOVE = 0.01
 """Distance above which a joint moves within some rows [rad or m]."""
 
@@ -34,6 +37,8 @@ def find_stuck(rows: Numbers, effort: Array, position: Array, scale: EffortScale
     position : (N,) float64
         q of the same rows [rad or m]
     """
+    if scale.run > USUAL_RUN * scale.hold:
+        return NO_NUMBERS
     edges = np.flatnonzero(np.diff(effort) != 0.0) + 1
     starts, stops = np.concatenate([[0], edges]), np.concatenate([edges, [len(effort)]])
     level = effort[starts]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tauscope.recording.examination.plausible_torque import find_implausible_torque
-from tauscope.recording.examination.sketch import Sketch
+from tauscope.recording.examination.sketch import Sketch, percentile
 from tauscope.recording.recording import Recording
 from tauscope.recording.units import METRES, RADIANS, SECONDS
 from tauscope.robot.robot import JointType, Robot
@@ -24,6 +24,9 @@ FASTEST_RATE_HZ = 2e5
 LONGEST_SWEEP_S = 1000.0
 """A joint that would need longer than this to cross its range at its own top speed is not moving [s]: slow friction
 sweeps take a few hundred."""
+
+SLOW_RATE_HZ, LONG_SWEEP_S = 10.0, 300.0
+"""Neither alone is strange, a rate below the one [Hz] or a sweep beyond the other [s]; both at once are."""
 
 LEAST_SWEEP = 0.05
 """A range below this is rest, whatever its speed [rad or m]."""
@@ -47,6 +50,12 @@ FEWEST_ROWS = 20
 
 MANY_TURNS = 4.0 * np.pi
 """Most joints of an arm of three joints or more keep below two turns [rad]."""
+
+FASTEST_ARM = 60.0
+"""No arm of three joints or more has most joints faster than this [rad/s]: the fastest reach 20."""
+
+QUARTER_TURN = 90.0
+"""Span in degrees from which gravity's torque shows that it swings in degrees."""
 
 LONGEST_SLIDE = 100.0
 """No prismatic joint is longer [m]."""
@@ -161,14 +170,15 @@ def _ratio_words(time: str, position: str, speed: str) -> str:
 def _doubt_time(sketch: Sketch) -> _Doubt | None:
     """Rates, and lengths of motions, that no arm's recording has."""
     ratios = _velocity_ratios(sketch)
-    if np.isfinite(ratios).any():
-        return None  # the recorded velocity vouches for the clock, whatever it shows
+    if (np.abs(ratios - 1.0) < AGREEMENT).any():
+        return None  # the recorded velocity vouches for the clock
     interval = sketch.interval
     moving = sketch.span > LEAST_SWEEP
     moving &= sketch.top_speed > 0.0
     sweep = float(np.min(sketch.span[moving] / sketch.top_speed[moving])) if moving.any() else 0.0
     whole = "" if not moving.any() else f" and the fastest joint takes {sweep:.3g} s to cross its range"
-    if interval >= 1.0 / SLOWEST_RATE_HZ or sweep > LONGEST_SWEEP_S:
+    is_slow = interval > 1.0 / SLOW_RATE_HZ and sweep > LONG_SWEEP_S
+    if interval >= 1.0 / SLOWEST_RATE_HZ or sweep > LONGEST_SWEEP_S or is_slow:
         text = f"rows are {interval:.4g} s apart{whole}: this is hardly in seconds"
         if abs(interval - 1.0) < 1e-9:
             return _Doubt("t", text, "t=ms where it counts ms, or --units t=index --rate HZ where it counts samples")
@@ -201,9 +211,16 @@ def _doubt_angle(sketch: Sketch, types: list[JointType], robot: Robot | None) ->
         joint = int(np.argmax(np.where(turned, sketch.reach, 0.0)))
         text = f"reaches {sketch.reach[joint]:.4g}, and {turned.sum()} of {len(types)} joints are beyond two turns"
         return _Doubt(f"q{joint + 1}", f"{text}, as angles in degrees are", "q=deg")
-    for joint in np.flatnonzero(revolute & (sketch.reach > 2.0 * np.pi)):
+    rushed = revolute & (percentile(np.abs(sketch.slope), 99.0) > FASTEST_ARM)
+    if rushed.sum() >= max(2.0, revolute.sum() / 2.0) and len(types) >= 3:
+        joint = int(np.argmax(np.where(rushed, sketch.reach, 0.0)))
+        text = (
+            f"moves at {sketch.top_speed[joint]:.4g} per second, and {rushed.sum()} of {len(types)} joints are as fast"
+        )
+        return _Doubt(f"q{joint + 1}", f"{text}, as angles in degrees are", "q=deg")
+    for joint in np.flatnonzero(revolute & (sketch.span > QUARTER_TURN)):
         if _swings_in_degrees(sketch, int(joint)):
-            text = f"reaches {sketch.reach[joint]:.4g}, and its torque swings once in 360, not once in 2π"
+            text = f"spans {sketch.span[joint]:.4g}, and its torque swings once in 360, not once in 2π"
             return _Doubt(f"q{joint + 1}", text, "q=deg")
     return None
 
@@ -244,7 +261,7 @@ def _swings_in_degrees(sketch: Sketch, joint: int) -> bool:
     if known.sum() < 10 * FEWEST_ROWS:
         return False
     angle, slope, torque = angle[known], slope[known], torque[known]
-    plain = [np.ones_like(angle), angle, slope, np.sign(slope)]
+    plain = [np.ones_like(angle), angle, slope, np.sign(slope), np.gradient(slope)]
 
     def residual(*columns: np.ndarray) -> float:
         matrix = np.column_stack([*plain, *columns])

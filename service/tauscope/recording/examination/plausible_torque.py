@@ -14,6 +14,9 @@ ABOVE_LIMITS = 5.0
 ABOVE_GRAVITY = 20.0
 """Multiple of the stated masses' gravity that no torque is: masses that are guessed are off by a few times."""
 
+LIVELY = 5.0
+"""Acceleration of the hand, relative to gravity's, from which a motion says nothing about gravity."""
+
 AS_GRAVITY = 0.8
 """Least cosine between torque and gravity's torque for which one is the other times a constant."""
 
@@ -147,7 +150,7 @@ def _find_excess(sketch: Sketch, robot: Robot | None) -> str | None:
 
 def _gravity_ratio(sketch: Sketch, robot: Robot) -> tuple[int, float] | None:
     """A joint whose torque follows gravity's, and how many times that it is; None where none does."""
-    if robot.model.links is None:
+    if robot.model.links is None or _is_lively(sketch, robot):
         return None
     known = np.flatnonzero(np.isfinite(sketch.position).all(axis=1) & np.isfinite(sketch.effort).all(axis=1))
     if len(known) < 10:
@@ -162,6 +165,15 @@ def _gravity_ratio(sketch: Sketch, robot: Robot) -> tuple[int, float] | None:
         return None
     joint = int(np.argmax(np.where(follows, weight, -1.0)))
     return joint, float(size[joint] / weight[joint])
+
+
+def _is_lively(sketch: Sketch, robot: Robot) -> bool:
+    """Whether inertia outweighs gravity, as in fast motion: then torque that follows gravity's may be larger."""
+    speed = percentile(np.abs(sketch.slope), 99.0)
+    acceleration = 2.0 * speed**2 / np.maximum(sketch.span, 1e-9)  # of a wave of this speed and span
+    revolute = np.array([joint.type is JointType.REVOLUTE for joint in robot.joints])
+    lever = np.where(revolute, _reach(robot, sketch), 1.0)
+    return bool((acceleration * lever).max() > LIVELY * 9.81)
 
 
 def _gravity_torque(robot: Robot, position: Array) -> Array:
