@@ -16,6 +16,9 @@ DROP = 10.0
 COMMON_DROP = 2.0
 """The same of at least one joint, where the efforts of all joints are exactly zero at once."""
 
+COMMON_ROWS = 3
+"""Rows, at least, in which all efforts are exactly zero by no accident: one side of the drop is enough."""
+
 OPEN_ROWS = 10
 """Rows of a dropout, at least, that reaches to the beginning or the end of the recording."""
 
@@ -58,7 +61,7 @@ class ZeroRuns:
         *own, common = ([] if len(runs) > MOST_RUNS else runs for runs in self._runs)
         lost: list[set[tuple[int, int]]] = [set() for _ in own]
         for run in common if len(own) > 1 else ():
-            drops = _drops(recording, run)
+            drops = _drops(recording, run, common=True)
             if any(drop > COMMON_DROP * scale.change for drop, scale in zip(drops, self._scales, strict=True)):
                 for ranges in lost:
                     ranges.add(run)
@@ -71,8 +74,8 @@ class ZeroRuns:
         return [np.array(sorted(ranges), dtype=np.int64).reshape(-1, 2) for ranges in lost]
 
 
-def _drops(recording: Recording, run: tuple[int, int]) -> NDArray[np.float64]:
-    """By how much every joint's effort falls to zero and comes back, the lesser of both, (n,); 0 where the sign changes.
+def _drops(recording: Recording, run: tuple[int, int], *, common: bool = False) -> NDArray[np.float64]:
+    """By how much every joint's effort falls to zero and comes back, the lesser of both, (n,); 0 where it changes sign.
 
     A run that is open on one side counts where the arm stands still in it, as on its brakes: an arm that moves without
     effort swings freely.
@@ -85,5 +88,7 @@ def _drops(recording: Recording, run: tuple[int, int]) -> NDArray[np.float64]:
     if len(sides) == 1 and (stop - start < OPEN_ROWS or is_moving(recording.samples(start, stop).position)):
         return none
     efforts = np.array([recording.samples(row, row + 1).effort[0] for row in sides])
+    if common and stop - start >= COMMON_ROWS:
+        return np.nan_to_num(np.abs(efforts).max(axis=0), nan=0.0)
     drops = np.where(efforts[0] * efforts[-1] > 0.0, np.abs(efforts).min(axis=0), 0.0)
     return np.nan_to_num(drops, nan=0.0)

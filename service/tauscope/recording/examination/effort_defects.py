@@ -62,7 +62,7 @@ def find_spikes(rows: Numbers, effort: Array, scale: EffortScale) -> Numbers:
     effort : (N,) float64
         in the recording's own unit, finite
     """
-    least = max(SURPRISE * scale.surprise, SPAN * (scale.high - scale.low))
+    least = max(SURPRISE * scale.surprise, SPAN * scale.span)
     large = np.flatnonzero(np.abs(np.diff(effort)) > least)
     # Most blocks have no change as large, and neighbours are dear: only the surroundings are looked at.
     if not len(large) or least == 0.0 or len(effort) < 2 * NEIGHBOURS + 1:

@@ -58,6 +58,8 @@ class EffortScale:
 
     low, high : float
         1st and 99th percentile
+    span : float
+        from the 5th to the 95th percentile
     change : float
         90th percentile of the change from row to row
     surprise : float
@@ -68,6 +70,7 @@ class EffortScale:
 
     low: float
     high: float
+    span: float
     change: float
     surprise: float
     run: int
@@ -98,26 +101,29 @@ def measure_efforts(sketch: Sketch) -> list[EffortScale]:
     for values in sketch.effort.T:
         known = values[np.isfinite(values)]
         if len(known) < 2:
-            scales.append(EffortScale(0.0, 0.0, 0.0, 0.0, 1, 1))
+            scales.append(EffortScale(0.0, 0.0, 0.0, 0.0, 0.0, 1, 1))
             continue
         _, run, hold = _measure_holds([known])
         changes = np.abs(np.diff(known))
-        low, high = np.percentile(known, [1.0, 99.0])
+        low, lower, upper, high = (float(value) for value in np.percentile(known, [1.0, 5.0, 95.0, 99.0]))
         beyond = distance_beyond(neighbour_windows(known))
         change, surprise = _percentile(changes[changes > 0.0], 90.0), _percentile(beyond[beyond > 0.0], 90.0)
-        scales.append(EffortScale(float(low), float(high), change, surprise, run, hold))
+        scales.append(EffortScale(low, high, upper - lower, change, surprise, run, hold))
     return scales
 
 
 def unwrap_steps(steps: Array, *, is_wrapped: bool) -> Array:
-    """Steps of an angle without whole turns.
+    """Steps of an angle without the turn that a wrap adds.
 
     Parameters
     ----------
     steps : (N,) float64
         changes from row to row [rad]
     """
-    return steps - ONE_TURN * np.rint(steps / ONE_TURN) if is_wrapped else steps
+    if not is_wrapped:
+        return steps
+    turns = np.rint(steps / ONE_TURN)
+    return steps - ONE_TURN * np.where(np.abs(turns) > 1.0, 0.0, turns)  # two turns at once are a spike
 
 
 def neighbours_median(values: Array) -> Array:

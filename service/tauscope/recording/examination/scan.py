@@ -34,6 +34,9 @@ BUNCHED = 0.1
 MOST_BUNCHED = 0.1
 """Share of bunched stamps above which the source always sends in bursts: the conditioning counts its rows."""
 
+IN_STEP = 0.8
+"""Share of the repeated rows that all efforts have in common where they are held at once."""
+
 MOST_JUMPS = 20
 """Jumps of one joint above which it is no encoder that was reset."""
 
@@ -96,11 +99,19 @@ class Defects:
         rows whose stamp is that of a neighbour
     alternate : bool
         whether positions and efforts come in rows of their own
+    paced : (m,) int64
+        rows that repeat the efforts of all joints, where all are held at once and positions are not
     """
 
     joints: list[JointDefects]
     alternate: bool
     bunched: Numbers = field(default_factory=lambda: NO_NUMBERS)
+    paced: Numbers = field(default_factory=lambda: NO_NUMBERS)
+
+    @property
+    def lost(self) -> Numbers:
+        """Rows that are left out whole, (m,)."""
+        return np.union1d(self.bunched, self.paced)
 
 
 def find_defects(recording: Recording, types: list[JointType]) -> Defects:
@@ -137,11 +148,21 @@ class _Scan:
     zeros: ZeroRuns
     found: dict[tuple[int, str], list[Numbers]] = field(default_factory=dict)
 
+    @property
+    def pace(self) -> int:
+        """Rows for which all efforts are held, where positions are not; 1 where they are not."""
+        holds = [joint.effort_hold for joint in self.defects.joints]
+        is_held = min(holds) > 1 and all(joint.hold == 1 for joint in self.defects.joints)
+        return int(np.median(holds)) if is_held and not self.defects.alternate else 1
+
     def add(self, samples: Samples, first: int, core: tuple[int, int]) -> None:
         """Take a block, of which the rows of `core` are its own and the others neighbours."""
         rows = np.arange(first, first + len(samples.time))
         close = _bunched(samples.time, self.interval)
         self._keep(0, "bunched", rows[close], core)
+        if self.pace > 1:
+            same = (samples.effort[1:] == samples.effort[:-1]).all(axis=1)
+            self._keep(0, "paced", rows[_repeated(np.concatenate([[False], same]), self.pace)], core)
         for joint, (place, scale) in enumerate(zip(self.defects.joints, self.positions, strict=True)):
             position = np.ascontiguousarray(samples.position[:, joint])
             known = np.isfinite(position) & ~close
@@ -151,7 +172,8 @@ class _Scan:
             self._keep(joint, "spikes", np.array(fault.spikes, dtype=np.int64), core)
             self._keep(joint, "frozen", np.array(fault.frozen, dtype=np.int64), (0, core[1]))
             if place.hold > 1:
-                self._keep(joint, "repeated", rows[_held(position, place.hold)], core)
+                same = np.concatenate([[False], position[1:] == position[:-1]])
+                self._keep(joint, "repeated", rows[_repeated(same, place.hold)], core)
             effort, measure = np.ascontiguousarray(samples.effort[:, joint]), self.efforts[joint]
             known = np.isfinite(effort) & (effort != 0.0)  # zeros are looked at elsewhere
             if known.any():
@@ -162,10 +184,12 @@ class _Scan:
         """What was found in all blocks."""
         defects = self.defects
         for (joint, name), parts in self.found.items():
-            target = defects if name == "bunched" else defects.joints[joint]
+            target = defects if name in ("bunched", "paced") else defects.joints[joint]
             setattr(target, name, np.unique(np.concatenate(parts)))
         if len(defects.bunched) > MOST_BUNCHED * len(recording):
             defects.bunched = NO_NUMBERS
+        if len(defects.paced) < IN_STEP * (1.0 - 1.0 / self.pace) * len(recording):
+            defects.paced = NO_NUMBERS
         for joint, ranges in zip(defects.joints, self.zeros.dropouts(recording), strict=True):
             joint.zeros = ranges
             if len(joint.jumps) > MOST_JUMPS:
@@ -190,9 +214,8 @@ def _bunched(time: Array, interval: float) -> NDArray[np.bool_]:
     return close
 
 
-def _held(position: Array, hold: int) -> NDArray[np.bool_]:
-    """Rows that repeat a held position; of a longer rest one row in `hold` is kept."""
-    same = np.concatenate([[False], position[1:] == position[:-1]])
-    number = np.arange(len(position))
+def _repeated(same: NDArray[np.bool_], hold: int) -> NDArray[np.bool_]:
+    """Rows that repeat a held value; of a longer rest one row in `hold` is kept."""
+    number = np.arange(len(same))
     since = number - np.maximum.accumulate(np.where(same, 0, number))
     return same & (since % hold != 0)
