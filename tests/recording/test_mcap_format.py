@@ -210,8 +210,7 @@ BAD_LOGS = [
     (edited(4, name=["a", "joint2"]), "message 5: joint joint1 is missing (the message names a, joint2)"),
     (edited(4, position=[1.0, np.inf]), "message 5, column q2: the value is infinite"),
     (edited(0, position=[], effort=[], velocity=[], name=[]), "message 1: carries no positions"),
-    (edited(4, header=messages()[3][1]["header"]), "message 5, column t: time repeats"),
-    (edited(4, header=messages()[2][1]["header"]), "message 5, column t: time runs backwards"),
+    (edited(14, header=messages()[2][1]["header"]), "message 15, column t: time runs backwards"),
     (NO_EFFORT, "message 1: carries no effort"),
     (messages(5), "holds only 5 samples"),
     ([], "no sensor_msgs/msg/JointState message was recorded"),
@@ -224,6 +223,14 @@ def test_bad_messages_are_refused_with_their_number(tmp_path, log, expected):
     message = message_of(lambda: read_recording(path))
     assert message.startswith(f"{path}: ")
     assert expected in message
+
+
+@pytest.mark.parametrize(("row", "words"), [(3, "1 row has the time"), (2, "1 row came after a later one")])
+def test_a_repeated_or_late_stamp_is_mended(tmp_path, row, words):
+    log = edited(4, header=messages()[row][1]["header"])
+    recording = read_recording(log_file(tmp_path, {"/joint_states": log}))
+    assert (np.diff(recording.samples().time) > 0).all()
+    assert words in recording.warnings[0].text
 
 
 def test_missed_samples_are_nan(tmp_path):

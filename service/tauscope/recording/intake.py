@@ -90,7 +90,7 @@ class RowIntake:
         """
         self._builder.append(self._tail)
         require_rows(len(self._builder), self._file)
-        if self._repeated > REPEATED_SHARE * self._rows:
+        if self._repeated > max(LATE_ROWS, REPEATED_SHARE * self._rows):
             raise RecordingError(
                 f"{self._file}: column t: {self._repeated} of {self._rows} rows repeat the time of another row, first"
                 f" at t = {self._first_repeated:.6g} s; write t with more digits"

@@ -9,7 +9,7 @@ from tauscope.recording.samples import Array
 SURPRISE = 20.0
 """Multiple of the usual distance beyond the neighbours' range above which a sample is a spike."""
 
-SPAN = 0.1
+SPAN = 0.15
 """Share of the effort's usual range that this distance exceeds, too."""
 
 STUCK_ROWS = 10

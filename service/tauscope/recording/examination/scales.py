@@ -14,6 +14,9 @@ ONE_TURN = 2.0 * np.pi
 TURN_SPARE = 0.01
 """Beyond one turn by this, an angle is not wrapped [rad]."""
 
+LARGEST_STEP = np.pi / 2.0
+"""Turn between two samples up to which it can be told which way [rad]."""
+
 STEPS_OF_A_MOVE = 4.0
 """A value that moves by so many of its own steps in one row is sampled too coarsely to rest in the next."""
 
@@ -63,7 +66,7 @@ class EffortScale:
     change : float
         90th percentile of the change from row to row
     surprise : float
-        90th percentile of the distance beyond the range of the neighbours, of efforts beyond it
+        95th percentile of the distance beyond the range of the neighbours
     run : int
         99th percentile of the rows for which a value is repeated
     """
@@ -107,7 +110,7 @@ def measure_efforts(sketch: Sketch) -> list[EffortScale]:
         changes = np.abs(np.diff(known))
         low, lower, upper, high = (float(value) for value in np.percentile(known, [1.0, 5.0, 95.0, 99.0]))
         beyond = distance_beyond(neighbour_windows(known))
-        change, surprise = _percentile(changes[changes > 0.0], 90.0), _percentile(beyond[beyond > 0.0], 90.0)
+        change, surprise = _percentile(changes[changes > 0.0], 90.0), _percentile(beyond, 95.0)
         scales.append(EffortScale(low, high, upper - lower, change, surprise, run, hold))
     return scales
 
@@ -122,8 +125,8 @@ def unwrap_steps(steps: Array, *, is_wrapped: bool) -> Array:
     """
     if not is_wrapped:
         return steps
-    turns = np.rint(steps / ONE_TURN)
-    return steps - ONE_TURN * np.where(np.abs(turns) > 1.0, 0.0, turns)  # two turns at once are a spike
+    is_wrap = np.abs(np.abs(steps) - ONE_TURN) < LARGEST_STEP  # two turns at once are a spike
+    return steps - ONE_TURN * np.sign(steps) * is_wrap
 
 
 def neighbours_median(values: Array) -> Array:
