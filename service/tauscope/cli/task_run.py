@@ -11,6 +11,7 @@ from pydantic import BaseModel, ValidationError
 from tauscope.cli.output_files import STANDARD_OUTPUT, require_distinct, require_free, write_file
 from tauscope.cli.terminal import Told, output, plain, shown_progress
 from tauscope.export.formats import SUFFIXES, ExportFile, ExportFormat
+from tauscope.recording import Recording
 from tauscope.robot import Robot, Severity, read_robot
 from tauscope.robot.messages import one_line
 from tauscope.tasks.task import LocalFiles
@@ -71,7 +72,7 @@ def run_task(
     if STANDARD_OUTPUT not in paths:
         for path in written:
             output().print(plain(f"wrote {path}"), soft_wrap=True)
-    _show_warnings(robot)
+    _show_warnings(robot, (*getattr(result, "recordings", ()), *getattr(result, "held_out", ())))
     return result
 
 
@@ -121,8 +122,11 @@ def export_outputs(paths: Sequence[Path], files: Mapping[ExportFormat, ExportFil
     return made
 
 
-def _show_warnings(robot: Robot) -> None:
-    """Warnings of a robot file, on standard error."""
+def _show_warnings(robot: Robot, recordings: Iterable[Recording]) -> None:
+    """Warnings of a robot file, and about samples of recordings, on standard error."""
     for finding in robot.findings:
         if finding.severity is Severity.WARNING:
             typer.echo(one_line(f"warning: {finding.where}: {finding.text}"), err=True)
+    for warning in (warning for recording in recordings for warning in recording.warnings):
+        remedy = f"; {warning.remedy}" if warning.remedy else ""
+        typer.echo(one_line(f"warning: {warning.text}{remedy} ({warning.code})"), err=True)

@@ -72,10 +72,10 @@ class Joint:
     limits: JointLimits = JointLimits()
     gear_ratio: float | None = None
     torque_constant: float = 1.0
-    has_torque_constant: bool = False
     sign: int = 1
     friction_shape: FrictionShape = FrictionShape()
     drive: Mapping[str, Any] | None = None
+    has_torque_constant: bool = False
 
 
 @dataclass(frozen=True, eq=False)

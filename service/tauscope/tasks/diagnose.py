@@ -104,6 +104,7 @@ class Result:
     request: Request
     files: Files
     recordings: tuple[Recording, ...]
+    held_out: tuple[Recording, ...]
     diagnosis: Diagnosis
     document: DiagnosisDocument
     planned: PlannedExperiment | None
@@ -190,4 +191,4 @@ def perform(request: Request, files: Files, progress: Progress) -> Result:
         refusal = error
     target = files.target("trajectory.json") or files.target("trajectory.csv")
     name = None if planned is None or target is None else str(target)
-    return Result(request, files, recordings, found, document(found, planned, name), planned, refusal)
+    return Result(request, files, recordings, held_out, found, document(found, planned, name), planned, refusal)
