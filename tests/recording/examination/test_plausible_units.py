@@ -107,8 +107,9 @@ def test_degrees_of_a_single_pendulum_show_in_its_torque() -> None:
 
 def test_registers_and_magnitudes_are_refused() -> None:
     samples = swing()
-    registers = np.mod(np.rint(samples.effort * 20), 65536)
-    assert "register of 16 bits" in str(find_implausible(changed(samples, effort=registers)))
+    counts = np.rint(samples.effort * 20)
+    for registers in (np.mod(counts, 65536), np.where(counts < 0, 1024 - counts, counts)):
+        assert "register has that is read without its sign" in str(find_implausible(changed(samples, effort=registers)))
     assert "this is a magnitude" in str(find_implausible(changed(samples, effort=np.abs(samples.effort))))
 
 

@@ -25,8 +25,8 @@ POSTURES = 400
 LARGEST_TORQUE = 1e6
 """No joint's torque is larger [Nm or N]."""
 
-REGISTER_RANGE = 1 << 15
-"""A negative 16-bit number that is read without its sign is at least this."""
+REGISTER_RANGE = 1 << 10
+"""A negative number that is read without its sign is at least this: signs are in bit 10 of old servos, or in bit 15."""
 
 REGISTER_LEVEL = 30.0
 """Torque in whole Nm belongs to an arm whose wrist, too, has this much; a register has it at every joint [Nm]."""
@@ -79,8 +79,8 @@ def _find_register(recording: Recording, sketch: Sketch, robot: Robot | None) ->
     if effort[known].min() >= 0.0 and highest.max() >= REGISTER_RANGE:
         joint = int(np.argmax(highest))
         return (
-            f"column {name}{joint + 1}: whole numbers up to {highest[joint]:.0f} and none below zero, as a register of"
-            " 16 bits has that is read without its sign; write signed numbers"
+            f"column {name}{joint + 1}: whole numbers up to {highest[joint]:.0f} and none below zero at any joint, as a"
+            " register has that is read without its sign; write signed numbers"
         )
     if recording.effort_kind is EffortKind.CURRENT:
         return None

@@ -30,6 +30,9 @@ MOVING_SHARE = 0.2
 LONGEST_HOLD = 64
 """Rows of the longest hold: a source of 30 Hz on a topic of 2 kHz."""
 
+JUDGED_ROWS = 2048
+"""Rows whose neighbours are looked at for a typical size."""
+
 NEIGHBOURS = 3
 """Rows on either side that a row is judged by."""
 
@@ -109,7 +112,7 @@ def measure_efforts(sketch: Sketch) -> list[EffortScale]:
         _, run, hold = _measure_holds([known])
         changes = np.abs(np.diff(known))
         low, lower, upper, high = (float(value) for value in np.percentile(known, [1.0, 5.0, 95.0, 99.0]))
-        beyond = distance_beyond(neighbour_windows(known))
+        beyond = distance_beyond(neighbour_windows(known)[:: max(1, len(known) // JUDGED_ROWS)])
         change, surprise = _percentile(changes[changes > 0.0], 90.0), _percentile(beyond, 95.0)
         scales.append(EffortScale(low, high, upper - lower, change, surprise, run, hold))
     return scales
