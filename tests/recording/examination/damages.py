@@ -103,9 +103,10 @@ def freeze_positions(channels: Channels, rng: np.random.Generator) -> None:
     speed = np.abs(np.gradient(channels.position, axis=0))
     joint = int(rng.integers(channels.position.shape[1]))
     fast = np.flatnonzero(speed[:, joint] > 0.5 * speed[:, joint].max())
-    fast = fast[(fast > 20) & (fast < len(speed) - 20)]
-    for row in rng.choice(fast, 3, replace=False):
-        channels.position[row : row + 5, joint] = channels.position[row, joint]
+    fast = np.unique(fast[(fast > 40) & (fast < len(speed) - 40)] // 40)
+    length = int(rng.integers(2, 7))
+    for row in 40 * rng.choice(fast, min(3, len(fast)), replace=False):
+        channels.position[row : row + length, joint] = channels.position[row, joint]
 
 
 def stick_efforts(channels: Channels, rng: np.random.Generator) -> None:

@@ -23,7 +23,7 @@ ARM, JUDGE = simulate(ROBOT, seed=1), simulate(ROBOT, seed=2)
 BASE = ARM.recording(ARM.white(PAPER_NOISE, np.random.default_rng(0)), ARM.white(1e-5, np.random.default_rng(3)))
 HELD_OUT = JUDGE.recording(JUDGE.white(PAPER_NOISE, np.random.default_rng(5)))
 Damage = Callable[[Channels, np.random.Generator], None]
-SLOW = {hold_efforts: 4, hold_all: 3}
+SLOW: dict[Damage, int] = {hold_efforts: 4, hold_all: 3}
 """Damages that lower the rate of a recording, and by how much."""
 
 

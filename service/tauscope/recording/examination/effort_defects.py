@@ -1,5 +1,7 @@
 """Efforts that no drive measured: stuck values, and spikes."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from tauscope.recording.examination.edits import NO_NUMBERS, Numbers
@@ -34,8 +36,8 @@ def find_stuck(rows: Numbers, effort: Array, position: Array, scale: EffortScale
         row of each value within the recording
     effort : (N,) float64
         in the recording's own unit, finite
-    position : (N,) float64
-        q of the same rows [rad or m]
+    position : (N, n) float64
+        q of all joints in the same rows [rad or m]
     """
     if scale.run > USUAL_RUN * scale.hold:
         return NO_NUMBERS
@@ -47,8 +49,30 @@ def find_stuck(rows: Numbers, effort: Array, position: Array, scale: EffortScale
     found = [
         rows[start + 1 : stop]  # the first of them was measured
         for start, stop in zip(starts[is_long], stops[is_long], strict=True)
-        if is_moving(position[start:stop, None])
+        if is_moving(position[start:stop])
     ]
+    return np.concatenate([NO_NUMBERS, *found])
+
+
+def find_all_stuck(rows: Numbers, effort: Array, position: Array, scales: Sequence[EffortScale]) -> Numbers:
+    """Rows of a block in which the efforts of several joints are stuck at once, whatever their level.
+
+    Parameters
+    ----------
+    rows : (N,) int64
+        row of each value within the recording
+    effort : (N, n) float64
+        in the recording's own unit
+    position : (N, n) float64
+        q of the same rows [rad or m]
+    """
+    if len(scales) < 2 or not any(0 < scale.run <= USUAL_RUN * scale.hold for scale in scales):
+        return NO_NUMBERS
+    same = np.concatenate([[False], (effort[1:] == effort[:-1]).all(axis=1) & (effort[1:] != 0.0).any(axis=1)])
+    runs = np.flatnonzero(np.diff(same, prepend=False, append=False)).reshape(-1, 2)
+    least = max(STUCK_ROWS, *(STUCK_RUNS * scale.hold for scale in scales))
+    long = runs[runs[:, 1] - runs[:, 0] >= least - 1]
+    found = [rows[start:stop] for start, stop in long if is_moving(position[start - 1 : stop])]
     return np.concatenate([NO_NUMBERS, *found])
 
 
@@ -68,7 +92,10 @@ def find_spikes(rows: Numbers, effort: Array, scale: EffortScale) -> Numbers:
     if not len(large) or least == 0.0 or len(effort) < 2 * NEIGHBOURS + 1:
         return NO_NUMBERS
     near = np.unique(large[:, None] + np.arange(2))
-    return rows[near[distance_beyond(neighbour_windows(effort)[near]) > least]]
+    # At the ends there are neighbours on one side only, and a signal that rises is beyond all of them.
+    is_end = (near < NEIGHBOURS) | (near >= len(effort) - NEIGHBOURS)
+    limit = np.where(is_end, max(least, scale.span), least)
+    return rows[near[distance_beyond(neighbour_windows(effort)[near]) > limit]]
 
 
 def is_moving(position: Array) -> bool:

@@ -96,7 +96,7 @@ def _joint_texts(
         ("q", "spikes", joint.spikes, "away from the neighbours by a jump and back"),
         ("q", "stuck-samples", joint.frozen, "with a repeated value that the next one makes up for"),
         ("effort", "effort-dropouts", row_numbers(joint.zeros), "of exactly zero between others that are not"),
-        ("effort", "stuck-samples", joint.stuck, "with a repeated value while the joint moves"),
+        ("effort", "stuck-samples", joint.stuck, "with a repeated value while the arm moves"),
         ("effort", "spikes", joint.effort_spikes, "far from all of their neighbours"),
     )
     for column, code, rows, words in masked:

@@ -247,8 +247,8 @@ def _beyond_limits(sketch: Sketch, kind: np.ndarray, factor: float, robot: Robot
         return None
     outside, joint, low, high = max(beyond)
     reach = sketch.reach[joint]
-    if reach < 2.0 * max(abs(low), abs(high)):
-        return None  # an offset of the encoder, not a unit
+    if reach < 2.0 * max(abs(low), abs(high)) or (factor != METRES["mm"] and reach < MANY_TURNS):
+        return None  # an offset of the encoder, or an angle that counts from 0 to 2π, and not a unit
     return joint, f"reaches {reach:.4g}, beyond its limits {low:.4g} to {high:.4g} in {100 * outside:.0f} % of the rows"
 
 

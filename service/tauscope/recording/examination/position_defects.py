@@ -30,14 +30,14 @@ JUMP = 5.0
 LEAST_JUMP = 0.01
 """Smallest jump that is called one [rad or m]."""
 
-FROZEN_ROWS = 3
-"""Repeated rows, at least, before a step that makes up for them."""
-
 MAKES_UP = 1.6
-"""Largest speed of that step over the rows that it makes up for, relative to the speed before and after."""
+"""Largest step after frozen rows over the motion that it makes up for, by the speed before and after."""
 
-CATCHES_UP = 2.0
+CATCHES_UP = 1.5
 """Least size of that step, relative to those that follow: a joint that starts to move goes on as it starts."""
+
+STOPS_AT = 0.3
+"""Least speed before frozen rows, relative to the speed after them: a joint that stops slows down first."""
 
 
 @dataclass
@@ -86,22 +86,21 @@ def scan_position(
     if least == 0.0 or np.abs(steps).max() <= least:
         return found
     surprise = steps - neighbours_median(steps)
-    large = np.flatnonzero(np.abs(surprise) > least)
+    large = np.flatnonzero((np.abs(surprise) > least) & (steps != 0.0))  # a rest is judged by the step that ends it
     whole = np.diff(time) < (BREAK + LONGEST_SPIKE) * interval
     index = 0
     while index < len(large):
         a = int(large[index])
-        partner = next((int(b) for b in large[index + 1 : index + 4] if _returns(surprise, a, int(b))), None)
+        frozen = _frozen_rows(steps, a)
+        partner = None if frozen else next((b for b in large[index + 1 : index + 4] if _returns(surprise, a, b)), None)
         index += 1
-        if partner is not None:
+        if frozen and is_core[a]:
+            found.frozen += [int(row) for row in rows[a - frozen + 1 : a + 1]]
+        elif partner is not None:
             found.spikes += [int(row) for row in rows[a + 1 : partner + 1] if core[0] <= row < core[1]]
             index = int(np.searchsorted(large, partner)) + 1
-        elif is_core[a]:
-            frozen = _frozen_rows(steps, a)
-            if frozen:
-                found.frozen += [int(row) for row in rows[a - frozen + 1 : a + 1]]
-            elif abs(surprise[a]) > max(JUMP * scale.move, LEAST_JUMP) and whole[a]:
-                found.jumps.append((int(rows[a + 1]), float(surprise[a])))
+        elif is_core[a] and abs(surprise[a]) > max(JUMP * scale.move, LEAST_JUMP) and whole[a]:
+            found.jumps.append((int(rows[a + 1]), float(surprise[a])))
     return found
 
 
@@ -114,12 +113,12 @@ def _returns(surprise: Array, a: int, b: int) -> bool:
 def _frozen_rows(steps: Array, k: int) -> int:
     """Repeated rows before a step that makes up for them; 0 where it does not."""
     moved = np.flatnonzero(steps[:k])
-    rest = k - 1 - (int(moved[-1]) if len(moved) else -1)
-    if rest < FROZEN_ROWS:
+    rest = k - 1 - (int(moved[-1]) if len(moved) else k)
+    if rest < 1:
         return 0
-    before = np.abs(steps[moved[-5:]]) if len(moved) else np.zeros(0)
-    around = np.concatenate([before, np.abs(steps[k + 1 : k + 6])])
-    speed = float(np.max(around, initial=0.0))
-    after = float(np.max(np.abs(steps[k + 1 : k + 6]), initial=0.0))
-    step = abs(float(steps[k]))
-    return rest if CATCHES_UP * after <= step <= MAKES_UP * (rest + 1) * speed else 0
+    sizes = np.abs(steps)
+    before, after, step = sizes[moved[-5:]], sizes[k + 1 : k + 6], float(sizes[k])
+    after = after[after > 0.0]
+    if not len(after) or before[-1] < STOPS_AT * np.median(after) or step < CATCHES_UP * np.median(after):
+        return 0
+    return rest if step <= MAKES_UP * (rest + 1) * max(before.max(), after.max()) else 0

@@ -106,7 +106,7 @@ def measure_efforts(sketch: Sketch) -> list[EffortScale]:
     scales = []
     for values in sketch.effort.T:
         known = values[np.isfinite(values)]
-        if len(known) < 2:
+        if len(known) <= NEIGHBOURS:
             scales.append(EffortScale(0.0, 0.0, 0.0, 0.0, 0.0, 1, 1))
             continue
         _, run, hold = _measure_holds([known])
@@ -144,14 +144,14 @@ def neighbours_median(values: Array) -> Array:
 
 
 def neighbour_windows(values: Array) -> Array:
-    """Each value with its neighbours, (N, 7); the ends are repeated.
+    """Each value with its neighbours, (N, 7), mirrored at the ends.
 
     Parameters
     ----------
     values : (N,) float64
         a signal
     """
-    return np.lib.stride_tricks.sliding_window_view(np.pad(values, NEIGHBOURS, mode="edge"), 2 * NEIGHBOURS + 1)
+    return np.lib.stride_tricks.sliding_window_view(np.pad(values, NEIGHBOURS, mode="reflect"), 2 * NEIGHBOURS + 1)
 
 
 def distance_beyond(windows: Array) -> Array:

@@ -15,7 +15,7 @@ from tauscope.recording.examination.edits import (
     join_ranges,
     row_numbers,
 )
-from tauscope.recording.examination.effort_defects import find_spikes, find_stuck
+from tauscope.recording.examination.effort_defects import find_all_stuck, find_spikes, find_stuck
 from tauscope.recording.examination.position_defects import scan_position
 from tauscope.recording.examination.scales import EffortScale, PositionScale, measure_efforts, measure_positions
 from tauscope.recording.examination.sketch import Sketch
@@ -163,7 +163,9 @@ class _Scan:
         if self.pace > 1:
             same = (samples.effort[1:] == samples.effort[:-1]).all(axis=1)
             self._keep(0, "paced", rows[_repeated(np.concatenate([[False], same]), self.pace)], core)
+        stuck = find_all_stuck(rows, samples.effort, samples.position, self.efforts)
         for joint, (place, scale) in enumerate(zip(self.defects.joints, self.positions, strict=True)):
+            self._keep(joint, "stuck", stuck, core)
             position = np.ascontiguousarray(samples.position[:, joint])
             known = np.isfinite(position) & ~close
             fault = scan_position(rows[known], samples.time[known], position[known], scale, self.interval, core)
@@ -178,7 +180,9 @@ class _Scan:
             known = np.isfinite(effort) & (effort != 0.0)  # zeros are looked at elsewhere
             if known.any():
                 self._keep(joint, "effort_spikes", find_spikes(rows[known], effort[known], measure), core)
-                self._keep(joint, "stuck", find_stuck(rows[known], effort[known], position[known], measure), core)
+                self._keep(
+                    joint, "stuck", find_stuck(rows[known], effort[known], samples.position[known], measure), core
+                )
 
     def finish(self, recording: Recording) -> Defects:
         """What was found in all blocks."""
