@@ -1,6 +1,7 @@
 """Every damage is found, counted and mended; a sound recording is left alone."""
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -10,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from identification.simulated import PAPER_NOISE, paper_robot, simulate
-from recording.examination.damages import DAMAGES, Channels, hold_all, hold_efforts
+from recording.examination.damages import DAMAGES, Channels, hold_all, hold_efforts, wrap_angles
 from recording.examination.sound_arms import sound_recording
 from recording.recording_files import message_of
 from tauscope.errors import TauscopeError
@@ -33,6 +34,7 @@ def held_out_error(recording: Recording) -> float:
     return fit.relative_error
 
 
+@cache
 def error_at_rate(step: int) -> float:
     """Error of the sound recording at a lower rate."""
     channels = Channels.of(BASE)
@@ -82,13 +84,14 @@ def test_damages_end_in_a_line_or_in_a_result_as_good(damages: list[Damage], see
         damage(channels, rng)
     try:
         recording = read_text(channels.csv())
-        error = held_out_error(recording)
+        result = held_out_error(recording)
     except TauscopeError as error:
         require_one_line(error)
         return
     codes = {warning.code for warning in recording.warnings}
-    assert any(DAMAGES[damage] in codes for damage in damages)
-    assert error < 1.25 * max(error_at_rate(4), 1.0 / 3.0 * error) if set(damages) & set(SLOW) else error < 0.045
+    assert any(DAMAGES[damage] in codes for damage in damages) or damages == [wrap_angles, wrap_angles]
+    slowest = max(SLOW.get(damage, 1) for damage in damages)
+    assert result < 1.2 * max(error_at_rate(slowest), error_at_rate(1))
 
 
 @settings(max_examples=150, deadline=None)

@@ -1,10 +1,11 @@
 """Efforts that no drive measured: stuck values, and spikes."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from tauscope.recording.examination.edits import NO_NUMBERS, Numbers
+from tauscope.recording.examination.edits import NO_NUMBERS, Numbers, row_numbers
 from tauscope.recording.examination.scales import NEIGHBOURS, EffortScale, distance_beyond, neighbour_windows
 from tauscope.recording.samples import Array
 
@@ -86,6 +87,11 @@ def find_spikes(rows: Numbers, effort: Array, scale: EffortScale) -> Numbers:
     effort : (N,) float64
         in the recording's own unit, finite
     """
+    if scale.hold > 1:  # a held spike is as wide as the hold: one row of each run is judged, for all of them
+        firsts = np.flatnonzero(np.diff(effort, prepend=np.nan) != 0.0)
+        spikes = find_spikes(firsts, effort[firsts], replace(scale, hold=1))
+        stops = np.append(firsts, len(effort))[np.searchsorted(firsts, spikes) + 1]
+        return rows[row_numbers(np.column_stack([spikes, stops]))]
     least = max(SURPRISE * scale.surprise, SPAN * scale.span)
     large = np.flatnonzero(np.abs(np.diff(effort)) > least)
     # Most blocks have no change as large, and neighbours are dear: only the surroundings are looked at.

@@ -112,7 +112,8 @@ def measure_efforts(sketch: Sketch) -> list[EffortScale]:
         _, run, hold = _measure_holds([known])
         changes = np.abs(np.diff(known))
         low, lower, upper, high = (float(value) for value in np.percentile(known, [1.0, 5.0, 95.0, 99.0]))
-        beyond = distance_beyond(neighbour_windows(known)[:: max(1, len(known) // JUDGED_ROWS)])
+        seen = known[np.diff(known, prepend=np.nan) != 0.0] if hold > 1 else known
+        beyond = distance_beyond(neighbour_windows(seen)[:: max(1, len(seen) // JUDGED_ROWS)])
         change, surprise = _percentile(changes[changes > 0.0], 90.0), _percentile(beyond, 95.0)
         scales.append(EffortScale(low, high, upper - lower, change, surprise, run, hold))
     return scales
