@@ -115,9 +115,7 @@ def test_currents_need_a_torque_constant(run: Run, files: SimulatedFiles, tmp_pa
     assert ended.status == 1
     assert "states no torque_constant for joint 1 (joint1); state joints[0].torque_constant" in ended.err
     robot = tmp_path / "robot.yaml"
-    text = files.robot.read_text(encoding="utf-8").replace(
-        "  - name: joint", "  - torque_constant: 2.0\n    name: joint"
-    )
+    text = files.robot.read_text(encoding="utf-8").replace("- name: joint", "- torque_constant: 2.0\n  name: joint")
     robot.write_text(text, encoding="utf-8")
     sound = error_of(run("identify", files.robot, files.train[0], "--json", "-"))
     mended = error_of(run("identify", robot, path, "--units", "tau=mA", "--json", "-"))

@@ -7,7 +7,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from identification.simulated import PAPER_NOISE, paper_robot, simulate
@@ -79,8 +79,9 @@ def test_a_damage_is_named_wherever_it_is(damage: Damage, seed: int) -> None:
 @settings(max_examples=1000, deadline=None)
 @given(damages=st.lists(st.sampled_from(list(DAMAGES)), min_size=1, max_size=2), seed=st.integers(0, 2**31))
 def test_damages_end_in_a_line_or_in_a_result_as_good(damages: list[Damage], seed: int) -> None:
+    assume(len(set(damages) & set(SLOW)) < 2)
     channels, rng = Channels.of(BASE), np.random.default_rng(seed)
-    for damage in damages:
+    for damage in sorted(damages, key=lambda damage: damage not in SLOW):  # a slow source comes before the others
         damage(channels, rng)
     try:
         recording = read_text(channels.csv())

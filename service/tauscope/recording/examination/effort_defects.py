@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from tauscope.recording.examination.edits import NO_NUMBERS, Numbers, row_numbers
-from tauscope.recording.examination.scales import NEIGHBOURS, EffortScale, distance_beyond, neighbour_windows
+from tauscope.recording.examination.scales import NEIGHBOURS, EffortScale, distance_beyond, is_new, neighbour_windows
 from tauscope.recording.samples import Array
 
 SURPRISE = 20.0
@@ -88,7 +88,7 @@ def find_spikes(rows: Numbers, effort: Array, scale: EffortScale) -> Numbers:
         in the recording's own unit, finite
     """
     if scale.hold > 1:  # a held spike is as wide as the hold: one row of each run is judged, for all of them
-        firsts = np.flatnonzero(np.diff(effort, prepend=np.nan) != 0.0)
+        firsts = np.flatnonzero(is_new(effort))
         spikes = find_spikes(firsts, effort[firsts], replace(scale, hold=1))
         stops = np.append(firsts, len(effort))[np.searchsorted(firsts, spikes) + 1]
         return rows[row_numbers(np.column_stack([spikes, stops]))]

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from tauscope.recording.examination.sketch import Sketch
@@ -92,8 +93,10 @@ def measure_positions(sketch: Sketch, types: list[JointType]) -> list[PositionSc
         values = values[np.isfinite(values)]
         low, high = np.percentile(values, [0.1, 99.9]) if len(values) else (0.0, 0.0)
         wrapped = kind is JointType.REVOLUTE and np.pi < high - low < ONE_TURN + TURN_SPARE
-        steps = np.concatenate([unwrap_steps(np.diff(piece), is_wrapped=wrapped) for piece in pieces])
         step, _, hold = _measure_holds(pieces)
+        if hold > 1:
+            pieces = [piece[is_new(piece)] for piece in pieces]
+        steps = np.concatenate([unwrap_steps(np.diff(piece), is_wrapped=wrapped) for piece in pieces])
         moves = np.abs(steps) > step / 2.0
         surprises = np.abs(steps - neighbours_median(steps))
         move, surprise = _percentile(np.abs(steps[moves]), 95.0), _percentile(surprises[moves], 90.0)
@@ -112,7 +115,7 @@ def measure_efforts(sketch: Sketch) -> list[EffortScale]:
         _, run, hold = _measure_holds([known])
         changes = np.abs(np.diff(known))
         low, lower, upper, high = (float(value) for value in np.percentile(known, [1.0, 5.0, 95.0, 99.0]))
-        seen = known[np.diff(known, prepend=np.nan) != 0.0] if hold > 1 else known
+        seen = known[is_new(known)] if hold > 1 else known
         beyond = distance_beyond(neighbour_windows(seen)[:: max(1, len(seen) // JUDGED_ROWS)])
         change, surprise = _percentile(changes[changes > 0.0], 90.0), _percentile(beyond, 95.0)
         scales.append(EffortScale(low, high, upper - lower, change, surprise, run, hold))
@@ -131,6 +134,17 @@ def unwrap_steps(steps: Array, *, is_wrapped: bool) -> Array:
         return steps
     is_wrap = np.abs(np.abs(steps) - ONE_TURN) < LARGEST_STEP  # two turns at once are a spike
     return steps - ONE_TURN * np.sign(steps) * is_wrap
+
+
+def is_new(values: Array) -> NDArray[np.bool_]:
+    """Whether a value is another than the one before, (N,).
+
+    Parameters
+    ----------
+    values : (N,) float64
+        a signal
+    """
+    return np.diff(values, prepend=np.nan) != 0.0
 
 
 def neighbours_median(values: Array) -> Array:

@@ -17,7 +17,7 @@ from tauscope.recording.examination.edits import (
 )
 from tauscope.recording.examination.effort_defects import find_all_stuck, find_spikes, find_stuck
 from tauscope.recording.examination.position_defects import scan_position
-from tauscope.recording.examination.scales import EffortScale, PositionScale, measure_efforts, measure_positions
+from tauscope.recording.examination.scales import EffortScale, PositionScale, is_new, measure_efforts, measure_positions
 from tauscope.recording.examination.sketch import Sketch
 from tauscope.recording.recording import Recording, Samples
 from tauscope.recording.samples import Array
@@ -36,6 +36,9 @@ MOST_BUNCHED = 0.1
 
 IN_STEP = 0.8
 """Share of the repeated rows that all efforts have in common where they are held at once."""
+
+REST_HOLDS = 4
+"""Holds of one value after which it is a rest, and no update that was lost."""
 
 MOST_JUMPS = 20
 """Jumps of one joint above which it is no encoder that was reset."""
@@ -168,7 +171,11 @@ class _Scan:
             self._keep(joint, "stuck", stuck, core)
             position = np.ascontiguousarray(samples.position[:, joint])
             known = np.isfinite(position) & ~close
-            fault = scan_position(rows[known], samples.time[known], position[known], scale, self.interval, core)
+            if place.hold > 1:
+                known[known] = is_new(position[known])
+            fault = scan_position(
+                rows[known], samples.time[known], position[known], scale, self.interval * place.hold, core
+            )
             place.jumps += fault.jumps
             place.wraps += fault.wraps
             self._keep(joint, "spikes", np.array(fault.spikes, dtype=np.int64), core)
@@ -219,7 +226,7 @@ def _bunched(time: Array, interval: float) -> NDArray[np.bool_]:
 
 
 def _repeated(same: NDArray[np.bool_], hold: int) -> NDArray[np.bool_]:
-    """Rows that repeat a held value; of a longer rest one row in `hold` is kept."""
+    """Rows that repeat a held value; of a rest of `REST_HOLDS` or more one row in `hold` is kept."""
     number = np.arange(len(same))
     since = number - np.maximum.accumulate(np.where(same, 0, number))
-    return same & (since % hold != 0)
+    return same & ((since % hold != 0) | (since < REST_HOLDS * hold))
