@@ -125,6 +125,16 @@ def test_log_time_where_no_message_has_a_stamp(tmp_path):
     assert np.allclose(recording.samples().time, MOTION["time"], rtol=0, atol=1e-15)
 
 
+@pytest.mark.parametrize("rows", [(7,), (0, 3)])
+def test_log_time_where_single_messages_have_no_stamp(tmp_path, rows):
+    log = [(time + 5_000_000, message) for time, message in messages()]
+    for row in rows:
+        log[row][1]["header"]["stamp"] = {"sec": 0, "nanosec": 0}
+    recording = read_recording(log_file(tmp_path, {"/joint_states": log}))
+    assert np.allclose(recording.samples().time, MOTION["time"], rtol=0, atol=1e-12)
+    assert f"{len(rows)} message" in recording.warnings[0].text
+
+
 def test_simulated_time_may_start_at_zero(tmp_path):
     log = [(10**18 + k, message) for k, (_, message) in enumerate(messages(start_ns=0))]
     recording = read_recording(log_file(tmp_path, {"/joint_states": log}))

@@ -7,7 +7,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given, note, settings
 from hypothesis import strategies as st
 
 from identification.simulated import PAPER_NOISE, paper_robot, simulate
@@ -92,6 +92,7 @@ def test_damages_end_in_a_line_or_in_a_result_as_good(damages: list[Damage], see
     codes = {warning.code for warning in recording.warnings}
     assert any(DAMAGES[damage] in codes for damage in damages) or damages == [wrap_angles, wrap_angles]
     slowest = max(SLOW.get(damage, 1) for damage in damages)
+    note(f"{[damage.__name__ for damage in damages]}, seed {seed}: {[warning.text for warning in recording.warnings]}")
     assert result < 1.2 * max(error_at_rate(slowest), error_at_rate(1))
 
 

@@ -82,8 +82,8 @@ class Sketch:
 
     @cached_property
     def reach(self) -> Array:
-        """Largest |q| of every joint, (n,) [rad or m]; 0 where it is not known."""
-        return np.fmax.reduce(np.abs(self.position), axis=0, initial=0.0)
+        """99th percentile of |q| of every joint, (n,) [rad or m]; 0 where it is not known. Spikes reach beyond."""
+        return percentile(np.abs(self.position), 99.0)
 
     @cached_property
     def span(self) -> Array:
