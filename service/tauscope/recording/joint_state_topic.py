@@ -173,7 +173,9 @@ class _Rows:
             )
         stamp = states.stamp
         unset = (stamp == 0) & (stamp.max() > LONGEST_FROM_ZERO_NS)
-        if unset.any() and not self._by_log_time:  # what the log's clock is ahead of the publisher's, it is for these messages, too
+        if (
+            unset.any() and not self._by_log_time
+        ):  # what the log's clock is ahead of the publisher's, it is for these messages, too
             ahead = np.median((log_time - stamp)[~unset]).astype(np.int64)
             stamp = np.where(unset, log_time - ahead, stamp)
             self._unset += int(unset.sum())

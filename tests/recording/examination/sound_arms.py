@@ -46,6 +46,8 @@ def sound_recording(seed: int, rows: int = 3000) -> Sound:
         step = 2.0 * np.pi / 2 ** rng.integers(12, 21)
         position = np.rint(position / step) * step
     stamps = time + rng.uniform(-0.3, 0.3, rows) / rate * (rng.random() < 0.3)
+    if rng.random() < 0.1:  # a buffer that is emptied four rows at a time
+        stamps = time[np.arange(rows) // 4 * 4] + np.arange(rows) % 4 * 1e-3 / rate
     velocity = None
     if rng.random() < 0.5:
         velocity = qd * (100.0 if rng.random() < 0.2 else 1.0)  # some report the motor's

@@ -128,8 +128,8 @@ def find_defects(recording: Recording, types: list[JointType]) -> Defects:
     sketch = Sketch.of(recording)
     positions, efforts = measure_positions(sketch, types), measure_efforts(sketch)
     joints = [JointDefects(q.hold, tau.hold) for q, tau in zip(positions, efforts, strict=True)]
-    has_effort = np.isfinite(sketch.effort).any(axis=1)
-    alternate = bool(has_effort.any() and not (has_effort & np.isfinite(sketch.position).all(axis=1)).any())
+    has_effort, has_position = np.isfinite(sketch.effort).any(axis=1), np.isfinite(sketch.position).all(axis=1)
+    alternate = bool(has_effort.any() and has_position.any() and not (has_effort & has_position).any())
     scan = _Scan(sketch.interval, positions, efforts, Defects(joints, alternate), ZeroRuns(efforts))
     count = len(recording)
     for start in range(0, count, BLOCK_ROWS):

@@ -15,6 +15,9 @@ WINDOW_ROWS = 1 << 13
 RANKED_ROWS = 4096
 """Rows of which a percentile is taken."""
 
+BURST = 0.1
+"""Share of the mean step below which the usual step is one within a burst, as buffers are emptied."""
+
 BREAK = 2.5
 """Steps of the clock above this many medians are gaps, across which nothing is differenced."""
 
@@ -36,8 +39,11 @@ class Sketch:
 
     @cached_property
     def interval(self) -> float:
-        """Median time from row to row [s]."""
-        return float(np.median(np.concatenate([np.diff(window.time) for window in self.windows])))
+        """Usual time from row to row [s]: the median, or where rows come in bursts the mean without gaps."""
+        steps = np.concatenate([np.diff(window.time) for window in self.windows])
+        median, longest = (float(value) for value in np.percentile(steps, [50.0, 99.0]))
+        mean = float(np.mean(steps[steps <= longest]))
+        return mean if median < BURST * mean else median
 
     @cached_property
     def position(self) -> Array:
