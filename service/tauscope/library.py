@@ -61,10 +61,10 @@ def read_recording(
     RecordingError
         the file cannot be read, does not fit the robot, or can hardly be in its units
     """
-    from tauscope.recording import Reading, read_examined
+    from tauscope.recording import Reading, open_recording
 
     reading = Reading(dict(units or {}), rate_hz, trust_units)
-    return read_examined(path, None if robot is None else _robot(robot), reading)
+    return open_recording(path, None if robot is None else _robot(robot), reading)
 
 
 def identify(

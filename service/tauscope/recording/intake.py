@@ -1,4 +1,4 @@
-"""Where all formats' rows go: converted to SI, checked, put in order of time, kept in a table."""
+"""The rows of all formats: converted to SI, checked, put in order of time, kept in a table."""
 
 from collections.abc import Callable, Sequence
 
@@ -129,7 +129,7 @@ class RowIntake:
         return block[is_new]
 
     def _warnings(self) -> Sequence[ResultWarning]:
-        """What was put in order."""
+        """Warnings about stamps that were put in order."""
         found = []
         if self._late:
             rows = "1 row came" if self._late == 1 else f"{self._late} rows came"

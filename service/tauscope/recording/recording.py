@@ -21,7 +21,7 @@ class Recording:
     """One continuous motion as it was measured.
 
     notes : tuple of ResultWarning
-        what was mended in it
+        warnings without its name
     is_examined : bool
         whether units and samples were looked at, so that they need not be again
     """
@@ -40,7 +40,7 @@ class Recording:
 
     @property
     def warnings(self) -> tuple[ResultWarning, ...]:
-        """What was mended in it, each beginning with its name."""
+        """Warnings about its units and samples, each beginning with its name."""
         return tuple(note.model_copy(update={"text": f"{self.name}: {note.text}"}) for note in self.notes)
 
     def samples(self, start: int = 0, stop: int | None = None) -> Samples:

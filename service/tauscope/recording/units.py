@@ -71,7 +71,7 @@ class Conversion:
     names : tuple of str
         columns after the conversion: torque that is current becomes i1…
     factor : (columns,) float64
-        what each column is multiplied by
+        multiplies each column
     from_first : bool
         whether time counts from the first row: a large count has no room for small parts of a second
     """
@@ -122,7 +122,7 @@ def parse_units(text: str) -> dict[str, str]:
 
 
 def _factor(group: str, number: str, reading: Reading) -> float:
-    """What a joint's column is multiplied by."""
+    """Factor of a joint's column."""
     root = next((root for root, followers in _FOLLOWERS.items() if group in followers), None)
     if root is None:
         return 1.0

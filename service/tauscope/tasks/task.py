@@ -10,7 +10,7 @@ from pydantic import BaseModel, Field, field_validator
 from pydantic_core import PydanticCustomError
 
 from tauscope.export.compensation import RecordingSource
-from tauscope.recording import EffortKind, Reading, Recording, read_examined
+from tauscope.recording import EffortKind, Reading, Recording, open_recording
 from tauscope.report.provenance import InputFile, Provenance, input_files, versions
 from tauscope.robot import RecordingLayout, Robot, find_fault
 from tauscope.strict_model import StrictModel
@@ -146,7 +146,7 @@ def read_recordings(
     if role == "simulated":
         robot, reading = replace(robot, recording=RecordingLayout()), Reading(trust_units=options.trust_units)
     paths = [files.find(role, name) for name in names]
-    read = [read_examined(path, robot, reading) for path in paths]
+    read = [open_recording(path, robot, reading) for path in paths]
     return tuple(
         recording if str(path) == name else replace(recording, name=name)
         for recording, path, name in zip(read, paths, names, strict=True)

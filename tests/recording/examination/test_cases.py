@@ -7,7 +7,7 @@ import pytest
 from recording.recording_files import message_of
 from shared_data import SHARED_CASES, SHARED_DATA, needs_shared_cases, needs_shared_data
 from tauscope.identification import document, identify
-from tauscope.recording import Reading, Recording, read_examined
+from tauscope.recording import Reading, Recording, open_recording
 from tauscope.robot import Robot, read_robot
 
 RECORDINGS = SHARED_CASES / "recordings"
@@ -20,7 +20,7 @@ def ur5() -> Robot:
 
 @pytest.fixture(scope="module")
 def held_out(ur5: Robot) -> Recording:
-    return read_examined(SHARED_CASES / "ur5" / "ur5-held.csv", ur5)
+    return open_recording(SHARED_CASES / "ur5" / "ur5-held.csv", ur5)
 
 
 READ = {
@@ -41,7 +41,7 @@ READ = {
 @pytest.mark.parametrize("name", READ)
 def test_a_case_is_as_good_as_the_sound_recording(name: str, ur5: Robot, held_out: Recording) -> None:
     units, codes = READ[name]
-    recording = read_examined(RECORDINGS / name, ur5, Reading(units))
+    recording = open_recording(RECORDINGS / name, ur5, Reading(units))
     assert {warning.code for warning in recording.warnings} == codes
     fit = document(identify(ur5, [recording], [held_out])).fit.held_out
     assert fit is not None
@@ -50,7 +50,7 @@ def test_a_case_is_as_good_as_the_sound_recording(name: str, ur5: Robot, held_ou
 
 @needs_shared_cases
 def test_positions_and_efforts_on_alternate_rows_are_read(ur5: Robot, held_out: Recording) -> None:
-    recording = read_examined(RECORDINGS / "49-outer-join.csv", ur5)
+    recording = open_recording(RECORDINGS / "49-outer-join.csv", ur5)
     assert {warning.code for warning in recording.warnings} == {"held-samples"}
     fit = document(identify(ur5, [recording], [held_out])).fit.held_out
     assert fit is not None
@@ -72,7 +72,7 @@ REFUSED = {
 @needs_shared_cases
 @pytest.mark.parametrize("name", REFUSED)
 def test_a_case_is_refused_with_evidence_and_remedy(name: str, ur5: Robot) -> None:
-    message = message_of(lambda: read_examined(RECORDINGS / name, ur5))
+    message = message_of(lambda: open_recording(RECORDINGS / name, ur5))
     assert message.startswith(f"{RECORDINGS / name}: ")
     for words in REFUSED[name]:
         assert words in message
@@ -80,7 +80,7 @@ def test_a_case_is_refused_with_evidence_and_remedy(name: str, ur5: Robot) -> No
 
 @needs_shared_cases
 def test_a_magnitude_is_told_without_the_robot() -> None:
-    assert "this is a magnitude" in message_of(lambda: read_examined(RECORDINGS / "43-magnitude.csv"))
+    assert "this is a magnitude" in message_of(lambda: open_recording(RECORDINGS / "43-magnitude.csv"))
 
 
 def sound_files() -> list[Path]:
@@ -93,6 +93,6 @@ def sound_files() -> list[Path]:
 @pytest.mark.parametrize("path", sound_files(), ids=lambda path: f"{path.parent.name}/{path.name}")
 def test_recordings_of_real_arms_are_not_refused(path: Path) -> None:
     robot = next(file for file in (path.with_name("robot.yaml"), path.with_name("ur5.yaml")) if file.is_file())
-    recording = read_examined(path, read_robot(robot))
-    read_examined(path)
+    recording = open_recording(path, read_robot(robot))
+    open_recording(path)
     assert {warning.code for warning in recording.warnings} <= {"spikes"}

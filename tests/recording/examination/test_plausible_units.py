@@ -113,6 +113,12 @@ def test_registers_and_magnitudes_are_refused() -> None:
     assert "this is a magnitude" in str(find_implausible(changed(samples, effort=np.abs(samples.effort))))
 
 
+def test_encoder_counts_are_no_angles() -> None:
+    samples = swing()
+    counts = np.rint(2048 + samples.position * 4096 / (2 * np.pi))
+    assert "counts of an encoder" in str(find_implausible(changed(samples, position=counts, velocity=None)))
+
+
 def test_torque_limits_tell_milliamperes() -> None:
     sound = sound_recording(8)
     robot = sound.robot

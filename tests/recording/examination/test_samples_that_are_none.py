@@ -16,7 +16,7 @@ from recording.examination.sound_arms import sound_recording
 from recording.recording_files import message_of
 from tauscope.errors import TauscopeError
 from tauscope.identification import document, identify
-from tauscope.recording import Recording, check_recording, examine_recording, read_examined
+from tauscope.recording import Recording, check_recording, examine_recording, open_recording
 from tauscope.recording.examination import mend_recording
 
 ROBOT = paper_robot()
@@ -50,7 +50,7 @@ def read_text(text: str) -> Recording:
     with TemporaryDirectory() as folder:
         path = Path(folder) / "damaged.csv"
         path.write_text(text, encoding="utf-8")
-        return read_examined(path, ROBOT)
+        return open_recording(path, ROBOT)
 
 
 def damaged(damage: Damage, seed: int) -> str:
@@ -148,7 +148,7 @@ def test_check_finds_the_same(tmp_path: Path) -> None:
     for damage, code in DAMAGES.items():
         path = tmp_path / f"{damage.__name__}.csv"
         path.write_text(damaged(damage, 2), encoding="utf-8")
-        texts = [warning.text for warning in read_examined(path, ROBOT).warnings if warning.code == code]
+        texts = [warning.text for warning in open_recording(path, ROBOT).warnings if warning.code == code]
         found = [finding.text for finding in check_recording(path, robot=ROBOT).findings]
         assert texts
         assert all(any(text.endswith(each) for each in found) for text in texts)

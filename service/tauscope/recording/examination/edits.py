@@ -1,4 +1,4 @@
-"""A recording's table with what was mended in it: read as any other, only the rows that are asked for are copied."""
+"""A recording's table with edits: read as any other, only the rows that are asked for are copied."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -17,7 +17,7 @@ NO_ROWS: Rows = np.empty((0, 2), dtype=np.int64)
 
 @dataclass(frozen=True, eq=False)
 class ColumnEdit:
-    """What is mended in one column.
+    """Edits of one column.
 
     blank : (k, 2) int64
         rows start:stop that were never measured: NaN; ascending, disjoint

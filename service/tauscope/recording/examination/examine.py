@@ -19,7 +19,7 @@ ROWS_AT_ONCE = 1 << 15
 TRUST = "go on with --trust-units"
 
 
-def read_examined(path: str | Path, robot: Robot | None = None, reading: Reading = SI) -> Recording:
+def open_recording(path: str | Path, robot: Robot | None = None, reading: Reading = SI) -> Recording:
     """Read a recording, convert its units, and examine it.
 
     Raises

@@ -29,7 +29,7 @@ def mend_recording(recording: Recording, robot: Robot | None = None) -> Recordin
 
 
 def _edits(recording: Recording, defects: Defects) -> dict[int, ColumnEdit]:
-    """What is mended, by column."""
+    """Edits by column."""
     edits: dict[int, ColumnEdit] = {}
     n = recording.joint_count
     for joint, found in enumerate(defects.joints):

@@ -51,6 +51,9 @@ FEWEST_ROWS = 20
 MANY_TURNS = 4.0 * np.pi
 """Most joints of an arm of three joints or more keep below two turns [rad]."""
 
+LARGEST_DEGREES = 720.0
+"""Whole numbers above this are no angles, in degrees neither: an encoder counts to 1024 or more."""
+
 FASTEST_ARM = 60.0
 """No arm of three joints or more has most joints faster than this [rad/s]: the fastest reach 20."""
 
@@ -69,7 +72,7 @@ class _Doubt:
     """A column that can hardly be in the stated unit.
 
     units : str
-        what ``--units`` would be given; empty where no unit is likely
+        value for ``--units``; empty where no unit is likely
     """
 
     column: str
@@ -156,7 +159,7 @@ def _foreign(units: tuple[str, ...]) -> int:
 
 
 def _ratio_words(time: str, position: str, speed: str) -> str:
-    """What a ratio of units is one of."""
+    """The units of a ratio in words."""
     words = []
     if time != "s":
         words.append(f"{time} to s")
@@ -196,6 +199,11 @@ def _doubt_time(sketch: Sketch) -> _Doubt | None:
 
 def _doubt_angle(sketch: Sketch, types: list[JointType], robot: Robot | None) -> _Doubt | None:
     """Positions that limits, or the number of turns, or gravity say are in degrees; or in mm."""
+    known = sketch.position[np.isfinite(sketch.position)]
+    if len(known) and sketch.reach.max() > LARGEST_DEGREES and (known == np.rint(known)).all():
+        joint = int(np.argmax(sketch.reach))
+        text = f"whole numbers up to {sketch.reach[joint]:.0f}, as counts of an encoder are"
+        return _Doubt(f"q{joint + 1}", text, "")
     revolute = np.array([kind is JointType.REVOLUTE for kind in types])
     for kind, unit, factor in ((revolute, "deg", np.pi / 180.0), (~revolute, "mm", 1e-3)):
         found = _beyond_limits(sketch, kind, factor, robot)

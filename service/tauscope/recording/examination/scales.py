@@ -1,4 +1,4 @@
-"""Typical sizes of a recording's steps, joint by joint: what a sample is judged against."""
+"""Typical sizes of a recording's steps, joint by joint, against which a sample is judged."""
 
 from dataclasses import dataclass
 

@@ -46,7 +46,7 @@ MOST_JUMPS = 20
 
 @dataclass(eq=False)
 class JointDefects:
-    """What is wrong with one joint's samples.
+    """Defects of one joint's samples.
 
     spikes, frozen, repeated, stuck, effort_spikes : (m,) int64
         rows, ascending: of positions the first three, of efforts the others
@@ -70,7 +70,7 @@ class JointDefects:
     effort_spikes: Numbers = field(default_factory=lambda: NO_NUMBERS)
 
     def position_edit(self, count: int, lost: Numbers) -> ColumnEdit:
-        """What mends the position of a recording of `count` rows: jumps are relative to the longest piece.
+        """Edit of the position of a recording of `count` rows: jumps are relative to the longest piece.
 
         Parameters
         ----------
@@ -96,7 +96,7 @@ class JointDefects:
 
 @dataclass(eq=False)
 class Defects:
-    """What is wrong with a recording's samples.
+    """Defects of a recording's samples.
 
     bunched : (m,) int64
         rows whose stamp is that of a neighbour
@@ -192,7 +192,7 @@ class _Scan:
                 )
 
     def finish(self, recording: Recording) -> Defects:
-        """What was found in all blocks."""
+        """Defects of all blocks."""
         defects = self.defects
         for (joint, name), parts in self.found.items():
             target = defects if name in ("bunched", "paced") else defects.joints[joint]
