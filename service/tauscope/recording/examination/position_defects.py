@@ -6,7 +6,6 @@ import numpy as np
 
 from tauscope.recording.examination.edits import Numbers
 from tauscope.recording.examination.scales import ONE_TURN, PositionScale, neighbours_median, unwrap_steps
-from tauscope.recording.examination.sketch import BREAK
 from tauscope.recording.samples import Array
 
 SURPRISE = 20.0
@@ -18,8 +17,11 @@ SHARE_OF_MOVE = 0.1
 STEPS = 5.0
 """Encoder steps above which it is: one or two are its rounding."""
 
-LONGEST_SPIKE = 5
+LONGEST_SPIKE = 32
 """Rows after which a position that jumped is back, where it was a spike."""
+
+LONGEST_STEP = 8.0
+"""Usual intervals beyond which nothing tells a jump from motion."""
 
 RETURN = 0.3
 """Largest difference between the way out and the way back of a spike, relative to them."""
@@ -87,7 +89,7 @@ def scan_position(
         return found
     surprise = steps - neighbours_median(steps)
     large = np.flatnonzero((np.abs(surprise) > least) & (steps != 0.0))  # a rest is judged by the step that ends it
-    whole = np.diff(time) < (BREAK + LONGEST_SPIKE) * interval
+    whole = np.diff(time) < LONGEST_STEP * interval
     index = 0
     while index < len(large):
         a = int(large[index])
@@ -121,4 +123,4 @@ def _frozen_rows(steps: Array, k: int) -> int:
     after = after[after > 0.0]
     if not len(after) or before[-1] < STOPS_AT * np.median(after) or step < CATCHES_UP * np.median(after):
         return 0
-    return rest if step <= MAKES_UP * (rest + 1) * max(before.max(), after.max()) else 0
+    return rest if step <= MAKES_UP * (rest + 1) * max(np.median(before), np.median(after)) else 0
