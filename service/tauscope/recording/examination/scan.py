@@ -78,13 +78,10 @@ class JointDefects:
             further rows to be masked
         """
         where, offsets = NO_NUMBERS, np.empty(0)
-        height: dict[int, float] = {}
-        for row, step in (*self.jumps, *self.wraps):
-            height[row] = height.get(row, 0.0) + step
-        if height:
-            where = np.array([0, *sorted(height)], dtype=np.int64)
-            offsets = np.cumsum([0.0, *(height[row] for row in sorted(height))])
-            offsets -= offsets[int(np.argmax(np.diff(np.append(where, count))))]
+        if self.jumps or self.wraps:
+            where = np.unique([0, *(row for row, _ in (*self.jumps, *self.wraps))])
+            # Whole turns matter to nobody: the longest piece is that between jumps.
+            offsets = _offsets(self.jumps, where, count) + _offsets(self.wraps, where, count)
         blank = np.unique(np.concatenate([self.spikes, self.frozen, self.repeated, lost]))
         return ColumnEdit(blank=join_ranges(blank), jumps=where, offsets=offsets)
 
@@ -212,6 +209,21 @@ class _Scan:
         own = rows[(rows >= core[0]) & (rows < core[1])]
         if len(own):
             self.found.setdefault((joint, name), []).append(own)
+
+
+def _offsets(jumps: list[tuple[int, float]], where: Numbers, count: int) -> Array:
+    """Offset from each of some rows on, (m,): the sum of the jumps up to there, 0 in the longest piece between them.
+
+    Parameters
+    ----------
+    where : (m,) int64
+        rows, ascending
+    """
+    ordered = sorted(jumps)
+    starts = np.array([0, *(row for row, _ in ordered)], dtype=np.int64)
+    heights = np.cumsum([0.0, *(height for _, height in ordered)])
+    heights -= heights[int(np.argmax(np.diff(np.append(starts, count))))]
+    return heights[np.searchsorted(starts, where, side="right") - 1]
 
 
 def _bunched(time: Array, interval: float) -> NDArray[np.bool_]:
