@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauscope.recording.examination.edits import Rows
-from tauscope.recording.examination.effort_defects import is_moving
+from tauscope.recording.examination.effort_defects import STUCK_ROWS, USUAL_RUN, is_moving
 from tauscope.recording.examination.scales import EffortScale
 from tauscope.recording.recording import Recording, Samples
 
@@ -56,13 +56,20 @@ class ZeroRuns:
                 else:
                     runs.append((start, stop))
 
+    @property
+    def _is_noisy(self) -> bool:
+        """Whether noise lets no effort stay at one value."""
+        return any(0 < scale.run <= USUAL_RUN * scale.hold and scale.change > 0.0 for scale in self._scales)
+
     def dropouts(self, recording: Recording) -> list[Rows]:
         """Ranges of rows that are dropouts, of every joint, (k, 2)."""
         *own, common = ([] if len(runs) > MOST_RUNS else runs for runs in self._runs)
         lost: list[set[tuple[int, int]]] = [set() for _ in own]
         for run in common if len(own) > 1 else ():
             drops = _drops(recording, run, common=True)
-            if any(drop > COMMON_DROP * scale.change for drop, scale in zip(drops, self._scales, strict=True)):
+            is_deep = any(drop > COMMON_DROP * scale.change for drop, scale in zip(drops, self._scales, strict=True))
+            is_closed = run[0] > 0 and run[1] < len(recording)
+            if is_deep or (is_closed and run[1] - run[0] >= STUCK_ROWS and self._is_noisy):
                 for ranges in lost:
                     ranges.add(run)
         for joint, (runs, scale) in enumerate(zip(own, self._scales, strict=True)):

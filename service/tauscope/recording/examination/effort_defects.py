@@ -101,7 +101,12 @@ def find_spikes(rows: Numbers, effort: Array, scale: EffortScale) -> Numbers:
     # At the ends there are neighbours on one side only, and a signal that rises is beyond all of them.
     is_end = (near < NEIGHBOURS) | (near >= len(effort) - NEIGHBOURS)
     limit = np.where(is_end, max(least, scale.span), least)
-    return rows[near[distance_beyond(neighbour_windows(effort)[near]) > limit]]
+    found = near[distance_beyond(neighbour_windows(effort)[near]) > limit]
+    if not len(found):
+        return NO_NUMBERS
+    # The highest of several spikes hides the others.
+    rest = np.delete(np.arange(len(effort)), found)
+    return np.union1d(rows[found], find_spikes(rows[rest], effort[rest], scale))
 
 
 def is_moving(position: Array) -> bool:

@@ -17,8 +17,8 @@ SHARE_OF_MOVE = 0.1
 STEPS = 5.0
 """Encoder steps above which it is: one or two are its rounding."""
 
-LONGEST_SPIKE = 32
-"""Rows after which a position that jumped is back, where it was a spike."""
+LONGEST_SPIKE, LONGEST_GLITCH = 5, 32
+"""Rows after which a position is back, where it was a spike; the second where it went as far as a jump."""
 
 LONGEST_STEP = 8.0
 """Usual intervals beyond which nothing tells a jump from motion."""
@@ -94,14 +94,17 @@ def scan_position(
     while index < len(large):
         a = int(large[index])
         frozen = _frozen_rows(steps, a)
-        partner = None if frozen else next((b for b in large[index + 1 : index + 4] if _returns(surprise, a, b)), None)
+        is_jump = abs(surprise[a]) > max(JUMP * scale.move, LEAST_JUMP)
+        reach = a + (LONGEST_GLITCH if is_jump else LONGEST_SPIKE)
+        later = [int(b) for b in large[index + 1 : index + 4] if b <= reach and not frozen]
+        partner = next((b for b in later if _returns(surprise, a, b)), None)
         index += 1
         if frozen and is_core[a]:
             found.frozen += [int(row) for row in rows[a - frozen + 1 : a + 1]]
         elif partner is not None:
             found.spikes += [int(row) for row in rows[a + 1 : partner + 1] if core[0] <= row < core[1]]
             index = int(np.searchsorted(large, partner)) + 1
-        elif is_core[a] and abs(surprise[a]) > max(JUMP * scale.move, LEAST_JUMP) and whole[a]:
+        elif is_core[a] and is_jump and whole[a]:
             found.jumps.append((int(rows[a + 1]), float(surprise[a])))
     return found
 
@@ -109,7 +112,7 @@ def scan_position(
 def _returns(surprise: Array, a: int, b: int) -> bool:
     """Whether a second step takes a first one back."""
     out, back = float(surprise[a]), float(surprise[b])
-    return b - a <= LONGEST_SPIKE and abs(out + back) < RETURN * max(abs(out), abs(back))
+    return abs(out + back) < RETURN * max(abs(out), abs(back))
 
 
 def _frozen_rows(steps: Array, k: int) -> int:
