@@ -1,4 +1,4 @@
-"""Where the recordings of real arms lie: never in this repository."""
+"""Where the recordings of real arms, and files as people bring them, lie: never in this repository."""
 
 import os
 from pathlib import Path
@@ -11,3 +11,10 @@ ABSENT = f"no recordings at {SHARED_DATA}; name their folder in TAUSCOPE_DATA"
 
 needs_shared_data = pytest.mark.skipif(not SHARED_DATA.is_dir(), reason=ABSENT)
 """Marks a test, or a module by ``pytestmark``, that reads the recordings."""
+
+SHARED_CASES = Path(os.environ.get("TAUSCOPE_CASES") or REPOSITORY.parent / "shared" / "cases")
+
+needs_shared_cases = pytest.mark.skipif(
+    not SHARED_CASES.is_dir(), reason=f"no files at {SHARED_CASES}; name their folder in TAUSCOPE_CASES"
+)
+"""The same for the files as people bring them."""

@@ -37,24 +37,34 @@ def load_robot(path: str | Path) -> "Robot":
     return read_robot(path)
 
 
-def read_recording(path: str | Path, robot: RobotSource | None = None) -> "Recording":
-    """Read a recording: CSV, Parquet, MCAP or rosbag2.
+def read_recording(
+    path: str | Path,
+    robot: RobotSource | None = None,
+    *,
+    units: Mapping[str, str] | None = None,
+    rate_hz: float | None = None,
+    trust_units: bool = False,
+) -> "Recording":
+    """Read a recording: CSV, Parquet, MCAP or rosbag2; samples that are none are masked or repaired.
 
     Parameters
     ----------
     robot : Robot or path or None
         its joints are picked by name where the file has names; None takes the file's own
+    units : mapping of str to str, or None
+        units of columns that are not in SI, as in ``{"q": "deg", "t": "ms"}``; None takes those of the robot file
+    rate_hz : float or None
+        samples a second where t counts samples [Hz]
 
     Raises
     ------
     RecordingError
-        the file cannot be read, or does not fit the robot
+        the file cannot be read, does not fit the robot, or can hardly be in its units
     """
-    from tauscope.recording import read_recording as read
+    from tauscope.recording import Reading, open_recording
 
-    if robot is None:
-        return read(path)
-    return read(path, joint_names=[joint.name for joint in _robot(robot).joints])
+    reading = Reading(dict(units or {}), rate_hz, trust_units)
+    return open_recording(path, None if robot is None else _robot(robot), reading)
 
 
 def identify(
@@ -231,7 +241,7 @@ def simulate(
             reason = record.stop if record.problem is None else record.problem.detail
             raise AcquisitionError(f"the simulated run {record.state}: {reason or 'no reason is known'}")
         recording = read(Path(folder, "run", "recording.csv"), joint_names=[joint.name for joint in arm.joints])
-        return SimulationResult(replace(recording, name=name))
+        return SimulationResult(replace(recording, name=name, is_examined=True))
 
 
 def rollout(robot: RobotSource, recordings: Recordings) -> NoReturn:
@@ -252,8 +262,12 @@ def _robot(source: RobotSource) -> "Robot":
 
 def _recordings(sources: Any, robot: "Robot") -> "tuple[Recording, ...]":
     """One recording or several, read where a path is given."""
+    from tauscope.recording import examine_recording
     from tauscope.results import SimulationResult
 
     several = sources if isinstance(sources, list | tuple) else (sources,)
     taken = [source.recording if isinstance(source, SimulationResult) else source for source in several]
-    return tuple(read_recording(each, robot) if isinstance(each, str | Path) else each for each in taken)
+    return tuple(
+        read_recording(each, robot) if isinstance(each, str | Path) else examine_recording(each, robot)
+        for each in taken
+    )

@@ -87,13 +87,13 @@ def test_robot_examples(code: str, robot: str, tmp_path: Path, monkeypatch: pyte
 @pytest.mark.parametrize(
     ("code", "text"),
     [
-        ("recording", spoilt_recording(57, "0.54,0.1,0.2,1.5,-0.5")),
+        ("recording", spoilt_recording(57, "0.34,0.1,0.2,1.5,-0.5")),
         ("recording", spoilt_recording(2, "[s],[rad],[rad],[Nm],[Nm]")),
         ("recording", spoilt_recording(1, "t,q1,tau1,tau2")),
         ("recording", ""),
         ("recording-mismatch", "t,q1,tau1\n" + "".join(f"{k},0.1,1.5\n" for k in range(200))),
     ],
-    ids=["time repeats", "units row", "missing column", "empty file", "one joint of two"],
+    ids=["time runs backwards", "units row", "missing column", "empty file", "one joint of two"],
 )
 def test_recording_examples(code: str, text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)

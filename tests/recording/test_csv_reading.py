@@ -5,8 +5,9 @@ import pytest
 
 from recording.recording_files import csv_text, message_of, rows_of, snapshot
 from tauscope.errors import RecordingMismatchError
-from tauscope.recording import EffortKind, read_recording
+from tauscope.recording import EffortKind, Reading, read_recording
 from tauscope.recording.csv_format import read_csv
+from tauscope.robot import JointType
 
 LINES = csv_text().splitlines()
 ROWS = np.array([[float(field) for field in line.split(",")] for line in LINES[1:]])
@@ -144,9 +145,9 @@ BAD = {
     "lone carriage return": (field_changed(17, "q1", "1\r2"), "line 17, column q1: '1\\r2' is not a number"),
     "time missing": (field_changed(17, "t", ""), "line 17, column t: the time is missing"),
     "time infinite": (field_changed(17, "t", "inf"), "line 17, column t: 'inf' is not a number"),
-    "time repeats": (field_changed(17, "t", "0.056"), "line 17, column t: time repeats 0.056 s after 0.056 s"),
+    "time repeats": ("t,q1,tau1\n" + "".join(f"{k // 2},0,0\n" for k in range(40)), "20 of 40 rows repeat the time"),
     "time decreases": (field_changed(17, "t", "0.01"), "line 17, column t: time runs backwards: 0.01 s after 0.056 s"),
-    "date": (field_changed(2, "t", "2024-05-01 10:00"), "line 2, column t: '2024-05-01 10:00' is not a number"),
+    "date": (field_changed(2, "t", "2024-15-01 10:00"), "line 2, column t: '2024-15-01 10:00' is no date of ISO 8601"),
     "few fields": (changed(17, "0.06,1,2"), "line 17 has 3 fields where the header has 5 columns"),
     "many fields": (changed(17, "0.06,1,2,3,4,5"), "line 17 has 6 fields where the header has 5 columns"),
     "decimal commas": (changed(17, "0,06,1,5,2,5,3,5,4,5"), "decimal commas? write decimals with a point"),
@@ -188,8 +189,54 @@ def test_line_numbers_far_into_the_file(tmp_path):
     assert "line 15001, column q1: 'x" in message_of(lambda: read(tmp_path, "\n".join(lines)))
     lines = csv_text(20_000).splitlines()
     lines[15_000] = "# comment"
-    lines[15_001] = lines[14_999]
-    assert "line 15002, column t: time repeats" in message_of(lambda: read(tmp_path, "\n".join(lines)))
+    lines[15_001] = lines[14_900]
+    assert "line 15002, column t: time runs backwards" in message_of(lambda: read(tmp_path, "\n".join(lines)))
+
+
+def test_a_repeated_and_a_late_row_are_put_right(tmp_path):
+    sound = read(tmp_path, csv_text(20_000))
+    lines = csv_text(20_000).splitlines()
+    lines[15_000], lines[15_003] = lines[15_003], lines[15_000]
+    lines.insert(17, lines[16])
+    recording = read(tmp_path, "\n".join(lines))
+    assert np.array_equal(rows_of(recording), rows_of(sound))
+    assert [warning.code for warning in recording.warnings] == ["time-stamps", "time-stamps"]
+    late, repeated = (warning.text for warning in recording.warnings)
+    assert "column t: 2 rows came after a later one" in late
+    assert "column t: 1 row has the time of the row before, first at t = 0.06 s; left out" in repeated
+
+
+def test_dates_become_seconds_from_the_first_row(tmp_path):
+    rows = (f"2026-11-28T23:59:{59 + k // 10 if k < 10 else k // 10 - 1:02d}.{k % 10}00Z,{k},0" for k in range(10))
+    recording = read(tmp_path, "\n".join(["t,q1,tau1", *rows]))
+    np.testing.assert_allclose(recording.samples().time, np.arange(10) / 10, atol=1e-9)
+
+
+@pytest.mark.parametrize("unit", ["ms", "us", "ns"])
+def test_time_in_other_units_counts_from_the_first_row(tmp_path, unit):
+    ticks = {"ms": 10**3, "us": 10**6, "ns": 10**9}[unit]
+    rows = (f"{1_700_000_000 * ticks + k * ticks // 100},{k},0" for k in range(20))
+    path = tmp_path / "file.csv"
+    path.write_text("\n".join(["t,q1,tau1", *rows]))
+    recording = read_recording(path, reading=Reading({"t": unit}))
+    np.testing.assert_allclose(recording.samples().time, np.arange(20) / 100, atol=1e-6)
+
+
+def test_degrees_and_currents_are_converted(tmp_path):
+    path = tmp_path / "file.csv"
+    path.write_text("t,q1,q2,tau1,tau2,qd1,qd2\n" + "".join(f"{k},180,{k},1000,{k},90,90\n" for k in range(20)))
+    types = (JointType.REVOLUTE, JointType.PRISMATIC)
+    units = {"q": "deg", "q2": "mm", "tau": "mA", "t": "index"}
+    recording = read_recording(path, reading=Reading(units, 50.0, joint_types=types))
+    samples = recording.samples()
+    assert recording.effort_kind is EffortKind.CURRENT
+    assert recording.table.names[3:5] == ("i1", "i2")
+    assert samples.time[-1] == pytest.approx(19 / 50)
+    assert samples.velocity is not None
+    np.testing.assert_allclose(samples.position[:, 0], np.pi)
+    np.testing.assert_allclose(samples.position[:, 1], np.arange(20) * 1e-3)
+    np.testing.assert_allclose(samples.velocity[0], [np.pi / 2, 0.09])
+    np.testing.assert_allclose(samples.effort[:, 0], 1.0)
 
 
 @pytest.mark.parametrize(

@@ -125,6 +125,16 @@ def test_log_time_where_no_message_has_a_stamp(tmp_path):
     assert np.allclose(recording.samples().time, MOTION["time"], rtol=0, atol=1e-15)
 
 
+@pytest.mark.parametrize("rows", [(7,), (0, 3)])
+def test_log_time_where_single_messages_have_no_stamp(tmp_path, rows):
+    log = [(time + 5_000_000, message) for time, message in messages()]
+    for row in rows:
+        log[row][1]["header"]["stamp"] = {"sec": 0, "nanosec": 0}
+    recording = read_recording(log_file(tmp_path, {"/joint_states": log}))
+    assert np.allclose(recording.samples().time, MOTION["time"], rtol=0, atol=1e-12)
+    assert f"{len(rows)} message" in recording.warnings[0].text
+
+
 def test_simulated_time_may_start_at_zero(tmp_path):
     log = [(10**18 + k, message) for k, (_, message) in enumerate(messages(start_ns=0))]
     recording = read_recording(log_file(tmp_path, {"/joint_states": log}))
@@ -210,8 +220,7 @@ BAD_LOGS = [
     (edited(4, name=["a", "joint2"]), "message 5: joint joint1 is missing (the message names a, joint2)"),
     (edited(4, position=[1.0, np.inf]), "message 5, column q2: the value is infinite"),
     (edited(0, position=[], effort=[], velocity=[], name=[]), "message 1: carries no positions"),
-    (edited(4, header=messages()[3][1]["header"]), "message 5, column t: time repeats"),
-    (edited(4, header=messages()[2][1]["header"]), "message 5, column t: time runs backwards"),
+    (edited(14, header=messages()[2][1]["header"]), "message 15, column t: time runs backwards"),
     (NO_EFFORT, "message 1: carries no effort"),
     (messages(5), "holds only 5 samples"),
     ([], "no sensor_msgs/msg/JointState message was recorded"),
@@ -224,6 +233,14 @@ def test_bad_messages_are_refused_with_their_number(tmp_path, log, expected):
     message = message_of(lambda: read_recording(path))
     assert message.startswith(f"{path}: ")
     assert expected in message
+
+
+@pytest.mark.parametrize(("row", "words"), [(3, "1 row has the time"), (2, "1 row came after a later one")])
+def test_a_repeated_or_late_stamp_is_mended(tmp_path, row, words):
+    log = edited(4, header=messages()[row][1]["header"])
+    recording = read_recording(log_file(tmp_path, {"/joint_states": log}))
+    assert (np.diff(recording.samples().time) > 0).all()
+    assert words in recording.warnings[0].text
 
 
 def test_missed_samples_are_nan(tmp_path):

@@ -69,9 +69,9 @@ def test_silent_and_stuck_channels():
     effort[:, 0] = 0
     effort[:, 1] = np.nan
     assert remarks(report(position=position, effort=effort))[:3] == [
+        (Severity.ERROR, "tau2", "NaN throughout: no effort was recorded; record torques or currents of every joint"),
         (Severity.WARNING, "q1", "never changes: the joint stood still or its encoder was not read"),
         (Severity.WARNING, "tau1", "is zero throughout: was it recorded?"),
-        (Severity.WARNING, "tau2", "no sample at all"),
     ]
     effort[:, 0] = 1.5
     assert (Severity.WARNING, "tau1", "never changes from 1.5: was it recorded?") in remarks(report(effort=effort))
@@ -83,13 +83,18 @@ def test_wrapped_angles():
     position[:, 1] = np.mod(2 * time, 2 * np.pi)
     wraps = int(2 * time[-1] / (2 * np.pi))
     first = time[np.argmax(np.diff(position[:, 1]) < 0) + 1]
-    expected = f"jumps by about 2π {wraps} times, first at t = {first:.6g} s: unwrap the angle"
+    expected = f"wraps by 2π {wraps} times, first at t = {first:.6g} s; unwrapped"
     assert remarks(report(position=position)) == [(Severity.WARNING, "q2", expected)]
 
 
 def test_degrees():
-    made = report(position=np.rad2deg(motion()["position"]))
-    assert made.findings[0].text == "spans 114.6: positions are read as rad, are these degrees?"
+    assert report(position=np.rad2deg(motion()["position"])).findings == ()  # no limits, no gravity: nothing tells
+    position = np.rad2deg(np.repeat(motion()["position"], 2, axis=1))
+    made = report(position=position, effort=np.repeat(motion()["effort"], 2, axis=1))
+    assert (made.findings[0].severity, made.findings[0].where) == (Severity.ERROR, "q1")
+    assert "4 of 4 joints are beyond two turns" in made.findings[0].text
+    assert "--units q=deg" in made.findings[0].text
+    assert "--trust-units" in message_of(made.require_usable)
 
 
 def test_encoder_steps():

@@ -1,7 +1,8 @@
 import numpy as np
 
 from recording.recording_files import message_of
-from tauscope.recording.row_check import RowCheck
+from tauscope.recording import EffortKind
+from tauscope.recording.intake import RowIntake
 
 
 def place(row: int) -> str:
@@ -12,14 +13,29 @@ def block(*times: float) -> np.ndarray:
     return np.column_stack([np.array(times), np.zeros((len(times), 2))])
 
 
+def intake() -> RowIntake:
+    return RowIntake("file", ("t", "q1", "tau1"), EffortKind.TORQUE)
+
+
 def test_time_rises_from_block_to_block():
-    check = RowCheck("file", ("t", "q1", "tau1"))
-    check(block(0.0, 0.1), place)
-    check(block(), place)
-    check(block(0.2), place)
-    message = message_of(lambda: check(block(0.2, 0.3), place))
-    assert message.startswith("file: line 2, column t: time repeats 0.2 s after 0.2 s; a recording is one motion")
+    rows = intake()
+    rows.add(block(*range(20)), place)
+    rows.add(block(), place)
+    rows.add(block(20.0), place)
+    message = message_of(lambda: rows.add(block(5.0, 21.0), place))
+    assert message.startswith(
+        "file: line 2, column t: time runs backwards: 5.0 s after 20.0 s; a recording is one motion"
+    )
+
+
+def test_late_and_repeated_rows_are_mended_across_blocks():
+    rows = intake()
+    rows.add(block(*range(20)), place)
+    rows.add(block(18.5, 19.0, 21.0, 20.0), place)
+    recording = rows.finish(1)
+    assert recording.samples().time.tolist() == [*range(18), 18, 18.5, 19, 20, 21]
+    assert len(recording.warnings) == 2
 
 
 def test_the_first_time_may_be_anything_finite():
-    RowCheck("file", ("t", "q1", "tau1"))(block(-1e300, 0, 1e300), place)
+    intake().add(block(-1e300, 0, 1e300), place)

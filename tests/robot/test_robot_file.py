@@ -33,6 +33,7 @@ def test_every_field_is_read(tmp_path: Path) -> None:
         limits=JointLimits((-2.9, 2.9), 2.0, 5.0, 40.0),
         gear_ratio=100.0,
         torque_constant=0.5,
+        has_torque_constant=True,
         sign=-1,
         friction_shape=FrictionShape(500.0, 10.0),
         drive={"bus": "can0", "node": 3},

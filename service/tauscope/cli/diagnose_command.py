@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
-from tauscope.cli.arguments import RobotFile
+from tauscope.cli.arguments import Rate, RobotFile, TrustUnits, Units, parse_unit_option
 from tauscope.cli.identify_command import Cutoff, HeldOut, parse_cutoff
 
 Recordings = Annotated[
@@ -44,6 +44,9 @@ def diagnose(
     held_out: HeldOut = None,
     against: Against,
     cutoff: Cutoff = "auto",
+    units: Units = None,
+    rate: Rate = None,
+    trust_units: TrustUnits = False,
     json: Annotated[Path | None, _output("Write the result as JSON; - is standard output.")] = None,
     report: Annotated[Path | None, _output("Write a page with verdict, findings and residuals.", "OUT.html")] = None,
     next_trajectory: Annotated[
@@ -67,8 +70,10 @@ def diagnose(
     ----------
     cutoff : str
         ``auto``, ``none`` or a frequency [Hz], for the identification
+    rate : float or None
+        samples a second where t counts samples [Hz]
     """
-    cutoff_hz = parse_cutoff(cutoff)
+    cutoff_hz, unit_of = parse_cutoff(cutoff), parse_unit_option(units)
     if next_trajectory is not None and next_trajectory.suffix.lower() not in TRAJECTORIES:
         text = f"{str(next_trajectory)!r}: a trajectory file ends in .json or .csv"
         raise typer.BadParameter(text, param_hint="--next-trajectory")
@@ -80,7 +85,13 @@ def diagnose(
 
     what, simulated, saved = parse_against(against)
     options = make_request(
-        task.DiagnosisOptions, against=what, cutoff_hz=cutoff_hz, next_trajectory=next_trajectory is not None
+        task.DiagnosisOptions,
+        against=what,
+        cutoff_hz=cutoff_hz,
+        next_trajectory=next_trajectory is not None,
+        units=unit_of,
+        rate_hz=rate,
+        trust_units=trust_units,
     )
     held, compared = held_out or [], [*simulated, *([] if saved is None else [saved])]
     request = task.Request(

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from tauscope.cli.arguments import RobotFile
+from tauscope.cli.arguments import Rate, RobotFile, TrustUnits, Units, parse_unit_option
 
 Recordings = Annotated[
     list[Path],
@@ -63,6 +63,9 @@ def identify(
             "--prior/--no-prior", help="Deliver the most probable bodies, or the free least-squares estimate."
         ),
     ] = True,
+    units: Units = None,
+    rate: Rate = None,
+    trust_units: TrustUnits = False,
     json: Annotated[
         Path | None, typer.Option(metavar="OUT", dir_okay=False, help="Write the result as JSON; - is standard output.")
     ] = None,
@@ -80,8 +83,10 @@ def identify(
     ----------
     cutoff : str
         ``auto``, ``none`` or a frequency [Hz]
+    rate : float or None
+        samples a second where t counts samples [Hz]
     """
-    cutoff_hz = parse_cutoff(cutoff)
+    cutoff_hz, unit_of = parse_cutoff(cutoff), parse_unit_option(units)
     from tauscope.cli.identify_summary import show_identification
     from tauscope.cli.task_run import export_outputs, make_request, run_task
     from tauscope.cli.terminal import output
@@ -94,6 +99,9 @@ def identify(
         cutoff_hz=cutoff_hz,
         rotor_inertia=rotor_inertia,
         prior=prior,
+        units=unit_of,
+        rate_hz=rate,
+        trust_units=trust_units,
     )
     held = held_out or []
     request = task.Request(

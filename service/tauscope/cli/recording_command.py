@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from tauscope.cli.arguments import RecordingFile
+from tauscope.cli.arguments import Rate, RecordingFile, TrustUnits, Units, parse_unit_option
 from tauscope.cli.verbs import add_verb
 
 recording = typer.Typer(help="Look at recordings, and convert them.", no_args_is_help=True, rich_markup_mode=None)
@@ -16,11 +16,30 @@ def check(
     joints: Annotated[
         int | None, typer.Option(min=1, metavar="N", help="Number of joints that it has to have.")
     ] = None,
+    robot: Annotated[
+        Path | None,
+        typer.Option(
+            exists=True, dir_okay=False, metavar="ROBOT", help="Robot file: its names, limits, masses and units."
+        ),
+    ] = None,
+    units: Units = None,
+    rate: Rate = None,
+    trust_units: TrustUnits = False,
 ) -> None:
-    """Show what a recording holds, and what to look at before trusting it."""
-    from tauscope.cli.recording_summary import show_recording
+    """Show what a recording holds, and what to look at before trusting it.
 
-    show_recording(file, joints)
+    Parameters
+    ----------
+    rate : float or None
+        samples a second where t counts samples [Hz]
+    """
+    unit_of = parse_unit_option(units)
+    from tauscope.cli.recording_summary import show_recording
+    from tauscope.cli.task_run import make_request
+    from tauscope.tasks.task import ReadingOptions
+
+    options = make_request(ReadingOptions, units=unit_of, rate_hz=rate, trust_units=trust_units)
+    show_recording(file, joints, robot, options.reading)
 
 
 def convert(

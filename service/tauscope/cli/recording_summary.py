@@ -5,23 +5,25 @@ from pathlib import Path
 import typer
 
 from tauscope.cli.terminal import output, plain, shown_progress, table
-from tauscope.recording import EffortKind, RecordingReport, check_recording, convert_recording
+from tauscope.recording import EffortKind, Reading, RecordingReport, check_recording, convert_recording
 from tauscope.recording.convert import FORMATS
 from tauscope.report.quantities import ABSENT, counted, significant
 from tauscope.report.table import Table
+from tauscope.robot import read_robot
 
 
-def show_recording(path: Path, joint_count: int | None) -> None:
+def show_recording(path: Path, joint_count: int | None, robot_file: Path | None, reading: Reading) -> None:
     """Show what a recording holds, and what to look at before trusting it.
 
     Raises
     ------
     RecordingError
-        if the recording cannot be read or breaks a rule
+        if the recording cannot be read, breaks a rule, or no other verb accepts it
     """
     with shown_progress() as progress:
         progress(f"read {path}")
-        report = check_recording(path, joint_count)
+        robot = None if robot_file is None else read_robot(robot_file)
+        report = check_recording(path, joint_count, robot, reading)
     console = output()
     console.print(
         plain(f"{report.name}: {counted(len(report.joints), 'joint')}, {counted(report.samples, 'sample')}"),
@@ -31,6 +33,7 @@ def show_recording(path: Path, joint_count: int | None) -> None:
     console.print(table("Joints", _joints(report)))
     for finding in report.findings:
         console.print(plain(f"{finding.severity}: {finding.where}: {finding.text}"), soft_wrap=True)
+    report.require_usable()
     console.print(plain(f"{path}: valid"), soft_wrap=True)
 
 

@@ -71,7 +71,7 @@ def run_task(
     if STANDARD_OUTPUT not in paths:
         for path in written:
             output().print(plain(f"wrote {path}"), soft_wrap=True)
-    _show_warnings(robot)
+    _show_warnings(robot, result, summarised=show is not None)
     return result
 
 
@@ -121,8 +121,17 @@ def export_outputs(paths: Sequence[Path], files: Mapping[ExportFormat, ExportFil
     return made
 
 
-def _show_warnings(robot: Robot) -> None:
-    """Warnings of a robot file, on standard error."""
+def _show_warnings(robot: Robot, result: Any, *, summarised: bool) -> None:
+    """Warnings of a robot file and of a result on standard error; a summary shows the result's own first."""
     for finding in robot.findings:
         if finding.severity is Severity.WARNING:
             typer.echo(one_line(f"warning: {finding.where}: {finding.text}"), err=True)
+    warnings = getattr(getattr(result, "document", None), "warnings", None)
+    if warnings is None:
+        recordings = (*getattr(result, "recordings", ()), *getattr(result, "held_out", ()))
+        warnings = [warning for recording in recordings for warning in recording.warnings]
+    elif summarised:
+        warnings = []
+    for warning in warnings:
+        remedy = f"; {warning.remedy}" if warning.remedy else ""
+        typer.echo(one_line(f"warning: {warning.text}{remedy} ({warning.code})"), err=True)

@@ -158,6 +158,8 @@ class AutocovarianceSum:
             covariance = _floored(covariance)
         whitened = _filtered(covariance[: reach + 1], whitener)
         orders = list(_levinson(whitened, min(LARGEST_ORDER, len(whitened) - 1)))
+        if not orders:  # pairs of what was measured fit together no more
+            return Autoregression(np.empty(0), float(covariance[0]), variance=float(covariance[0]))
         scores = [count * log(variance) + len(found) * log(count) for found, variance in orders]
         coefficients, variance = orders[int(np.argmin(scores))]
         both = np.convolve(whitener, np.append(1.0, -coefficients))
@@ -173,6 +175,8 @@ def _following_share(sums: LaggedProducts) -> float:
 def _levinson(covariance: Array, largest: int) -> Iterator[tuple[Array, float]]:
     """Coefficients and innovation variance of the autoregressions of order 0, 1 … by Levinson's recursion."""
     variance = float(covariance[0])
+    if variance <= 0.0:
+        return
     coefficients = np.zeros(largest)
     yield np.empty(0), variance
     for order in range(1, largest + 1):
@@ -193,7 +197,7 @@ def _floored(covariance: Array) -> Array:
 
 def _prediction_error_filter(covariance: Array, order: int) -> Array:
     """1 - Σ a_k z⁻ᵏ that whitens noise of this autocovariance."""
-    *_, (coefficients, _variance) = _levinson(covariance, order)
+    *_, (coefficients, _variance) = _levinson(covariance, order)  # of white noise, which has a variance
     return np.append(1.0, -coefficients)
 
 

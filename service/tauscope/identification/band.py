@@ -183,7 +183,8 @@ def _quiet_band(
     prepared = next(iter(motions))
     chosen = np.linspace(0, len(prepared.motion.position) - 1, PROBED_POSTURES).astype(int)
     inertia = _inertia(structure, parameters, prepared.motion.position[chosen])
-    from_position = np.array([[name == Source.POSITION for name in c.source.names] for c in conditioners])
+    sources = [conditioner.source.in_band(motions.cutoff_hz) for conditioner in conditioners]
+    from_position = np.array([[name == Source.POSITION for name in source.names] for source in sources])
     density = np.mean([c.noise.density for c in conditioners] * from_position, axis=0)
     independent = _independent_share(prepared.motion, conditioners[0].position_noise_std)
     density *= independent + (1.0 - independent) * prepared.motion.repetitions

@@ -29,6 +29,7 @@ from tauscope.identification.signs import reversed_joints
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.conditioning import Conditioner, ConditioningSummary
 from tauscope.recording.recording import Array, Recording
+from tauscope.result_warning import ResultWarning
 from tauscope.robot import Robot
 
 KNOWN_SHARE = 0.1
@@ -108,6 +109,7 @@ class Identification:
     extrapolation: Array | None
     cutoff_hz: float | None
     options: Options
+    recording_warnings: tuple[ResultWarning, ...]
     conditioning: tuple[ConditioningSummary, ...]
     held_out_conditioning: tuple[ConditioningSummary, ...]
     identifiable: tuple[dict[str, bool], ...]
@@ -219,6 +221,7 @@ def identify(
         extrapolation=beyond,
         cutoff_hz=cutoff,
         options=options,
+        recording_warnings=tuple(warning for each in (*recordings, *held_out) for warning in each.warnings),
         conditioning=tuple(conditioner.summary(cutoff) for conditioner in conditioners),
         held_out_conditioning=tuple(conditioner.summary(cutoff) for conditioner in held_conditioners),
         identifiable=_identifiable(structure, factors, covariance, solution, shapes),

@@ -35,6 +35,7 @@ def identification_warnings(result: Identification) -> list[ResultWarning]:
     return [
         *_signs(result),
         *_scale(result),
+        *result.recording_warnings,
         *_bodies(result),
         *_excitation(result),
         *_extrapolation(result),

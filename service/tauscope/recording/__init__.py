@@ -2,17 +2,23 @@
 
 from tauscope.recording.checks import RecordingReport, check_recording, report_recording
 from tauscope.recording.convert import Conversion, convert_recording, write_recording
+from tauscope.recording.examination import examine_recording, open_recording
 from tauscope.recording.reading import read_recording
 from tauscope.recording.recording import EffortKind, Recording, Samples
+from tauscope.recording.units import Reading, parse_units
 
 __all__ = [
     "Conversion",
     "EffortKind",
+    "Reading",
     "Recording",
     "RecordingReport",
     "Samples",
     "check_recording",
     "convert_recording",
+    "examine_recording",
+    "open_recording",
+    "parse_units",
     "read_recording",
     "report_recording",
     "write_recording",

@@ -6,14 +6,17 @@ from pathlib import Path
 
 import numpy as np
 
+from tauscope.errors import RecordingError
+from tauscope.recording.examination import find_implausible, find_missing_effort, mend_recording
 from tauscope.recording.measures import Gaps, JointMeasures, StepMeasures, measure_gaps, measure_rows
 from tauscope.recording.reading import read_recording
 from tauscope.recording.recording import EffortKind, Recording
+from tauscope.recording.units import SI, Reading
 from tauscope.recording.words import listed
 from tauscope.robot.finding import Finding, Severity
+from tauscope.robot.robot import Robot
 
 _MEANINGFUL_STEP = 1e-4
-_DEGREES_SPAN = 8 * np.pi
 
 
 @dataclass(frozen=True)
@@ -49,9 +52,21 @@ class RecordingReport:
     joints: tuple[JointMeasures, ...]
     findings: tuple[Finding, ...]
 
+    def require_usable(self) -> None:
+        """Refuse a recording that no other verb accepts.
+
+        Raises
+        ------
+        RecordingError
+            a column can hardly be in its unit, or a joint has no effort
+        """
+        for finding in self.findings:
+            if finding.severity is Severity.ERROR:
+                raise RecordingError(f"{self.name}: column {finding.where}: {finding.text}")
+
 
 def check_recording(
-    path: str | Path, joint_count: int | None = None, joint_names: tuple[str, ...] | None = None
+    path: str | Path, joint_count: int | None = None, robot: Robot | None = None, reading: Reading = SI
 ) -> RecordingReport:
     """Read a recording and report what it holds, in memory that does not grow with its length.
 
@@ -65,15 +80,19 @@ def check_recording(
     RecordingError
         the file cannot be read or breaks a rule
     """
-    return report_recording(read_recording(path, joint_count, joint_names))
+    reading = reading.for_robot(robot)
+    joints = None if robot is None else [joint.name for joint in robot.joints]
+    recording = read_recording(path, joint_count, joints, reading)
+    return report_recording(recording, robot, trust_units=reading.trust_units)
 
 
-def report_recording(recording: Recording) -> RecordingReport:
-    """Report what a recording holds."""
+def report_recording(recording: Recording, robot: Robot | None = None, *, trust_units: bool = False) -> RecordingReport:
+    """Report what a recording holds; what no other verb accepts is among the findings, as an error."""
     measures = measure_rows(recording)
     gaps = measure_gaps(recording, measures)
     runs = measures.period_lengths
-    findings = [*_about_columns(recording), *_about_clock(gaps), *_about_missed(measures.missed)]
+    findings = [*_about_units(recording, robot, trust_units=trust_units), *_about_samples(recording, robot)]
+    findings += [*_about_columns(recording), *_about_clock(gaps), *_about_missed(measures.missed)]
     for joint, measure in enumerate(measures.joints, 1):
         findings += _about_position(f"q{joint}", measure)
         findings += _about_effort(f"{recording.effort_kind}{joint}", measure, len(recording))
@@ -90,8 +109,31 @@ def report_recording(recording: Recording) -> RecordingReport:
         missed=measures.missed,
         periods=Periods(len(runs), min(runs), max(runs)) if runs else None,
         joints=measures.joints,
-        findings=tuple(sorted(findings, key=lambda finding: finding.severity is not Severity.WARNING)),
+        findings=tuple(sorted(findings, key=lambda finding: list(Severity).index(finding.severity))),
     )
+
+
+def _about_units(recording: Recording, robot: Robot | None, *, trust_units: bool) -> Iterator[Finding]:
+    """Columns that can hardly be in their unit, and efforts that were not recorded."""
+    missing, doubt = find_missing_effort(recording), find_implausible(recording, robot)
+    if missing is not None:
+        yield _placed(Severity.ERROR, missing)
+    if doubt is not None:
+        trusted = (Severity.WARNING, "") if trust_units else (Severity.ERROR, ", or go on with --trust-units")
+        yield _placed(trusted[0], doubt + trusted[1])
+
+
+def _about_samples(recording: Recording, robot: Robot | None) -> Iterator[Finding]:
+    """Samples that are none, masked or repaired before anything is estimated."""
+    for note in mend_recording(recording, robot).notes:
+        yield _placed(Severity.WARNING, note.text)
+
+
+def _placed(severity: Severity, text: str) -> Finding:
+    """A finding from a text that begins with its column."""
+    where, found, rest = text.partition(": ")
+    place = where.removeprefix("columns ").removeprefix("column ")
+    return Finding(severity, place, rest) if found and place != where else Finding(severity, "t", text)
 
 
 def _about_columns(recording: Recording) -> Iterator[Finding]:
@@ -123,28 +165,20 @@ def _about_missed(missed: dict[str, int]) -> Iterator[Finding]:
 
 
 def _about_position(q: str, measure: JointMeasures) -> Iterator[Finding]:
-    """One joint's position channel: stuck, wrapped or in other units."""
+    """One joint's position channel: absent or stuck, and its encoder."""
     low, high = measure.position
     if np.isnan(low):
         yield Finding(Severity.WARNING, q, "no sample at all")
     elif low == high:
         yield Finding(Severity.WARNING, q, "never changes: the joint stood still or its encoder was not read")
-    if measure.wraps:
-        times = "once" if measure.wraps == 1 else f"{measure.wraps} times"
-        text = f"jumps by about 2π {times}, first at t = {measure.first_wrap:.6g} s: unwrap the angle"
-        yield Finding(Severity.WARNING, q, text)
-    elif high - low > _DEGREES_SPAN:
-        yield Finding(Severity.INFO, q, f"spans {high - low:.4g}: positions are read as rad, are these degrees?")
     if measure.position_step is not None and measure.position_step > _MEANINGFUL_STEP:
         yield Finding(Severity.INFO, q, f"moves in steps of {measure.position_step:.3g} (encoder resolution)")
 
 
 def _about_effort(effort: str, measure: JointMeasures, samples: int) -> Iterator[Finding]:
-    """One joint's effort channel: absent, stuck or clipped."""
+    """One joint's effort channel: stuck or clipped."""
     low, high = measure.effort
-    if np.isnan(low):
-        yield Finding(Severity.WARNING, effort, "no sample at all")
-    elif low == high:
+    if low == high:
         level = "is zero throughout" if low == 0 else f"never changes from {low:.6g}"
         yield Finding(Severity.WARNING, effort, f"{level}: was it recorded?")
     for level, count in measure.clipped:

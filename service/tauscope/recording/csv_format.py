@@ -10,10 +10,11 @@ import numpy as np
 
 from tauscope.errors import RecordingError
 from tauscope.recording.columns import ColumnLayout, find_columns, require_joint_count
-from tauscope.recording.csv_numbers import is_number, parse_number, parse_quickly, shown
+from tauscope.recording.csv_numbers import Clock, is_number, parse_number, parse_quickly, shown
+from tauscope.recording.intake import RowIntake
 from tauscope.recording.recording import Array, Recording
-from tauscope.recording.row_check import RowCheck, require_rows
-from tauscope.recording.table import SPOOL_ABOVE_BYTES, TableBuilder
+from tauscope.recording.table import SPOOL_ABOVE_BYTES
+from tauscope.recording.units import SI, Reading
 
 _CHUNK_BYTES = 2**18
 _LONGEST_LINE_BYTES = 2**20
@@ -23,7 +24,11 @@ _DELIMITERS = (b",", b";", b"\t")
 
 
 def read_csv(
-    path: Path, name: str, joint_count: int | None = None, spool_above_bytes: int = SPOOL_ABOVE_BYTES
+    path: Path,
+    name: str,
+    joint_count: int | None = None,
+    spool_above_bytes: int = SPOOL_ABOVE_BYTES,
+    reading: Reading = SI,
 ) -> Recording:
     """Read a CSV recording, in time linear and in memory bounded in its number of lines.
 
@@ -46,19 +51,16 @@ def read_csv(
     with path.open("rb") as file:
         header = _read_header(file, name)
         require_joint_count(header.layout.joint_count, joint_count, name)
-        check = RowCheck(name, header.layout.names)
-        builder: TableBuilder | None = None
+        layout = header.layout
+        intake: RowIntake | None = None
         for chunk in _chunks(file, header.line + 1, name):
-            block, lines = _parse_chunk(chunk, header, name, is_first=builder is None or not len(builder))
-            check(block, lambda row, lines=lines: f"line {lines[row]}")
-            if builder is None:
+            block, lines = _parse_chunk(chunk, header, name, is_first=intake is None or not len(intake))
+            if intake is None:
                 expected = int(len(block) * os.fstat(file.fileno()).st_size / len(chunk.text) * 1.01) + 16
-                builder = TableBuilder(header.layout.names, expected, spool_above_bytes)
-            builder.append(block)
-    layout = header.layout
-    builder = builder or TableBuilder(layout.names)
-    require_rows(len(builder), name)
-    return Recording(name, layout.joint_count, layout.effort_kind, builder.finish(), layout.ignored)
+                intake = RowIntake(name, layout.names, layout.effort_kind, reading, expected, spool_above_bytes)
+            intake.add(block, lambda row, lines=lines: f"line {lines[row]}")
+    intake = intake or RowIntake(name, layout.names, layout.effort_kind, reading)
+    return intake.finish(layout.joint_count, layout.ignored)
 
 
 def write_csv(recording: Recording, file: BinaryIO) -> None:
@@ -78,6 +80,7 @@ class _Header:
     line: int
     delimiter: bytes
     layout: ColumnLayout
+    clock: Clock
 
 
 @dataclass(frozen=True)
@@ -122,7 +125,7 @@ def _parse_header(line: bytes, number: int, name: str) -> _Header:
         header = [field.decode("utf-8") for field in fields]
     except UnicodeDecodeError as error:
         raise RecordingError(f"{name}: line {number}: the header is not UTF-8 text; save the file as UTF-8") from error
-    return _Header(number, delimiter, find_columns(header, name))
+    return _Header(number, delimiter, find_columns(header, name), Clock())
 
 
 def _chunks(file: BinaryIO, line: int, name: str) -> Iterator[_Chunk]:
@@ -167,8 +170,9 @@ def _parse_chunk(chunk: _Chunk, header: _Header, name: str, *, is_first: bool) -
         fields = _split_line(line, number, header, name, is_truncated=is_truncated)
         if is_first and not rows:
             _refuse_units(fields, number, header, name)
-        names = zip(layout.names, layout.source, strict=True)
-        rows.append([parse_number(fields[index], name, number, column) for column, index in names])
+        time, *others = zip(layout.names, layout.source, strict=True)
+        row = [parse_number(fields[index], name, number, column) for column, index in others]
+        rows.append([header.clock.parse(fields[time[1]], name, number), *row])
         lines.append(number)
     return np.array(rows, dtype=np.float64).reshape(len(rows), len(layout.names)), lines
 

@@ -8,6 +8,7 @@ and both round correctly, so they agree on every text that both take; what the q
 import re
 import struct
 from collections.abc import Sequence
+from datetime import datetime
 
 import numpy as np
 from pydantic_core import from_json
@@ -19,6 +20,7 @@ _NUMBER_BYTES = b"0123456789+-.eE \tnaN"
 _NOT_SEPARATORS = bytes(set(range(256)) - set(b",\n"))
 _NUMBER = re.compile(rb"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _MISSED = re.compile(rb"[+-]?nan", re.IGNORECASE)
+_DATE = re.compile(rb"[0-9]{4}-[0-9]{2}-[0-9]{2}[T ]")
 _SHOWN_CHARACTERS = 40
 
 
@@ -96,6 +98,43 @@ def parse_number(field: bytes, file: str, line: int, column: str) -> float:
     if np.isinf(value):
         raise RecordingError(f"{file}: line {line}, column {column}: {shown(text)} is too large for a number")
     return value
+
+
+class Clock:
+    """Reads a file's column t: numbers, or ISO 8601 dates, of which seconds since the first are kept."""
+
+    def __init__(self) -> None:
+        """Start before the first row."""
+        self._first: datetime | None = None
+
+    def parse(self, field: bytes, file: str, line: int) -> float:
+        """Time of a row.
+
+        Parameters
+        ----------
+        line : int
+            its line, counted from 1
+
+        Returns
+        -------
+        float
+            [s], or in the file's own unit
+
+        Raises
+        ------
+        RecordingError
+            the text is neither a number nor a date
+        """
+        text = field.strip(b' \t"')
+        if not _DATE.match(text):
+            return parse_number(field, file, line, "t")
+        try:
+            stamp = datetime.fromisoformat(text.decode("ascii"))
+            self._first = self._first or stamp
+            return (stamp - self._first).total_seconds()
+        except (ValueError, TypeError) as error:
+            reason = "has a time zone in some rows only" if isinstance(error, TypeError) else "is no date of ISO 8601"
+            raise RecordingError(f"{file}: line {line}, column t: {shown(text)} {reason}") from error
 
 
 def is_number(field: bytes) -> bool:

@@ -1,7 +1,7 @@
 """From the JointState messages of one topic to a recording: which joints, which clock."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import TypeVar
 
@@ -10,13 +10,18 @@ from numpy.typing import NDArray
 
 from tauscope.errors import RecordingError, RecordingMismatchError
 from tauscope.recording.columns import table_columns
+from tauscope.recording.intake import RowIntake
 from tauscope.recording.joint_state import JointState, JointStateLayout, JointStates, decode_cdr, decode_json
 from tauscope.recording.recording import EffortKind, Recording
-from tauscope.recording.row_check import RowCheck, require_rows
-from tauscope.recording.table import SPOOL_ABOVE_BYTES, TableBuilder
+from tauscope.recording.table import SPOOL_ABOVE_BYTES
+from tauscope.recording.units import SI, Reading
 from tauscope.recording.words import listed, reason
+from tauscope.result_warning import ResultWarning
 
 _MESSAGES_AT_ONCE = 4096
+
+LONGEST_FROM_ZERO_NS = 10**12
+"""A stamp of zero beside stamps above this is none [ns]; simulated time may begin at zero."""
 
 Decoded = TypeVar("Decoded")
 
@@ -35,6 +40,7 @@ class Choice:
     joint_count: int | None = None
     joint_names: tuple[str, ...] | None = None
     spool_above_bytes: int = SPOOL_ABOVE_BYTES
+    reading: Reading = SI
 
 
 class JointStateTopic:
@@ -148,14 +154,15 @@ class _Rows:
         self.joint_names = joint_names
         self._name, self._topic = choice.file, topic
         self._joint_count, self._has_velocity = joint_count, has_velocity
-        self._columns = table_columns(joint_count, EffortKind.TORQUE, ("qd",) if has_velocity else ())
-        self._builder = TableBuilder(self._columns, spool_above_bytes=choice.spool_above_bytes)
-        self._check = RowCheck(choice.file, self._columns)
+        columns = table_columns(joint_count, EffortKind.TORQUE, ("qd",) if has_velocity else ())
+        spool = choice.spool_above_bytes
+        self._intake = RowIntake(choice.file, columns, EffortKind.TORQUE, choice.reading, spool_above_bytes=spool)
         self._origin: int | None = None
         self._by_log_time = False
+        self._unset = 0
 
     def __len__(self) -> int:
-        return len(self._builder)
+        return len(self._intake)
 
     def append(self, states: JointStates, order: Sequence[int], log_time: NDArray[np.int64], number: int) -> None:
         """Add messages; the clock is the header stamp, or the log's where the first batch has no stamps at all."""
@@ -164,24 +171,39 @@ class _Rows:
                 f"{self._name}: topic {self._topic}, message {number}: velocities are sent in some messages only; "
                 "record again with one publisher"
             )
+        stamp = states.stamp
+        unset = (stamp == 0) & (stamp.max() > LONGEST_FROM_ZERO_NS)
+        if (
+            unset.any() and not self._by_log_time
+        ):  # what the log's clock is ahead of the publisher's, it is for these messages, too
+            ahead = np.median((log_time - stamp)[~unset]).astype(np.int64)
+            stamp = np.where(unset, log_time - ahead, stamp)
+            self._unset += int(unset.sum())
         if self._origin is None:
-            self._by_log_time = not states.stamp.any()
-            self._origin = int(log_time[0] if self._by_log_time else states.stamp[0])
-        elif self._by_log_time and states.stamp.any():
+            self._by_log_time = not stamp.any()
+            self._origin = int(log_time[0] if self._by_log_time else stamp[0])
+        elif self._by_log_time and stamp.any():
             raise RecordingError(
-                f"{self._name}: topic {self._topic}, message {number + int(np.argmax(states.stamp != 0))}: "
+                f"{self._name}: topic {self._topic}, message {number + int(np.argmax(stamp != 0))}: "
                 "has a time stamp where the messages before it have none"
             )
-        clock = log_time if self._by_log_time else states.stamp
+        clock = log_time if self._by_log_time else stamp
         time = (clock - self._origin).astype(np.float64) * 1e-9
         parts = [time[:, None], states.position[:, order], states.effort[:, order]]
         block = np.hstack([*parts, states.velocity[:, order]] if self._has_velocity else parts)
-        self._check(block, lambda row: f"topic {self._topic}, message {number + row}")
-        self._builder.append(block)
+        self._intake.add(block, lambda row: f"topic {self._topic}, message {number + row}")
 
     def finish(self) -> Recording:
-        require_rows(len(self._builder), self._name)
-        return Recording(self._name, self._joint_count, EffortKind.TORQUE, self._builder.finish())
+        recording = self._intake.finish(self._joint_count)
+        if not self._unset:
+            return recording
+        messages = "1 message has" if self._unset == 1 else f"{self._unset} messages have"
+        note = ResultWarning(
+            code="time-stamps",
+            text=f"column t: {messages} no stamp; the time at which they were logged was taken",
+            remedy="stamp every message",
+        )
+        return replace(recording, notes=(*recording.notes, note))
 
 
 def _layout_of(state: JointState) -> tuple[tuple[str, ...], int, int, int]:

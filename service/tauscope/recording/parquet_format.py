@@ -12,9 +12,10 @@ import numpy as np
 from tauscope.errors import RecordingError
 from tauscope.recording.columns import find_columns, require_joint_count
 from tauscope.recording.inflation import require_plausible_inflation
+from tauscope.recording.intake import RowIntake
 from tauscope.recording.recording import Array, Recording
-from tauscope.recording.row_check import RowCheck, require_rows
-from tauscope.recording.table import SPOOL_ABOVE_BYTES, TableBuilder
+from tauscope.recording.table import SPOOL_ABOVE_BYTES
+from tauscope.recording.units import SI, Reading
 from tauscope.recording.words import printable, reason
 
 PARQUET_MAGIC = b"PAR1"
@@ -24,7 +25,11 @@ _ROWS_AT_ONCE = 2**16
 
 
 def read_parquet(
-    path: Path, name: str, joint_count: int | None = None, spool_above_bytes: int = SPOOL_ABOVE_BYTES
+    path: Path,
+    name: str,
+    joint_count: int | None = None,
+    spool_above_bytes: int = SPOOL_ABOVE_BYTES,
+    reading: Reading = SI,
 ) -> Recording:
     """Read a Parquet recording batch by batch; null is a missed sample.
 
@@ -50,15 +55,19 @@ def read_parquet(
         _require_numbers(file.schema_arrow, layout.names, name)
         unpacked_bytes = file.metadata.num_rows * len(layout.names) * 8
         require_plausible_inflation(path.stat().st_size, unpacked_bytes, name)
-        builder = TableBuilder(layout.names, file.metadata.num_rows, spool_above_bytes)
-        check = RowCheck(name, layout.names)
+        rows, first_stamp = file.metadata.num_rows, None
+        intake = RowIntake(name, layout.names, layout.effort_kind, reading, rows, spool_above_bytes)
         for batch in file.iter_batches(batch_size=_ROWS_AT_ONCE, columns=list(layout.names), use_threads=False):
-            first = len(builder) + 1
-            block = np.column_stack([_numbers(batch.column(column)) for column in layout.names])
-            check(block, lambda row, first=first: f"row {first + row}")
-            builder.append(block)
-    require_rows(len(builder), name)
-    return Recording(name, layout.joint_count, layout.effort_kind, builder.finish(), layout.ignored)
+            first = len(intake) + 1
+            columns = [batch.column(column) for column in layout.names]
+            if _is_stamp(columns[0].type):
+                stamps = columns[0].cast("timestamp[ns]", safe=False).cast("int64")
+                first_stamp = next((stamp.as_py() for stamp in stamps), 0) if first_stamp is None else first_stamp
+                time = arrow.compute.subtract(stamps, first_stamp or 0)
+                columns[0] = arrow.compute.multiply(time.cast("float64"), 1e-9)
+            block = np.column_stack([_numbers(column) for column in columns])
+            intake.add(block, lambda row, first=first: f"row {first + row}")
+    return intake.finish(layout.joint_count, layout.ignored)
 
 
 def write_parquet(recording: Recording, file: BinaryIO) -> None:
@@ -83,6 +92,7 @@ def _arrow(name: str) -> Any:
     """The module pyarrow with its Parquet reader, loaded when first wanted: it is large, and an extra."""
     try:
         import_module("pyarrow.parquet")
+        import_module("pyarrow.compute")
         return import_module("pyarrow")
     except ImportError as error:
         raise RecordingError(
@@ -105,9 +115,14 @@ def _require_numbers(schema: Any, names: tuple[str, ...], name: str) -> None:
     """Refuse columns of text, dates and the like."""
     for column in names:
         kind = schema.field(column).type
-        if not _NUMBER_TYPE.fullmatch(str(kind)):
+        if not _NUMBER_TYPE.fullmatch(str(kind)) and not (column == "t" and _is_stamp(kind)):
             hint = "seconds as a float are needed" if column == "t" else "numbers are needed"
             raise RecordingError(f"{name}: column {column} is of type {printable(str(kind))}; {hint}")
+
+
+def _is_stamp(kind: Any) -> bool:
+    """Whether a column's type is a date with time."""
+    return str(kind).startswith("timestamp[")
 
 
 def _numbers(column: Any) -> Array:

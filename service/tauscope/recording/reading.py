@@ -12,6 +12,7 @@ from tauscope.recording.mcap_format import MCAP_MAGIC, read_mcap
 from tauscope.recording.parquet_format import PARQUET_MAGIC, read_parquet
 from tauscope.recording.recording import Recording
 from tauscope.recording.rosbag2_format import SQLITE_MAGIC, read_database, read_rosbag2
+from tauscope.recording.units import SI, Reading
 from tauscope.recording.words import printable
 
 _LONGEST_PATH = 4096
@@ -32,7 +33,10 @@ _FOREIGN = (
 
 
 def read_recording(
-    path: str | Path, joint_count: int | None = None, joint_names: Sequence[str] | None = None
+    path: str | Path,
+    joint_count: int | None = None,
+    joint_names: Sequence[str] | None = None,
+    reading: Reading = SI,
 ) -> Recording:
     """Read a recording: CSV, Parquet, MCAP, or a rosbag2 folder or database; told apart by content.
 
@@ -53,7 +57,7 @@ def read_recording(
     if joint_count is None and names is not None:
         joint_count = len(names)
     try:
-        recording = _read(path, name, joint_count, Choice(name, joint_count, names))
+        recording = _read(path, name, joint_count, Choice(name, joint_count, names, reading=reading))
     except OSError as error:
         raise RecordingError(f"{name}: {_reason(error)}") from error
     require_joint_count(recording.joint_count, joint_count, name)
@@ -82,7 +86,7 @@ def _read(path: Path, name: str, joint_count: int | None, choice: Choice) -> Rec
         return read_rosbag2(path, choice)
     magic = first_bytes(path, name)
     if magic.startswith(PARQUET_MAGIC):
-        return read_parquet(path, name, joint_count)
+        return read_parquet(path, name, joint_count, reading=choice.reading)
     if magic.startswith(MCAP_MAGIC):
         return read_mcap(path, choice)
     if magic.startswith(SQLITE_MAGIC):
@@ -93,7 +97,7 @@ def _read(path: Path, name: str, joint_count: int | None, choice: Choice) -> Rec
     if path.suffix.lower() in (".mcap", ".parquet", ".db3"):
         found = "is empty" if not magic else f"does not begin as a {path.suffix.lower()} file does"
         raise RecordingError(f"{name}: the file {found}; it is damaged or of another format")
-    return read_csv(path, name, joint_count)
+    return read_csv(path, name, joint_count, reading=choice.reading)
 
 
 def _reason(error: OSError) -> str:

@@ -7,9 +7,10 @@ import numpy as np
 
 from tauscope.errors import RecordingError, RecordingMismatchError
 from tauscope.recording.columns import OPTIONAL_GROUPS, table_columns
-from tauscope.recording.row_check import RowCheck, require_rows
+from tauscope.recording.row_check import RowCheck, require_rising, require_rows
 from tauscope.recording.samples import Array, EffortKind, Samples, Table
 from tauscope.recording.table import MemoryTable
+from tauscope.result_warning import ResultWarning
 from tauscope.robot.robot import Robot
 
 __all__ = ["Array", "EffortKind", "Recording", "Samples", "Table"]
@@ -17,17 +18,30 @@ __all__ = ["Array", "EffortKind", "Recording", "Samples", "Table"]
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """One continuous motion as it was measured."""
+    """One continuous motion as it was measured.
+
+    notes : tuple of ResultWarning
+        warnings without its name
+    is_examined : bool
+        whether units and samples were looked at, so that they need not be again
+    """
 
     name: str
     joint_count: int
     effort_kind: EffortKind
     table: Table
     ignored_columns: tuple[str, ...] = ()
+    notes: tuple[ResultWarning, ...] = ()
+    is_examined: bool = False
 
     def __len__(self) -> int:
         """Number of samples N."""
         return len(self.table)
+
+    @property
+    def warnings(self) -> tuple[ResultWarning, ...]:
+        """Warnings about its units and samples, each beginning with its name."""
+        return tuple(note.model_copy(update={"text": f"{self.name}: {note.text}"}) for note in self.notes)
 
     def samples(self, start: int = 0, stop: int | None = None) -> Samples:
         """Samples start:stop, as read-only views of the table where its columns allow.
@@ -204,6 +218,7 @@ def _from_groups(
     names = table_columns(shape[1], effort_kind, present)
     data = np.hstack(columns)
     RowCheck(name, names)(data, lambda row: f"row {row}")
+    require_rising(data[:, 0], -np.inf, name, lambda row: f"row {row}")
     return Recording(name, shape[1], effort_kind, MemoryTable(names, data))
 
 

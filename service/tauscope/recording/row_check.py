@@ -12,7 +12,7 @@ MINIMUM_ROWS = 10
 
 
 class RowCheck:
-    """Checks blocks of rows in the order of the file: time is finite and strictly increasing, no number is infinite.
+    """Checks blocks of rows: time is known, no number is infinite, a period is a whole number.
 
     NaN is a missed sample and welcome in every column but time.
     """
@@ -22,7 +22,6 @@ class RowCheck:
         self._file = file
         self._names = names
         self._period = names.index("period") if "period" in names else None
-        self._previous = -np.inf
 
     def __call__(self, block: Array, place: Callable[[int], str]) -> None:
         """Check the next block.
@@ -45,23 +44,12 @@ class RowCheck:
                 f"{self._file}: {place(row)}, column {self._names[column]}: the value is infinite; "
                 "leave the field empty where a sample was missed"
             )
-        self._check_time(block[:, 0], place)
+        unknown = np.isnan(block[:, 0])
+        if unknown.any():
+            row = int(np.argmax(unknown))
+            raise RecordingError(f"{self._file}: {place(row)}, column t: the time is missing; delete the row")
         if self._period is not None:
             self._check_period(block[:, self._period], place)
-
-    def _check_time(self, time: Array, place: Callable[[int], str]) -> None:
-        step_is_up = np.diff(time, prepend=self._previous) > 0
-        if not step_is_up.all():
-            row = int(np.argmin(step_is_up))
-            if np.isnan(time[row]):
-                raise RecordingError(f"{self._file}: {place(row)}, column t: the time is missing; delete the row")
-            previous = self._previous if row == 0 else float(time[row - 1])
-            word = "repeats" if time[row] == previous else "runs backwards:"
-            raise RecordingError(
-                f"{self._file}: {place(row)}, column t: time {word} {float(time[row])!r} s after {previous!r} s; "
-                "a recording is one motion with strictly increasing time"
-            )
-        self._previous = float(time[-1])
 
     def _check_period(self, period: Array, place: Callable[[int], str]) -> None:
         fault = (period != np.floor(period)) & ~np.isnan(period)
@@ -70,6 +58,33 @@ class RowCheck:
             raise RecordingError(
                 f"{self._file}: {place(row)}, column period: {float(period[row])!r} is not a whole number"
             )
+
+
+def require_rising(time: Array, previous: float, file: str, place: Callable[[int], str]) -> None:
+    """Refuse time that does not rise from row to row.
+
+    Parameters
+    ----------
+    time : (rows,) float64
+        stamps [s]
+    previous : float
+        the stamp before them [s]
+
+    Raises
+    ------
+    RecordingError
+        names the row
+    """
+    is_up = np.diff(time, prepend=previous) > 0
+    if is_up.all():
+        return
+    row = int(np.argmin(is_up))
+    before = previous if row == 0 else float(time[row - 1])
+    word = "repeats" if time[row] == before else "runs backwards:"
+    raise RecordingError(
+        f"{file}: {place(row)}, column t: time {word} {float(time[row])!r} s after {float(before)!r} s; "
+        "a recording is one motion with strictly increasing time"
+    )
 
 
 def require_rows(count: int, file: str) -> None:

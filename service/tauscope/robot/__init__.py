@@ -5,6 +5,7 @@ from tauscope.robot.denavit_hartenberg import DenavitHartenbergRow, modified_seg
 from tauscope.robot.finding import Finding, Severity
 from tauscope.robot.kinematics import homogeneous, link_placements
 from tauscope.robot.physical import Defect, find_defect, pseudo_inertia
+from tauscope.robot.recording_layout import RecordingLayout, find_fault
 from tauscope.robot.robot import (
     STANDARD_PARAMETERS,
     FrictionCoefficients,
@@ -36,6 +37,7 @@ __all__ = [
     "LinkInertia",
     "Model",
     "Placement",
+    "RecordingLayout",
     "Robot",
     "RobotReport",
     "Segment",
@@ -43,6 +45,7 @@ __all__ = [
     "UrdfChain",
     "check_robot",
     "find_defect",
+    "find_fault",
     "homogeneous",
     "link_placements",
     "modified_segments",

@@ -19,6 +19,7 @@ from tauscope.robot.document_fields import (
     refusal,
 )
 from tauscope.robot.messages import shown
+from tauscope.robot.recording_layout import find_fault
 from tauscope.robot.robot import JointType
 
 MOST_JOINTS = 100
@@ -171,6 +172,25 @@ class ModelDocument(Document):
     friction: list[FrictionDocument] | None = Field(default=None, min_length=1, max_length=MOST_JOINTS)
 
 
+class RecordingDocument(Document):
+    """How the arm's recordings are written.
+
+    rate_hz : float or None
+        samples a second where t counts samples [Hz]
+    """
+
+    units: dict[Name, Name] = Field(default_factory=dict)
+    rate_hz: Positive | None = None
+
+    @model_validator(mode="after")
+    def _check_units(self) -> Self:
+        """Units that are known."""
+        fault = find_fault(self.units, self.rate_hz)
+        if fault is not None:
+            raise refusal(fault[1], None if fault[0] == "rate_hz" else "units")
+        return self
+
+
 class RobotDocument(Document):
     """The whole robot file.
 
@@ -183,6 +203,7 @@ class RobotDocument(Document):
     gravity: Vector = Field(default=[0.0, 0.0, -9.81])
     joints: list[JointDocument] | None = Field(default=None, min_length=1, max_length=MOST_JOINTS)
     model: ModelDocument | None = None
+    recording: RecordingDocument | None = None
 
     @model_validator(mode="after")
     def _check_names(self) -> Self:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauscope.robot.finding import Finding
+from tauscope.robot.recording_layout import RecordingLayout
 
 STANDARD_PARAMETERS = ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz", "m", "msx", "msy", "msz")
 """Names of a link's ten standard parameters, in the order of the seed paper's equation (3)."""
@@ -62,6 +63,8 @@ class Joint:
 
     gear_ratio : float or None
         motor turns per joint turn; None where not stated
+    has_torque_constant : bool
+        whether the robot file states the constant; 1 stands where it does not
     """
 
     name: str
@@ -72,6 +75,7 @@ class Joint:
     sign: int = 1
     friction_shape: FrictionShape = FrictionShape()
     drive: Mapping[str, Any] | None = None
+    has_torque_constant: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,6 +185,7 @@ class Robot:
     urdf: Path | None = None
     urdf_links: tuple[tuple[str, ...], ...] = ()
     findings: tuple[Finding, ...] = ()
+    recording: RecordingLayout = field(default_factory=RecordingLayout)
 
     @property
     def joint_count(self) -> int:

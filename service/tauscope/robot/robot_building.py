@@ -22,6 +22,7 @@ from tauscope.robot.document_origin import DocumentOrigin
 from tauscope.robot.finding import Finding, Severity
 from tauscope.robot.messages import shown
 from tauscope.robot.physical import find_defect
+from tauscope.robot.recording_layout import RecordingLayout
 from tauscope.robot.robot import (
     FrictionCoefficients,
     FrictionShape,
@@ -63,6 +64,7 @@ def build_robot(document: RobotDocument, origin: DocumentOrigin, urdf_source: Ur
         # The URDF's own inertials are not used then: what is wrong with them is worth a warning, no more.
         findings = [Finding(tolerated(f.severity), f.where, f.text) for f in findings]
     joints = _joints(document.joints, chain, origin)
+    layout = document.recording
     return Robot(
         name=document.name,
         joints=joints,
@@ -72,6 +74,7 @@ def build_robot(document: RobotDocument, origin: DocumentOrigin, urdf_source: Ur
         urdf=chain.urdf_path,
         urdf_links=chain.urdf.link_names if chain.urdf else (),
         findings=tuple(findings),
+        recording=RecordingLayout() if layout is None else RecordingLayout(layout.units, layout.rate_hz),
     )
 
 
@@ -145,6 +148,7 @@ def _joint(document: JointDocument, segment: Segment, urdf_limits: JointLimits) 
         ),
         gear_ratio=document.gear_ratio,
         torque_constant=1.0 if document.torque_constant is None else document.torque_constant,
+        has_torque_constant=document.torque_constant is not None,
         sign=1 if document.sign is None else document.sign,
         friction_shape=FrictionShape() if shape is None else FrictionShape(shape.k_v, shape.delta),
         drive=document.drive,

@@ -61,8 +61,9 @@ def robot_to_dict(robot: Robot) -> dict[str, Any]:
         "gravity": robot.gravity.tolist(),
         "joints": [_joint(joint) for joint in robot.joints],
     }
-    model = _model(robot.model)
-    return {**data, "model": model} if model else data
+    layout = robot.recording
+    recording = {"units": dict(layout.units), "rate_hz": layout.rate_hz} if layout.units else None
+    return {**data, **_stated({"model": _model(robot.model) or None, "recording": recording})}
 
 
 def _given(origin: DocumentOrigin, urdf_files: Mapping[str, bytes]) -> UrdfSource:
@@ -95,12 +96,13 @@ def _joint(joint: Joint) -> dict[str, Any]:
         "acceleration": joint.limits.acceleration,
         "torque": joint.limits.torque,
     }
+    is_stated = joint.has_torque_constant or joint.torque_constant != Joint.torque_constant
     return _stated(
         {
             "name": joint.name,
             "limits": _stated(limits) or None,
             "gear_ratio": joint.gear_ratio,
-            "torque_constant": joint.torque_constant,
+            "torque_constant": joint.torque_constant if is_stated else None,
             "sign": joint.sign,
             "friction_shape": _stated({"k_v": joint.friction_shape.k_v, "delta": joint.friction_shape.delta}) or None,
             "drive": None if joint.drive is None else dict(joint.drive),

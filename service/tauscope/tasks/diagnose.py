@@ -33,6 +33,7 @@ from tauscope.tasks.task import (
     Files,
     Outputs,
     Progress,
+    ReadingOptions,
     command_words,
     effort_kind,
     json_text,
@@ -46,7 +47,7 @@ from tauscope.trajectory.files import DEFAULT_RATE_HZ
 from tauscope.version import tauscope_version
 
 
-class DiagnosisOptions(StrictModel):
+class DiagnosisOptions(ReadingOptions):
     """How a diagnosis is done."""
 
     against: Literal["identified", "model", "simulation", "saved"] = Field(
@@ -88,6 +89,7 @@ class Request(StrictModel):
             held_out=self.held_out,
             against=compared or (self.options.against,),
             cutoff=self.options.cutoff_hz,
+            **self.options.words,
         )
 
 
@@ -102,6 +104,7 @@ class Result:
     request: Request
     files: Files
     recordings: tuple[Recording, ...]
+    held_out: tuple[Recording, ...]
     diagnosis: Diagnosis
     document: DiagnosisDocument
     planned: PlannedExperiment | None
@@ -166,9 +169,9 @@ def perform(request: Request, files: Files, progress: Progress) -> Result:
     progress("read robot and recordings")
     robot = read_robot(files.find("robot", request.robot))
     saved = None if request.model is None else read_model(files.find("model", request.model), robot)
-    recordings = read_recordings(files, "recordings", request.recordings, robot)
-    held_out = read_recordings(files, "held_out", request.held_out, robot)
-    simulated = read_recordings(files, "simulated", request.simulated, robot)
+    recordings = read_recordings(files, "recordings", request.recordings, robot, request.options)
+    held_out = read_recordings(files, "held_out", request.held_out, robot, request.options)
+    simulated = read_recordings(files, "simulated", request.simulated, robot, request.options)
     options = Options(cutoff_hz=request.options.cutoff_hz)
     found = diagnose(robot, recordings, held_out, options, progress)
     if simulated:
@@ -188,4 +191,4 @@ def perform(request: Request, files: Files, progress: Progress) -> Result:
         refusal = error
     target = files.target("trajectory.json") or files.target("trajectory.csv")
     name = None if planned is None or target is None else str(target)
-    return Result(request, files, recordings, found, document(found, planned, name), planned, refusal)
+    return Result(request, files, recordings, held_out, found, document(found, planned, name), planned, refusal)

@@ -23,6 +23,7 @@ from tauscope.tasks.task import (
     Files,
     Outputs,
     Progress,
+    ReadingOptions,
     command_words,
     effort_kind,
     json_text,
@@ -34,7 +35,7 @@ from tauscope.tasks.task import (
 CutoffFrequency = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
 
-class IdentificationOptions(StrictModel):
+class IdentificationOptions(ReadingOptions):
     """How an identification is done."""
 
     estimator: Literal["ls", "wls"] = Field(default="wls", description="how the joints' equations are weighted")
@@ -70,6 +71,7 @@ class Request(StrictModel):
             cutoff=options.cutoff_hz,
             rotor_inertia=options.rotor_inertia,
             prior=options.prior,
+            **options.words,
         )
 
 
@@ -129,8 +131,8 @@ def perform(request: Request, files: Files, progress: Progress) -> Result:
     """
     progress("read robot and recordings")
     robot = read_robot(files.find("robot", request.robot))
-    recordings = read_recordings(files, "recordings", request.recordings, robot)
-    held_out = read_recordings(files, "held_out", request.held_out, robot)
+    recordings = read_recordings(files, "recordings", request.recordings, robot, request.options)
+    held_out = read_recordings(files, "held_out", request.held_out, robot, request.options)
     asked = request.options
     options = Options(Estimator(asked.estimator), asked.cutoff_hz, asked.rotor_inertia, asked.prior)
     found = identify(robot, recordings, held_out, options, progress)

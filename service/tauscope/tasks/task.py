@@ -6,15 +6,58 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Protocol
 
-from pydantic import BaseModel
+from pydantic import BaseModel, Field, field_validator
+from pydantic_core import PydanticCustomError
 
 from tauscope.export.compensation import RecordingSource
-from tauscope.recording import EffortKind, Recording, read_recording
+from tauscope.recording import EffortKind, Reading, Recording, open_recording
 from tauscope.report.provenance import InputFile, Provenance, input_files, versions
-from tauscope.robot import Robot
+from tauscope.robot import RecordingLayout, Robot, find_fault
+from tauscope.strict_model import StrictModel
 
 ROLES = {"recordings": "recording", "held_out": "held out", "simulated": "compared with", "model": "compared with"}
 """What each list of a request is called in a report."""
+
+
+class ReadingOptions(StrictModel):
+    """How the recordings of a request are read."""
+
+    units: dict[str, str] | None = Field(
+        default=None,
+        description="unit of the columns that are not in SI: t (s, ms, us, ns, index), q (rad, deg, m, mm), qd (rad,"
+        " deg, rpm, m, mm), tau (Nm, N, A, mA, drive), or of one joint's column, as q3; null: as the robot file says",
+        examples=[{"q": "deg", "t": "ms"}],
+    )
+    rate_hz: float | None = Field(
+        default=None, gt=0.0, allow_inf_nan=False, description="samples a second where t counts samples [Hz]"
+    )
+    trust_units: bool = Field(
+        default=False, description="whether a recording is used that can hardly be in the stated units"
+    )
+
+    @field_validator("units")
+    @classmethod
+    def _check_units(cls, units: dict[str, str] | None) -> dict[str, str] | None:
+        """Units that are known; the rate may be in the robot file."""
+        fault = find_fault(units or {}, 1.0 if (units or {}).get("t") == "index" else None)
+        if fault is not None:
+            raise PydanticCustomError("units", "{text}", {"text": fault[1]})
+        return units
+
+    @property
+    def reading(self) -> Reading:
+        """The same for those who read."""
+        return Reading(self.units or {}, self.rate_hz, self.trust_units)
+
+    @property
+    def words(self) -> dict[str, Any]:
+        """Options of a command line, those that are not as by default."""
+        words = {
+            "units": ",".join(f"{column}={unit}" for column, unit in (self.units or {}).items()) or None,
+            "rate": self.rate_hz,
+            "trust_units": self.trust_units or None,
+        }
+        return {name: value for name, value in words.items() if value is not None}
 
 
 class Progress(Protocol):
@@ -95,11 +138,15 @@ def json_text(document: BaseModel, indent: int | None = 1) -> str:
     return document.model_dump_json(by_alias=True, indent=indent) + "\n"
 
 
-def read_recordings(files: Files, role: str, names: Sequence[str], robot: Robot) -> tuple[Recording, ...]:
-    """Recordings of a robot, called as the request calls them."""
-    joints = [joint.name for joint in robot.joints]
+def read_recordings(
+    files: Files, role: str, names: Sequence[str], robot: Robot, options: ReadingOptions
+) -> tuple[Recording, ...]:
+    """Recordings of a robot, called as the request calls them; those of a simulator are in SI."""
+    reading = options.reading
+    if role == "simulated":
+        robot, reading = replace(robot, recording=RecordingLayout()), Reading(trust_units=options.trust_units)
     paths = [files.find(role, name) for name in names]
-    read = [read_recording(path, robot.joint_count, joints) for path in paths]
+    read = [open_recording(path, robot, reading) for path in paths]
     return tuple(
         recording if str(path) == name else replace(recording, name=name)
         for recording, path, name in zip(read, paths, names, strict=True)

@@ -157,3 +157,38 @@ def test_clean_positions_need_no_help() -> None:
     time = TIME
     recording = record(MOTION, time, velocity=MOTION.derivative(time, 1))
     assert sources(recording) == (Source.POSITION, Source.POSITION)
+
+
+SLOW_RATE = 30.0
+SLOW_TIME = np.arange(500) / SLOW_RATE
+
+
+def slow(change: Change) -> Conditioner:
+    """A short recording at 30 Hz, as of a robot's state topic: noisy positions, quieter velocities."""
+    rng = np.random.default_rng(5)
+    position = MOTION.derivative(SLOW_TIME, 0) + 2e-2 * rng.standard_normal((len(SLOW_TIME), 2))
+    velocity = change(MOTION.derivative(SLOW_TIME, 1)) + 2e-1 * rng.standard_normal(position.shape)
+    return Conditioner.survey(record(MOTION, SLOW_TIME, position=position, velocity=velocity), robot())
+
+
+def test_at_a_low_rate_the_velocity_is_used_in_bands_in_which_it_is_quieter() -> None:
+    conditioner = slow(lambda v: v)
+    limit = conditioner.noise.limit_hz
+    assert limit is not None
+    assert conditioner.summary(0.5 * limit).velocity_source == (Source.POSITION, Source.POSITION)
+    assert conditioner.summary(5.0).velocity_source == (Source.VELOCITY, Source.VELOCITY)
+    assert conditioner.summary(None).velocity_source == (Source.VELOCITY, Source.VELOCITY)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda v: 1.1 * v,
+        lambda v: -v,
+        lambda v: np.roll(v, 1, axis=0),
+        lambda v: v + 0.1 * np.abs(v).max(),
+    ],
+    ids=["gain", "sign", "late", "offset"],
+)
+def test_at_a_low_rate_another_velocity_is_not(change: Change) -> None:
+    assert slow(change).summary(5.0).velocity_source == (Source.POSITION, Source.POSITION)

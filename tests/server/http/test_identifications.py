@@ -48,7 +48,8 @@ def test_uploaded_files_all_the_way(client: TestClient, files: Files, paper_reco
     status = client.get(here).json()
     assert status["state"] == "succeeded"
     assert status["robot"] == "paper-arm"
-    assert status["options"] == {"estimator": "wls", "cutoff_hz": None, "rotor_inertia": True}
+    read_as = {"units": None, "rate_hz": None, "trust_units": False}
+    assert status["options"] == {"estimator": "wls", "cutoff_hz": None, "rotor_inertia": True, "prior": True, **read_as}
     assert [(entry["name"], entry["origin"]) for entry in status["recordings"]] == [("train.csv", "uploaded")]
     assert status["created"] <= status["started"] <= status["ended"]
 

@@ -190,7 +190,9 @@ class Observations:
             robot,
             pieces=tuple(
                 replace(
-                    _piece(each, starts[each.recording], conditioners[each.recording], bands[each.recording]),
+                    _piece(
+                        each, starts[each.recording], conditioners[each.recording], bands[each.recording], cutoff_hz
+                    ),
                     quiet_hz=quiet[each.recording],
                     rigid_hz=None if cutoff_hz is None else STATE_BANDS[0] * cutoff_hz,
                 )
@@ -280,7 +282,9 @@ class Observations:
         return iter(self.pieces)
 
 
-def _piece(prepared: PreparedMotion, start_s: float, conditioner: Conditioner, state_hz: Array | None) -> Piece:
+def _piece(
+    prepared: PreparedMotion, start_s: float, conditioner: Conditioner, state_hz: Array | None, cutoff_hz: float | None
+) -> Piece:
     """The torque of every repetition in the common band."""
     motion = prepared.motion
     length = len(motion.time) / motion.rate_hz
@@ -290,5 +294,5 @@ def _piece(prepared: PreparedMotion, start_s: float, conditioner: Conditioner, s
     torque = np.stack([reduce(without_spikes(np.ascontiguousarray(each.T))) for each in motion.torque], axis=1)
     widest = np.full(motion.position.shape[1], motion.rate_hz / 2.0)
     width = widest if state_hz is None else np.minimum(state_hz, widest)
-    source = conditioner.source
+    source = conditioner.source.in_band(cutoff_hz)
     return Piece(prepared, torque, used, time, width, conditioner.noise, ~(source.velocity | source.acceleration))

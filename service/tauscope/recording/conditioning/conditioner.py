@@ -171,7 +171,7 @@ class Conditioner:
             resampled=resampled,
             averaged_periods=max((motion.repetitions for motion in groups if motion is not None), default=0),
             position_noise_std=tuple(float(value) for value in self.position_noise_std),
-            velocity_source=tuple(str(name) for name in self.source.names),
+            velocity_source=tuple(str(name) for name in self.source.in_band(cutoff_hz).names),
         )
 
     def _stretch_motions(self, rows: tuple[int, int], cutoff_hz: float | None) -> Iterator[Motion]:
@@ -210,7 +210,7 @@ class Conditioner:
         periods = self._repeating(read_stretch(self.recording, self.robot, first, last, timing), cutoff_hz)
         if periods is None:
             return None
-        motion = averaged_motion(periods, cutoff_hz, self.source)
+        motion = averaged_motion(periods, cutoff_hz, self.source.in_band(cutoff_hz))
         measured = np.asarray(motion.measured.any(axis=0))
         usable = motion.band.reduce_mask(measured.T).all(axis=1) | ~np.asarray(measured.any(axis=0))
         return motion if usable.all() else None
@@ -242,7 +242,7 @@ class Conditioner:
         while first < stop:
             last = first + size if first + size + (size - overlap) // 2 < stop else stop
             stretch = read_stretch(self.recording, self.robot, first, last, self.timing)
-            motion = transient_motion(stretch, trim, self.source)
+            motion = transient_motion(stretch, trim, self.source.in_band(cutoff_hz))
             if motion is not None:
                 yield replace(motion, own=slice(*(int(i) for i in np.searchsorted(motion.time, [own_from, own_to]))))
                 own_from = float(motion.time[-1]) + 0.5 / motion.rate_hz

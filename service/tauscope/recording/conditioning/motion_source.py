@@ -7,10 +7,14 @@ q̈, so that the band may be wider.
 
 In acceleration, where the fast part of the motion weighs most: q̈_recorded = g q̈ - d q⃛ + noise, fitted by least squares
 to signals smoothed alike; g is the gain and d the delay.
+
+A short recording at a low rate shows neither so well in acceleration. There the same is fitted to velocity, and the
+delay to all joints together, for one driver reports them all. A velocity that passes is used in bands in which its
+noise reaches q̈ less than the positions' noise does.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
@@ -18,6 +22,7 @@ import numpy as np
 from tauscope.recording.conditioning.filters import DIFFERENCE_MARGIN, derivative, smooth, smoothing_margin
 from tauscope.recording.conditioning.position_noise import (
     PLATEAU,
+    TINY,
     AccelerationSpectrum,
     PositionNoise,
     acceleration_spectrum,
@@ -48,6 +53,10 @@ FLATNESS = 2.0
 """A measurement's noise is white; where the lower half of its plateau lies this much over the upper one, it was
 filtered, and its plateau tells nothing about its band."""
 
+RESOLVED = 0.03
+"""Largest standard error of a gain, and largest offset, that is fitted to velocity: beyond the band of the positions
+their own noise is more."""
+
 WORTHWHILE = 1.25
 """Least widening of the band for which another source is used."""
 
@@ -76,11 +85,28 @@ class MotionSource:
         whether the recorded signal is used for q̇, for q̈
     limits_hz : (n,) float64
         widest band in which q̈ keeps to `NOISE_SHARE`; infinite where it does everywhere
+    quieter_from_hz : (n,) float64 or None
+        band from which on the recorded velocity is the quieter source; infinite where it never is
     """
 
     velocity: np.ndarray
     acceleration: np.ndarray
     limits_hz: Array
+    quieter_from_hz: Array | None = None
+
+    def in_band(self, cutoff_hz: float | None) -> "MotionSource":
+        """The sources of a band.
+
+        Parameters
+        ----------
+        cutoff_hz : float or None
+            of the common band [Hz]; None for no filter
+        """
+        if self.quieter_from_hz is None:
+            return self
+        band = np.inf if cutoff_hz is None else cutoff_hz
+        quieter = np.isfinite(self.quieter_from_hz) & (band >= self.quieter_from_hz)
+        return replace(self, velocity=self.velocity | (quieter & ~self.acceleration))
 
     @property
     def names(self) -> tuple[Source, ...]:
@@ -113,7 +139,105 @@ def choose_sources(stretches: Sequence[Stretch], noise: PositionNoise) -> Motion
             if wider is not None and wider > WORTHWHILE * best[joint]:
                 best[joint], used[joint] = wider, True
                 limits[joint] = min(wider, WIDEST * limit)
-    return MotionSource(chosen[0], chosen[1], limits)
+    return MotionSource(chosen[0], chosen[1], limits, _quieter_bands(stretches, noise))
+
+
+def _quieter_bands(stretches: Sequence[Stretch], noise: PositionNoise) -> Array | None:
+    """Band from which on each joint's recorded velocity is the quieter source, (n,) [Hz]; None without velocities.
+
+    Noise of density S in q leaves ω⁵ S / 5 in q̈ up to ω, noise of q̇ leaves ω³ S / 3.
+    """
+    joint_count, rate = stretches[0].position.shape[1], stretches[0].rate_hz
+    bands, fits = np.full(joint_count, np.inf), []
+    for joint in range(joint_count):
+        limit = float(noise.joint_limits_hz[joint])
+        pieces = [
+            (stretch.position[:, joint], stretch.velocity[:, joint])
+            for stretch in stretches
+            if stretch.velocity is not None and np.isfinite(stretch.velocity[:, joint]).all()
+        ]
+        fit = _fit_velocity(pieces, rate, limit) if pieces and np.isfinite(limit) else None
+        if fit is None:
+            continue
+        fits.append(fit)
+        spectrum = acceleration_spectrum([values[:, None] for _, values in pieces], rate, 1)
+        density, expected = float(spectrum.density[0]), float(noise.density[joint])
+        if fit.is_alike and expected > 0.0 and _is_flat(spectrum, rate) and _has_own_noise(fit, expected, rate):
+            bands[joint] = max(np.sqrt(5.0 * density / (3.0 * expected)) / (2.0 * np.pi), limit)
+    if not fits:
+        return None
+    weight = np.array([fit.delay_std for fit in fits]) ** -2.0
+    delay = abs(float(np.sum(weight * [fit.delay for fit in fits]) / weight.sum())) + float(weight.sum() ** -0.5)
+    return bands if delay <= DELAY_TOLERANCE / rate else None
+
+
+@dataclass(frozen=True)
+class _VelocityFit:
+    """q̇_recorded = g q̇ - d q̈ + offset.
+
+    delay, delay_std : float
+        d and its standard error [s]
+    offset : float
+        relative to the rms of the velocity
+    misfit : float
+        rms of the rest [rad/s or m/s]
+    """
+
+    gain: float
+    gain_std: float
+    delay: float
+    delay_std: float
+    offset: float
+    misfit: float
+    band_hz: float
+
+    @property
+    def is_alike(self) -> bool:
+        """Whether gain and offset are those of the positions' own velocity, as far as is known well enough."""
+        return (
+            abs(self.gain - 1.0) <= GAIN_TOLERANCE + 2.0 * self.gain_std
+            and self.gain_std <= RESOLVED
+            and abs(self.offset) <= RESOLVED
+        )
+
+
+def _fit_velocity(pieces: Sequence[tuple[Array, Array]], rate_hz: float, limit_hz: float) -> _VelocityFit | None:
+    """Fit the recorded velocity to the positions' own; None where too little of the motion is left."""
+    margin = smoothing_margin(rate_hz, limit_hz) + 2 * DIFFERENCE_MARGIN
+    columns, targets = [], []
+    for position, recorded in pieces:
+        if len(position) < 3 * margin:
+            continue
+        inner = slice(margin, -margin)
+        velocity = derivative(smooth(position[:, None], rate_hz, limit_hz), rate_hz)
+        acceleration = derivative(velocity, rate_hz)
+        columns.append(np.hstack([velocity[inner], acceleration[inner], np.ones_like(velocity[inner])]))
+        targets.append(smooth(recorded[:, None], rate_hz, limit_hz)[inner, 0])
+    if not columns:
+        return None
+    matrix, target = np.concatenate(columns), np.concatenate(targets)
+    rms = float(np.sqrt(np.mean(target**2)))
+    if rms == 0.0 or np.linalg.matrix_rank(matrix) < matrix.shape[1]:
+        return None
+    solution, *_ = np.linalg.lstsq(matrix, target, rcond=None)
+    misfit = float(np.sqrt(np.mean((target - matrix @ solution) ** 2)))
+    independent = max(1.0, len(target) * 2.0 * limit_hz / rate_hz)
+    inverse = np.linalg.pinv(matrix.T @ matrix * (independent / len(target)))
+    gain_std, delay_std, _ = np.maximum(misfit, TINY) * np.sqrt(np.maximum(np.diag(inverse), 0.0))
+    return _VelocityFit(
+        float(solution[0]),
+        float(gain_std),
+        float(-solution[1]),
+        max(float(delay_std), TINY),
+        float(solution[2] / rms),
+        misfit,
+        limit_hz,
+    )
+
+
+def _has_own_noise(fit: _VelocityFit, density: float, rate_hz: float) -> bool:
+    """Whether the positions' noise shows in the difference: a velocity that was made from them carries it, too."""
+    return fit.misfit**2 >= OWN_NOISE * density * _noise_gain(rate_hz, fit.band_hz, 1)
 
 
 def _wider_band(

@@ -1,0 +1,121 @@
+"""Efforts that no drive measured: stuck values, and spikes."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from tauscope.recording.examination.edits import NO_NUMBERS, Numbers, row_numbers
+from tauscope.recording.examination.scales import NEIGHBOURS, EffortScale, distance_beyond, is_new, neighbour_windows
+from tauscope.recording.samples import Array
+
+SURPRISE = 20.0
+"""Multiple of the usual distance beyond the neighbours' range above which a sample is a spike."""
+
+SPAN = 0.15
+"""Share of the effort's usual range that this distance exceeds, too."""
+
+STUCK_ROWS = 10
+"""Rows for which a stuck value is repeated, at least."""
+
+STUCK_RUNS = 5
+"""Multiple of the rows for which values usually are."""
+
+USUAL_RUN = 3
+"""Rows for which noise lets no value be repeated: where it does, the effort comes in coarse steps and may rest."""
+
+LEAST_MOVE = 0.01
+"""Distance above which a joint moves within some rows [rad or m]."""
+
+
+def find_stuck(rows: Numbers, effort: Array, position: Array, scale: EffortScale) -> Numbers:
+    """Rows of a block in which one joint's effort is stuck.
+
+    Parameters
+    ----------
+    rows : (N,) int64
+        row of each value within the recording
+    effort : (N,) float64
+        in the recording's own unit, finite
+    position : (N, n) float64
+        q of all joints in the same rows [rad or m]
+    """
+    if scale.run > USUAL_RUN * scale.hold:
+        return NO_NUMBERS
+    edges = np.flatnonzero(np.diff(effort) != 0.0) + 1
+    starts, stops = np.concatenate([[0], edges]), np.concatenate([edges, [len(effort)]])
+    level = effort[starts]
+    is_long = stops - starts >= max(STUCK_ROWS, STUCK_RUNS * scale.run)
+    is_long &= (level > scale.low) & (level < scale.high)  # a clipped value is not stuck
+    found = [
+        rows[start + 1 : stop]  # the first of them was measured
+        for start, stop in zip(starts[is_long], stops[is_long], strict=True)
+        if is_moving(position[start:stop])
+    ]
+    return np.concatenate([NO_NUMBERS, *found])
+
+
+def find_all_stuck(rows: Numbers, effort: Array, position: Array, scales: Sequence[EffortScale]) -> Numbers:
+    """Rows of a block in which the efforts of several joints are stuck at once, whatever their level.
+
+    Parameters
+    ----------
+    rows : (N,) int64
+        row of each value within the recording
+    effort : (N, n) float64
+        in the recording's own unit
+    position : (N, n) float64
+        q of the same rows [rad or m]
+    """
+    if len(scales) < 2 or not any(0 < scale.run <= USUAL_RUN * scale.hold for scale in scales):
+        return NO_NUMBERS
+    same = np.concatenate([[False], (effort[1:] == effort[:-1]).all(axis=1) & (effort[1:] != 0.0).any(axis=1)])
+    runs = np.flatnonzero(np.diff(same, prepend=False, append=False)).reshape(-1, 2)
+    least = max(STUCK_ROWS, *(STUCK_RUNS * scale.hold for scale in scales))
+    long = runs[runs[:, 1] - runs[:, 0] >= least - 1]
+    found = [rows[start:stop] for start, stop in long if is_moving(position[start - 1 : stop])]
+    return np.concatenate([NO_NUMBERS, *found])
+
+
+def find_spikes(rows: Numbers, effort: Array, scale: EffortScale) -> Numbers:
+    """Rows of a block in which one joint's effort is far from all of its neighbours.
+
+    Parameters
+    ----------
+    rows : (N,) int64
+        row of each value within the recording
+    effort : (N,) float64
+        in the recording's own unit, finite
+    """
+    if scale.hold > 1:  # a held spike is as wide as the hold: one row of each run is judged, for all of them
+        firsts = np.flatnonzero(is_new(effort))
+        spikes = find_spikes(firsts, effort[firsts], replace(scale, hold=1))
+        stops = np.append(firsts, len(effort))[np.searchsorted(firsts, spikes) + 1]
+        return rows[row_numbers(np.column_stack([spikes, stops]))]
+    least = max(SURPRISE * scale.surprise, SPAN * scale.span)
+    large = np.flatnonzero(np.abs(np.diff(effort)) > least)
+    # Most blocks have no change as large, and neighbours are dear: only the surroundings are looked at.
+    if not len(large) or least == 0.0 or len(effort) < 2 * NEIGHBOURS + 1:
+        return NO_NUMBERS
+    near = np.unique(large[:, None] + np.arange(2))
+    # At the ends there are neighbours on one side only, and a signal that rises is beyond all of them.
+    is_end = (near < NEIGHBOURS) | (near >= len(effort) - NEIGHBOURS)
+    limit = np.where(is_end, max(least, scale.span), least)
+    found = near[distance_beyond(neighbour_windows(effort)[near]) > limit]
+    if not len(found):
+        return NO_NUMBERS
+    # The highest of several spikes hides the others.
+    rest = np.delete(np.arange(len(effort)), found)
+    return np.union1d(rows[found], find_spikes(rows[rest], effort[rest], scale))
+
+
+def is_moving(position: Array) -> bool:
+    """Whether any joint moves within some rows.
+
+    Parameters
+    ----------
+    position : (N, n) float64
+        q [rad or m]
+    """
+    low, high = np.fmin.reduce(position, axis=0), np.fmax.reduce(position, axis=0)
+    return bool((high - low > LEAST_MOVE).any())

@@ -1,0 +1,109 @@
+"""A recording with its defects mended, and a warning about each kind of them."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from typing import Literal
+
+from tauscope.recording.examination.edits import NO_NUMBERS, ColumnEdit, EditedTable, Numbers, row_numbers
+from tauscope.recording.examination.scan import Defects, JointDefects, find_defects
+from tauscope.recording.recording import Recording
+from tauscope.result_warning import ResultWarning
+from tauscope.robot.robot import JointType, Robot
+
+FILLED_ROWS = 4
+"""Rows without an effort that are filled in where positions and efforts come in rows of their own."""
+
+BUS = "check the bus for lost reads and damaged frames"
+
+
+def mend_recording(recording: Recording, robot: Robot | None = None) -> Recording:
+    """Mask or repair the samples of a recording that were never measured, and say so in its notes."""
+    types = [JointType.REVOLUTE] * recording.joint_count if robot is None else [joint.type for joint in robot.joints]
+    names = [None] * len(types) if robot is None else [joint.name for joint in robot.joints]
+    defects = find_defects(recording, types)
+    edits = _edits(recording, defects)
+    if not edits:
+        return recording
+    notes = (*recording.notes, *_warnings(recording, defects, names))
+    return replace(recording, table=EditedTable(recording.table, edits), notes=notes)
+
+
+def _edits(recording: Recording, defects: Defects) -> dict[int, ColumnEdit]:
+    """Edits by column."""
+    edits: dict[int, ColumnEdit] = {}
+    n = recording.joint_count
+    for joint, found in enumerate(defects.joints):
+        # A row without one joint's position is left out as a whole.
+        position = found.position_edit(len(recording), defects.lost if joint == 0 else NO_NUMBERS)
+        if len(position.blank) or len(position.jumps):
+            edits[1 + joint] = position
+        hold = found.effort_hold if found.effort_hold > 1 and not len(defects.paced) else 0
+        effort = ColumnEdit(found.lost_efforts, hold=hold, fill=FILLED_ROWS if defects.alternate else 0)
+        if len(effort.blank) or effort.hold or effort.fill:
+            edits[1 + n + joint] = effort
+    return edits
+
+
+def _warnings(recording: Recording, defects: Defects, joints: Sequence[str | None]) -> Iterator[ResultWarning]:
+    """A warning about each kind of defect of each joint."""
+
+    def begin(row: int) -> str:
+        return f"first at t = {recording.samples(row, row + 1).time[0]:.6g} s"
+
+    if len(defects.bunched):
+        text = f"column t: {_counted(defects.bunched)} within a tenth of an interval of another row"
+        remedy = "stamp samples when they are measured, not when a buffer is emptied"
+        yield ResultWarning(
+            code="time-stamps", text=f"{text}, {begin(int(defects.bunched[0]))}; left out", remedy=remedy
+        )
+    if defects.alternate:
+        text = "positions and efforts stand in rows of their own; efforts are interpolated to the rows of the positions"
+        yield ResultWarning(code="held-samples", text=text, remedy="record both at the same instants")
+    kind = recording.effort_kind.value
+    alike: dict[tuple[str, str, str | None], list[int]] = {}
+    for number, joint in enumerate(defects.joints, 1):
+        way = "their rows are masked" if len(defects.paced) else "interpolated from change to change"
+        for column, code, text, remedy in _joint_texts(joint, begin, way):
+            alike.setdefault((code, f"{column}: {text}", remedy), []).append(number)
+    for (code, text, remedy), numbers in alike.items():
+        group, _, words = text.partition(": ")
+        columns = [f"{kind if group == 'effort' else 'q'}{number}" for number in numbers]
+        many = "column" if len(columns) == 1 else "columns"
+        joint = joints[numbers[0] - 1] if len(numbers) == 1 else None
+        yield ResultWarning(code=code, joint=joint, text=f"{many} {', '.join(columns)}: {words}", remedy=remedy)
+
+
+def _joint_texts(
+    joint: JointDefects, begin: Callable[[int], str], way: str
+) -> Iterator[tuple[Literal["q", "effort"], str, str, str | None]]:
+    """Column, code, text and remedy of each kind of defect of one joint."""
+    if joint.wraps:
+        first, times = min(joint.wraps)[0], "once" if len(joint.wraps) == 1 else f"{len(joint.wraps)} times"
+        yield "q", "wrapped-angle", f"wraps by 2π {times}, {begin(first)}; unwrapped", None
+    if joint.jumps:
+        jumps = sorted(joint.jumps)
+        heights = ", ".join(f"{step:.4g}" for _, step in jumps[:3]) + (", …" if len(jumps) > 3 else "")
+        text = f"jumps by {heights}, {begin(jumps[0][0])}; taken out, the longest piece is kept as it is"
+        yield "q", "encoder-reset", text, "home the encoder before the recording, and not within it"
+    slow = "record at the rate of the controller"
+    if len(joint.repeated):
+        text = f"each value is held for about {joint.hold} rows; {_counted(joint.repeated)} masked"
+        yield "q", "held-samples", text, slow
+    if joint.effort_hold > 1:
+        text = f"each value is held for about {joint.effort_hold} rows; {way}"
+        yield "effort", "held-samples", text, slow
+    masked: tuple[tuple[Literal["q", "effort"], str, Numbers, str], ...] = (
+        ("q", "spikes", joint.spikes, "away from the neighbours by a jump and back"),
+        ("q", "stuck-samples", joint.frozen, "with a repeated value that the next one makes up for"),
+        ("effort", "effort-dropouts", row_numbers(joint.zeros), "of exactly zero between others that are not"),
+        ("effort", "stuck-samples", joint.stuck, "with a repeated value while the arm moves"),
+        ("effort", "spikes", joint.effort_spikes, "far from all of their neighbours"),
+    )
+    for column, code, rows, words in masked:
+        if len(rows):
+            yield column, code, f"{_counted(rows)} {words}, {begin(int(rows[0]))}; masked", BUS
+
+
+def _counted(rows: Numbers) -> str:
+    """A count of rows in words."""
+    return "1 row" if len(rows) == 1 else f"{len(rows)} rows"

@@ -1,0 +1,129 @@
+"""Positions that no encoder measured: spikes, frozen values, and jumps by a constant."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tauscope.recording.examination.edits import Numbers
+from tauscope.recording.examination.scales import ONE_TURN, PositionScale, neighbours_median, unwrap_steps
+from tauscope.recording.samples import Array
+
+SURPRISE = 20.0
+"""Multiple of the usual surprise above which a step is looked at: 26 standard deviations of noise."""
+
+SHARE_OF_MOVE = 0.1
+"""Share of the largest usual step above which it is: motion has small surprises where noise has none."""
+
+STEPS = 5.0
+"""Encoder steps above which it is: one or two are its rounding."""
+
+LONGEST_SPIKE, LONGEST_GLITCH = 5, 32
+"""Rows after which a position is back, where it was a spike; the second where it went as far as a jump."""
+
+LONGEST_STEP = 8.0
+"""Usual intervals beyond which nothing tells a jump from motion."""
+
+RETURN = 0.3
+"""Largest difference between the way out and the way back of a spike, relative to them."""
+
+JUMP = 5.0
+"""Multiple of the largest usual step that a jump exceeds; a joint that hits an end stop does not."""
+
+LEAST_JUMP = 0.01
+"""Smallest jump that is called one [rad or m]."""
+
+MAKES_UP = 1.6
+"""Largest step after frozen rows over the motion that it makes up for, by the speed before and after."""
+
+CATCHES_UP = 1.5
+"""Least size of that step, relative to those that follow: a joint that starts to move goes on as it starts."""
+
+STOPS_AT = 0.3
+"""Least speed before frozen rows, relative to the speed after them: a joint that stops slows down first."""
+
+
+@dataclass
+class PositionDefects:
+    """Rows of one joint, counted from the first row of the recording.
+
+    spikes, frozen : list of int
+        rows whose position was never measured
+    jumps, wraps : list of (int, float)
+        first row behind a jump, and its height [rad or m]
+    """
+
+    spikes: list[int] = field(default_factory=list)
+    frozen: list[int] = field(default_factory=list)
+    jumps: list[tuple[int, float]] = field(default_factory=list)
+    wraps: list[tuple[int, float]] = field(default_factory=list)
+
+
+def scan_position(
+    rows: Numbers, time: Array, position: Array, scale: PositionScale, interval: float, core: tuple[int, int]
+) -> PositionDefects:
+    """Defects of a block of one joint's known positions.
+
+    Parameters
+    ----------
+    rows : (N,) int64
+        row of each value within the recording
+    time : (N,) float64
+        stamps [s]
+    position : (N,) float64
+        q [rad or m], finite
+    interval : float
+        usual time from row to row [s]
+    core : (int, int)
+        rows that this block answers for; the others are neighbours
+    """
+    found = PositionDefects()
+    if len(position) < 8:
+        return found
+    plain = np.diff(position)
+    steps = unwrap_steps(plain, is_wrapped=scale.is_wrapped)
+    is_core = (rows[1:] >= core[0]) & (rows[1:] < core[1])
+    for k in np.flatnonzero((plain != steps) & is_core):
+        found.wraps.append((int(rows[k + 1]), float(ONE_TURN * np.rint((plain[k] - steps[k]) / ONE_TURN))))
+    least = max(SURPRISE * scale.surprise, STEPS * scale.step, SHARE_OF_MOVE * scale.move)
+    if least == 0.0 or np.abs(steps).max() <= least:
+        return found
+    surprise = steps - neighbours_median(steps)
+    large = np.flatnonzero((np.abs(surprise) > least) & (steps != 0.0))  # a rest is judged by the step that ends it
+    whole = np.diff(time) < LONGEST_STEP * interval
+    index = 0
+    while index < len(large):
+        a = int(large[index])
+        frozen = _frozen_rows(steps, a)
+        is_jump = abs(surprise[a]) > max(JUMP * scale.move, LEAST_JUMP)
+        reach = a + (LONGEST_GLITCH if is_jump else LONGEST_SPIKE)
+        later = [int(b) for b in large[index + 1 : index + 4] if b <= reach and not frozen]
+        partner = next((b for b in later if _returns(surprise, a, b)), None)
+        index += 1
+        if frozen and is_core[a]:
+            found.frozen += [int(row) for row in rows[a - frozen + 1 : a + 1]]
+        elif partner is not None:
+            found.spikes += [int(row) for row in rows[a + 1 : partner + 1] if core[0] <= row < core[1]]
+            index = int(np.searchsorted(large, partner)) + 1
+        elif is_core[a] and is_jump and whole[a]:
+            found.jumps.append((int(rows[a + 1]), float(surprise[a])))
+    return found
+
+
+def _returns(surprise: Array, a: int, b: int) -> bool:
+    """Whether a second step takes a first one back."""
+    out, back = float(surprise[a]), float(surprise[b])
+    return abs(out + back) < RETURN * max(abs(out), abs(back))
+
+
+def _frozen_rows(steps: Array, k: int) -> int:
+    """Repeated rows before a step that makes up for them; 0 where it does not."""
+    moved = np.flatnonzero(steps[:k])
+    rest = k - 1 - (int(moved[-1]) if len(moved) else k)
+    if rest < 1:
+        return 0
+    sizes = np.abs(steps)
+    before, after, step = sizes[moved[-5:]], sizes[k + 1 : k + 6], float(sizes[k])
+    after = after[after > 0.0]
+    if not len(after) or before[-1] < STOPS_AT * np.median(after) or step < CATCHES_UP * np.median(after):
+        return 0
+    return rest if step <= MAKES_UP * (rest + 1) * max(np.median(before), np.median(after)) else 0

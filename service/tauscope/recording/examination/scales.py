@@ -1,0 +1,217 @@
+"""Typical sizes of a recording's steps, joint by joint, against which a sample is judged."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from tauscope.recording.examination.sketch import Sketch
+from tauscope.recording.samples import Array
+from tauscope.robot.robot import JointType
+
+ONE_TURN = 2.0 * np.pi
+
+TURN_SPARE = 0.01
+"""Beyond one turn by this, an angle is not wrapped [rad]."""
+
+LARGEST_STEP = np.pi / 2.0
+"""Turn between two samples up to which it can be told which way [rad]."""
+
+STEPS_OF_A_MOVE = 4.0
+"""A value that moves by so many of its own steps in one row is sampled too coarsely to rest in the next."""
+
+HELD_SHARE = 0.5
+"""Share of such moves followed by a rest above which the source holds its values."""
+
+FEWEST_MOVES = 30
+MOVING_SHARE = 0.2
+"""Least number of such moves, and their least share of all changes: noise makes some now and then."""
+
+LONGEST_HOLD = 64
+"""Rows of the longest hold: a source of 30 Hz on a topic of 2 kHz."""
+
+JUDGED_ROWS = 2048
+"""Rows whose neighbours are looked at for a typical size."""
+
+NEIGHBOURS = 3
+"""Rows on either side that a row is judged by."""
+
+
+@dataclass(frozen=True)
+class PositionScale:
+    """Typical steps of one joint's position.
+
+    step : float
+        encoder's step, or the least noise [rad or m]
+    move : float
+        95th percentile of the change from row to row, while the joint moves [rad or m]
+    surprise : float
+        90th percentile of the change beyond what the neighbours foretell, while the joint moves [rad or m]
+    hold : int
+        rows for which the source holds a value; 1 where it does not
+    """
+
+    is_wrapped: bool
+    step: float
+    move: float
+    surprise: float
+    hold: int
+
+
+@dataclass(frozen=True)
+class EffortScale:
+    """Typical steps of one joint's effort, in its own unit.
+
+    low, high : float
+        1st and 99th percentile
+    span : float
+        from the 5th to the 95th percentile
+    change : float
+        90th percentile of the change from row to row
+    surprise : float
+        95th percentile of the distance beyond the range of the neighbours
+    run : int
+        99th percentile of the rows for which a value is repeated
+    """
+
+    low: float
+    high: float
+    span: float
+    change: float
+    surprise: float
+    run: int
+    hold: int
+
+
+def measure_positions(sketch: Sketch, types: list[JointType]) -> list[PositionScale]:
+    """Scales of every joint's position."""
+    scales = []
+    for joint, kind in enumerate(types):
+        pieces = [_steady(window.time, window.position[:, joint], sketch.interval) for window in sketch.windows]
+        values = sketch.position[:, joint]
+        values = values[np.isfinite(values)]
+        low, high = np.percentile(values, [0.1, 99.9]) if len(values) else (0.0, 0.0)
+        wrapped = kind is JointType.REVOLUTE and np.pi < high - low < ONE_TURN + TURN_SPARE
+        step, _, hold = _measure_holds(pieces)
+        if hold > 1:
+            pieces = [piece[is_new(piece)] for piece in pieces]
+        steps = np.concatenate([unwrap_steps(np.diff(piece), is_wrapped=wrapped) for piece in pieces])
+        moves = np.abs(steps) > step / 2.0
+        surprises = np.abs(steps - neighbours_median(steps))
+        move, surprise = _percentile(np.abs(steps[moves]), 95.0), _percentile(surprises[moves], 90.0)
+        scales.append(PositionScale(bool(wrapped), step, move, surprise, hold))
+    return scales
+
+
+def measure_efforts(sketch: Sketch) -> list[EffortScale]:
+    """Scales of every joint's effort."""
+    scales = []
+    for values in sketch.effort.T:
+        known = values[np.isfinite(values)]
+        if len(known) <= NEIGHBOURS:
+            scales.append(EffortScale(0.0, 0.0, 0.0, 0.0, 0.0, 1, 1))
+            continue
+        _, run, hold = _measure_holds([known])
+        changes = np.abs(np.diff(known))
+        low, lower, upper, high = (float(value) for value in np.percentile(known, [1.0, 5.0, 95.0, 99.0]))
+        seen = known[is_new(known)] if hold > 1 else known
+        beyond = distance_beyond(neighbour_windows(seen)[:: max(1, len(seen) // JUDGED_ROWS)])
+        change, surprise = _percentile(changes[changes > 0.0], 90.0), _percentile(beyond, 95.0)
+        scales.append(EffortScale(low, high, upper - lower, change, surprise, run, hold))
+    return scales
+
+
+def unwrap_steps(steps: Array, *, is_wrapped: bool) -> Array:
+    """Steps of an angle without the turn that a wrap adds.
+
+    Parameters
+    ----------
+    steps : (N,) float64
+        changes from row to row [rad]
+    """
+    if not is_wrapped:
+        return steps
+    is_wrap = np.abs(np.abs(steps) - ONE_TURN) < LARGEST_STEP  # two turns at once are a spike
+    return steps - ONE_TURN * np.sign(steps) * is_wrap
+
+
+def is_new(values: Array) -> NDArray[np.bool_]:
+    """Whether a value is another than the one before, (N,).
+
+    Parameters
+    ----------
+    values : (N,) float64
+        a signal
+    """
+    return np.diff(values, prepend=np.nan) != 0.0
+
+
+def neighbours_median(values: Array) -> Array:
+    """Median of the seven values around each one, (N,); the ends are repeated.
+
+    Parameters
+    ----------
+    values : (N,) float64
+        a signal
+    """
+    return median_filter(values, size=2 * NEIGHBOURS + 1, mode="nearest")
+
+
+def neighbour_windows(values: Array) -> Array:
+    """Each value with its neighbours, (N, 7), mirrored at the ends.
+
+    Parameters
+    ----------
+    values : (N,) float64
+        a signal
+    """
+    return np.lib.stride_tricks.sliding_window_view(np.pad(values, NEIGHBOURS, mode="reflect"), 2 * NEIGHBOURS + 1)
+
+
+def distance_beyond(windows: Array) -> Array:
+    """Distance of the middle value of every window beyond the range of the others, (N,); 0 within it.
+
+    The range leaves the highest and the lowest neighbour out, which may be a spike, too. A step lies within it.
+
+    Parameters
+    ----------
+    windows : (N, 7) float64
+        values and their neighbours
+    """
+    values = windows[:, NEIGHBOURS]
+    others = np.sort(np.delete(windows, NEIGHBOURS, axis=1), axis=1)
+    return np.maximum(np.maximum(values - others[:, -2], others[:, 1] - values), 0.0)
+
+
+def _steady(time: Array, values: Array, interval: float) -> Array:
+    """A joint's known values without the rows before which the clock stands."""
+    known = np.isfinite(values)
+    time, values = time[known], values[known]
+    return values[np.diff(time, prepend=-np.inf) > 0.1 * interval]
+
+
+def _measure_holds(pieces: list[Array]) -> tuple[float, int, int]:
+    """Least step of some signals, usual length of a run of one value, and rows of a zero-order hold."""
+    steps, lengths = [], []
+    for values in pieces:
+        changes = np.flatnonzero(np.diff(values) != 0.0) + 1
+        if len(changes) > 1:
+            steps.append(np.abs(values[changes] - values[changes - 1]))
+            lengths.append(np.diff(changes))
+    if not steps:
+        return 0.0, max((len(values) for values in pieces), default=1), 1
+    step = float(np.percentile(np.concatenate(steps), 1.0))
+    bold = [sizes >= STEPS_OF_A_MOVE * step for sizes in steps]
+    moves = np.concatenate([runs[large[:-1] & large[1:]] for runs, large in zip(lengths, bold, strict=True)])
+    usual = int(np.percentile(np.concatenate(lengths), 99.0))
+    enough = len(moves) >= max(FEWEST_MOVES, MOVING_SHARE * sum(map(len, lengths)))
+    if not enough or np.mean(moves > 1) < HELD_SHARE:
+        return step, usual, 1
+    hold = int(np.median(moves))
+    return step, usual, hold if hold <= LONGEST_HOLD else 1
+
+
+def _percentile(values: Array, share: float) -> float:
+    """A percentile, 0 of nothing."""
+    return float(np.percentile(values, share)) if len(values) else 0.0

@@ -1,0 +1,244 @@
+"""All samples of a recording that are none, found block by block."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.recording.examination.dropouts import ZeroRuns
+from tauscope.recording.examination.edits import (
+    NO_NUMBERS,
+    NO_ROWS,
+    ColumnEdit,
+    Numbers,
+    Rows,
+    join_ranges,
+    row_numbers,
+)
+from tauscope.recording.examination.effort_defects import find_all_stuck, find_spikes, find_stuck
+from tauscope.recording.examination.position_defects import scan_position
+from tauscope.recording.examination.scales import EffortScale, PositionScale, is_new, measure_efforts, measure_positions
+from tauscope.recording.examination.sketch import Sketch
+from tauscope.recording.recording import Recording, Samples
+from tauscope.recording.samples import Array
+from tauscope.robot.robot import JointType
+
+BLOCK_ROWS = 1 << 15
+
+SPARE_ROWS = 512
+"""Rows read beyond a block on either side: a run of one value that is longer is taken to end there."""
+
+BUNCHED = 0.1
+"""Share of the usual interval below which two stamps belong to one instant: a buffer was emptied."""
+
+MOST_BUNCHED = 0.1
+"""Share of bunched stamps above which the source always sends in bursts: the conditioning counts its rows."""
+
+IN_STEP = 0.8
+"""Share of the repeated rows that all efforts have in common where they are held at once."""
+
+REST_HOLDS = 4
+"""Holds of one value after which it is a rest, and no update that was lost."""
+
+MOST_JUMPS = 20
+"""Jumps of one joint above which it is no encoder that was reset."""
+
+
+@dataclass(eq=False)
+class JointDefects:
+    """Defects of one joint's samples.
+
+    spikes, frozen, repeated, stuck, effort_spikes : (m,) int64
+        rows, ascending: of positions the first three, of efforts the others
+    jumps, wraps : list of (int, float)
+        first row behind a jump, and its height [rad or m]
+    hold, effort_hold : int
+        rows for which position, effort are held; 1 where they are not
+    zeros : (k, 2) int64
+        ranges of rows in which the effort dropped to zero
+    """
+
+    hold: int
+    effort_hold: int
+    spikes: Numbers = field(default_factory=lambda: NO_NUMBERS)
+    frozen: Numbers = field(default_factory=lambda: NO_NUMBERS)
+    repeated: Numbers = field(default_factory=lambda: NO_NUMBERS)
+    jumps: list[tuple[int, float]] = field(default_factory=list)
+    wraps: list[tuple[int, float]] = field(default_factory=list)
+    zeros: Rows = field(default_factory=lambda: NO_ROWS)
+    stuck: Numbers = field(default_factory=lambda: NO_NUMBERS)
+    effort_spikes: Numbers = field(default_factory=lambda: NO_NUMBERS)
+
+    def position_edit(self, count: int, lost: Numbers) -> ColumnEdit:
+        """Edit of the position of a recording of `count` rows: jumps are relative to the longest piece.
+
+        Parameters
+        ----------
+        lost : (m,) int64
+            further rows to be masked
+        """
+        where, offsets = NO_NUMBERS, np.empty(0)
+        if self.jumps or self.wraps:
+            where = np.unique([0, *(row for row, _ in (*self.jumps, *self.wraps))])
+            # Whole turns matter to nobody: the longest piece is that between jumps.
+            offsets = _offsets(self.jumps, where, count) + _offsets(self.wraps, where, count)
+        blank = np.unique(np.concatenate([self.spikes, self.frozen, self.repeated, lost]))
+        return ColumnEdit(blank=join_ranges(blank), jumps=where, offsets=offsets)
+
+    @property
+    def lost_efforts(self) -> Rows:
+        """Ranges of rows without a measured effort, (k, 2)."""
+        return join_ranges(np.unique(np.concatenate([row_numbers(self.zeros), self.stuck, self.effort_spikes])))
+
+
+@dataclass(eq=False)
+class Defects:
+    """Defects of a recording's samples.
+
+    bunched : (m,) int64
+        rows whose stamp is that of a neighbour
+    alternate : bool
+        whether positions and efforts come in rows of their own
+    paced : (m,) int64
+        rows that repeat the efforts of all joints, where all are held at once and positions are not
+    """
+
+    joints: list[JointDefects]
+    alternate: bool
+    bunched: Numbers = field(default_factory=lambda: NO_NUMBERS)
+    paced: Numbers = field(default_factory=lambda: NO_NUMBERS)
+
+    @property
+    def lost(self) -> Numbers:
+        """Rows that are left out whole, (m,)."""
+        return np.union1d(self.bunched, self.paced)
+
+
+def find_defects(recording: Recording, types: list[JointType]) -> Defects:
+    """Find a recording's defects in memory that grows with their number only.
+
+    Parameters
+    ----------
+    types : list of JointType
+        of the joints: only revolute ones wrap
+    """
+    sketch = Sketch.of(recording)
+    positions, efforts = measure_positions(sketch, types), measure_efforts(sketch)
+    joints = [JointDefects(q.hold, tau.hold) for q, tau in zip(positions, efforts, strict=True)]
+    has_effort, has_position = np.isfinite(sketch.effort).any(axis=1), np.isfinite(sketch.position).all(axis=1)
+    alternate = bool(has_effort.any() and has_position.any() and not (has_effort & has_position).any())
+    scan = _Scan(sketch.interval, positions, efforts, Defects(joints, alternate), ZeroRuns(efforts))
+    count = len(recording)
+    for start in range(0, count, BLOCK_ROWS):
+        stop = min(start + BLOCK_ROWS, count)
+        first = max(start - SPARE_ROWS, 0)
+        scan.add(recording.samples(first, min(stop + SPARE_ROWS, count)), first, (start, stop))
+        scan.zeros.add(recording.samples(start, stop), start)
+    return scan.finish(recording)
+
+
+@dataclass(eq=False)
+class _Scan:
+    """One walk through a recording."""
+
+    interval: float
+    positions: list[PositionScale]
+    efforts: list[EffortScale]
+    defects: Defects
+    zeros: ZeroRuns
+    found: dict[tuple[int, str], list[Numbers]] = field(default_factory=dict)
+
+    @property
+    def pace(self) -> int:
+        """Rows for which all efforts are held, where positions are not; 1 where they are not."""
+        holds = [joint.effort_hold for joint in self.defects.joints]
+        is_held = min(holds) > 1 and all(joint.hold == 1 for joint in self.defects.joints)
+        return int(np.median(holds)) if is_held and not self.defects.alternate else 1
+
+    def add(self, samples: Samples, first: int, core: tuple[int, int]) -> None:
+        """Take a block, of which the rows of `core` are its own and the others neighbours."""
+        rows = np.arange(first, first + len(samples.time))
+        close = _bunched(samples.time, self.interval)
+        self._keep(0, "bunched", rows[close], core)
+        if self.pace > 1:
+            same = (samples.effort[1:] == samples.effort[:-1]).all(axis=1)
+            self._keep(0, "paced", rows[_repeated(np.concatenate([[False], same]), self.pace)], core)
+        stuck = find_all_stuck(rows, samples.effort, samples.position, self.efforts)
+        for joint, (place, scale) in enumerate(zip(self.defects.joints, self.positions, strict=True)):
+            self._keep(joint, "stuck", stuck, core)
+            position = np.ascontiguousarray(samples.position[:, joint])
+            known = np.isfinite(position) & ~close
+            if place.hold > 1:
+                known[known] = is_new(position[known])
+            fault = scan_position(
+                rows[known], samples.time[known], position[known], scale, self.interval * place.hold, core
+            )
+            place.jumps += fault.jumps
+            place.wraps += fault.wraps
+            self._keep(joint, "spikes", np.array(fault.spikes, dtype=np.int64), core)
+            self._keep(joint, "frozen", np.array(fault.frozen, dtype=np.int64), (0, core[1]))
+            if place.hold > 1:
+                same = np.concatenate([[False], position[1:] == position[:-1]])
+                self._keep(joint, "repeated", rows[_repeated(same, place.hold)], core)
+            effort, measure = np.ascontiguousarray(samples.effort[:, joint]), self.efforts[joint]
+            known = np.isfinite(effort) & (effort != 0.0)  # zeros are looked at elsewhere
+            if known.any():
+                self._keep(joint, "effort_spikes", find_spikes(rows[known], effort[known], measure), core)
+                self._keep(
+                    joint, "stuck", find_stuck(rows[known], effort[known], samples.position[known], measure), core
+                )
+
+    def finish(self, recording: Recording) -> Defects:
+        """Defects of all blocks."""
+        defects = self.defects
+        for (joint, name), parts in self.found.items():
+            target = defects if name in ("bunched", "paced") else defects.joints[joint]
+            setattr(target, name, np.unique(np.concatenate(parts)))
+        if len(defects.bunched) > MOST_BUNCHED * len(recording):
+            defects.bunched = NO_NUMBERS
+        if len(defects.paced) < IN_STEP * (1.0 - 1.0 / self.pace) * len(recording):
+            defects.paced = NO_NUMBERS
+        for joint, ranges in zip(defects.joints, self.zeros.dropouts(recording), strict=True):
+            joint.zeros = ranges
+            if len(joint.jumps) > MOST_JUMPS:
+                joint.jumps.clear()
+        return defects
+
+    def _keep(self, joint: int, name: str, rows: Numbers, core: tuple[int, int]) -> None:
+        """Keep the rows that are a block's own."""
+        own = rows[(rows >= core[0]) & (rows < core[1])]
+        if len(own):
+            self.found.setdefault((joint, name), []).append(own)
+
+
+def _offsets(jumps: list[tuple[int, float]], where: Numbers, count: int) -> Array:
+    """Offset from each of some rows on, (m,): the sum of the jumps up to there, 0 in the longest piece between them.
+
+    Parameters
+    ----------
+    where : (m,) int64
+        rows, ascending
+    """
+    ordered = sorted(jumps)
+    starts = np.array([0, *(row for row, _ in ordered)], dtype=np.int64)
+    heights = np.cumsum([0.0, *(height for _, height in ordered)])
+    heights -= heights[int(np.argmax(np.diff(np.append(starts, count))))]
+    return heights[np.searchsorted(starts, where, side="right") - 1]
+
+
+def _bunched(time: Array, interval: float) -> NDArray[np.bool_]:
+    """Rows of which the stamp is that of a neighbour; of two the one that leaves the more even intervals."""
+    steps = np.diff(time)
+    close = np.zeros(len(time), dtype=bool)
+    for k in np.flatnonzero(steps < BUNCHED * interval):
+        before = float(steps[k - 1]) if k > 0 else 0.0
+        after = float(steps[k + 1]) if k + 1 < len(steps) else 0.0
+        close[k if before > after else k + 1] = True
+    return close
+
+
+def _repeated(same: NDArray[np.bool_], hold: int) -> NDArray[np.bool_]:
+    """Rows that repeat a held value; of a rest of `REST_HOLDS` or more one row in `hold` is kept."""
+    number = np.arange(len(same))
+    since = number - np.maximum.accumulate(np.where(same, 0, number))
+    return same & ((since % hold != 0) | (since < REST_HOLDS * hold))

@@ -1,0 +1,142 @@
+"""The rows of all formats: converted to SI, checked, put in order of time, kept in a table."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from tauscope.errors import RecordingError
+from tauscope.recording.recording import Recording
+from tauscope.recording.row_check import RowCheck, require_rising, require_rows
+from tauscope.recording.samples import Array, EffortKind
+from tauscope.recording.table import SPOOL_ABOVE_BYTES, TableBuilder
+from tauscope.recording.units import SI, Conversion, Reading
+from tauscope.result_warning import ResultWarning
+
+LATE_ROWS = 8
+"""Rows by which one may come too late and still be put in its place: threads and networks swap neighbours. A clock
+that is set back, or two files in one, come later by far more."""
+
+REPEATED_SHARE = 0.05
+"""Share of rows with a stamp of another row above which the stamps are too coarse: leaving them out leaves holes."""
+
+
+class RowIntake:
+    """Takes a file's rows block by block, in the order of the file."""
+
+    def __init__(
+        self,
+        file: str,
+        names: Sequence[str],
+        effort_kind: EffortKind,
+        reading: Reading = SI,
+        expected_rows: int = 0,
+        spool_above_bytes: int = SPOOL_ABOVE_BYTES,
+    ) -> None:
+        """Prepare for the first block.
+
+        Parameters
+        ----------
+        spool_above_bytes : int
+            size above which the rows go to a temporary file [bytes]
+        """
+        self._file = file
+        self._conversion = Conversion.design(names, effort_kind, reading)
+        self._check = RowCheck(file, self._conversion.names)
+        self._builder = TableBuilder(self._conversion.names, expected_rows, spool_above_bytes)
+        self._tail = np.empty((0, len(names)))
+        self._origin: float | None = None
+        self._last = -np.inf
+        self._rows = self._repeated = self._late = 0
+        self._first_repeated = self._first_late = np.nan
+
+    def __len__(self) -> int:
+        """Rows taken so far, repeated ones too."""
+        return self._rows
+
+    def add(self, block: Array, place: Callable[[int], str]) -> None:
+        """Take the next block.
+
+        Parameters
+        ----------
+        block : (rows, columns) float64
+            as the file has them
+
+        Raises
+        ------
+        RecordingError
+            names the row and the column at fault
+        """
+        self._check(block, place)
+        self._rows += len(block)
+        block = self._converted(block)
+        kept = len(self._tail)
+        if kept:
+            block = np.concatenate([self._tail, block])
+        if not (np.diff(block[:, 0], prepend=self._last) > 0).all():
+            block = self._ordered(block, lambda row: place(max(row - kept, 0)))
+        split = max(len(block) - LATE_ROWS, 0)
+        if split:
+            self._last = float(block[split - 1, 0])
+            self._builder.append(block[:split])
+        self._tail = block[split:].copy()
+
+    def finish(self, joint_count: int, ignored: tuple[str, ...] = ()) -> Recording:
+        """The recording of all rows.
+
+        Raises
+        ------
+        RecordingError
+            there is next to none, or too many have the same stamp
+        """
+        self._builder.append(self._tail)
+        require_rows(len(self._builder), self._file)
+        if self._repeated > max(LATE_ROWS, REPEATED_SHARE * self._rows):
+            raise RecordingError(
+                f"{self._file}: column t: {self._repeated} of {self._rows} rows repeat the time of another row, first"
+                f" at t = {self._first_repeated:.6g} s; write t with more digits"
+            )
+        kind, table = self._conversion.effort_kind, self._builder.finish()
+        return Recording(self._file, joint_count, kind, table, ignored, tuple(self._warnings()))
+
+    def _converted(self, block: Array) -> Array:
+        """Rows in SI."""
+        if not self._conversion.is_needed or not len(block):
+            return block
+        converted = block * self._conversion.factor
+        if self._conversion.from_first:
+            self._origin = float(block[0, 0]) if self._origin is None else self._origin
+            converted[:, 0] = (block[:, 0] - self._origin) * self._conversion.factor[0]
+        return converted
+
+    def _ordered(self, block: Array, place: Callable[[int], str]) -> Array:
+        """Rows in order of time, the first of those with one stamp."""
+        time = block[:, 0]
+        order = np.argsort(time, kind="stable")
+        if np.abs(order - np.arange(len(order))).max() > LATE_ROWS or time[order[0]] < self._last:
+            row = int(np.argmax(np.diff(time, prepend=self._last) < 0))
+            require_rising(
+                time[row:], self._last if row == 0 else float(time[row - 1]), self._file, lambda _: place(row)
+            )
+        late = np.flatnonzero(np.diff(time, prepend=self._last) < 0)
+        block = block[order]
+        is_new = np.diff(block[:, 0], prepend=self._last) > 0
+        if len(late):
+            self._first_late = self._first_late if self._late else float(time[late[0]])
+            self._late += len(late)
+        if not is_new.all():
+            self._first_repeated = self._first_repeated if self._repeated else float(block[np.argmin(is_new), 0])
+            self._repeated += int((~is_new).sum())
+        return block[is_new]
+
+    def _warnings(self) -> Sequence[ResultWarning]:
+        """Warnings about stamps that were put in order."""
+        found = []
+        if self._late:
+            rows = "1 row came" if self._late == 1 else f"{self._late} rows came"
+            text = f"{rows} after a later one, first at t = {self._first_late:.6g} s; put in order of time"
+            found.append((text, "record with one publisher, or sort the file by t"))
+        if self._repeated:
+            rows = "1 row has" if self._repeated == 1 else f"{self._repeated} rows have"
+            text = f"{rows} the time of the row before, first at t = {self._first_repeated:.6g} s; left out"
+            found.append((text, "write t with more digits, or record each message once"))
+        return [ResultWarning(code="time-stamps", text=f"column t: {text}", remedy=remedy) for text, remedy in found]

@@ -1,0 +1,138 @@
+"""From the units that a file is written in to SI: factors of its columns, and the clock of its rows."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from tauscope.errors import RecordingError
+from tauscope.recording.samples import Array, EffortKind
+from tauscope.robot.recording_layout import RecordingLayout, find_fault
+from tauscope.robot.robot import JointType, Robot
+
+SECONDS: Mapping[str, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+"""Units of time [s]."""
+
+RADIANS: Mapping[str, float] = {"rad": 1.0, "deg": np.pi / 180.0, "rpm": 2.0 * np.pi / 60.0}
+"""Units of angle [rad], and of speed a minute [rad/s]."""
+
+METRES: Mapping[str, float] = {"m": 1.0, "mm": 1e-3}
+"""Units of length [m]."""
+
+CURRENTS: Mapping[str, float] = {"A": 1.0, "mA": 1e-3, "drive": 1.0}
+"""Units that a joint's torque constant turns into torque [A, or the drive's own unit]."""
+
+_FOLLOWERS: Mapping[str, tuple[str, ...]] = {"q": ("q", "qref", "qlink"), "qd": ("qd", "qdd"), "tau": ("tau", "taucmd")}
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How a file is to be read.
+
+    units : mapping of str to str
+        unit of ``t``, ``q``, ``qd``, ``tau``, or of one joint's column, ``q3``; SI where none is stated
+    rate_hz : float or None
+        samples a second where t counts samples [Hz]
+    joint_types : tuple of JointType or None
+        of the robot, where it is known: degrees are of revolute joints only, mm of prismatic ones
+    """
+
+    units: Mapping[str, str] = field(default_factory=dict)
+    rate_hz: float | None = None
+    trust_units: bool = False
+    joint_types: tuple[JointType, ...] | None = None
+
+    def for_robot(self, robot: Robot | None) -> "Reading":
+        """The same reading, with the units of the robot file where this one states none.
+
+        Raises
+        ------
+        RecordingError
+            a unit is not known, or the rate is missing
+        """
+        layout = RecordingLayout() if robot is None else robot.recording
+        units = {**layout.units, **self.units}
+        rate_hz = self.rate_hz if self.rate_hz is not None or units.get("t") != "index" else layout.rate_hz
+        fault = find_fault(units, rate_hz)
+        if fault is not None:
+            raise RecordingError(f"units: {fault[1]}")
+        types = None if robot is None else tuple(joint.type for joint in robot.joints)
+        return replace(self, units=units, rate_hz=rate_hz, joint_types=types)
+
+
+SI = Reading()
+"""A file in SI units."""
+
+
+@dataclass(frozen=True, eq=False)
+class Conversion:
+    """Turns rows of a file into SI.
+
+    names : tuple of str
+        columns after the conversion: torque that is current becomes i1…
+    factor : (columns,) float64
+        multiplies each column
+    from_first : bool
+        whether time counts from the first row: a large count has no room for small parts of a second
+    """
+
+    names: tuple[str, ...]
+    effort_kind: EffortKind
+    factor: Array
+    from_first: bool
+
+    @staticmethod
+    def design(names: Sequence[str], effort_kind: EffortKind, reading: Reading) -> "Conversion":
+        """The conversion of a table's columns."""
+        time = reading.units.get("t", "s")
+        seconds = 1.0 / (reading.rate_hz or 1.0) if time == "index" else SECONDS[time]
+        torque = reading.units.get("tau")
+        kind = effort_kind if torque is None else EffortKind.CURRENT if torque in CURRENTS else EffortKind.TORQUE
+        columns, factors = [], []
+        for name in names:
+            group = name.rstrip("0123456789")
+            number = name[len(group) :]
+            factors.append(seconds if group == "t" else _factor("tau" if group == "i" else group, number, reading))
+            columns.append(kind.value + number if group == effort_kind.value else name)
+        return Conversion(tuple(columns), kind, np.array(factors), time != "s")
+
+    @property
+    def is_needed(self) -> bool:
+        """Whether anything changes."""
+        return self.from_first or bool((self.factor != 1.0).any())
+
+
+def parse_units(text: str) -> dict[str, str]:
+    """Units as a command line writes them: ``q=deg,t=ms``.
+
+    Raises
+    ------
+    ValueError
+        naming the part that is no assignment
+    """
+    units: dict[str, str] = {}
+    for part in filter(None, (part.strip() for part in text.split(","))):
+        column, sign, unit = (piece.strip() for piece in part.partition("="))
+        if not (column and sign and unit):
+            raise ValueError(f"{part!r} is no unit; write it as q=deg,t=ms,tau=mA")
+        if column in units:
+            raise ValueError(f"{column} has two units; give one")
+        units[column] = unit
+    return units
+
+
+def _factor(group: str, number: str, reading: Reading) -> float:
+    """Factor of a joint's column."""
+    root = next((root for root, followers in _FOLLOWERS.items() if group in followers), None)
+    if root is None:
+        return 1.0
+    units = reading.units
+    unit = units.get(f"{root}{number}", units.get(root, ""))
+    if not unit and root == "qd":  # a file in degrees holds degrees a second
+        unit = units.get(f"q{number}", units.get("q", ""))
+    joint = None if reading.joint_types is None or not number else reading.joint_types[int(number) - 1]
+    if unit in RADIANS:
+        return RADIANS[unit] if joint is not JointType.PRISMATIC else 1.0
+    if unit in METRES:
+        return METRES[unit] if joint is not JointType.REVOLUTE else 1.0
+    return CURRENTS.get(unit, 1.0)

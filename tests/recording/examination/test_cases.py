@@ -1,0 +1,98 @@
+"""Recordings as people bring them: read, mended, or refused with the option that mends them."""
+
+from pathlib import Path
+
+import pytest
+
+from recording.recording_files import message_of
+from shared_data import SHARED_CASES, SHARED_DATA, needs_shared_cases, needs_shared_data
+from tauscope.identification import document, identify
+from tauscope.recording import Reading, Recording, open_recording
+from tauscope.robot import Robot, read_robot
+
+RECORDINGS = SHARED_CASES / "recordings"
+
+
+@pytest.fixture(scope="module")
+def ur5() -> Robot:
+    return read_robot(SHARED_CASES / "ur5" / "ur5.yaml")
+
+
+@pytest.fixture(scope="module")
+def held_out(ur5: Robot) -> Recording:
+    return open_recording(SHARED_CASES / "ur5" / "ur5-held.csv", ur5)
+
+
+READ = {
+    "18-duplicate-stamp": ({}, {"time-stamps"}),
+    "19-out-of-order": ({}, {"time-stamps"}),
+    "35-time-iso.csv": ({}, set()),
+    "35-time-ms.csv": ({"t": "ms"}, set()),
+    "35-time-us.csv": ({"t": "us"}, set()),
+    "35-time-ns.csv": ({"t": "ns"}, set()),
+    "36-degrees.csv": ({"q": "deg"}, set()),
+    "37-wrapped.csv": ({}, {"wrapped-angle"}),
+    "38-duplicate-stamps.csv": ({}, {"time-stamps"}),
+    "42-effort-dropouts.csv": ({}, {"effort-dropouts"}),
+}
+
+
+@needs_shared_cases
+@pytest.mark.parametrize("name", READ)
+def test_a_case_is_as_good_as_the_sound_recording(name: str, ur5: Robot, held_out: Recording) -> None:
+    units, codes = READ[name]
+    recording = open_recording(RECORDINGS / name, ur5, Reading(units))
+    assert {warning.code for warning in recording.warnings} == codes
+    fit = document(identify(ur5, [recording], [held_out])).fit.held_out
+    assert fit is not None
+    assert fit.relative_error < 0.0042  # 0.0040 of the sound recording
+
+
+@needs_shared_cases
+def test_positions_and_efforts_on_alternate_rows_are_read(ur5: Robot, held_out: Recording) -> None:
+    recording = open_recording(RECORDINGS / "49-outer-join.csv", ur5)
+    assert {warning.code for warning in recording.warnings} == {"held-samples"}
+    fit = document(identify(ur5, [recording], [held_out])).fit.held_out
+    assert fit is not None
+    assert fit.relative_error < 0.006
+
+
+REFUSED = {
+    "16-effort-nan": ("columns tau1 to tau6: NaN throughout",),
+    "35-time-ms.csv": ("column t", "--units t=ms"),
+    "35-time-us.csv": ("column t", "--units t=us"),
+    "35-time-ns.csv": ("column t", "--units t=ns"),
+    "36-degrees.csv": ("column q2", "--units q=deg"),
+    "43-milliampere-as-tau.csv": ("column tau2", "gravity of the stated masses", "--units tau=mA", "torque_constant"),
+    "43-current-without-constant.csv": ("column i1", "torque_constant"),
+    "43-magnitude.csv": ("column i1", "torque_constant"),
+}
+
+
+@needs_shared_cases
+@pytest.mark.parametrize("name", REFUSED)
+def test_a_case_is_refused_with_evidence_and_remedy(name: str, ur5: Robot) -> None:
+    message = message_of(lambda: open_recording(RECORDINGS / name, ur5))
+    assert message.startswith(f"{RECORDINGS / name}: ")
+    for words in REFUSED[name]:
+        assert words in message
+
+
+@needs_shared_cases
+def test_a_magnitude_is_told_without_the_robot() -> None:
+    assert "this is a magnitude" in message_of(lambda: open_recording(RECORDINGS / "43-magnitude.csv"))
+
+
+def sound_files() -> list[Path]:
+    folders = [*SHARED_DATA.glob("*"), *SHARED_CASES.glob("arms/*"), SHARED_CASES / "ur5"]
+    return [file for folder in folders for file in sorted([*folder.glob("*.csv"), *folder.glob("*.db3")])]
+
+
+@needs_shared_data
+@needs_shared_cases
+@pytest.mark.parametrize("path", sound_files(), ids=lambda path: f"{path.parent.name}/{path.name}")
+def test_recordings_of_real_arms_are_not_refused(path: Path) -> None:
+    robot = next(file for file in (path.with_name("robot.yaml"), path.with_name("ur5.yaml")) if file.is_file())
+    recording = open_recording(path, read_robot(robot))
+    open_recording(path)
+    assert {warning.code for warning in recording.warnings} <= {"spikes"}
