@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 
 from tauscope.recording.examination.sketch import Sketch
 from tauscope.recording.samples import Array
@@ -155,6 +154,8 @@ def neighbours_median(values: Array) -> Array:
     values : (N,) float64
         a signal
     """
+    from scipy.ndimage import median_filter  # slow to import, and a control process reads no recordings
+
     return median_filter(values, size=2 * NEIGHBOURS + 1, mode="nearest")
 
 
