@@ -4,9 +4,9 @@
 
 A residual that is coloured counts for fewer rows: ρ_j is its spectral density at frequency zero over that of white
 noise. σ_j is estimated as by expectation maximisation, N_j σ_j² = ‖A_j Θ - y_j‖² + tr(A_j S A_jᵀ), S the posterior
-covariance: no joint takes the freedom that its parameters took for precision. The width w of the bodies' prior is the
-one under which the data are most probable (MacKay 1992), and never narrow. Data that
-determine a parameter overrule the prior; a parameter that they leave open stays at what was believed.
+covariance: no joint takes the freedom of its parameters for precision. The width w of the bodies' prior is the one
+under which the data are most probable (MacKay 1992), and never narrow. Data that determine a parameter overrule the
+prior; a parameter that they leave open stays at what was believed.
 """
 
 from dataclasses import dataclass
@@ -34,7 +34,6 @@ ROUNDS = 20
 
 SETTLED = 1e-3
 """…which end where no joint's noise changes by more than this share."""
-
 
 DETERMINED = 0.9
 """Share of the prior's variance that data take from a parameter which they determine."""
