@@ -16,7 +16,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo page prove test test-slow test-realtime test-long test-all bench lint format lock clean
+.PHONY: help venv demo page prove test test-slow test-all bench lint format lock clean
 
 help: ## say what there is
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 20
@@ -58,14 +58,8 @@ test: $(INSTALLED) ## the quick tests
 # The limit ends what hangs, and no test that a busy machine makes slow: one diagnosis of half a minute has taken five.
 # Exit status 5: no test was selected, which is right where the change needs none.
 test-slow: $(INSTALLED) ## the tests that take long or need something of the host; CHANGED=1: those that the change needs
-	@$(MAKE) --jobs 2 --output-sync test-realtime test-long
-
-# Real-time tests wait most of the time: the others, which give way to them, fill the gaps.
-test-realtime: $(INSTALLED)
 	$(BIN)/pytest -m realtime --reruns 4 --only-rerun MachineStoodStill $(SELECTED) $(PYTEST_FLAGS) || $(NONE_NEEDED)
-
-test-long: $(INSTALLED)
-	nice -n 19 $(BIN)/pytest $(BY_FILE) -n 2 --timeout 1800 -m "(slow or system) and not realtime" $(SELECTED) $(PYTEST_FLAGS) || $(NONE_NEEDED)
+	$(BIN)/pytest $(BY_FILE) -n 2 --timeout 1800 -m "(slow or system) and not realtime" $(SELECTED) $(PYTEST_FLAGS) || $(NONE_NEEDED)
 
 test-all: test test-slow ## every test
 
