@@ -257,6 +257,8 @@ def _identifiable(
             place = int(np.searchsorted(factor.columns, column))
             reach = std[column] * np.linalg.norm(factor.triangle[:, place])
             known[name] = bool(reach < KNOWN_SHARE * torque) and not bool(solution.undetermined[column])
+        # Where neither slope is known, a fall with speed and a step of another form are one and the same.
+        known["stribeck"] &= shape.delta_identifiable or shape.k_v_identifiable
         known["k_v"], known["delta"] = shape.k_v_identifiable, shape.delta_identifiable
         described.append(known)
     return tuple(described)
