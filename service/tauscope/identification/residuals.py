@@ -22,6 +22,9 @@ from tauscope.recording.recording import Array
 FEWEST_PERIOD_SAMPLES = 50
 """Differences between periods that are needed before their variance is trusted."""
 
+LEAST_TORQUE = 1e-12
+"""Share of the residual below which a recording has no torque to be compared with."""
+
 CLEARLY_MORE = 1.3
 """Ratio of two estimated powers that is no chance."""
 
@@ -169,7 +172,8 @@ class _Sums:
     def statistics(self) -> ResidualStatistics:
         """The sums, turned into what they stand for."""
         band_rms = np.sqrt(self._band_squares / np.maximum(self._band_count, 1))
-        relative = np.sqrt(self._band_squares.sum() / max(self._torque_squares.sum(), np.finfo(float).tiny))
+        left, torque = self._band_squares.sum(), self._torque_squares.sum()
+        relative = np.sqrt(left / max(torque, LEAST_TORQUE**2 * left, np.finfo(float).tiny))
         torque_rms = np.sqrt(self._torque_squares / np.maximum(self._band_count, 1))
         rms = np.sqrt(self._raw_squares / np.maximum(self._raw_count, 1))
         moving_rms = np.sqrt(self._moving_squares / np.maximum(self._moving_count, 1))
