@@ -243,7 +243,7 @@ def prepared_motion(
 
 def _at_rest(motion: Motion, resolution: Array | None) -> Array:
     """Share of each row's samples within a stretch of `REST_S` in which a joint moves by no more than it resolves."""
-    window = round(REST_S * motion.rate_hz) + 1
+    window = min(round(REST_S * motion.rate_hz) + 1, len(motion.position))
     shape = (motion.position.shape[1], len(motion.position))
     if resolution is None or window < FEWEST_AT_REST or isinstance(motion.band, HarmonicBand):
         return np.zeros_like(motion.band.reduce(np.zeros(shape)))
