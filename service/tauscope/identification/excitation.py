@@ -15,6 +15,10 @@ TOP = 0.99
 """Share of the samples that are slower than the top speed."""
 
 
+MOST_SAMPLES = 2048
+"""Samples of one piece of motion, which has up to 32,768, by which it is described."""
+
+
 @dataclass(frozen=True, eq=False)
 class Excitation:
     """How the joints move.
@@ -35,7 +39,7 @@ class Excitation:
 
 def measure_excitation(motions: Iterable[PreparedMotion]) -> Excitation:
     """Ranges, speeds and reversals of all motions together."""
-    pieces = [(prepared.motion.position, prepared.motion.velocity) for prepared in motions]
+    pieces = [(thin(prepared.motion.position), thin(prepared.motion.velocity)) for prepared in motions]
     speed = np.quantile(np.abs(np.concatenate([velocity for _, velocity in pieces])), TOP, axis=0)
     return Excitation(
         np.min([position.min(axis=0) for position, _ in pieces], axis=0),
@@ -43,6 +47,11 @@ def measure_excitation(motions: Iterable[PreparedMotion]) -> Excitation:
         speed,
         np.sum([_count_reversals(velocity, TURNING * speed) for _, velocity in pieces], axis=0),
     )
+
+
+def thin(signals: Array, most: int = MOST_SAMPLES) -> Array:
+    """Every so many rows of a piece (N, n), so that a long recording is not held in memory."""
+    return signals[:: -(-len(signals) // most)].copy()
 
 
 def _count_reversals(velocity: Array, threshold: Array) -> np.ndarray:

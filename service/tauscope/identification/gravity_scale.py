@@ -4,6 +4,7 @@ import numpy as np
 
 from tauscope.dynamics.regressor import torque_regressor
 from tauscope.identification.dataset import Dataset
+from tauscope.identification.excitation import thin
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array
 
@@ -30,8 +31,7 @@ def gravity_scale(motions: Dataset, structure: ModelStructure, parameters: Array
     links = structure.robot.model.links
     if links is None:
         return None
-    position = np.concatenate([prepared.motion.position for prepared in motions])
-    position = position[:: max(len(position) // POSTURES, 1)]
+    position = thin(np.concatenate([thin(prepared.motion.position, POSTURES) for prepared in motions]), POSTURES)
     still = np.zeros_like(position)
     columns = torque_regressor(
         structure.robot, position, still, still, columns=np.asarray(structure.base.independent_columns)
