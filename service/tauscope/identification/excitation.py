@@ -50,7 +50,13 @@ def measure_excitation(motions: Iterable[PreparedMotion]) -> Excitation:
 
 
 def thin(signals: Array, most: int = MOST_SAMPLES) -> Array:
-    """Every so many rows of a piece (N, n), so that a long recording is not held in memory."""
+    """Every so many rows of a piece, so that a long recording is not held in memory.
+
+    Parameters
+    ----------
+    signals : (N, n) float64
+        one row a sample
+    """
     return signals[:: -(-len(signals) // most)].copy()
 
 
