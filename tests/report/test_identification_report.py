@@ -113,7 +113,6 @@ def test_without_held_out_recordings_it_says_so(case: Case) -> None:
     alone = replace(
         case.identification,
         held_out=None,
-        held_out_free=None,
         predicted_held_out=None,
         extrapolation=None,
         held_out_conditioning=(),

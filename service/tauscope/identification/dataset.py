@@ -187,7 +187,7 @@ class Dataset:
     def __iter__(self) -> Iterator[PreparedMotion]:
         """The pieces in the order of the recordings; computed once where they fit into `MEMORY_LIMIT`."""
         if self._kept is not None:
-            yield from map(self._with_rest, self._kept)
+            yield from map(self._doubt_rest, self._kept)
             return
         kept: list[PreparedMotion] = []
         size = 0
@@ -198,11 +198,11 @@ class Dataset:
                 kept.clear()
             else:
                 kept.append(prepared)
-            yield self._with_rest(prepared)
+            yield self._doubt_rest(prepared)
         if not self._too_large:
             self._kept = kept
 
-    def _with_rest(self, prepared: PreparedMotion) -> PreparedMotion:
+    def _doubt_rest(self, prepared: PreparedMotion) -> PreparedMotion:
         """The piece with what is known of friction at rest."""
         return prepared if self.rest_variance is None else replace(prepared, rest_variance=self.rest_variance)
 

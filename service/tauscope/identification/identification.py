@@ -102,7 +102,6 @@ class Identification:
     price_of_bodies: Array
     predicted_train: Array
     held_out: Fit | None
-    held_out_free: Fit | None
     predicted_held_out: Array | None
     excitation: Excitation
     held_out_excitation: Excitation | None
@@ -159,7 +158,7 @@ def identify(
         posterior = infer(structure, factors, ratios, options.estimator)
         consistent = consistent_estimate(structure, posterior.factor, posterior.target, posterior.prior)
         progress("compare signs")
-        reversed_ = reversed_joints(motions, structure, factors, ratios, posterior, consistent)
+        wrong = reversed_joints(motions, structure, factors, ratios, posterior, consistent)
     consistent_parameters = in_model_columns(structure, consistent.parameters)
     parameters = consistent_parameters if options.prior else solution.parameters
     progress("evaluate residuals")
@@ -186,14 +185,13 @@ def identify(
 
     progress("evaluate held-out recordings")
     held_conditioners = [Conditioner.survey(recording, robot) for recording in held_out]
-    held: Sequence[Fit | None] = (None, None)
-    predicted = beyond = held_excitation = None
+    held = predicted = beyond = held_excitation = None
     if held_out:
         unseen = Dataset(held_conditioners, robot, base, cutoff, motions.rest_variance)
-        held = [each.fit for each in evaluate(unseen, structure, [parameters, solution.parameters])]
+        held = evaluate(unseen, structure, [parameters])[0].fit
         predicted, uncertain = predict(unseen)
         held_excitation = measure_excitation(unseen)
-        beyond = uncertain / np.maximum(held[0].torque_rms, np.finfo(float).tiny)
+        beyond = uncertain / np.maximum(held.torque_rms, np.finfo(float).tiny)
     return Identification(
         robot=robot,
         structure=structure,
@@ -201,7 +199,7 @@ def identify(
         free_parameters=solution.parameters,
         consistent_parameters=consistent_parameters,
         constrained=is_rejected(consistent),
-        reversed_joints=reversed_,
+        reversed_joints=wrong,
         gravity_scale=gravity_scale(motions, structure, parameters),
         posterior=posterior,
         covariance=covariance,
@@ -213,8 +211,7 @@ def identify(
         free_fit=free.fit,
         price_of_bodies=residuals.fit.band_rms / np.maximum(free.fit.band_rms, np.finfo(float).tiny),
         predicted_train=predict(motions)[0],
-        held_out=held[0],
-        held_out_free=held[1],
+        held_out=held,
         predicted_held_out=predicted,
         excitation=measure_excitation(motions),
         held_out_excitation=held_excitation,

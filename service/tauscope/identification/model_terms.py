@@ -47,7 +47,7 @@ def choose_model(
         shapes = _refined(motions, structure, _estimated_shapes(motions, structure, speed), speed)
     else:
         shapes = tuple(EstimatedShape(s.k_v or 0.0, s.delta, True, True, True, True) for s in given)
-    shapes = tuple(_with_doubt(shape) for shape in shapes)
+    shapes = tuple(_open_at_limit(shape) for shape in shapes)
     complete = _with_shapes(structure, shapes)
     factors = factorise(motions, complete)
     needed = _needed_rotors(motions, complete, factors) if any(separable) else separable
@@ -100,7 +100,7 @@ def _estimated_shapes(motions: Dataset, structure: ModelStructure, speed: Array)
     )
 
 
-def _with_doubt(shape: EstimatedShape) -> EstimatedShape:
+def _open_at_limit(shape: EstimatedShape) -> EstimatedShape:
     """The shape, its constants open where δ is at the limit of its range.
 
     Two steps as near as they may be are one step of another form than an arctangent, and no fall with speed.

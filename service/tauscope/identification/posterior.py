@@ -58,7 +58,6 @@ class Posterior:
     """
 
     prior: Prior
-    width: float
     doubt: Array
     noise_std: Array
     weights: Array
@@ -97,18 +96,21 @@ def infer(
     std = torque_rms(factors)  # from above: beside a noise of nothing every parameter looks determined
     factor, target = _stack(factors, structure.size, std * colour)
     prior = plausible_prior(structure.robot, factor @ full.map, target, full.friction)
+    centre, root = _project(full, prior)
     for _ in range(ROUNDS):
-        width, evident, mean, covariance, precision = _most_probable(full, prior, factor, target)
+        width, evident, mean, covariance = _most_probable(centre, root, full.base_count, factor, target)
         before, std = std, _noise_std(factors, mean, covariance, estimator)
         factor, target = _stack(factors, structure.size, std * colour)
         if np.all(np.abs(std - before) <= SETTLED * before):
             break
-    width, evident, mean, covariance, precision = _most_probable(full, prior, factor, target)
+    width, evident, mean, covariance = _most_probable(centre, root, full.base_count, factor, target)
+    half = solve_triangular(_widen(root, full.base_count, width), np.eye(len(mean)), lower=True)
+    precision = half.T @ half
     learnt = 1.0 - np.diag(covariance) * np.diag(precision)
     doubt = _friction_doubt(structure, mean * np.sqrt(np.diag(precision)), learnt)
     doubt[: structure.base_count] = evident / width
     weights = 1.0 / (std * colour)
-    return Posterior(prior.widen(width), width, doubt, std, weights, factor, target, mean, covariance, precision)
+    return Posterior(prior.widen(width), doubt, std, weights, factor, target, mean, covariance, precision)
 
 
 def _friction_doubt(structure: ModelStructure, deviation: Array, learnt: Array) -> Array:
@@ -137,29 +139,30 @@ def _stack(factors: tuple[JointFactor, ...], size: int, std: Array) -> tuple[Arr
     return triangle[:-1, :-1], triangle[:-1, -1]
 
 
+def _project(full: FullParameters, prior: Prior) -> tuple[Array, Array]:
+    """Mean of the model's columns before any data, and C with C Cᵀ their covariance at w = 1; C is lower triangular."""
+    spread = full.map @ np.linalg.inv(prior.root)
+    return full.map @ prior.mean, np.asarray(np.linalg.cholesky(spread @ spread.T), dtype=np.float64)
+
+
+def _widen(root: Array, bodies: int, width: float) -> Array:
+    """C at another width: friction, which has no covariance with bodies, keeps its own."""
+    return root * np.append(np.full(bodies, width), np.ones(len(root) - bodies))
+
+
 def _most_probable(
-    full: FullParameters, prior: Prior, factor: Array, target: Array
-) -> tuple[float, float, Array, Array, Array]:
-    """Width of the prior, width of highest evidence, and mean, covariance and prior precision.
+    mean: Array, root: Array, bodies: int, factor: Array, target: Array
+) -> tuple[float, float, Array, Array]:
+    """Width of the prior, width of highest evidence, and mean and covariance.
 
     Friction is eliminated first: its prior does not depend on w. What is left is diagonal in the singular vectors of
     R C, with C Cᵀ the prior covariance of the base parameters at w = 1, and every width costs a sum.
     """
-    bodies = full.base_count
-    mean = full.map @ prior.mean
-    spread = np.linalg.inv(prior.root) @ np.linalg.inv(prior.root).T
-    covariance = full.map @ spread @ full.map.T
-    root = np.linalg.cholesky(covariance)  # block diagonal: friction has no covariance with bodies
     white = np.column_stack([factor @ root, target - factor @ mean])
     friction = white[:, bodies:-1]
     size = friction.shape[1]
-    rows = np.block(
-        [
-            [friction, white[:, :bodies], white[:, -1:]],
-            [np.eye(size), np.zeros((size, bodies + 1))],
-        ]
-    )
-    reduced = np.asarray(qr(rows, mode="r", pivoting=False)[0])[size:, size:]
+    rows = np.block([[friction, white[:, :bodies], white[:, -1:]], [np.eye(size), np.zeros((size, bodies + 1))]])
+    reduced = np.asarray(qr(rows, mode="r")[0])[size:, size:]
     left, singular, _ = svd(reduced[:, :-1], full_matrices=False)
     along = left.T @ reduced[:, -1]
     gain = 1.0 + np.outer(WIDTHS**2, singular**2)
@@ -167,14 +170,12 @@ def _most_probable(
     width = max(float(WIDTHS[int(np.argmax(evidence))]), WIDE)
     weight = np.exp(evidence - evidence.max())
     evident = float(np.sqrt(weight @ WIDTHS**2 / weight.sum()))
-    scale = np.append(np.full(bodies, width), np.ones(size))
-    root = root * scale
+    root = _widen(root, bodies, width)
     stacked = np.vstack([factor @ root, np.eye(len(mean))])
     whole = np.column_stack([stacked, np.append(target - factor @ mean, np.zeros(len(mean)))])
     triangle = np.asarray(qr(whole, mode="r")[0])[: len(mean)]
     inverse = root @ solve_triangular(triangle[:, :-1], np.eye(len(mean)))
-    root_precision = solve_triangular(root, np.eye(len(mean)), lower=True)
-    return width, evident, mean + inverse @ triangle[:, -1], inverse @ inverse.T, root_precision.T @ root_precision
+    return width, evident, mean + inverse @ triangle[:, -1], inverse @ inverse.T
 
 
 def _noise_std(factors: tuple[JointFactor, ...], parameters: Array, covariance: Array, estimator: Estimator) -> Array:

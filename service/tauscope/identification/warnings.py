@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from tauscope.identification.identification import Identification
 from tauscope.identification.posterior import DETERMINED
 from tauscope.recording.conditioning import ConditioningSummary
+from tauscope.recording.words import listed
 from tauscope.result_warning import ResultWarning
 from tauscope.robot import JointType
 
@@ -20,13 +21,10 @@ BEYOND = 1.25
 FAR_OFF = 3.0
 """Factor between recorded and stated weight beyond which a unit is wrong rather than a mass."""
 
-MOST_NAMES = 4
-"""Names in a sentence."""
-
 _FRICTION = {
-    "stiction": "Coulomb friction: turn the joint round more often",
-    "viscous": "viscous friction: move at three or more speeds",
-    "offset": "constant torque: turn the joint round more often",
+    "stiction": "Coulomb friction; turn the joint round more often",
+    "viscous": "viscous friction; move at three or more speeds",
+    "offset": "constant torque; turn the joint round more often",
 }
 
 
@@ -52,14 +50,14 @@ def weak_points(result: Identification, joint: int) -> list[str]:
         joint index, from 0
     """
     if result.excitation.speed[joint] == 0.0:
-        return ["it stands still: move it through its range"]
+        return ["motion: it stands still; move it through its range"]
     known = result.identifiable[joint]
     weak = [text for name, text in _FRICTION.items() if not known.get(name, True)]
     if result.excitation.reversals[joint] < FEWEST_REVERSALS:
-        weak.append(f"it turns round {result.excitation.reversals[joint]} times: move it to and fro")
+        weak.append(f"reversals: {result.excitation.reversals[joint]}; move it to and fro")
     open_ = [name for name, learnt in _own_bodies(result, joint) if learnt < DETERMINED]
     if open_:
-        weak.append(f"{_listed(open_)}: move it faster together with the joints before it, in more postures")
+        weak.append(f"{listed(open_)}; move it faster together with the joints before it, in more postures")
     return weak
 
 
@@ -115,7 +113,7 @@ def _excitation(result: Identification) -> Iterator[ResultWarning]:
             yield ResultWarning(
                 code="poor-excitation",
                 joint=each.name,
-                text=f"{each.name}: these recordings hardly tell {'; '.join(weak)}",
+                text=f"{each.name}: weakly excited: {'. '.join(weak)}",
                 remedy="record the motion of `tauscope excite`",
             )
 
@@ -156,9 +154,3 @@ def _samples(summaries: tuple[ConditioningSummary, ...]) -> Iterator[ResultWarni
         if each.gaps:
             text = f"{each.recording}: split at {each.gaps} {'gap' if each.gaps == 1 else 'gaps'} in the clock"
             yield ResultWarning(code="clock-gaps", text=text, remedy="record without a pause")
-
-
-def _listed(names: list[str]) -> str:
-    """Names in a sentence, not all of them where there are many."""
-    shown = ", ".join(names[:MOST_NAMES])
-    return shown if len(names) <= MOST_NAMES else f"{shown} and {len(names) - MOST_NAMES} more"

@@ -117,19 +117,19 @@ def _about_units(recording: Recording, robot: Robot | None, *, trust_units: bool
     """Columns that can hardly be in their unit, and efforts that were not recorded."""
     missing, doubt = find_missing_effort(recording), find_implausible(recording, robot)
     if missing is not None:
-        yield _placed(Severity.ERROR, missing)
+        yield _locate(Severity.ERROR, missing)
     if doubt is not None:
         trusted = (Severity.WARNING, "") if trust_units else (Severity.ERROR, ", or go on with --trust-units")
-        yield _placed(trusted[0], doubt + trusted[1])
+        yield _locate(trusted[0], doubt + trusted[1])
 
 
 def _about_samples(recording: Recording, robot: Robot | None) -> Iterator[Finding]:
     """Samples that are none, masked or repaired before anything is estimated."""
     for note in mend_recording(recording, robot).notes:
-        yield _placed(Severity.WARNING, note.text)
+        yield _locate(Severity.WARNING, note.text)
 
 
-def _placed(severity: Severity, text: str) -> Finding:
+def _locate(severity: Severity, text: str) -> Finding:
     """A finding from a text that begins with its column."""
     where, found, rest = text.partition(": ")
     place = where.removeprefix("columns ").removeprefix("column ")

@@ -68,12 +68,12 @@ class RowIntake:
         """
         self._check(block, place)
         self._rows += len(block)
-        block = self._converted(block)
+        block = self._convert(block)
         kept = len(self._tail)
         if kept:
             block = np.concatenate([self._tail, block])
         if not (np.diff(block[:, 0], prepend=self._last) > 0).all():
-            block = self._ordered(block, lambda row: place(max(row - kept, 0)))
+            block = self._order(block, lambda row: place(max(row - kept, 0)))
         split = max(len(block) - LATE_ROWS, 0)
         if split:
             self._last = float(block[split - 1, 0])
@@ -98,7 +98,7 @@ class RowIntake:
         kind, table = self._conversion.effort_kind, self._builder.finish()
         return Recording(self._file, joint_count, kind, table, ignored, tuple(self._warnings()))
 
-    def _converted(self, block: Array) -> Array:
+    def _convert(self, block: Array) -> Array:
         """Rows in SI."""
         if not self._conversion.is_needed or not len(block):
             return block
@@ -108,7 +108,7 @@ class RowIntake:
             converted[:, 0] = (block[:, 0] - self._origin) * self._conversion.factor[0]
         return converted
 
-    def _ordered(self, block: Array, place: Callable[[int], str]) -> Array:
+    def _order(self, block: Array, place: Callable[[int], str]) -> Array:
         """Rows in order of time, the first of those with one stamp."""
         time = block[:, 0]
         order = np.argsort(time, kind="stable")

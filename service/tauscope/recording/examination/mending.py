@@ -51,7 +51,7 @@ def _warnings(recording: Recording, defects: Defects, joints: Sequence[str | Non
         return f"first at t = {recording.samples(row, row + 1).time[0]:.6g} s"
 
     if len(defects.bunched):
-        text = f"column t: {_counted(defects.bunched)} within a tenth of an interval of another row"
+        text = f"column t: {_count(defects.bunched)} within a tenth of an interval of another row"
         remedy = "stamp samples when they are measured, not when a buffer is emptied"
         yield ResultWarning(
             code="time-stamps", text=f"{text}, {begin(int(defects.bunched[0]))}; left out", remedy=remedy
@@ -87,7 +87,7 @@ def _joint_texts(
         yield "q", "encoder-reset", text, "home the encoder before the recording, and not within it"
     slow = "record at the rate of the controller"
     if len(joint.repeated):
-        text = f"each value is held for about {joint.hold} rows; {_counted(joint.repeated)} masked"
+        text = f"each value is held for about {joint.hold} rows; {_count(joint.repeated)} masked"
         yield "q", "held-samples", text, slow
     if joint.effort_hold > 1:
         text = f"each value is held for about {joint.effort_hold} rows; {way}"
@@ -101,9 +101,9 @@ def _joint_texts(
     )
     for column, code, rows, words in masked:
         if len(rows):
-            yield column, code, f"{_counted(rows)} {words}, {begin(int(rows[0]))}; masked", BUS
+            yield column, code, f"{_count(rows)} {words}, {begin(int(rows[0]))}; masked", BUS
 
 
-def _counted(rows: Numbers) -> str:
+def _count(rows: Numbers) -> str:
     """A count of rows in words."""
     return "1 row" if len(rows) == 1 else f"{len(rows)} rows"

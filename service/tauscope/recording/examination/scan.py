@@ -158,11 +158,11 @@ class _Scan:
     def add(self, samples: Samples, first: int, core: tuple[int, int]) -> None:
         """Take a block, of which the rows of `core` are its own and the others neighbours."""
         rows = np.arange(first, first + len(samples.time))
-        close = _bunched(samples.time, self.interval)
+        close = _find_bunched(samples.time, self.interval)
         self._keep(0, "bunched", rows[close], core)
         if self.pace > 1:
             same = (samples.effort[1:] == samples.effort[:-1]).all(axis=1)
-            self._keep(0, "paced", rows[_repeated(np.concatenate([[False], same]), self.pace)], core)
+            self._keep(0, "paced", rows[_find_repeated(np.concatenate([[False], same]), self.pace)], core)
         stuck = find_all_stuck(rows, samples.effort, samples.position, self.efforts)
         for joint, (place, scale) in enumerate(zip(self.defects.joints, self.positions, strict=True)):
             self._keep(joint, "stuck", stuck, core)
@@ -179,7 +179,7 @@ class _Scan:
             self._keep(joint, "frozen", np.array(fault.frozen, dtype=np.int64), (0, core[1]))
             if place.hold > 1:
                 same = np.concatenate([[False], position[1:] == position[:-1]])
-                self._keep(joint, "repeated", rows[_repeated(same, place.hold)], core)
+                self._keep(joint, "repeated", rows[_find_repeated(same, place.hold)], core)
             effort, measure = np.ascontiguousarray(samples.effort[:, joint]), self.efforts[joint]
             known = np.isfinite(effort) & (effort != 0.0)  # zeros are looked at elsewhere
             if known.any():
@@ -226,7 +226,7 @@ def _offsets(jumps: list[tuple[int, float]], where: Numbers, count: int) -> Arra
     return heights[np.searchsorted(starts, where, side="right") - 1]
 
 
-def _bunched(time: Array, interval: float) -> NDArray[np.bool_]:
+def _find_bunched(time: Array, interval: float) -> NDArray[np.bool_]:
     """Rows of which the stamp is that of a neighbour; of two the one that leaves the more even intervals."""
     steps = np.diff(time)
     close = np.zeros(len(time), dtype=bool)
@@ -237,7 +237,7 @@ def _bunched(time: Array, interval: float) -> NDArray[np.bool_]:
     return close
 
 
-def _repeated(same: NDArray[np.bool_], hold: int) -> NDArray[np.bool_]:
+def _find_repeated(same: NDArray[np.bool_], hold: int) -> NDArray[np.bool_]:
     """Rows that repeat a held value; of a rest of `REST_HOLDS` or more one row in `hold` is kept."""
     number = np.arange(len(same))
     since = number - np.maximum.accumulate(np.where(same, 0, number))
