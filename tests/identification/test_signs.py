@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from identification.poor_motion import poor_arm
-from shared_data import SHARED_DATA, needs_shared_data
+from shared_data import SHARED_CASES, SHARED_DATA, needs_shared_cases, needs_shared_data
 from tauscope.identification import Identification, document, identify
 from tauscope.recording import Recording, read_recording
 from tauscope.robot import LinkInertia, Model, Robot, read_robot
@@ -66,3 +66,10 @@ def test_torque_far_from_the_stated_masses_is_named(tmp_path: Path) -> None:
         assert found.gravity_scale == pytest.approx(scale, rel=0.5)
         assert ("torque-scale" in {each.code for each in document(found).warnings}) == (scale < 1.0)
         assert not np.isnan(found.parameters).any()
+
+
+@needs_shared_cases
+def test_two_joints_of_a_file_as_people_bring_it() -> None:
+    robot = read_robot(SHARED_CASES / "ur5" / "ur5.yaml")
+    found = identify(robot, [read_recording(SHARED_CASES / "recordings" / "40-two-joints-flipped.csv")])
+    assert found.reversed_joints == (1, 3)
