@@ -2,7 +2,6 @@
 
 TauscopeError
 ├── RobotFileError        (ValueError)    robot-file          the robot file cannot be read or is not valid
-│   └── UnphysicalModelError              robot-unphysical    its model block describes an impossible body
 ├── RecordingError        (ValueError)    recording           the recording cannot be read or is not valid
 │   └── RecordingMismatchError            recording-mismatch  the recording does not fit the robot
 ├── IdentificationError   (ValueError)    identification      the data cannot answer the question
@@ -33,12 +32,6 @@ class RobotFileError(TauscopeError, ValueError):
     """The robot file, or the URDF that it names, cannot be read or is not valid."""
 
     code = "robot-file"
-
-
-class UnphysicalModelError(RobotFileError):
-    """A link of the robot's model has a mass or an inertia that no rigid body can have."""
-
-    code = "robot-unphysical"
 
 
 class RecordingError(TauscopeError, ValueError):

@@ -12,3 +12,8 @@ class ResultWarning(ResultModel):
     joint: str | None = Field(default=None, description="name of the joint; null where it concerns the whole arm")
     text: str = Field(description="what was found, with the evidence")
     remedy: str | None = Field(default=None, description="what to do about it")
+
+    @property
+    def sentence(self) -> str:
+        """Text and remedy."""
+        return f"{self.text}; {self.remedy}" if self.remedy else self.text

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from tauscope.errors import RobotFileError, TauscopeError, UnphysicalModelError
+from tauscope.errors import RobotFileError, TauscopeError
+from tauscope.robot.physical import about_centre, nearest_body
 from tauscope.robot.robot import Joint, JointType, LinkInertia, Robot, Segment
 
 Array = NDArray[np.float64]
@@ -22,9 +23,6 @@ LEAST_INERTIA = 1e-12
 
 LEAST_MASS = 1e-12
 """Mass given to a massless link [kg], for the same reason."""
-
-INERTIA_TOLERANCE = 1e-9
-"""Negative moments up to this part of the inertia about the link frame's origin are rounding of the robot file."""
 
 _JOINT_TYPES = {
     JointType.REVOLUTE: mujoco.mjtJoint.mjJNT_HINGE,
@@ -43,8 +41,6 @@ def build_spec(robot: Robot) -> mujoco.MjSpec:
     ------
     RobotFileError
         where the robot file states no links, or where MuJoCo refuses the model
-    UnphysicalModelError
-        where a link is no rigid body: negative mass, or moments of inertia that no mass distribution has
     """
     links = robot.model.links
     if links is None or len(links) != robot.joint_count:
@@ -65,7 +61,7 @@ def build_spec(robot: Robot) -> mujoco.MjSpec:
         for number, (joint, segment, link) in enumerate(zip(robot.joints, robot.segments, links, strict=True), 1):
             body = body.add_body(name=f"link{number}")
             _place(body, joint, segment)
-            _weigh(body, link, f"{_origin(robot)}: model.links, link {number}")
+            _weigh(body, link)
     return spec
 
 
@@ -76,8 +72,6 @@ def build_model(robot: Robot) -> mujoco.MjModel:
     ------
     RobotFileError
         where the robot file states no links, or where MuJoCo refuses the model
-    UnphysicalModelError
-        where a link is no rigid body
     """
     spec = build_spec(robot)
     with _mujoco_refusals(robot):
@@ -116,9 +110,9 @@ def _place(body: mujoco.MjsBody, joint: Joint, segment: Segment) -> None:
     )
 
 
-def _weigh(body: mujoco.MjsBody, link: LinkInertia, place: str) -> None:
+def _weigh(body: mujoco.MjsBody, link: LinkInertia) -> None:
     """Give the body its inertia."""
-    inertia = body_inertia(link, place)
+    inertia = body_inertia(link)
     body.explicitinertial = True
     body.mass = inertia.mass
     body.ipos = inertia.centre
@@ -146,46 +140,24 @@ class BodyInertia:
     moments: Array
 
 
-def body_inertia(link: LinkInertia, place: str) -> BodyInertia:
-    """Centre of mass, principal axes and principal moments of a link.
-
-    Raises
-    ------
-    UnphysicalModelError
-        where the link is no rigid body: negative mass, or moments of inertia that no mass distribution has
-    """
-    if link.mass < 0.0:
-        raise UnphysicalModelError(f"{place}: mass {link.mass:g} kg is negative; give a mass of zero or more")
-    if link.mass == 0.0 and np.any(link.first_moment):
-        raise UnphysicalModelError(f"{place}: first_moment is not zero but mass is; give the mass or drop the moment")
-    centre = link.first_moment / link.mass if link.mass > 0.0 else np.zeros(3)
-    about_centre = link.inertia - link.mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
-    moments, axes = np.linalg.eigh(about_centre)
+def body_inertia(link: LinkInertia) -> BodyInertia:
+    """Centre of mass, principal axes and principal moments of a link, or of the nearest body where it is none."""
+    body = nearest_body(link)
+    centre = body.first_moment / body.mass if body.mass > 0.0 else np.zeros(3)
+    moments, axes = np.linalg.eigh(about_centre(body))
     if np.linalg.det(axes) < 0.0:
         axes[:, 0] = -axes[:, 0]
     return BodyInertia(
-        mass=max(link.mass, LEAST_MASS),
+        mass=max(body.mass, LEAST_MASS),
         centre=centre,
         quaternion=_quaternion(axes),
-        moments=_regularised(moments, float(np.trace(link.inertia)), place),
+        moments=_regularise(moments, float(np.trace(body.inertia))),
     )
 
 
-def _regularised(moments: Array, scale: float, place: str) -> Array:
+def _regularise(moments: Array, scale: float) -> Array:
     """Ascending principal moments with rounding removed and just enough added for MuJoCo to accept them."""
-    tolerance = INERTIA_TOLERANCE * scale
-    first, second, third = (float(moment) for moment in moments)
-    if first < -tolerance:
-        raise UnphysicalModelError(
-            f"{place}: the inertia about the centre of mass has a negative principal moment {first:.3g} kg m²; "
-            "check inertia (about the frame's origin), mass and first_moment"
-        )
-    if third - second - first > tolerance:
-        raise UnphysicalModelError(
-            f"{place}: principal moments {first:.3g}, {second:.3g}, {third:.3g} kg m² about the centre of mass break "
-            "the triangle inequality; check inertia (about the frame's origin), mass and first_moment"
-        )
-    first, second = max(first, 0.0), max(second, 0.0)
+    first, second, third = (max(float(moment), 0.0) for moment in moments)
     # a flat body has third = first + second: rounding may put it a hair above, which MuJoCo refuses
     first += max(0.0, third - second - first)
     return np.array([first, second, third]) + max(LEAST_INERTIA, 1e-13 * scale)

@@ -192,3 +192,25 @@ def test_the_report_is_written(run: Run, files: SimulatedFiles, tmp_path: Path) 
     text = page.read_text(encoding="utf-8")
     assert hashlib.sha256(files.train[0].read_bytes()).hexdigest() in text
     assert f"tauscope identify {files.robot} {files.train[0]} --held-out {files.held_out[0]}" in text
+
+
+def test_a_link_that_no_body_can_be_stands_first(run: Run, files: SimulatedFiles, tmp_path: Path) -> None:
+    link = "{mass: MASS, first_moment: [0.1, 0, 0], inertia: {xx: 0.1, yy: 0.2, zz: 0.2, xy: 0, xz: 0, yz: 0}}"
+    links = ", ".join(link.replace("MASS", mass) for mass in ("1", "-1.4", "1"))
+    robot = tmp_path / "robot.yaml"
+    robot.write_text(files.robot.read_text(encoding="utf-8") + f"model: {{links: [{links}]}}\n", encoding="utf-8")
+    words = "joint2'): mass -1.4 kg is negative; the nearest body is used: mass -1.4 → 0 kg"
+    for verb in ("identify", "diagnose"):
+        out, report = tmp_path / f"{verb}.json", tmp_path / f"{verb}.html"
+        ended = run(verb, robot, files.train[0], "--report", report)
+        assert (ended.status, ended.err) == (0, "")
+        assert words in next(line for line in ended.out.splitlines() if line.startswith("! "))
+        ended = run(verb, robot, files.train[0], "--json", out)
+        assert words in ended.out + ended.err
+        (warning,) = [
+            each
+            for each in json.loads(out.read_text(encoding="utf-8"))["warnings"]
+            if each["code"] == "repaired-inertial"
+        ]
+        assert words in warning["text"]
+        assert "mass -1.4 → 0 kg" in report.read_text(encoding="utf-8")

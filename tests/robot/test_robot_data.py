@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from robot.robot_texts import ROBOT_YAML, URDF, URDF_ROBOT_YAML, write_robot
-from tauscope.errors import RobotFileError, UnphysicalModelError
+from tauscope.errors import RobotFileError
 from tauscope.robot import Robot, link_placements, read_robot, robot_from_dict, robot_from_yaml, robot_to_dict
 from tauscope.robot.yaml_text import read_yaml
 
@@ -74,11 +74,11 @@ def test_error_names_the_json_path_and_the_joint() -> None:
     )
 
 
-def test_impossible_body_is_refused() -> None:
+def test_impossible_body_is_repaired() -> None:
     data = _data()
     data["model"]["links"][1]["mass"] = -1.0
-    with pytest.raises(UnphysicalModelError, match=r"robot: model\.links\[1\] \(link 2, 'slide'\): mass -1 kg"):
-        robot_from_dict(data)
+    (warning,) = robot_from_dict(data).warnings
+    assert warning.text.startswith("robot: model.links[1] (link 2, 'slide'): mass -1 kg is negative")
 
 
 @pytest.mark.parametrize(

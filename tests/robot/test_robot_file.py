@@ -14,7 +14,6 @@ from tauscope.robot import (
     JointLimits,
     JointType,
     Robot,
-    Severity,
     link_placements,
     read_robot,
 )
@@ -95,11 +94,12 @@ def test_model_block_replaces_all_of_the_urdfs_model(tmp_path: Path) -> None:
     assert robot.model.friction == (FrictionCoefficients(1.0, 0.0, 2.0),) * 2
 
 
-def test_impossible_urdf_inertial_is_but_a_warning_where_the_model_block_replaces_it(tmp_path: Path) -> None:
+def test_impossible_urdf_inertial_matters_not_where_the_model_block_replaces_it(tmp_path: Path) -> None:
     friction = "{stiction: 1, stribeck: 0, viscous: 2}"
     model = f"model:\n  friction: [{friction}, {friction}]\n"
     robot = _read(tmp_path, URDF_ROBOT_YAML + model, replaced(URDF, 'izz="0.04"', 'izz="0.4"'))
-    assert [finding.severity for finding in robot.findings] == [Severity.WARNING]
+    assert robot.findings == ()
+    assert robot.warnings == ()
 
 
 def test_aliases_and_byte_order_mark_are_accepted(tmp_path: Path) -> None:

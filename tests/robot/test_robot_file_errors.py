@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from robot.robot_texts import ROBOT_YAML, URDF, URDF_ROBOT_YAML, replaced, write_robot
-from tauscope.errors import RobotFileError, UnphysicalModelError
+from tauscope.errors import RobotFileError
 from tauscope.robot import read_robot
 
 LINK_2 = "{mass: 1.4, first_moment: [0.1, 0, 0], inertia: {xx: 0.02, yy: 0.03, zz: 0.03, xy: 0, xz: 0, yz: 0}}"
@@ -259,24 +259,24 @@ def test_error_in_the_urdf_names_the_urdf_and_its_line(tmp_path: Path) -> None:
         ("mass: 1.4", "mass: -1.4", "mass -1.4 kg is negative"),
         ("mass: 1.4", "mass: 0", "mass is zero but the first moment is [0.1, 0, 0] kg m"),
         ("xx: 0.02, yy: 0.03", "xx: -0.02, yy: 0.03", "inertia is not positive semidefinite: principal moments"),
-        ("zz: 0.03, xy", "zz: 0.08, xy", "inertia breaks the triangle inequality: principal moments"),
+        ("zz: 0.03, xy", "zz: 0.08, xy", "inertia breaks the triangle inequality: 0.02 + 0.03 < 0.08 kg m²"),
         ("xx: 0.02, yy: 0.03, zz: 0.03", "xx: 0.01, yy: 0.006, zz: 0.006", "inertia is not positive semidefinite"),
         ("xy: 0, xz: 0, yz: 0}}\n  fr", "xy: 0.1, xz: 0, yz: 0}}\n  fr", "inertia is not positive semidefinite"),
     ],
 )
-def test_impossible_body_in_the_model_is_refused_by_link_and_condition(
+def test_impossible_body_in_the_model_is_repaired_and_named_by_link_and_condition(
     tmp_path: Path, old: str, new: str, message: str
 ) -> None:
     path = write_robot(tmp_path, replaced(ROBOT_YAML, old, new))
-    with pytest.raises(UnphysicalModelError) as caught:
-        read_robot(path)
-    assert str(caught.value).startswith(f"{path}:20: model.links[1] (link 2, 'slide'): {message}")
-    assert "about the link frame's origin" in str(caught.value)
+    (warning,) = read_robot(path).warnings
+    assert (warning.code, warning.joint) == ("repaired-inertial", "slide")
+    assert warning.text.startswith(f"{path}:20: model.links[1] (link 2, 'slide'): {message}")
+    assert "about the link frame's origin" in str(warning.remedy)
 
 
-def test_impossible_inertial_of_a_urdf_is_refused(tmp_path: Path) -> None:
+def test_impossible_inertial_of_a_urdf_is_repaired(tmp_path: Path) -> None:
     path = write_robot(tmp_path, URDF_ROBOT_YAML, replaced(URDF, 'izz="0.04"', 'izz="0.4"'))
-    with pytest.raises(
-        UnphysicalModelError, match=r"arm\.urdf:5: inertial of link 'upper': inertia breaks the triangle"
-    ):
-        read_robot(path)
+    (warning,) = read_robot(path).warnings
+    assert "arm.urdf:5: inertial of link 'upper': inertia breaks the triangle inequality: 0.02 + 0.03" in warning.text
+    assert "the nearest body is used: principal moments [0.02, 0.03, 0.4] → [0.195, 0.205, 0.4] kg m²" in warning.text
+    assert warning.remedy == "correct the <inertial>"

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from robot.robot_texts import ROBOT_YAML, URDF, URDF_ROBOT_YAML, write_robot
 from tauscope.errors import RobotFileError
-from tauscope.robot import Severity, check_robot, link_placements, read_robot, robot_from_dict, robot_to_dict
+from tauscope.robot import check_robot, find_defect, link_placements, read_robot, robot_from_dict, robot_to_dict
 
 TOKEN = re.compile(r"\s+|[-+.\w]+|[^\s\w]")
 NUMBERS = [
@@ -129,19 +129,16 @@ def _assert_sound_or_refused(path: Path) -> None:
         assert len(robot.joints) == len(robot.segments) == placements.shape[1] > 0
         for link in robot.model.links or ():
             assert np.all(np.isfinite(link.to_vector()))
-        assert check_robot(path).passed
+            assert find_defect(link, 1e-8) is None
+        assert len(check_robot(path).findings) >= len(robot.repairs)
         assert robot_to_dict(robot_from_dict(robot_to_dict(robot))) == robot_to_dict(robot)
     assert {file: file.read_bytes() for file in path.parent.iterdir()} == before
 
 
 def _assert_check_agrees(path: Path) -> None:
-    """What `read_robot` refuses, `check_robot` refuses or reports as an error."""
-    try:
-        report = check_robot(path)
-    except RobotFileError:
-        return
-    assert not report.passed
-    assert report.findings[0].severity is Severity.ERROR
+    """What `read_robot` refuses, `check_robot` refuses."""
+    with pytest.raises(RobotFileError):
+        check_robot(path)
 
 
 @pytest.fixture(scope="module")

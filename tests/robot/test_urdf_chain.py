@@ -312,11 +312,19 @@ def test_doctype_cannot_hide_in_another_encoding(encoding: str) -> None:
         read_urdf_chain(text.encode(encoding), "arm.urdf", "base", "tool")
 
 
-def test_unphysical_inertial_is_an_error_finding_with_its_line() -> None:
-    (found,) = _chain(replaced(URDF, 'izz="0.04"', 'izz="0.4"')).findings
-    assert found.severity is Severity.ERROR
-    assert found.where == "arm.urdf:5: inertial of link 'upper'"
-    assert "0.02 + 0.03 < 0.4" in found.text
+def test_unphysical_inertial_is_repaired_in_the_frame_of_its_link() -> None:
+    chain = _chain(replaced(URDF, 'izz="0.04"', 'izz="0.4"'))
+    (repair,) = chain.repairs
+    assert chain.findings == ()
+    assert (repair.link, repair.place) == (0, "arm.urdf:5: inertial of link 'upper'")
+    assert "0.02 + 0.03 < 0.4" in repair.text
+    assert chain.links is not None
+    stated = _chain(URDF).links
+    assert stated is not None
+    np.testing.assert_allclose(
+        (repair.after.to_vector() - chain.links[0].to_vector())[6:],
+        (repair.before.to_vector() - stated[0].to_vector())[6:],
+    )
 
 
 def test_origin_given_twice_counts_once_and_is_reported() -> None:

@@ -13,6 +13,8 @@ from tauscope.report.table import Table
 def show_diagnosis(console: Console, document: DiagnosisDocument) -> None:
     """Show the verdict, the findings, and what they change."""
     console.print(plain(f"Robot {document.robot}: {document.verdict}: {VERDICTS[document.verdict]}"), soft_wrap=True)
+    for warning in document.warnings:
+        console.print(plain(f"! {warning.sentence}."), soft_wrap=True)
     console.print()
     for finding in document.findings:
         console.print(plain(f"* {finding.statement}"), soft_wrap=True)

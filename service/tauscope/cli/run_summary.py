@@ -12,6 +12,8 @@ from tauscope.runtime.record import RunRecord
 def show_run(console: Console, record: RunRecord, robot: Robot) -> None:
     """Show how a run went, and how it kept its time."""
     console.print(plain(f"Robot {record.robot} on {record.backend}: {record.state}"), soft_wrap=True)
+    for warning in robot.warnings:
+        console.print(plain(f"! {warning.sentence}."), soft_wrap=True)
     console.print(table("Run", _whole(record)))
     if record.worst_following:
         console.print(table("Joints", _joints(record, robot)))

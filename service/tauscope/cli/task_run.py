@@ -128,10 +128,8 @@ def _show_warnings(robot: Robot, result: Any, *, summarised: bool) -> None:
             typer.echo(one_line(f"warning: {finding.where}: {finding.text}"), err=True)
     warnings = getattr(getattr(result, "document", None), "warnings", None)
     if warnings is None:
-        recordings = (*getattr(result, "recordings", ()), *getattr(result, "held_out", ()))
-        warnings = [warning for recording in recordings for warning in recording.warnings]
+        warnings = robot.warnings
     elif summarised:
         warnings = []
     for warning in warnings:
-        remedy = f"; {warning.remedy}" if warning.remedy else ""
-        typer.echo(one_line(f"warning: {warning.text}{remedy} ({warning.code})"), err=True)
+        typer.echo(one_line(f"warning: {warning.sentence} ({warning.code})"), err=True)

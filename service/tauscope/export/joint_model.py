@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from tauscope.errors import ExportError
 from tauscope.export.compensation.model import JointFriction, check_friction
 from tauscope.robot import LinkInertia, Robot, find_defect
-from tauscope.robot.finding import Severity
 from tauscope.robot.messages import one_line, shown
 
 
@@ -73,10 +72,10 @@ def centred(joint: str, link: LinkInertia) -> CentredInertia:
     ExportError
         if no rigid body has these parameters
     """
-    defect = find_defect(link) if np.isfinite(link.to_vector()).all() else None
-    if not np.isfinite(link.to_vector()).all() or link.mass <= 0.0 or (defect and defect.severity is Severity.ERROR):
-        reason = defect.text if defect else f"mass {link.mass:g} kg"
-        text = f"the link of joint {shown(joint)} cannot exist ({reason}); export the physically consistent model"
+    finite = bool(np.isfinite(link.to_vector()).all())
+    defect = find_defect(link) if finite and link.mass > 0.0 else f"mass {link.mass:g} kg"
+    if defect is not None:
+        text = f"the link of joint {shown(joint)} cannot exist ({defect}); export the physically consistent model"
         raise ExportError(one_line(text))
     centre = link.first_moment / link.mass
     inertia = link.inertia - link.mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))

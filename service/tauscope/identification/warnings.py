@@ -33,6 +33,7 @@ def identification_warnings(result: Identification) -> list[ResultWarning]:
     return [
         *_signs(result),
         *_scale(result),
+        *result.robot.warnings,
         *result.recording_warnings,
         *_bodies(result),
         *_excitation(result),

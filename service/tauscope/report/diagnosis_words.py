@@ -89,6 +89,7 @@ def summary_sentences(document: DiagnosisDocument) -> Iterator[str]:
 
 def cautions(document: DiagnosisDocument) -> Iterator[str]:
     """What a reader has to know before acting on it."""
+    yield from (f"{each.sentence}." for each in document.warnings)
     if document.fit.held_out is None:
         yield "No recording was held out: nothing here was tested on motion that the model has not seen."
     for finding in document.findings:

@@ -47,7 +47,7 @@ def fit_sentences(document: IdentificationDocument) -> list[str]:
 
 def cautions(document: IdentificationDocument) -> list[str]:
     """What a reader has to know before using the numbers, each with what to do about it."""
-    return [f"{each.text}; {each.remedy}." if each.remedy else f"{each.text}." for each in document.warnings]
+    return [f"{each.sentence}." for each in document.warnings]
 
 
 def noise_words(document: IdentificationDocument) -> str:

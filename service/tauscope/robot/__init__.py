@@ -4,7 +4,7 @@ from tauscope.robot.check import JointSummary, RobotReport, check_robot
 from tauscope.robot.denavit_hartenberg import DenavitHartenbergRow, modified_segments, standard_segments
 from tauscope.robot.finding import Finding, Severity
 from tauscope.robot.kinematics import homogeneous, link_placements
-from tauscope.robot.physical import Defect, find_defect, pseudo_inertia
+from tauscope.robot.physical import find_defect, nearest_body, pseudo_inertia
 from tauscope.robot.recording_layout import RecordingLayout, find_fault
 from tauscope.robot.robot import (
     STANDARD_PARAMETERS,
@@ -16,6 +16,7 @@ from tauscope.robot.robot import (
     LinkInertia,
     Model,
     Placement,
+    Repair,
     Robot,
     Segment,
 )
@@ -25,7 +26,6 @@ from tauscope.robot.urdf import UrdfChain, read_urdf_chain
 
 __all__ = [
     "STANDARD_PARAMETERS",
-    "Defect",
     "DenavitHartenbergRow",
     "Finding",
     "FrictionCoefficients",
@@ -38,6 +38,7 @@ __all__ = [
     "Model",
     "Placement",
     "RecordingLayout",
+    "Repair",
     "Robot",
     "RobotReport",
     "Segment",
@@ -49,6 +50,7 @@ __all__ = [
     "homogeneous",
     "link_placements",
     "modified_segments",
+    "nearest_body",
     "pseudo_inertia",
     "read_robot",
     "read_urdf_chain",

@@ -9,7 +9,7 @@ import numpy as np
 from tauscope.robot.finding import Finding, Severity
 from tauscope.robot.kinematics import homogeneous
 from tauscope.robot.robot import Joint, JointLimits, JointType, Robot, Segment
-from tauscope.robot.robot_file import load_robot
+from tauscope.robot.robot_file import read_robot
 
 EARTH = (9.7, 9.9)
 """Acceleration of gravity on the ground, with room for altitude and latitude [m/s²]."""
@@ -60,21 +60,16 @@ class RobotReport:
     total_mass: float | None
     findings: tuple[Finding, ...]
 
-    @property
-    def passed(self) -> bool:
-        """Whether every other command accepts the file."""
-        return all(finding.severity is not Severity.ERROR for finding in self.findings)
-
 
 def check_robot(path: Path | str) -> RobotReport:
-    """The report on a robot file; a model that no rigid body can have is among its findings.
+    """The report on a robot file; links that no body can be are among its findings.
 
     Raises
     ------
     RobotFileError
         if the file or its URDF cannot be read or is not valid
     """
-    robot = load_robot(path)
+    robot = read_robot(path)
     rank = list(Severity)
     findings = sorted((*robot.findings, *_remarks(robot, str(path))), key=lambda finding: rank.index(finding.severity))
     links = robot.model.links
@@ -111,7 +106,9 @@ def _summary(number: int, joint: Joint, segment: Segment, mass: float | None) ->
 
 
 def _remarks(robot: Robot, source: str) -> Iterator[Finding]:
-    """What other commands will miss or stumble over."""
+    """What other commands repair, will miss or stumble over."""
+    for repair in robot.repairs:
+        yield Finding(Severity.WARNING, repair.place, f"{repair.text}; {repair.remedy}")
     size = float(np.linalg.norm(robot.gravity))
     if not EARTH[0] <= size <= EARTH[1]:
         yield Finding(

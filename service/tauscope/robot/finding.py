@@ -5,7 +5,7 @@ from enum import StrEnum
 
 
 class Severity(StrEnum):
-    """How much a finding matters: an error refuses the robot, a warning may spoil results, the rest is good to know."""
+    """How much a finding matters: an error refuses, a warning may spoil results, the rest is good to know."""
 
     ERROR = "error"
     WARNING = "warning"

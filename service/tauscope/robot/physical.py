@@ -1,34 +1,25 @@
-"""Which inertial parameters a rigid body can have, and which it cannot.
+"""Which inertial parameters a rigid body can have, and the body nearest to those that none can have.
 
 A body of positive density has mass m > 0, and the second moments Σ_c = ½ tr(I_c) 1 - I_c of its mass about its centre
 are positive semidefinite. In principal moments: none is negative, none exceeds the sum of the other two. The same in
 one matrix (Wensing, Kim, Slotine 2018): the pseudo-inertia [[Σ, h], [hᵀ, m]] about any origin is positive semidefinite.
+Its limit, inertia without mass, counts as a body: some robot files state motors so.
 """
-
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tauscope.robot.finding import Severity
+from tauscope.robot.document_fields import LARGEST_NUMBER
 from tauscope.robot.robot import LinkInertia
 
 Array = NDArray[np.float64]
 
 ROUNDING = 1e-3
-"""Violation, relative to the moments of inertia, that rounding to four digits can cause: warned of, not refused."""
+"""Violation, relative to the moments of inertia, that rounding to four digits can cause: repaired without a word."""
 ROUND_OFF = 1e-9
-"""Violation that is float64 arithmetic on numbers of full length: nothing to speak of."""
+"""Violation that is float64 arithmetic on numbers of full length: left as it is."""
 SMALLEST = float(np.finfo(np.float64).tiny)
 """Below this float64 loses digits, and so does any comparison of moments [kg m²]."""
-
-
-@dataclass(frozen=True)
-class Defect:
-    """Why no rigid body has these parameters."""
-
-    severity: Severity
-    text: str
 
 
 def pseudo_inertia(link: LinkInertia) -> Array:
@@ -40,57 +31,116 @@ def pseudo_inertia(link: LinkInertia) -> Array:
     return matrix
 
 
-def find_defect(link: LinkInertia) -> Defect | None:
-    """What makes the parameters impossible for a rigid body, or None where a body can have them."""
+def find_defect(link: LinkInertia, tolerance: float = ROUNDING) -> str | None:
+    """Why no rigid body has these parameters; None where a body can have them.
+
+    Parameters
+    ----------
+    tolerance : float
+        violation that is allowed, relative to the largest entry of the inertia
+    """
     offset = float(np.linalg.norm(link.first_moment))
     if link.mass < 0.0:
-        return Defect(Severity.ERROR, f"mass {link.mass:g} kg is negative")
+        return f"mass {link.mass:g} kg is negative"
     if link.mass == 0.0 and offset > 0.0:
-        return Defect(Severity.ERROR, f"mass is zero but the first moment is {_listed(link.first_moment)} kg m")
+        return f"mass is zero but the first moment is {_listed(link.first_moment)} kg m"
     scale = float(np.max(np.abs(link.inertia)))
+    allowed = tolerance * scale + SMALLEST
     if offset == 0.0:
-        return _worst(_principal_defects(link.inertia, scale, "about the centre of mass"))
-    about_origin = _principal_defects(link.inertia, scale, "about the frame's origin")
-    if offset * (offset / link.mass) > 2.0 * scale:
+        return _principal_defect(link.inertia, allowed, "about the centre of mass")
+    about_origin = _principal_defect(link.inertia, allowed, "about the frame's origin")
+    if about_origin is None and offset * (offset / link.mass) > 2.0 * scale:
         # A point mass m at distance d has the moment m d² = h²/m; far beyond the entries given, it might overflow.
-        text = (
+        return (
             f"inertia is not positive semidefinite about the centre of mass: mass {link.mass:g} kg with first moment "
             f"{_listed(link.first_moment)} kg m alone makes {offset / link.mass * offset:g} kg m² "
             f"about the frame's origin, where the largest entry is {scale:g} kg m²"
         )
-        return _worst([*about_origin, Defect(Severity.ERROR, text)])
-    about_centre = _principal_defects(_about_centre(link), scale, "about the centre of mass")
-    return _worst([*about_origin, *about_centre])
+    return about_origin or _principal_defect(about_centre(link), allowed, "about the centre of mass")
 
 
-def _about_centre(link: LinkInertia) -> Array:
-    """Inertia about the centre of mass: I_c = I - (hᵀh 1 - h hᵀ)/m, equation (5) reversed."""
+def nearest_body(link: LinkInertia) -> LinkInertia:
+    """The nearest body; the link itself where a body can have its parameters.
+
+    min ‖A⁻¹ (J - J₀) A⁻ᵀ‖_F over J ⪰ 0, J the pseudo-inertia and A Aᵀ that of a compact body about the same centre of
+    mass: negative eigenvalues of A⁻¹ J₀ A⁻ᵀ become zero (Higham 1988). Positive mass and its centre stay, and so does
+    the answer in other units and frames. Without a mass that tells the centre, A is a body at the frame's origin.
+    """
+    if find_defect(link, ROUND_OFF) is None:
+        return link
+    offset = float(np.linalg.norm(link.first_moment))
+    if offset > 0.0 and not offset * offset <= LARGEST_NUMBER * abs(link.mass):
+        return _nearest_without_centre(link, offset)
+    inertia = about_centre(link)
+    values, axes = np.linalg.eigh(0.5 * np.trace(inertia) * np.eye(3) - inertia)
+    added = (axes * np.maximum(-values, 0.0)) @ axes.T
+    added_inertia = np.trace(added) * np.eye(3) - added
+    if link.mass < 0.0:
+        return LinkInertia(0.0, np.zeros(3), inertia + added_inertia)
+    return LinkInertia(link.mass, link.first_moment, link.inertia + added_inertia)
+
+
+def repair_text(stated: LinkInertia, body: LinkInertia) -> str | None:
+    """Why no body has the stated parameters, and the numbers before and after; None where rounding explains it."""
+    defect = find_defect(stated)
+    if defect is None:
+        return None
+    changes = [] if stated.mass == body.mass else [f"mass {stated.mass:g} → {body.mass:g} kg"]
+    if np.array_equal(stated.first_moment, body.first_moment):
+        about, inertias = "centre of mass", [about_centre(stated), about_centre(body)]
+    else:
+        changes.append(f"first moment {_listed(stated.first_moment)} → {_listed(body.first_moment)} kg m")
+        about, inertias = "frame's origin", [stated.inertia, body.inertia]
+    before, after = (_listed(_principal_moments(inertia)) for inertia in inertias)
+    if before != after:
+        changes.append(f"principal moments {before} → {after} kg m² about the {about}")
+    return f"{defect}; the nearest body is used: {', '.join(changes)}"
+
+
+def about_centre(link: LinkInertia) -> Array:
+    """Inertia about the centre of mass: I_c = I - (hᵀh 1 - h hᵀ)/m, equation (5) reversed; I itself without mass.
+
+    Returns
+    -------
+    (3, 3) float64
+        I_c [kg m²]
+    """
+    if link.mass == 0.0:
+        return link.inertia
     moment = link.first_moment
     centre = moment / link.mass  # before the product, which underflows where the mass is tiny
     return link.inertia - (moment @ centre * np.eye(3) - np.outer(moment, centre))
 
 
-def _principal_defects(inertia: Array, scale: float, about: str) -> list[Defect]:
-    """Principal moments that no body has; `scale` is the size that digits were rounded at [kg m²]."""
-    smallest, middle, largest = (float(moment) for moment in np.linalg.eigvalsh(inertia))
-    principal = f"principal moments {about} are {smallest:.6g}, {middle:.6g}, {largest:.6g} kg m²"
-    sums = f"{smallest:.6g} + {middle:.6g} < {largest:.6g}"
-    defects: list[Defect] = []
-    for shortfall, text in (
-        (-smallest, f"inertia is not positive semidefinite: {principal}"),
-        (largest - middle - smallest, f"inertia breaks the triangle inequality: {principal}, and {sums}"),
-    ):
-        if shortfall > ROUNDING * scale + SMALLEST:
-            defects.append(Defect(Severity.ERROR, text))
-        elif shortfall > ROUND_OFF * scale + SMALLEST:
-            defects.append(Defect(Severity.WARNING, f"{text}, by so little that rounded digits explain it"))
-    return defects
+def _nearest_without_centre(link: LinkInertia, offset: float) -> LinkInertia:
+    """The nearest body of the size that second and first moments make together; no such size: no first moment."""
+    pseudo = pseudo_inertia(link)
+    size = float(np.linalg.norm(pseudo[:3, :3])) / offset
+    if not SMALLEST < size * size < LARGEST_NUMBER:
+        return nearest_body(LinkInertia(0.0, np.zeros(3), link.inertia))
+    unit = np.array([size] * 3 + [1.0])
+    values, axes = np.linalg.eigh(pseudo / np.outer(unit, unit))
+    nearest = (axes * np.maximum(values, 0.0)) @ axes.T * np.outer(unit, unit)
+    second = nearest[:3, :3]
+    return LinkInertia(float(nearest[3, 3]), nearest[:3, 3], np.trace(second) * np.eye(3) - second)
 
 
-def _worst(defects: list[Defect]) -> Defect | None:
-    """The first error, or else the first warning."""
-    errors = [defect for defect in defects if defect.severity is Severity.ERROR]
-    return next(iter([*errors, *defects]), None)
+def _principal_defect(inertia: Array, allowed: float, about: str) -> str | None:
+    """Principal moments that no body has, beyond what is allowed [kg m²]."""
+    smallest, middle, largest = _principal_moments(inertia)
+    if -smallest > allowed:
+        moments = f"{smallest:.6g}, {middle:.6g}, {largest:.6g}"
+        return f"inertia is not positive semidefinite: principal moments {about} are {moments} kg m²"
+    if largest - middle - smallest > allowed:
+        sums = f"{smallest:.6g} + {middle:.6g} < {largest:.6g}"
+        return f"inertia breaks the triangle inequality: {sums} kg m², the principal moments {about}"
+    return None
+
+
+def _principal_moments(inertia: Array) -> Array:
+    """Principal moments in ascending order, round-off as zero [kg m²]."""
+    moments = np.linalg.eigvalsh(inertia)
+    return np.where(np.abs(moments) > ROUND_OFF * np.max(np.abs(moments)), moments, 0.0)
 
 
 def _listed(vector: Array) -> str:

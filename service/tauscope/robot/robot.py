@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tauscope.result_warning import ResultWarning
 from tauscope.robot.finding import Finding
 from tauscope.robot.recording_layout import RecordingLayout
 
@@ -141,6 +142,24 @@ class LinkInertia:
         return LinkInertia(mass, np.array(first_moment), inertia)
 
 
+@dataclass(frozen=True, eq=False)
+class Repair:
+    """Stated inertial parameters that no body has, and the nearest body, which the model holds instead.
+
+    link : int
+        index of the link that the body belongs to, from 0
+    before, after : LinkInertia
+        of the body, in the frame of that link
+    """
+
+    link: int
+    place: str
+    text: str
+    remedy: str
+    before: LinkInertia
+    after: LinkInertia
+
+
 @dataclass(frozen=True)
 class FrictionCoefficients:
     """Friction of one joint, the seed paper's equation (7).
@@ -185,9 +204,23 @@ class Robot:
     urdf: Path | None = None
     urdf_links: tuple[tuple[str, ...], ...] = ()
     findings: tuple[Finding, ...] = ()
+    repairs: tuple[Repair, ...] = ()
     recording: RecordingLayout = field(default_factory=RecordingLayout)
 
     @property
     def joint_count(self) -> int:
         """Number of joints n."""
         return len(self.joints)
+
+    @property
+    def warnings(self) -> tuple[ResultWarning, ...]:
+        """One for each inertial that no body has, with the numbers before and after."""
+        return tuple(
+            ResultWarning(
+                code="repaired-inertial",
+                joint=self.joints[repair.link].name,
+                text=f"{repair.place}: {repair.text}",
+                remedy=repair.remedy,
+            )
+            for repair in self.repairs
+        )

@@ -21,7 +21,7 @@ from tauscope.robot.document import (
 from tauscope.robot.document_origin import DocumentOrigin
 from tauscope.robot.finding import Finding, Severity
 from tauscope.robot.messages import shown
-from tauscope.robot.physical import find_defect
+from tauscope.robot.physical import nearest_body, repair_text
 from tauscope.robot.recording_layout import RecordingLayout
 from tauscope.robot.robot import (
     FrictionCoefficients,
@@ -31,10 +31,13 @@ from tauscope.robot.robot import (
     LinkInertia,
     Model,
     Placement,
+    Repair,
     Robot,
     Segment,
 )
 from tauscope.robot.urdf import UrdfChain, read_urdf_chain
+
+REPAIR_REMEDY = "correct the link (inertia is about the link frame's origin, not about the centre of mass)"
 
 UrdfSource = Callable[[str], tuple[bytes, str, Path | None]]
 """Looks up the URDF that a document names: its content, its label for messages, and its path where it has one."""
@@ -51,7 +54,7 @@ class _Chain:
 
 
 def build_robot(document: RobotDocument, origin: DocumentOrigin, urdf_source: UrdfSource) -> Robot:
-    """The robot of a document, with what is impossible about its model among the findings, as errors.
+    """The robot of a document; a link of its model that no body can be is replaced by the nearest body.
 
     Raises
     ------
@@ -60,27 +63,21 @@ def build_robot(document: RobotDocument, origin: DocumentOrigin, urdf_source: Ur
     """
     chain = _chain(document.kinematics, origin, urdf_source)
     findings: list[Finding] = [*(chain.urdf.findings if chain.urdf else ())]
-    if document.model is not None:
-        # The URDF's own inertials are not used then: what is wrong with them is worth a warning, no more.
-        findings = [Finding(tolerated(f.severity), f.where, f.text) for f in findings]
     joints = _joints(document.joints, chain, origin)
+    model, repairs = _model(document.model, chain, origin, findings)
     layout = document.recording
     return Robot(
         name=document.name,
         joints=joints,
         segments=chain.segments,
         gravity=np.array(document.gravity),
-        model=_model(document.model, chain, origin, findings),
+        model=model,
         urdf=chain.urdf_path,
         urdf_links=chain.urdf.link_names if chain.urdf else (),
         findings=tuple(findings),
+        repairs=repairs,
         recording=RecordingLayout() if layout is None else RecordingLayout(layout.units, layout.rate_hz),
     )
-
-
-def tolerated(severity: Severity) -> Severity:
-    """A severity that does not refuse the robot: an error becomes a warning."""
-    return Severity.WARNING if severity is Severity.ERROR else severity
 
 
 def _chain(kinematics: KinematicsDocument, origin: DocumentOrigin, urdf_source: UrdfSource) -> _Chain:
@@ -155,20 +152,35 @@ def _joint(document: JointDocument, segment: Segment, urdf_limits: JointLimits) 
     )
 
 
-def _model(document: ModelDocument | None, chain: _Chain, origin: DocumentOrigin, findings: list[Finding]) -> Model:
-    """The model block, or where it is absent what the URDF says."""
+def _model(
+    document: ModelDocument | None, chain: _Chain, origin: DocumentOrigin, findings: list[Finding]
+) -> tuple[Model, tuple[Repair, ...]]:
+    """The model block, or where it is absent what the URDF says; and which of its links were repaired."""
     if document is None:
-        return Model(chain.urdf.links, chain.urdf.friction) if chain.urdf else Model()
-    links = friction = None
+        return (Model(chain.urdf.links, chain.urdf.friction), chain.urdf.repairs) if chain.urdf else (Model(), ())
+    links, repairs, friction = None, (), None
     if document.links is not None:
         _check_count(origin, ("model", "links"), len(document.links), len(chain.segments), chain.key)
-        links = tuple(_link(link) for link in document.links)
-        for index, link in enumerate(links):
-            _remark_on_link(link, origin.where(("model", "links", index)), findings)
+        links, repairs = _links(document.links, origin, findings)
     if document.friction is not None:
         _check_count(origin, ("model", "friction"), len(document.friction), len(chain.segments), chain.key)
         friction = tuple(FrictionCoefficients(f.stiction, f.stribeck, f.viscous) for f in document.friction)
-    return Model(links, friction)
+    return Model(links, friction), repairs
+
+
+def _links(
+    documents: list[LinkDocument], origin: DocumentOrigin, findings: list[Finding]
+) -> tuple[tuple[LinkInertia, ...], tuple[Repair, ...]]:
+    """Links of the model block as bodies, and which of them were none."""
+    links, repairs = [], []
+    for index, document in enumerate(documents):
+        stated, place = _link(document), origin.where(("model", "links", index))
+        links.append(nearest_body(stated))
+        if text := repair_text(stated, links[index]):
+            repairs.append(Repair(index, place, text, REPAIR_REMEDY, stated, links[index]))
+        elif stated.mass == 0.0 and np.any(stated.inertia):
+            findings.append(Finding(Severity.WARNING, place, "has inertia but no mass, as no body has; add the mass"))
+    return tuple(links), tuple(repairs)
 
 
 def _link(document: LinkDocument) -> LinkInertia:
@@ -176,16 +188,6 @@ def _link(document: LinkDocument) -> LinkInertia:
     i = document.inertia
     inertia = np.array([[i.xx, i.xy, i.xz], [i.xy, i.yy, i.yz], [i.xz, i.yz, i.zz]])
     return LinkInertia(document.mass, np.array(document.first_moment), inertia)
-
-
-def _remark_on_link(link: LinkInertia, place: str, findings: list[Finding]) -> None:
-    """Add what is impossible or doubtful about a link of the model block."""
-    defect = find_defect(link)
-    if defect is not None:
-        text = f"{defect.text}; correct it (inertia is about the link frame's origin, not about the centre of mass)"
-        findings.append(Finding(defect.severity, place, text))
-    elif link.mass == 0.0 and np.any(link.inertia):
-        findings.append(Finding(Severity.WARNING, place, "has inertia but no mass, as no body has; add the mass"))
 
 
 def _check_count(origin: DocumentOrigin, place: tuple[str, ...], found: int, count: int, key: str) -> None:

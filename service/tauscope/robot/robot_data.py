@@ -10,7 +10,7 @@ from tauscope.robot.document_origin import DocumentOrigin
 from tauscope.robot.messages import nearest, one_line, shown
 from tauscope.robot.robot import Joint, LinkInertia, Model, Placement, Robot
 from tauscope.robot.robot_building import UrdfSource, build_robot
-from tauscope.robot.robot_file import parse_robot_file, refuse_unphysical
+from tauscope.robot.robot_file import parse_robot_file
 from tauscope.robot.urdf_xml import LARGEST_URDF
 
 
@@ -25,12 +25,10 @@ def robot_from_dict(
     ------
     RobotFileError
         if the data are not valid; one line naming the JSON path and joint
-    UnphysicalModelError
-        if no rigid body can have the mass and inertia of a link of the model
     """
     origin = DocumentOrigin(label, data)
     document = origin.validated(PlainRobotDocument)
-    return refuse_unphysical(build_robot(document, origin, _given(origin, urdf_files or {})))
+    return build_robot(document, origin, _given(origin, urdf_files or {}))
 
 
 def robot_from_yaml(data: bytes, label: str = "robot", urdf_files: Mapping[str, bytes] | None = None) -> Robot:
@@ -40,17 +38,15 @@ def robot_from_yaml(data: bytes, label: str = "robot", urdf_files: Mapping[str, 
     ------
     RobotFileError
         if the robot file or its URDF is not valid; one line naming line, place and joint
-    UnphysicalModelError
-        if no rigid body can have the mass and inertia of a link of the model
     """
     document, origin = parse_robot_file(data, label)
-    return refuse_unphysical(build_robot(document, origin, _given(origin, urdf_files or {})))
+    return build_robot(document, origin, _given(origin, urdf_files or {}))
 
 
 def robot_to_dict(robot: Robot) -> dict[str, Any]:
     """Everything that computing with the robot needs, as plain data without files beside it.
 
-    `robot_from_dict` gives the same robot back, but for the paths of its files, the URDF's link names and its findings.
+    `robot_from_dict` gives the same robot back, but for paths of files, the URDF's link names, findings and repairs.
     """
     segments = [
         {"type": s.type.value, "before": _placement(s.before), "after": _placement(s.after)} for s in robot.segments

@@ -3,11 +3,10 @@
 from dataclasses import replace
 from pathlib import Path
 
-from tauscope.errors import RobotFileError, UnphysicalModelError
+from tauscope.errors import RobotFileError
 from tauscope.robot.bounded_file import decode_utf8, read_bounded
 from tauscope.robot.document import RobotDocument
 from tauscope.robot.document_origin import DocumentOrigin
-from tauscope.robot.finding import Severity
 from tauscope.robot.messages import one_line
 from tauscope.robot.robot import Robot
 from tauscope.robot.robot_building import build_robot
@@ -24,19 +23,6 @@ def read_robot(path: Path | str) -> Robot:
     ------
     RobotFileError
         if the file or its URDF cannot be read or is not valid; one line naming file, line, place and joint
-    UnphysicalModelError
-        if no rigid body can have the mass and inertia of a link of the model
-    """
-    return refuse_unphysical(load_robot(path))
-
-
-def load_robot(path: Path | str) -> Robot:
-    """The robot of a robot file, even where its model is impossible: then `findings` holds the errors.
-
-    Raises
-    ------
-    RobotFileError
-        if the file or its URDF cannot be read or is not valid
     """
     source = Path(path)
     document, origin = parse_robot_file(read_bounded(source, LARGEST_ROBOT_FILE), str(path))
@@ -69,18 +55,3 @@ def parse_robot_file(data: bytes, label: str) -> tuple[RobotDocument, DocumentOr
     content = read_yaml(text, label)
     origin = DocumentOrigin(label, content.data, content.lines)
     return origin.validated(RobotDocument), origin
-
-
-def refuse_unphysical(robot: Robot) -> Robot:
-    """The robot itself, if a rigid body can have the mass and inertia of each link of its model.
-
-    Raises
-    ------
-    UnphysicalModelError
-        naming the first impossible link
-    """
-    errors = [finding for finding in robot.findings if finding.severity is Severity.ERROR]
-    if errors:
-        more = f" (the first of {len(errors)} such links)" if len(errors) > 1 else ""
-        raise UnphysicalModelError(one_line(f"{errors[0].where}: {errors[0].text}{more}"))
-    return robot

@@ -16,7 +16,7 @@ from tauscope.robot.document_fields import LARGEST_NUMBER
 from tauscope.robot.finding import Finding, Severity
 from tauscope.robot.messages import nearest, one_line, shown
 from tauscope.robot.placement import compose, rotation_of_z_to
-from tauscope.robot.robot import FrictionCoefficients, JointLimits, JointType, LinkInertia, Placement, Segment
+from tauscope.robot.robot import FrictionCoefficients, JointLimits, JointType, LinkInertia, Placement, Repair, Segment
 from tauscope.robot.urdf_element import Element, children, number, only_child, origin, urdf_error, vector, where
 from tauscope.robot.urdf_inertia import lumped_inertia
 from tauscope.robot.urdf_xml import UrdfJoint, UrdfTree, parse_urdf
@@ -41,6 +41,7 @@ class UrdfChain:
     friction: tuple[FrictionCoefficients, ...] | None
     link_names: tuple[tuple[str, ...], ...]
     findings: tuple[Finding, ...]
+    repairs: tuple[Repair, ...]
 
 
 def read_urdf_chain(data: bytes, label: str, base: str, tip: str) -> UrdfChain:
@@ -58,7 +59,8 @@ def read_urdf_chain(data: bytes, label: str, base: str, tip: str) -> UrdfChain:
     for joint in moving:
         _check_movable(tree, joint)
     bodies = [_bodies(tree, joint, chain, findings) for joint in moving]
-    links = [lumped_inertia(label, members, findings) for members in bodies]
+    lumped = [lumped_inertia(label, link, members, findings) for link, members in enumerate(bodies)]
+    links = [link for link, _ in lumped]
     _remark_on_base(tree, base, findings)
     for joint, link in zip(moving, links, strict=True):
         if link is None and any(links):
@@ -73,6 +75,7 @@ def read_urdf_chain(data: bytes, label: str, base: str, tip: str) -> UrdfChain:
         friction=tuple(f or FrictionCoefficients() for f in frictions) if any(frictions) else None,
         link_names=tuple(tuple(element.get("name") for element, _ in members) for members in bodies),
         findings=tuple(findings),
+        repairs=tuple(repair for _, repairs in lumped for repair in repairs),
     )
 
 

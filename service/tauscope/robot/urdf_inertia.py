@@ -6,9 +6,9 @@ import numpy as np
 
 from tauscope.robot.finding import Finding, Severity
 from tauscope.robot.messages import one_line, shown
-from tauscope.robot.physical import find_defect
+from tauscope.robot.physical import nearest_body, repair_text
 from tauscope.robot.placement import compose
-from tauscope.robot.robot import LinkInertia, Placement
+from tauscope.robot.robot import LinkInertia, Placement, Repair
 from tauscope.robot.urdf_element import Element, bounded_number, only_child, origin, urdf_error, where
 
 ENTRIES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -32,12 +32,14 @@ def inertia_about_frame(mass: float, centre: Placement, inertia: np.ndarray) -> 
 
 
 def lumped_inertia(
-    label: str, bodies: Iterable[tuple[Element, Placement]], findings: list[Finding]
-) -> LinkInertia | None:
+    label: str, link: int, bodies: Iterable[tuple[Element, Placement]], findings: list[Finding]
+) -> tuple[LinkInertia | None, list[Repair]]:
     """Sum of the inertials of the bodies that move with one link, or None where none of them has an `<inertial>`.
 
     Parameters
     ----------
+    link : int
+        index of the link, from 0
     bodies : iterable of (Element, Placement)
         link elements, with the placement of each in the frame of the link that they move with
 
@@ -46,38 +48,39 @@ def lumped_inertia(
     RobotFileError
         if an `<inertial>` is incomplete or not made of numbers
     """
-    vectors = [
-        inertial.to_vector()
-        for body, placement in bodies
-        if (inertial := _body_inertia(label, body, placement, findings)) is not None
-    ]
-    return LinkInertia.from_vector(np.sum(vectors, axis=0)) if vectors else None
+    vectors, repairs = [], []
+    for body, placement in bodies:
+        element = only_child(label, body, "inertial", findings)
+        if element is None:
+            continue
+        stated = _stated_inertia(label, body, element, findings)
+        centre = compose(placement, origin(label, element, findings))
+        used = nearest_body(stated)
+        before, after = (inertia_about_frame(each.mass, centre, each.inertia) for each in (stated, used))
+        place = one_line(f"{where(label, element)} of link {shown(body.get('name'))}")
+        if text := repair_text(stated, used):
+            repairs.append(Repair(link, place, text, "correct the <inertial>", before, after))
+        else:
+            _remark(place, stated, findings)
+        vectors.append(after.to_vector())
+    return LinkInertia.from_vector(np.sum(vectors, axis=0)) if vectors else None, repairs
 
 
-def _body_inertia(label: str, body: Element, placement: Placement, findings: list[Finding]) -> LinkInertia | None:
-    """The `<inertial>` of one link element, about the frame at the far end of `placement`."""
-    element = only_child(label, body, "inertial", findings)
-    if element is None:
-        return None
+def _stated_inertia(label: str, body: Element, element: Element, findings: list[Finding]) -> LinkInertia:
+    """An `<inertial>` as it stands, about the centre of mass."""
     parts = {kind: only_child(label, element, kind, findings) for kind in ("mass", "inertia")}
     for kind, part in parts.items():
         if part is None:
             raise urdf_error(label, element, f"of link {shown(body.get('name'))} has no <{kind}>; add it")
     mass = bounded_number(label, parts["mass"], "value")
     xx, xy, xz, yy, yz, zz = (bounded_number(label, parts["inertia"], key) for key in ENTRIES)
-    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    _remark(label, body, element, LinkInertia(mass, np.zeros(3), inertia), findings)
-    return inertia_about_frame(mass, compose(placement, origin(label, element, findings)), inertia)
+    return LinkInertia(mass, np.zeros(3), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
 
 
-def _remark(label: str, body: Element, element: Element, about_centre: LinkInertia, findings: list[Finding]) -> None:
-    """Add what is wrong or doubtful about one body."""
-    place = one_line(f"{where(label, element)} of link {shown(body.get('name'))}")
-    defect = find_defect(about_centre)
-    if defect is not None:
-        findings.append(Finding(defect.severity, place, f"{defect.text}; correct the <inertial>"))
-    elif about_centre.mass == 0.0 and np.any(about_centre.inertia):
+def _remark(place: str, stated: LinkInertia, findings: list[Finding]) -> None:
+    """Add what is doubtful about one body."""
+    if stated.mass == 0.0 and np.any(stated.inertia):
         findings.append(Finding(Severity.WARNING, place, "has inertia but no mass, as no body has; add the mass"))
-    elif about_centre.mass > 0.0 and not np.any(about_centre.inertia):
-        text = f"has mass {about_centre.mass:g} kg but no inertia, a point mass; some simulators refuse that"
+    elif stated.mass > 0.0 and not np.any(stated.inertia):
+        text = f"has mass {stated.mass:g} kg but no inertia, a point mass; some simulators refuse that"
         findings.append(Finding(Severity.INFO, place, text))

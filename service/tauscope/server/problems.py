@@ -28,7 +28,6 @@ class ProblemKind:
 _KINDS = (
     # Codes of tauscope.errors; their pages stand in docs/errors/.
     ProblemKind("robot-file", HTTPStatus.UNPROCESSABLE_ENTITY, "The robot file cannot be read or is not valid"),
-    ProblemKind("robot-unphysical", HTTPStatus.UNPROCESSABLE_ENTITY, "The robot's model describes an impossible body"),
     ProblemKind("recording", HTTPStatus.UNPROCESSABLE_ENTITY, "A recording cannot be read or is not valid"),
     ProblemKind("recording-mismatch", HTTPStatus.UNPROCESSABLE_ENTITY, "A recording does not fit the robot"),
     ProblemKind("identification", HTTPStatus.UNPROCESSABLE_ENTITY, "The data cannot answer the question"),

@@ -27,7 +27,6 @@ class RigidBodies:
         self._model.dof_armature[:] = rotor_inertia
         self._data = mujoco.MjData(self._model)
         self._scratch = mujoco.MjData(self._model)
-        self._place = f"{robot.name}: link {robot.joint_count} with its payload"
         count = robot.joint_count
         self._last_link = list(robot.model.links or ())[-1].to_vector()
         self._carried: dict[int, Array] = {}
@@ -111,7 +110,7 @@ class RigidBodies:
 
     def _weigh_last_link(self) -> None:
         """Write the last link's inertia into the compiled model, and let MuJoCo renew what depends on it."""
-        inertia = body_inertia(LinkInertia.from_vector(sum(self._carried.values(), self._last_link)), self._place)
+        inertia = body_inertia(LinkInertia.from_vector(sum(self._carried.values(), self._last_link)))
         body = len(self._position)
         self._model.body_mass[body] = inertia.mass
         self._model.body_ipos[body] = inertia.centre

@@ -112,15 +112,6 @@ def test_robots_that_are_not_valid(robot: dict[str, Any], words: str, client: Te
     assert words in assert_problem(answer, "robot-file", 422)["detail"]
 
 
-@pytest.mark.usefixtures("kept")
-def test_a_robot_that_no_body_can_be(client: TestClient) -> None:
-    link = {"mass": -1.0, "first_moment": [0, 0, 0], "inertia": dict.fromkeys(("xx", "yy", "zz", "xy", "xz", "yz"), 0)}
-    answer = client.post(
-        IDENTIFICATIONS, json={"robot": {**ROBOT, "model": {"links": [link]}}, "recordings": ["a.csv"]}
-    )
-    assert_problem(answer, "robot-unphysical", 422)
-
-
 @pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e999"])
 def test_numbers_that_json_does_not_know(number: str, client: TestClient) -> None:
     body = json.dumps({"robot": {**ROBOT, "gravity": [0, 0, 1]}, "recordings": ["a.csv"]}).replace(

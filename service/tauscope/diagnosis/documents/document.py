@@ -45,6 +45,7 @@ def document(
     """The document of a diagnosis."""
     names = [joint.name for joint in diagnosis.robot.joints]
     return DiagnosisDocument(
+        warnings=[*diagnosis.robot.warnings, *diagnosis.identification.recording_warnings],
         robot=diagnosis.robot.name,
         joints=names,
         against=diagnosis.against,

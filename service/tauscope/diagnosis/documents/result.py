@@ -4,6 +4,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from tauscope.result_warning import ResultWarning
 from tauscope.strict_model import ResultModel
 
 
@@ -128,6 +129,7 @@ class DiagnosisDocument(ResultModel):
     schema_id: Literal["tauscope.diagnosis/1"] = Field(
         default="tauscope.diagnosis/1", alias="schema", description="name and version of this document's form"
     )
+    warnings: list[ResultWarning] = Field(default=[], description="what to know of the robot file and the recordings")
     robot: str = Field(description="name of the robot")
     joints: list[str] = Field(description="names of its joints, in chain order")
     against: Literal["identified", "model", "simulation"] = Field(description="what the recordings were compared with")

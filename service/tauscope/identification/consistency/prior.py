@@ -82,10 +82,11 @@ def plausible_prior(robot: Robot, factor: Array, target: Array, friction: Fricti
     between its two joints, as large as their distance, and all have one common mass: the one that explains the data
     best. A link's deviation is measured by its own body: ‖A⁻¹ (J - J₀) A⁻ᵀ‖_F with A Aᵀ = J₀ the pseudo-inertia, made
     at least as thick as a compact body, so that it does not depend on units or on the frame (Lee & Park 2018, to second
-    order). Friction is expected to be absent; a coefficient's standard deviation is ‖z‖ / ‖R_i‖: that coefficient alone
-    would explain all torque, and viscous friction would at the speed that the joint is made for. It is a tenth of that
-    for τ_sc and the rotor's inertia, so that a motion that cannot tell τ_sc from τ_s (never slow enough) credits τ_s,
-    and what cannot be told from the link's own inertia is credited to the link.
+    order). A link that no body can be was stated wrong by at least the distance d of the nearest body, measured so: its
+    variance is 1 + d² times as large. Friction is expected to be absent; a coefficient's standard deviation is
+    ‖z‖ / ‖R_i‖: that coefficient alone would explain all torque, and viscous friction would at the speed that the joint
+    is made for. It is a tenth of that for τ_sc and the rotor's inertia, so that a motion that cannot tell τ_sc from τ_s
+    (never slow enough) credits τ_s, and what cannot be told from the link's own inertia is credited to the link.
 
     Parameters
     ----------
@@ -124,8 +125,15 @@ def plausible_prior(robot: Robot, factor: Array, target: Array, friction: Fricti
     root = np.diag(np.concatenate([np.zeros(10 * count), 1.0 / friction_scale]))
     for index, (link, mass, length) in enumerate(zip(links, masses, lengths, strict=True)):
         own = slice(10 * index, 10 * index + 10)
-        root[own, own] = _deviation(link, mass, length)
+        deviation = _deviation(link, mass, length)
+        root[own, own] = deviation / np.hypot(1.0, np.linalg.norm(deviation @ _repaired(robot, index)))
     return Prior(mean, root, scale, masses)
+
+
+def _repaired(robot: Robot, index: int) -> Array:
+    """What repairs added to the stated parameters of a link, (10,)."""
+    added = (each.after.to_vector() - each.before.to_vector() for each in robot.repairs if each.link == index)
+    return sum(added, np.zeros(10))
 
 
 def _deviation(link: LinkInertia, mass: float, length: float) -> Array:

@@ -60,7 +60,7 @@ class JointAnswer(AnswerModel):
 class FindingAnswer(AnswerModel):
     """One remark."""
 
-    severity: Severity = Field(description="error: refused; warning: may spoil results; info: good to know")
+    severity: Severity = Field(description="warning: may spoil results; info: good to know")
     where: str = Field(description="file and place, or column, that it is about")
     text: str = Field(description="what is so, and what to do about it")
 
@@ -69,11 +69,10 @@ class RobotReportAnswer(AnswerModel):
     """A robot file at a glance."""
 
     name: str = Field(description="of the robot")
-    passed: bool = Field(description="whether an identification accepts it")
     gravity: tuple[float, float, float] = Field(description="in the base frame [m/s²]")
     total_mass: float | None = Field(description="of all moving links, as the model believes [kg]")
     joints: tuple[JointAnswer, ...] = Field(description="base first")
-    findings: tuple[FindingAnswer, ...] = Field(description="errors first")
+    findings: tuple[FindingAnswer, ...] = Field(description="warnings first")
 
     @classmethod
     def of(cls, report: RobotReport) -> "RobotReportAnswer":

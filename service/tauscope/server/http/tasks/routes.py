@@ -16,7 +16,6 @@ SUBMISSION = (
     "limit-exceeded",
     "media-type",
     "robot-file",
-    "robot-unphysical",
     "invalid-request",
     "storage-full",
 )
