@@ -76,23 +76,23 @@ class PreparedMotion:
         """
         white = rows * (self.used[joint] * self.row_weight)
         if self.rest_variance[joint] > 0.0:
-            for stop in (stop for owner, stop in self.stops if owner == joint):
+            for stop in self.stops(joint):
                 kept = 1.0 / np.sqrt(1.0 + self.rest_variance[joint] * (stop.stop - stop.start))
                 white[:, stop] -= (1.0 - kept) * white[:, stop].mean(axis=1, keepdims=True)
         return white
 
-    @property
-    def stops(self) -> list[tuple[int, slice]]:
-        """Joint and consecutive rows of every stop that is longer than a turning point."""
+    def stops(self, joint: int) -> list[slice]:
+        """Consecutive rows of every stop of a joint that is longer than a turning point.
+
+        Parameters
+        ----------
+        joint : int
+            joint index, from 0
+        """
+        resting = self.used[joint] & (self.at_rest[joint] >= MOSTLY)
+        edges = np.flatnonzero(np.diff(resting, prepend=False, append=False)).reshape(-1, 2)
         least = STOP_S * self.motion.band.rate_hz
-        resting = self.used & (self.at_rest >= MOSTLY)
-        edges = [np.flatnonzero(np.diff(each, prepend=False, append=False)) for each in resting]
-        return [
-            (joint, slice(int(begin), int(end)))
-            for joint, own in enumerate(edges)
-            for begin, end in zip(own[::2], own[1::2], strict=True)
-            if end - begin >= least
-        ]
+        return [slice(int(begin), int(end)) for begin, end in edges if end - begin >= least]
 
     @property
     def moving(self) -> Mask:

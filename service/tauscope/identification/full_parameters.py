@@ -11,7 +11,7 @@ from tauscope.recording.recording import Array
 
 @dataclass(frozen=True, eq=False)
 class FullParameters:
-    """Θ* = M x.
+    """Θ* = M x, a model in its own columns from full parameters x of shape (q,).
 
     map : (p, q) float64
         M: base parameters Θ_L + B Θ_K of the links' ten parameters each, then the joints' coefficients as they are

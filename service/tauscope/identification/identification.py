@@ -17,10 +17,11 @@ from tauscope.identification.dataset import Dataset
 from tauscope.identification.estimate import Estimator, estimate
 from tauscope.identification.excitation import Excitation, measure_excitation
 from tauscope.identification.friction_shape import EstimatedShape, shape_parameters
+from tauscope.identification.full_parameters import FullParameters
 from tauscope.identification.gravity_scale import gravity_scale
 from tauscope.identification.least_squares import JointFactor, Solution, condition_number
 from tauscope.identification.model_terms import choose_model
-from tauscope.identification.physical_estimate import consistent_estimate, in_model_columns, is_rejected
+from tauscope.identification.physical_estimate import consistent_estimate, is_rejected
 from tauscope.identification.posterior import Posterior, infer
 from tauscope.identification.preconditions import require_motion
 from tauscope.identification.prediction import uncertain_torque
@@ -114,6 +115,25 @@ class Identification:
     identifiable: tuple[dict[str, bool], ...]
 
 
+@dataclass(frozen=True, eq=False)
+class _Estimates:
+    """The free and the most probable model of the training recordings.
+
+    weights : (n,) float64
+        1/σ_j of the free estimate
+    """
+
+    structure: ModelStructure
+    shapes: tuple[EstimatedShape, ...]
+    factors: tuple[JointFactor, ...]
+    weights: Array
+    solution: Solution
+    free: ResidualStatistics
+    posterior: Posterior
+    consistent: ConsistentParameters
+    reversed_joints: tuple[int, ...]
+
+
 @ThreadpoolController().wrap(limits=1, user_api="blas")  # factors of 50 columns: threads cost more than they bring
 def identify(
     robot: Robot,
@@ -133,12 +153,7 @@ def identify(
     IdentificationError
         where the recordings hold too little for the parameters
     """
-    for recording in (*recordings, *held_out):
-        if recording.joint_count != robot.joint_count:
-            raise RecordingMismatchError(
-                f"{recording.name}: has {recording.joint_count} joints, robot {robot.name} has {robot.joint_count}:"
-                " give the robot file that belongs to it"
-            )
+    _require_joints(robot, (*recordings, *held_out))
     progress("condition recordings")
     base = base_parameters(robot)
     conditioners = [Conditioner.survey(recording, robot) for recording in recordings]
@@ -146,41 +161,30 @@ def identify(
     with _naming(recordings):
         asked = options.cutoff_hz
         cutoff = choose_cutoff(conditioners, robot, base) if asked == "auto" else asked
-    motions = Dataset(conditioners, robot, base, cutoff)
-    with _naming(recordings):
-        progress("choose model terms")
-        structure, shapes, factors = choose_model(motions, robot, base, rotor_inertia=options.rotor_inertia)
-        progress("estimate parameters")
-        weights, solution = estimate(factors, structure.size, options.estimator)
-        coloured = infer(structure, factors, estimator=options.estimator)
-        free, believed = evaluate(motions, structure, [solution.parameters, coloured.mean])
-        ratios = np.array([model.long_run_ratio for model in believed.autoregressions])
-        posterior = infer(structure, factors, ratios, options.estimator)
-        consistent = consistent_estimate(structure, posterior.factor, posterior.target, posterior.prior)
-        progress("compare signs")
-        wrong = reversed_joints(motions, structure, factors, ratios, posterior, consistent)
-    consistent_parameters = in_model_columns(structure, consistent.parameters)
-    parameters = consistent_parameters if options.prior else solution.parameters
+        motions = Dataset(conditioners, robot, base, cutoff)
+        found = _estimate(motions, options, progress)
+    structure = found.structure
+    consistent_parameters = FullParameters.of(structure).map @ found.consistent.parameters
+    parameters = consistent_parameters if options.prior else found.solution.parameters
     progress("evaluate residuals")
-    (residuals,) = evaluate(motions, structure, [parameters]) if options.prior else (free,)
+    (residuals,) = evaluate(motions, structure, [parameters]) if options.prior else (found.free,)
     progress("estimate uncertainty")
     covariance = parameter_covariance(
         motions,
         structure,
         parameters,
-        factors,
-        posterior.weights if options.prior else weights,
+        found.factors,
+        found.posterior.weights if options.prior else found.weights,
         residuals.autoregressions,
-        shape_parameters(shapes),
-        posterior if options.prior else None,
+        shape_parameters(found.shapes),
+        found.posterior if options.prior else None,
     )
+    noise = _moving_noise(found, residuals.fit)
     outside = np.maximum(residuals.fit.rms**2 - residuals.fit.band_rms**2, 0.0)
-    left = np.sqrt([factor.squared_residual(posterior.mean) / factor.rows for factor in factors])
-    noise = residuals.fit.moving_rms * posterior.noise_std / np.maximum(left, np.finfo(float).tiny)
 
     def predict(others: Dataset) -> tuple[Array, Array]:
         """Expected residual of a motion, and what of it the parameters leave uncertain, (n,) each."""
-        uncertain = uncertain_torque(others, structure, parameters, shape_parameters(shapes), covariance, noise)
+        uncertain = uncertain_torque(others, structure, parameters, shape_parameters(found.shapes), covariance, noise)
         return np.sqrt(outside + noise**2 + uncertain**2), uncertain
 
     progress("evaluate held-out recordings")
@@ -196,20 +200,20 @@ def identify(
         robot=robot,
         structure=structure,
         parameters=parameters,
-        free_parameters=solution.parameters,
+        free_parameters=found.solution.parameters,
         consistent_parameters=consistent_parameters,
-        constrained=is_rejected(consistent),
-        reversed_joints=wrong,
+        constrained=is_rejected(found.consistent),
+        reversed_joints=found.reversed_joints,
         gravity_scale=gravity_scale(motions, structure, parameters),
-        posterior=posterior,
+        posterior=found.posterior,
         covariance=covariance,
-        undetermined=solution.undetermined,
-        shapes=shapes,
-        consistent=consistent,
-        condition_number=condition_number(factors, structure.size),
+        undetermined=found.solution.undetermined,
+        shapes=found.shapes,
+        consistent=found.consistent,
+        condition_number=condition_number(found.factors, structure.size),
         residuals=residuals,
-        free_fit=free.fit,
-        price_of_bodies=residuals.fit.band_rms / np.maximum(free.fit.band_rms, np.finfo(float).tiny),
+        free_fit=found.free.fit,
+        price_of_bodies=residuals.fit.band_rms / np.maximum(found.free.fit.band_rms, np.finfo(float).tiny),
         predicted_train=predict(motions)[0],
         held_out=held,
         predicted_held_out=predicted,
@@ -221,8 +225,40 @@ def identify(
         recording_warnings=tuple(warning for each in (*recordings, *held_out) for warning in each.warnings),
         conditioning=tuple(conditioner.summary(cutoff) for conditioner in conditioners),
         held_out_conditioning=tuple(conditioner.summary(cutoff) for conditioner in held_conditioners),
-        identifiable=_identifiable(structure, factors, covariance, solution, shapes),
+        identifiable=_identifiable(found, covariance),
     )
+
+
+def _require_joints(robot: Robot, recordings: Sequence[Recording]) -> None:
+    """Refuse recordings of another number of joints."""
+    for recording in recordings:
+        if recording.joint_count != robot.joint_count:
+            raise RecordingMismatchError(
+                f"{recording.name}: has {recording.joint_count} joints, robot {robot.name} has {robot.joint_count}:"
+                " give the robot file that belongs to it"
+            )
+
+
+def _estimate(motions: Dataset, options: Options, progress: Progress) -> _Estimates:
+    """Terms of the model, the free estimate, and the most probable bodies."""
+    progress("choose model terms")
+    structure, shapes, factors = choose_model(motions, motions.robot, motions.base, rotor_inertia=options.rotor_inertia)
+    progress("estimate parameters")
+    weights, solution = estimate(factors, structure.size, options.estimator)
+    coloured = infer(structure, factors, estimator=options.estimator)
+    free, believed = evaluate(motions, structure, [solution.parameters, coloured.mean])
+    ratios = np.array([model.long_run_ratio for model in believed.autoregressions])
+    posterior = infer(structure, factors, ratios, options.estimator)
+    consistent = consistent_estimate(structure, posterior.factor, posterior.target, posterior.prior)
+    progress("compare signs")
+    wrong = reversed_joints(motions, structure, factors, ratios, posterior, consistent)
+    return _Estimates(structure, shapes, factors, weights, solution, free, posterior, consistent, wrong)
+
+
+def _moving_noise(found: _Estimates, fit: Fit) -> Array:
+    """Noise in the common band while a joint moves, with the freedom of the parameters, (n,) [Nm or N]."""
+    left = np.sqrt([factor.squared_residual(found.posterior.mean) / factor.rows for factor in found.factors])
+    return fit.moving_rms * found.posterior.noise_std / np.maximum(left, np.finfo(float).tiny)
 
 
 @contextmanager
@@ -234,26 +270,20 @@ def _naming(recordings: Sequence[Recording]) -> Iterator[None]:
         raise IdentificationError(f"{', '.join(recording.name for recording in recordings)}: {error}") from error
 
 
-def _identifiable(
-    structure: ModelStructure,
-    factors: tuple[JointFactor, ...],
-    covariance: Array,
-    solution: Solution,
-    shapes: Sequence[EstimatedShape],
-) -> tuple[dict[str, bool], ...]:
+def _identifiable(found: _Estimates, covariance: Array) -> tuple[dict[str, bool], ...]:
     """Per joint, which coefficients and shape constants the data can tell."""
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     described = []
-    for joint, (factor, shape) in enumerate(zip(factors, shapes, strict=True)):
+    for joint, (factor, shape) in enumerate(zip(found.factors, found.shapes, strict=True)):
         torque = np.linalg.norm(factor.triangle[:, -1])
         known: dict[str, bool] = {"stribeck": False}
-        for name in structure.terms[joint].names:
-            column = structure.coefficient(joint, name)
+        for name in found.structure.terms[joint].names:
+            column = found.structure.coefficient(joint, name)
             if column is None:
                 continue
             place = int(np.searchsorted(factor.columns, column))
             reach = std[column] * np.linalg.norm(factor.triangle[:, place])
-            known[name] = bool(reach < KNOWN_SHARE * torque) and not bool(solution.undetermined[column])
+            known[name] = bool(reach < KNOWN_SHARE * torque) and not bool(found.solution.undetermined[column])
         # Where neither slope is known, a fall with speed and a step of another form are one and the same.
         known["stribeck"] &= shape.delta_identifiable or shape.k_v_identifiable
         known["k_v"], known["delta"] = shape.k_v_identifiable, shape.delta_identifiable

@@ -70,10 +70,11 @@ def _doubt_friction_at_rest(motions: Dataset, structure: ModelStructure) -> None
     held, rows = np.zeros(len(columns)), np.full(len(columns), np.finfo(float).tiny)
     for prepared in motions:
         left = prepared.reduced_torque - prepared.predicted_rows(structure, posterior.mean)
-        for joint, stop in prepared.stops:
-            count = stop.stop - stop.start
-            held[joint] += count * left[joint, stop].mean() ** 2 - posterior.noise_std[joint] ** 2
-            rows[joint] += count
+        for joint, row in enumerate(left):
+            for stop in prepared.stops(joint):
+                count = stop.stop - stop.start
+                held[joint] += count * row[stop].mean() ** 2 - posterior.noise_std[joint] ** 2
+                rows[joint] += count
     motions.rest_variance = np.clip(held / rows, 0.0, stiction**2) / posterior.noise_std**2
 
 

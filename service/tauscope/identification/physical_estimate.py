@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import numpy as np
 from scipy import stats
 
 from tauscope.errors import IdentificationError
@@ -62,23 +61,6 @@ def consistent_estimate(structure: ModelStructure, factor: Array, target: Array,
             free_squared_residual=found.free_squared_residual / scale**2,
         )
     raise AssertionError("the last attempt returns or raises")
-
-
-def in_model_columns(structure: ModelStructure, full: Array) -> Array:
-    """Full standard parameters and friction, projected onto the model's columns: Θ* = Θ_L + B Θ_K.
-
-    Parameters
-    ----------
-    full : (10 n + k,) float64
-        standard parameters of all links, then the joints' coefficients
-
-    Returns
-    -------
-    (p,) float64
-        the same model in base parameters
-    """
-    standard = 10 * structure.robot.joint_count
-    return np.concatenate([structure.base.project(full[:standard]), full[standard:]])
 
 
 def is_rejected(consistent: ConsistentParameters) -> bool:

@@ -13,8 +13,9 @@ import numpy as np
 from tauscope.identification.consistency import ConsistentParameters
 from tauscope.identification.dataset import PreparedMotion
 from tauscope.identification.estimate import torque_rms
+from tauscope.identification.full_parameters import FullParameters
 from tauscope.identification.least_squares import JointFactor
-from tauscope.identification.physical_estimate import consistent_estimate, in_model_columns, is_rejected
+from tauscope.identification.physical_estimate import consistent_estimate, is_rejected
 from tauscope.identification.posterior import Posterior, infer
 from tauscope.identification.residuals import evaluate
 from tauscope.identification.structure import ModelStructure
@@ -49,7 +50,7 @@ def reversed_joints(
     if not (is_rejected(consistent) or unexplained.any()):
         return ()
     signs = np.ones(structure.robot.joint_count)
-    parameters = in_model_columns(structure, consistent.parameters)
+    parameters = FullParameters.of(structure).map @ consistent.parameters
     while True:
         tried = [(other, _estimate(structure, factors, ratios, other)) for other in _neighbours(signs)]
         other, best = max(tried, key=lambda each: _log_likelihood(factors, ratios, *each))
@@ -76,7 +77,7 @@ def _estimate(structure: ModelStructure, factors: tuple[JointFactor, ...], ratio
     turned = tuple(_turn(factor, sign) for factor, sign in zip(factors, signs, strict=True))
     posterior = infer(structure, turned, ratios)
     found = consistent_estimate(structure, posterior.factor, posterior.target, posterior.prior)
-    return in_model_columns(structure, found.parameters)
+    return FullParameters.of(structure).map @ found.parameters
 
 
 def _turn(factor: JointFactor, sign: float) -> JointFactor:

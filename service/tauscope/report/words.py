@@ -3,7 +3,8 @@
 from collections.abc import Iterator
 
 from tauscope.identification import IdentificationDocument
-from tauscope.report.quantities import ABSENT, percent, significant
+from tauscope.recording.words import listed
+from tauscope.report.quantities import percent, significant
 
 AT_NOISE = 1.1
 """A residual of at most this many times the noise holds nothing but noise."""
@@ -93,14 +94,6 @@ def _about_held_out(document: IdentificationDocument) -> Iterator[str]:
     worse = [joint for joint, own, other in pairs if other > CARRIES_OVER * own]
     if worse:
         yield (
-            f"On held-out recordings the residual of {_listed(worse)} is larger than on the model's own: the model does"
+            f"On held-out recordings the residual of {listed(worse)} is larger than on the model's own: the model does"
             " not carry over to that motion; identify from recordings that move the joints in more ways."
         )
-
-
-def _listed(names: list[str], most: int = 8) -> str:
-    """Names in a sentence, not all of them where there are many."""
-    if not names:
-        return ABSENT
-    shown = ", ".join(names[:most])
-    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
