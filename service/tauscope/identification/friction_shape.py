@@ -7,7 +7,7 @@ never a slope that ran away.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,9 @@ ORDINARY = 1000.0
 
 STRAIGHT = 0.17
 """δ times the rms velocity v below which A(δ v) is a straight line but for a hundredth: (δ v)²/3."""
+
+AT_LIMIT = 0.95
+"""Share of the steepest δ from which on it is at its limit."""
 
 SEPARATION = 4.0
 """K_v is at least this many times δ: closer, their columns are one."""
@@ -70,6 +73,15 @@ class EstimatedShape:
     delta_identifiable: bool
     k_v_given: bool
     delta_given: bool
+
+    def open_at_limit(self) -> "EstimatedShape":
+        """The shape, its constants open where δ is at the limit of its range.
+
+        Two steps as near as they may be are one step of another form than an arctangent, and no fall with speed.
+        """
+        if self.delta is None or self.delta_given or self.delta * SEPARATION < AT_LIMIT * self.k_v:
+            return self
+        return replace(self, k_v_identifiable=self.k_v_given, delta_identifiable=False)
 
 
 def estimate_shapes(

@@ -12,7 +12,7 @@ from tauscope.identification.consistency import LEAST_COULOMB
 from tauscope.identification.covariance import parameter_covariance
 from tauscope.identification.dataset import Dataset, rms_speed
 from tauscope.identification.estimate import FINEST_TORQUE, single_joint_std
-from tauscope.identification.friction_shape import SEPARATION, EstimatedShape, estimate_shapes, shape_parameters
+from tauscope.identification.friction_shape import EstimatedShape, estimate_shapes, shape_parameters
 from tauscope.identification.least_squares import JointFactor, factorise, restricted
 from tauscope.identification.posterior import infer
 from tauscope.identification.residuals import evaluate
@@ -25,9 +25,6 @@ from tauscope.robot import Robot
 TIGHT = {"k_v": 0.1, "delta": 0.2}
 """Standard error of a constant's logarithm that leaves no doubt about it. K_v has its profile as well; δ is known where
 five standard errors are within a factor of e."""
-
-AT_LIMIT = 0.95
-"""Share of the steepest δ from which on it is at its limit."""
 
 SIGNIFICANT = float(stats.chi2.isf(2.0 * stats.norm.sf(5.0), df=2))
 """Noise variances that a Stribeck term must take off the criterion to stay in the model: what chance does as rarely as
@@ -47,7 +44,7 @@ def choose_model(
         shapes = _refined(motions, structure, _estimated_shapes(motions, structure, speed), speed)
     else:
         shapes = tuple(EstimatedShape(s.k_v or 0.0, s.delta, True, True, True, True) for s in given)
-    shapes = tuple(_open_at_limit(shape) for shape in shapes)
+    shapes = tuple(shape.open_at_limit() for shape in shapes)
     complete = _with_shapes(structure, shapes)
     factors = factorise(motions, complete)
     needed = _needed_rotors(motions, complete, factors) if any(separable) else separable
@@ -99,16 +96,6 @@ def _estimated_shapes(motions: Dataset, structure: ModelStructure, speed: Array)
     return tuple(
         _with_tight(shape, best, tight[joint]) for joint, (shape, best) in enumerate(zip(found, refined, strict=True))
     )
-
-
-def _open_at_limit(shape: EstimatedShape) -> EstimatedShape:
-    """The shape, its constants open where δ is at the limit of its range.
-
-    Two steps as near as they may be are one step of another form than an arctangent, and no fall with speed.
-    """
-    if shape.delta is None or shape.delta_given or shape.delta * SEPARATION < AT_LIMIT * shape.k_v:
-        return shape
-    return replace(shape, k_v_identifiable=shape.k_v_given, delta_identifiable=False)
 
 
 def _with_tight(shape: EstimatedShape, refined: EstimatedShape, tight: set[str]) -> EstimatedShape:
