@@ -45,6 +45,7 @@ WRONG = {
     "mass with the wrong sign": {"mass": -1.4},
     "inertia about the centre of mass": {"inertia": {"xx": 0, "yy": 0.01, "zz": 0.01, "xy": 0, "xz": 0, "yz": 0}},
     "moments in another order": {"inertia": {"xx": 0.4, "yy": 0.02, "zz": 0.3, "xy": 0, "xz": 0, "yz": 0}},
+    "gram and millimetre": {"inertia": {"xx": 1e6, "yy": 1e7, "zz": 3e7, "xy": 0, "xz": 0, "yz": 0}},
     "products of a larger body": {"inertia": {"xx": 0.02, "yy": 0.2, "zz": 0.2, "xy": 3, "xz": 1, "yz": 0}},
     "no mass": {"mass": 0},
 }
@@ -56,7 +57,8 @@ def test_a_rich_recording_overrules_a_link_that_no_body_can_be(
 ) -> None:
     found = identify(restated(arm.robot, 1, **WRONG[name]), [recording], [recording])
     result = document(found)
-    (warning,) = [each for each in result.warnings if each.code == "repaired-inertial"]
+    warning, *further = [each for each in result.warnings if each.code == "repaired-inertial"]
+    assert [each.joint for each in further] == (["joint2"] if name == "gram and millimetre" else [])
     assert warning.joint == "joint2"
     assert "the nearest body is used" in warning.text
     assert "→" in warning.text
@@ -123,6 +125,19 @@ def test_the_nearest_body_is_the_conic_program_s_in_the_prior_s_metric(seed: int
 
 
 QUICK = settings(max_examples=15, deadline=None, phases=[Phase.generate], suppress_health_check=[HealthCheck.too_slow])
+
+
+@pytest.mark.parametrize(("unit", "kept"), [(1.0, True), (1e3, True), (1e7, False)])
+def test_a_body_a_hundred_times_as_large_as_the_arm_is_no_prior(
+    unit: float, kept: bool, arm: SimulatedArm, recording: Recording, sound: Identification
+) -> None:
+    moments = {"xx": 0.05 * unit, "yy": 0.15 * unit, "zz": 0.15 * unit, "xy": 0, "xz": 0, "yz": 0}
+    result = document(identify(restated(arm.robot, 1, inertia=moments), [recording], [recording]))
+    warnings = [each for each in result.warnings if each.code == "repaired-inertial"]
+    assert [each.joint for each in warnings] == ([] if kept else ["joint2"])
+    assert result.fit.held_out is not None
+    assert sound.held_out is not None
+    assert result.fit.held_out.relative_error < 1.02 * sound.held_out.relative_error
 
 
 @QUICK

@@ -2,12 +2,13 @@
 
 from collections.abc import Iterator
 
+from tauscope.identification.consistency import far_reaching
 from tauscope.identification.identification import Identification
 from tauscope.identification.posterior import DETERMINED
 from tauscope.recording.conditioning import ConditioningSummary
 from tauscope.recording.words import listed
 from tauscope.result_warning import ResultWarning
-from tauscope.robot import JointType
+from tauscope.robot import JointType, Robot
 
 FEWEST_REVERSALS = 2
 """A joint turns round at least so often where friction is to be told from a constant torque."""
@@ -33,13 +34,28 @@ def identification_warnings(result: Identification) -> list[ResultWarning]:
     return [
         *_signs(result),
         *_scale(result),
-        *result.robot.warnings,
+        *robot_warnings(result.robot),
         *result.recording_warnings,
         *_bodies(result),
         *_excitation(result),
         *_extrapolation(result),
         *_samples((*result.conditioning, *result.held_out_conditioning)),
     ]
+
+
+def robot_warnings(robot: Robot) -> list[ResultWarning]:
+    """Warnings of what the robot file states, and what is believed instead."""
+    far = [
+        ResultWarning(
+            code="repaired-inertial",
+            joint=robot.joints[link].name,
+            text=f"{robot.joints[link].name}: the stated inertia of its link is that of a body a hundred times as large"
+            " as the arm; a compact body is believed instead",
+            remedy="state the inertia in kg m² and the mass in kg",
+        )
+        for link in far_reaching(robot)
+    ]
+    return [*robot.warnings, *far]
 
 
 def weak_points(result: Identification, joint: int) -> list[str]:

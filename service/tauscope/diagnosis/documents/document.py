@@ -31,6 +31,7 @@ from tauscope.diagnosis.next_experiment import PlannedExperiment
 from tauscope.effects import Quantity, TimeLocalEffect, effect_class
 from tauscope.effects.load_dependent_friction import LoadDependentFriction
 from tauscope.effects.torque_gain_error import TorqueGainError
+from tauscope.identification.warnings import robot_warnings
 from tauscope.recording.recording import Array
 
 SHIFTS_FROM = 3.0
@@ -45,7 +46,7 @@ def document(
     """The document of a diagnosis."""
     names = [joint.name for joint in diagnosis.robot.joints]
     return DiagnosisDocument(
-        warnings=[*diagnosis.robot.warnings, *diagnosis.identification.recording_warnings],
+        warnings=[*robot_warnings(diagnosis.robot), *diagnosis.identification.recording_warnings],
         robot=diagnosis.robot.name,
         joints=names,
         against=diagnosis.against,

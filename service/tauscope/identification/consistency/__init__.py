@@ -8,7 +8,7 @@ from tauscope.identification.consistency.inequalities import (
     mass_inequalities,
 )
 from tauscope.identification.consistency.nearest import ConsistentParameters, nearest_consistent_parameters
-from tauscope.identification.consistency.prior import Prior, plausible_prior
+from tauscope.identification.consistency.prior import Prior, far_reaching, plausible_prior
 
 __all__ = [
     "LEAST_COULOMB",
@@ -16,6 +16,7 @@ __all__ = [
     "FrictionColumns",
     "LinearInequalities",
     "Prior",
+    "far_reaching",
     "friction_inequalities",
     "mass_inequalities",
     "nearest_consistent_parameters",

@@ -1,5 +1,6 @@
 """What is plausible before any measurement: it decides only where the data do not."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,6 +22,9 @@ lie anywhere along it and as far beside it."""
 
 _ORDINARY_SPEED = {JointType.REVOLUTE: 1.0, JointType.PRISMATIC: 0.3}
 """Speed that a joint is made for where its file does not say [rad/s or m/s]."""
+
+_FAR = 100.0
+"""Lengths of the whole arm beyond which no mass of it lies: a reflected rotor seems to reach a few, g mm² thousands."""
 
 _LIGHTEST = 0.1
 """A link is believed to weigh at least this share of the heaviest."""
@@ -78,15 +82,16 @@ class Prior:
 def plausible_prior(robot: Robot, factor: Array, target: Array, friction: FrictionColumns | None = None) -> Prior:
     """Bodies and friction that are plausible before any measurement.
 
-    The links are those of the robot file's model where it has them. Otherwise each link is a compact body half-way
-    between its two joints, as large as their distance, and all have one common mass: the one that explains the data
-    best. A link's deviation is measured by its own body: ‖A⁻¹ (J - J₀) A⁻ᵀ‖_F with A Aᵀ = J₀ the pseudo-inertia, made
-    at least as thick as a compact body, so that it does not depend on units or on the frame (Lee & Park 2018, to second
-    order). A link that no body can be was stated wrong by at least the distance d of the nearest body, measured so: its
-    variance is 1 + d² times as large. Friction is expected to be absent; a coefficient's standard deviation is
-    ‖z‖ / ‖R_i‖: that coefficient alone would explain all torque, and viscous friction would at the speed that the joint
-    is made for. It is a tenth of that for τ_sc and the rotor's inertia, so that a motion that cannot tell τ_sc from τ_s
-    (never slow enough) credits τ_s, and what cannot be told from the link's own inertia is credited to the link.
+    The links are those of the robot file's model where it has them and they can belong to the arm. Otherwise each link
+    is a compact body half-way between its two joints, as large as their distance; without a model all have one common
+    mass: the one that explains the data best. A link's deviation is measured by its own body: ‖A⁻¹ (J - J₀) A⁻ᵀ‖_F with
+    A Aᵀ = J₀ the pseudo-inertia, made at least as thick as a compact body, so that it does not depend on units or on
+    the frame (Lee & Park 2018, to second order). A link that no body can be was stated wrong by at least the distance d
+    of the nearest body, measured so: its variance is 1 + d² times as large. Friction is expected to be absent; a
+    coefficient's standard deviation is ‖z‖ / ‖R_i‖: that coefficient alone would explain all torque, and viscous
+    friction would at the speed that the joint is made for. It is a tenth of that for τ_sc and the rotor's inertia, so
+    that a motion that cannot tell τ_sc from τ_s (never slow enough) credits τ_s, and what cannot be told from the
+    link's own inertia is credited to the link.
 
     Parameters
     ----------
@@ -108,9 +113,10 @@ def plausible_prior(robot: Robot, factor: Array, target: Array, friction: Fricti
                 if moving > 0.0 and step > 0.0:
                     friction_scale[viscous - 10 * count] *= min(moving / (step * made_for), 1.0)
     if robot.model.links is not None:
-        links = robot.model.links
-        heaviest = max(link.mass for link in links)
-        masses = np.array([max(link.mass, _LIGHTEST * heaviest) for link in links])
+        links, masses = list(robot.model.links), _expected_masses(robot.model.links)
+        for index in far_reaching(robot):
+            unit = _default_link(robot, index, lengths[index])
+            links[index] = LinkInertia.from_vector(masses[index] * unit.to_vector())
         lengths = np.maximum(lengths, [_extent(link) for link in links])
     else:
         unit_links = tuple(_default_link(robot, index, lengths[index]) for index in range(count))
@@ -118,8 +124,6 @@ def plausible_prior(robot: Robot, factor: Array, target: Array, friction: Fricti
         mass = _common_mass(unit_links, np.delete(factor, rotors, axis=1), target)
         links = tuple(LinkInertia.from_vector(mass * link.to_vector()) for link in unit_links)
         masses = np.full(count, mass)
-    if not np.all(masses > 0.0):
-        masses = np.ones(count)
     mean = np.concatenate([*(link.to_vector() for link in links), np.zeros(friction_scale.size)])
     scale = np.concatenate([*map(parameter_scale, masses, lengths), friction_scale])
     root = np.diag(np.concatenate([np.zeros(10 * count), 1.0 / friction_scale]))
@@ -130,8 +134,23 @@ def plausible_prior(robot: Robot, factor: Array, target: Array, friction: Fricti
     return Prior(mean, root, scale, masses)
 
 
+def far_reaching(robot: Robot) -> tuple[int, ...]:
+    """Indices of links that cannot belong to the arm: their inertia is in another unit, and no prior."""
+    links, whole = robot.model.links or (), float(link_lengths(robot).sum())
+    reaches = (_extent(replace(link, mass=mass)) for link, mass in zip(links, _expected_masses(links), strict=True))
+    return tuple(index for index, reach in enumerate(reaches) if reach > _FAR * whole)
+
+
+def _expected_masses(links: Sequence[LinkInertia]) -> Array:
+    """Mass that each link may be expected to have, (n,): its own, but not next to nothing; 1 kg where none has any."""
+    heaviest = max((link.mass for link in links), default=0.0)
+    return np.array([max(link.mass, _LIGHTEST * heaviest) or 1.0 for link in links])
+
+
 def _repaired(robot: Robot, index: int) -> Array:
-    """What repairs added to the stated parameters of a link, (10,)."""
+    """What repairs added to the stated parameters of a link, (10,); nothing where these are no prior."""
+    if index in far_reaching(robot):
+        return np.zeros(10)
     added = (each.after.to_vector() - each.before.to_vector() for each in robot.repairs if each.link == index)
     return sum(added, np.zeros(10))
 
