@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from tauscope.recording.examination.edits import Rows
+from tauscope.recording.examination.edits import Rows, find_runs
 from tauscope.recording.examination.effort_defects import STUCK_ROWS, USUAL_RUN, is_moving
 from tauscope.recording.examination.scales import EffortScale
 from tauscope.recording.recording import Recording, Samples
@@ -49,8 +49,7 @@ class ZeroRuns:
             is_zero = zero[:, joint] if joint < len(self._scales) else zero.all(axis=1)
             if not is_zero.any() or len(runs) > MOST_RUNS:
                 continue
-            edges = np.flatnonzero(np.diff(is_zero, prepend=False, append=False)).reshape(-1, 2) + first
-            for start, stop in edges.tolist():
+            for start, stop in (find_runs(is_zero) + first).tolist():
                 if runs and runs[-1][1] == start:
                     runs[-1] = (runs[-1][0], stop)
                 else:

@@ -87,12 +87,9 @@ def _apply(edit: ColumnEdit, values: Array, time: Array, first: int) -> None:
 
 def _interpolate(values: Array, time: Array, doubtful: NDArray[np.bool_], longest: int) -> None:
     """Draw straight lines across doubtful rows, up to `longest` of them, in place."""
-    gaps = np.flatnonzero(np.diff(doubtful, prepend=False, append=False)).reshape(-1, 2)
+    gaps = find_runs(doubtful)
     inside = (gaps[:, 0] > 0) & (gaps[:, 1] < len(values)) & (gaps[:, 1] - gaps[:, 0] <= longest)
-    chosen = np.zeros(len(values) + 1, dtype=np.int64)
-    chosen[gaps[inside, 0]] += 1
-    chosen[gaps[inside, 1]] -= 1
-    at = np.flatnonzero(np.cumsum(chosen[:-1]))
+    at = row_numbers(gaps[inside])
     known = ~doubtful & np.isfinite(values)
     if len(at) and known.any():
         values[at] = np.interp(time[at], time[known], values[known])
@@ -119,7 +116,16 @@ def join_ranges(rows: Numbers) -> Rows:
     """
     if not len(rows):
         return NO_ROWS
-    breaks = np.flatnonzero(np.diff(rows) != 1)
-    starts = rows[np.concatenate([[0], breaks + 1])]
-    stops = rows[np.concatenate([breaks, [len(rows) - 1]])] + 1
-    return np.column_stack([starts, stops])
+    edges = np.flatnonzero(np.diff(rows, prepend=rows[0] - 2, append=rows[-1] + 2) != 1)
+    return np.column_stack([rows[edges[:-1]], rows[edges[1:] - 1] + 1])
+
+
+def find_runs(mask: NDArray[np.bool_]) -> Rows:
+    """Ranges start:stop in which a mask is true, (k, 2).
+
+    Parameters
+    ----------
+    mask : (N,) bool
+        one value a row
+    """
+    return np.flatnonzero(np.diff(mask, prepend=False, append=False)).reshape(-1, 2)

@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tauscope.recording.examination.edits import NO_NUMBERS, Numbers, row_numbers
+from tauscope.recording.examination.edits import NO_NUMBERS, Numbers, find_runs, row_numbers
 from tauscope.recording.examination.scales import NEIGHBOURS, EffortScale, distance_beyond, is_new, neighbour_windows
 from tauscope.recording.samples import Array
 
@@ -42,17 +43,9 @@ def find_stuck(rows: Numbers, effort: Array, position: Array, scale: EffortScale
     """
     if scale.run > USUAL_RUN * scale.hold:
         return NO_NUMBERS
-    edges = np.flatnonzero(np.diff(effort) != 0.0) + 1
-    starts, stops = np.concatenate([[0], edges]), np.concatenate([edges, [len(effort)]])
-    level = effort[starts]
-    is_long = stops - starts >= max(STUCK_ROWS, STUCK_RUNS * scale.run)
-    is_long &= (level > scale.low) & (level < scale.high)  # a clipped value is not stuck
-    found = [
-        rows[start + 1 : stop]  # the first of them was measured
-        for start, stop in zip(starts[is_long], stops[is_long], strict=True)
-        if is_moving(position[start:stop])
-    ]
-    return np.concatenate([NO_NUMBERS, *found])
+    same = np.diff(effort, prepend=np.nan) == 0.0
+    same &= (effort > scale.low) & (effort < scale.high)  # a clipped value is not stuck
+    return _stuck_rows(rows, same, position, max(STUCK_ROWS, STUCK_RUNS * scale.run))
 
 
 def find_all_stuck(rows: Numbers, effort: Array, position: Array, scales: Sequence[EffortScale]) -> Numbers:
@@ -70,11 +63,14 @@ def find_all_stuck(rows: Numbers, effort: Array, position: Array, scales: Sequen
     if len(scales) < 2 or not any(0 < scale.run <= USUAL_RUN * scale.hold for scale in scales):
         return NO_NUMBERS
     same = np.concatenate([[False], (effort[1:] == effort[:-1]).all(axis=1) & (effort[1:] != 0.0).any(axis=1)])
-    runs = np.flatnonzero(np.diff(same, prepend=False, append=False)).reshape(-1, 2)
-    least = max(STUCK_ROWS, *(STUCK_RUNS * scale.hold for scale in scales))
+    return _stuck_rows(rows, same, position, max(STUCK_ROWS, *(STUCK_RUNS * scale.hold for scale in scales)))
+
+
+def _stuck_rows(rows: Numbers, same: NDArray[np.bool_], position: Array, least: int) -> Numbers:
+    """Rows that repeat a value, where it stands in `least` rows or more while the arm moves; the first was measured."""
+    runs = find_runs(same)
     long = runs[runs[:, 1] - runs[:, 0] >= least - 1]
-    found = [rows[start:stop] for start, stop in long if is_moving(position[start - 1 : stop])]
-    return np.concatenate([NO_NUMBERS, *found])
+    return np.concatenate([NO_NUMBERS, *(rows[a:b] for a, b in long if is_moving(position[a - 1 : b]))])
 
 
 def find_spikes(rows: Numbers, effort: Array, scale: EffortScale) -> Numbers:

@@ -6,9 +6,10 @@ from typing import Literal
 
 from tauscope.recording.examination.edits import NO_NUMBERS, ColumnEdit, EditedTable, Numbers, row_numbers
 from tauscope.recording.examination.scan import Defects, JointDefects, find_defects
+from tauscope.recording.examination.sketch import joint_types
 from tauscope.recording.recording import Recording
 from tauscope.result_warning import ResultWarning
-from tauscope.robot.robot import JointType, Robot
+from tauscope.robot.robot import Robot
 
 FILLED_ROWS = 4
 """Rows without an effort that are filled in where positions and efforts come in rows of their own."""
@@ -18,9 +19,8 @@ BUS = "check the bus for lost reads and damaged frames"
 
 def mend_recording(recording: Recording, robot: Robot | None = None) -> Recording:
     """Mask or repair the samples of a recording that were never measured, and say so in its notes."""
-    types = [JointType.REVOLUTE] * recording.joint_count if robot is None else [joint.type for joint in robot.joints]
-    names = [None] * len(types) if robot is None else [joint.name for joint in robot.joints]
-    defects = find_defects(recording, types)
+    names = [None] * recording.joint_count if robot is None else [joint.name for joint in robot.joints]
+    defects = find_defects(recording, joint_types(recording, robot))
     edits = _edits(recording, defects)
     if not edits:
         return recording

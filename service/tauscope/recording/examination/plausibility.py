@@ -5,12 +5,10 @@ rates, speeds and lengths of motions that arms have. Sound recordings are never 
 ten or so to what any arm does; a wrong unit is a factor of 57 or more.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from tauscope.recording.examination.plausible_torque import find_implausible_torque
-from tauscope.recording.examination.sketch import Sketch, percentile
+from tauscope.recording.examination.sketch import Sketch, joint_types, percentile
 from tauscope.recording.recording import Recording
 from tauscope.recording.units import METRES, RADIANS, SECONDS
 from tauscope.robot.robot import JointType, Robot
@@ -48,6 +46,8 @@ FAST_PART = 0.3
 
 FEWEST_ROWS = 20
 
+SI_LENGTHS = ("rad", "m")
+
 MANY_TURNS = 4.0 * np.pi
 """Most joints of an arm of three joints or more keep below two turns [rad]."""
 
@@ -67,38 +67,23 @@ BEYOND_LIMITS = 0.1
 """Share of the range by which a joint may be beyond its limits: offsets, and limits of another model."""
 
 
-@dataclass(frozen=True)
-class _Doubt:
-    """A column that can hardly be in the stated unit.
-
-    units : str
-        value for ``--units``; empty where no unit is likely
-    """
-
-    column: str
-    evidence: str
-    units: str
-
-
 def find_implausible(recording: Recording, robot: Robot | None = None) -> str | None:
     """A column that can hardly be in the stated unit: its name, the evidence, and the option that mends it."""
-    sketch = Sketch.of(recording)
-    types = _joint_types(recording, robot)
-    doubt = _doubt_velocity(sketch, types) or _doubt_time(sketch) or _doubt_angle(sketch, types, robot)
-    if doubt is not None:
-        mend = f"read it with --units {doubt.units}" if doubt.units else "write it in SI units"
-        return f"column {doubt.column}: {doubt.evidence}; {mend}"
-    return find_implausible_torque(recording, sketch, robot)
+    sketch, types = Sketch.of(recording), joint_types(recording, robot)
+    return (
+        _doubt_velocity(sketch, types)
+        or _doubt_time(sketch)
+        or _doubt_angle(sketch, types, robot)
+        or find_implausible_torque(recording, sketch, robot)
+    )
 
 
-def _joint_types(recording: Recording, robot: Robot | None) -> list[JointType]:
-    """Types of the joints, revolute where no robot says otherwise."""
-    if robot is None:
-        return [JointType.REVOLUTE] * recording.joint_count
-    return [joint.type for joint in robot.joints]
+def _doubt(column: str, evidence: str, units: str = "") -> str:
+    """A column that can hardly be in the stated unit; without `units`, the value for ``--units``, none is likely."""
+    return f"column {column}: {evidence}; {f'read it with --units {units}' if units else 'write it in SI units'}"
 
 
-def _doubt_velocity(sketch: Sketch, types: list[JointType]) -> _Doubt | None:
+def _doubt_velocity(sketch: Sketch, types: list[JointType]) -> str | None:
     """Recorded velocity against the positions' own: their ratio is a ratio of units."""
     ratios = _velocity_ratios(sketch)
     known = np.isfinite(ratios)
@@ -118,18 +103,20 @@ def _doubt_velocity(sketch: Sketch, types: list[JointType]) -> _Doubt | None:
         for v in speeds
     ]
     # Of equal ratios the one with fewest units other than SI: that of q and qd both in degrees is 1.
-    deviation, time, position, speed = min(fits, key=lambda f: (f[0] > SAME_RATIO, _foreign(f[1:]), f[0]))
+    deviation, time, position, speed = min(fits, key=lambda f: (f[0] > SAME_RATIO, len(_foreign(*f[1:])), f[0]))
     evidence = f"Δq/Δt is {typical:.3g} times column qd{joint + 1}"
     if deviation <= SAME_RATIO:
-        column = "t" if time != "s" else f"q{joint + 1}" if position not in ("rad", "m") else f"qd{joint + 1}"
+        column = "t" if time != "s" else f"q{joint + 1}" if position not in SI_LENGTHS else f"qd{joint + 1}"
         named = {"t": time, "q": position, "qd": speed}
         units = [f"{key}={unit}" for key, unit in named.items() if unit not in ("s", "rad", "m")]
-        if position in ("deg", "mm") and speed in ("rad", "m"):
+        if position in ("deg", "mm") and speed in SI_LENGTHS:
             units.append(f"qd={speed}")
-        return _Doubt(column, f"{evidence}, the ratio of {_ratio_words(time, position, speed)}", ",".join(units))
+        return _doubt(
+            column, f"{evidence}, the ratio of {' and '.join(_foreign(time, position, speed))}", ",".join(units)
+        )
     if abs(sketch.interval - 1.0) < 1e-9:
         text = f"rises by 1 from row to row, and {evidence}: it counts samples of about {1.0 / typical:.4g} Hz"
-        return _Doubt("t", text, "t=index --rate HZ")
+        return _doubt("t", text, "t=index --rate HZ")
     return None
 
 
@@ -140,11 +127,9 @@ def _velocity_ratios(sketch: Sketch) -> np.ndarray:
         return ratios
     for joint, (slope, velocity) in enumerate(zip(sketch.slope.T, sketch.velocity.T, strict=True)):
         known = np.isfinite(slope) & np.isfinite(velocity)
-        fast = (
-            known & (np.abs(velocity) > FAST_PART * np.percentile(np.abs(velocity[known]), 99.0))
-            if known.any()
-            else known
-        )
+        if not known.any():
+            continue
+        fast = known & (np.abs(velocity) > FAST_PART * np.percentile(np.abs(velocity[known]), 99.0))
         if fast.sum() < FEWEST_ROWS:
             continue
         low, middle, high = np.percentile(slope[fast] / velocity[fast], [25, 50, 75])
@@ -153,24 +138,17 @@ def _velocity_ratios(sketch: Sketch) -> np.ndarray:
     return ratios
 
 
-def _foreign(units: tuple[str, ...]) -> int:
-    """How many of the units are not SI."""
-    return sum(unit not in ("s", "rad", "m") for unit in units)
+def _foreign(time: str, position: str, speed: str) -> list[str]:
+    """The units that are not SI, in words."""
+    words = (
+        "" if time == "s" else f"{time} to s",
+        "" if position in SI_LENGTHS else f"{position} to {'m' if position == 'mm' else 'rad'}",
+        "" if speed in SI_LENGTHS else f"{speed} to {'m/s' if speed == 'mm' else 'rad/s'} in qd",
+    )
+    return [each for each in words if each]
 
 
-def _ratio_words(time: str, position: str, speed: str) -> str:
-    """The units of a ratio in words."""
-    words = []
-    if time != "s":
-        words.append(f"{time} to s")
-    if position not in ("rad", "m"):
-        words.append(f"{position} to {'m' if position == 'mm' else 'rad'}")
-    if speed not in ("rad", "m"):
-        words.append(f"{speed} to {'m/s' if speed == 'mm' else 'rad/s'} in qd")
-    return " and ".join(words)
-
-
-def _doubt_time(sketch: Sketch) -> _Doubt | None:
+def _doubt_time(sketch: Sketch) -> str | None:
     """Rates, and lengths of motions, that no arm's recording has."""
     ratios = _velocity_ratios(sketch)
     if (np.abs(ratios - 1.0) < AGREEMENT).any():
@@ -184,52 +162,50 @@ def _doubt_time(sketch: Sketch) -> _Doubt | None:
     if interval >= 1.0 / SLOWEST_RATE_HZ or sweep > LONGEST_SWEEP_S or is_slow:
         text = f"rows are {interval:.4g} s apart{whole}: this is hardly in seconds"
         if abs(interval - 1.0) < 1e-9:
-            return _Doubt("t", text, "t=ms where it counts ms, or --units t=index --rate HZ where it counts samples")
+            return _doubt("t", text, "t=ms where it counts ms, or --units t=index --rate HZ where it counts samples")
         unit = "ms" if interval < 50.0 else "us" if interval < 5e4 else "ns"
-        return _Doubt("t", text, f"t={unit}")
+        return _doubt("t", text, f"t={unit}")
     if interval < 1.0 / FASTEST_RATE_HZ:
-        return _Doubt("t", f"rows are {interval:.3g} s apart: this is hardly in seconds", "")
+        return _doubt("t", f"rows are {interval:.3g} s apart: this is hardly in seconds")
     typical = np.nanmedian(np.abs(sketch.slope), axis=0) if np.isfinite(sketch.slope).any(axis=0).all() else np.zeros(1)
     joint = int(np.argmax(typical))
     if typical[joint] > FASTEST:
         text = f"q{joint + 1} moves at {typical[joint]:.3g} per second most of the time: one of both is in another unit"
-        return _Doubt(f"t or q{joint + 1}", text, "")
+        return _doubt(f"t or q{joint + 1}", text)
     return None
 
 
-def _doubt_angle(sketch: Sketch, types: list[JointType], robot: Robot | None) -> _Doubt | None:
+def _doubt_angle(sketch: Sketch, types: list[JointType], robot: Robot | None) -> str | None:
     """Positions that limits, or the number of turns, or gravity say are in degrees; or in mm."""
     known = sketch.position[np.isfinite(sketch.position)]
     if len(known) and sketch.reach.max() > LARGEST_DEGREES and (known == np.rint(known)).all():
         joint = int(np.argmax(sketch.reach))
         text = f"whole numbers up to {sketch.reach[joint]:.0f}, as counts of an encoder are"
-        return _Doubt(f"q{joint + 1}", text, "")
+        return _doubt(f"q{joint + 1}", text)
     revolute = np.array([kind is JointType.REVOLUTE for kind in types])
     for kind, unit, factor in ((revolute, "deg", np.pi / 180.0), (~revolute, "mm", 1e-3)):
         found = _beyond_limits(sketch, kind, factor, robot)
         if found is not None:
             joint, text = found
-            return _Doubt(f"q{joint + 1}", text, f"q={unit}")
+            return _doubt(f"q{joint + 1}", text, f"q={unit}")
     slides = ~revolute & (sketch.reach > LONGEST_SLIDE)
     if slides.any():
         joint = int(np.argmax(slides))
-        return _Doubt(f"q{joint + 1}", f"reaches {sketch.reach[joint]:.4g}, as a length in mm does", "q=mm")
+        return _doubt(f"q{joint + 1}", f"reaches {sketch.reach[joint]:.4g}, as a length in mm does", "q=mm")
     turned = revolute & (sketch.reach > MANY_TURNS)
-    if turned.sum() >= max(2.0, revolute.sum() / 2.0) and len(types) >= 3:
-        joint = int(np.argmax(np.where(turned, sketch.reach, 0.0)))
-        text = f"reaches {sketch.reach[joint]:.4g}, and {turned.sum()} of {len(types)} joints are beyond two turns"
-        return _Doubt(f"q{joint + 1}", f"{text}, as angles in degrees are", "q=deg")
     rushed = revolute & (percentile(np.abs(sketch.slope), 99.0) > FASTEST_ARM)
-    if rushed.sum() >= max(2.0, revolute.sum() / 2.0) and len(types) >= 3:
-        joint = int(np.argmax(np.where(rushed, sketch.reach, 0.0)))
-        text = (
-            f"moves at {sketch.top_speed[joint]:.4g} per second, and {rushed.sum()} of {len(types)} joints are as fast"
-        )
-        return _Doubt(f"q{joint + 1}", f"{text}, as angles in degrees are", "q=deg")
+    for many, words, values, others in (
+        (turned, "reaches {:.4g}", sketch.reach, "beyond two turns"),
+        (rushed, "moves at {:.4g} per second", sketch.top_speed, "as fast"),
+    ):
+        if many.sum() >= max(2.0, revolute.sum() / 2.0) and len(types) >= 3:
+            joint = int(np.argmax(np.where(many, sketch.reach, 0.0)))
+            text = f"{words.format(values[joint])}, and {many.sum()} of {len(types)} joints are {others}"
+            return _doubt(f"q{joint + 1}", f"{text}, as angles in degrees are", "q=deg")
     for joint in np.flatnonzero(revolute & (sketch.span > QUARTER_TURN)):
         if _swings_in_degrees(sketch, int(joint)):
             text = f"spans {sketch.span[joint]:.4g}, and its torque swings once in 360, not once in 2π"
-            return _Doubt(f"q{joint + 1}", text, "q=deg")
+            return _doubt(f"q{joint + 1}", text, "q=deg")
     return None
 
 

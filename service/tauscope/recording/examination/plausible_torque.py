@@ -22,6 +22,9 @@ AS_GRAVITY = 0.8
 
 POSTURES = 400
 
+SMALL_STEP = 1e-5
+"""Of a difference quotient: its error of 1e-10 of the slope is as large as round-off [rad or m]."""
+
 LARGEST_TORQUE = 1e6
 """No joint's torque is larger [Nm or N]."""
 
@@ -177,26 +180,17 @@ def _is_lively(sketch: Sketch, robot: Robot) -> bool:
 
 
 def _gravity_torque(robot: Robot, position: Array) -> Array:
-    """Torque that holds the stated masses against gravity, (N, n) [Nm or N]: axis · Σ (c - p) × (-m g)."""
-    frames = link_placements(robot, position)
-    links = robot.model.links or ()
-    count = len(links)
-    mass = np.array([link.mass for link in links])
-    moment = np.array([link.first_moment for link in links])
-    centre = frames[..., :3, 3] * mass[:, None] + np.einsum("tjab,jb->tja", frames[..., :3, :3], moment)
-    torque = np.empty((len(position), count))
-    before = np.broadcast_to(np.eye(4), (len(position), 4, 4))
-    for joint, segment in enumerate(robot.segments):
-        base = before[:, :3, :3] @ segment.before.rotation
-        origin = before[:, :3, 3] + before[:, :3, :3] @ segment.before.translation
-        axis, moved = base[..., 2], mass[joint:].sum()
-        arm = centre[:, joint:].sum(axis=1) - moved * origin
-        if segment.type is JointType.PRISMATIC:
-            torque[:, joint] = -moved * axis @ robot.gravity
-        else:
-            torque[:, joint] = -np.einsum("ta,ta->t", axis, np.cross(arm, robot.gravity))
-        before = frames[:, joint]
-    return torque
+    """Torque that holds the stated masses against gravity, (N, n) [Nm or N]: the slope of their potential energy."""
+    mass = np.array([link.mass for link in robot.model.links or ()])
+    moment = np.array([link.first_moment for link in robot.model.links or ()])
+
+    def potential(posture: Array) -> Array:
+        frames = link_placements(robot, posture)
+        centre = frames[..., :3, 3] * mass[:, None] + np.einsum("tjab,jb->tja", frames[..., :3, :3], moment)
+        return -centre.sum(axis=1) @ robot.gravity
+
+    steps = SMALL_STEP * np.eye(robot.joint_count)
+    return np.stack([potential(position + step) - potential(position - step) for step in steps], 1) / (2 * SMALL_STEP)
 
 
 def _reach(robot: Robot, sketch: Sketch) -> float:

@@ -7,6 +7,7 @@ import numpy as np
 
 from tauscope.recording.recording import Recording
 from tauscope.recording.samples import Array, Samples
+from tauscope.robot.robot import JointType, Robot
 
 WINDOWS = 8
 WINDOW_ROWS = 1 << 13
@@ -97,6 +98,11 @@ class Sketch:
         low = np.fmin.reduce(self.position, axis=0, initial=np.inf)
         high = np.fmax.reduce(self.position, axis=0, initial=-np.inf)
         return np.maximum(high - low, 0.0)
+
+
+def joint_types(recording: Recording, robot: Robot | None) -> list[JointType]:
+    """Types of the joints, revolute where no robot says otherwise."""
+    return [JointType.REVOLUTE] * recording.joint_count if robot is None else [joint.type for joint in robot.joints]
 
 
 def percentile(values: Array, share: float) -> Array:
