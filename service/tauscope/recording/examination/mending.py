@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Literal
 
-from tauscope.recording.examination.edits import NO_NUMBERS, ColumnEdit, EditedTable, Numbers, row_numbers
+from tauscope.recording.examination.edits import NO_NUMBERS, ColumnEdit, EditedTable, Numbers
 from tauscope.recording.examination.scan import Defects, JointDefects, find_defects
 from tauscope.recording.examination.sketch import joint_types
 from tauscope.recording.recording import Recording
@@ -86,21 +86,21 @@ def _joint_texts(
         text = f"jumps by {heights}, {begin(jumps[0][0])}; taken out, the longest piece is kept as it is"
         yield "q", "encoder-reset", text, "home the encoder before the recording, and not within it"
     slow = "record at the rate of the controller"
-    if len(joint.repeated):
-        text = f"each value is held for about {joint.hold} rows; {_count(joint.repeated)} masked"
+    if len(repeated := joint.rows["repeated"]):
+        text = f"each value is held for about {joint.hold} rows; {_count(repeated)} masked"
         yield "q", "held-samples", text, slow
     if joint.effort_hold > 1:
         text = f"each value is held for about {joint.effort_hold} rows; {way}"
         yield "effort", "held-samples", text, slow
-    masked: tuple[tuple[Literal["q", "effort"], str, Numbers, str], ...] = (
-        ("q", "spikes", joint.spikes, "away from the neighbours by a jump and back"),
-        ("q", "stuck-samples", joint.frozen, "with a repeated value that the next one makes up for"),
-        ("effort", "effort-dropouts", row_numbers(joint.zeros), "of exactly zero between others that are not"),
-        ("effort", "stuck-samples", joint.stuck, "with a repeated value while the arm moves"),
-        ("effort", "spikes", joint.effort_spikes, "far from all of their neighbours"),
+    masked: tuple[tuple[Literal["q", "effort"], str, str, str], ...] = (
+        ("q", "spikes", "spikes", "away from the neighbours by a jump and back"),
+        ("q", "stuck-samples", "frozen", "with a repeated value that the next one makes up for"),
+        ("effort", "effort-dropouts", "zeros", "of exactly zero between others that are not"),
+        ("effort", "stuck-samples", "stuck", "with a repeated value while the arm moves"),
+        ("effort", "spikes", "effort_spikes", "far from all of their neighbours"),
     )
-    for column, code, rows, words in masked:
-        if len(rows):
+    for column, code, kind, words in masked:
+        if len(rows := joint.rows[kind]):
             yield column, code, f"{_count(rows)} {words}, {begin(int(rows[0]))}; masked", BUS
 
 

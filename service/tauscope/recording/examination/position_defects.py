@@ -1,6 +1,7 @@
 """Positions that no encoder measured: spikes, frozen values, and jumps by a constant."""
 
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -42,25 +43,17 @@ STOPS_AT = 0.3
 """Least speed before frozen rows, relative to the speed after them: a joint that stops slows down first."""
 
 
-@dataclass
-class PositionDefects:
-    """Rows of one joint, counted from the first row of the recording.
+class PositionDefect(NamedTuple):
+    """A row whose position was never measured, or the first row behind a jump, and its height [rad or m]."""
 
-    spikes, frozen : list of int
-        rows whose position was never measured
-    jumps, wraps : list of (int, float)
-        first row behind a jump, and its height [rad or m]
-    """
-
-    spikes: list[int] = field(default_factory=list)
-    frozen: list[int] = field(default_factory=list)
-    jumps: list[tuple[int, float]] = field(default_factory=list)
-    wraps: list[tuple[int, float]] = field(default_factory=list)
+    kind: Literal["spikes", "frozen", "jumps", "wraps"]
+    row: int
+    height: float = 0.0
 
 
 def scan_position(
     rows: Numbers, time: Array, position: Array, scale: PositionScale, interval: float, core: tuple[int, int]
-) -> PositionDefects:
+) -> Iterator[PositionDefect]:
     """Defects of a block of one joint's known positions.
 
     Parameters
@@ -76,17 +69,16 @@ def scan_position(
     core : (int, int)
         rows that this block answers for; the others are neighbours
     """
-    found = PositionDefects()
     if len(position) < 8:
-        return found
+        return
     plain = np.diff(position)
     steps = unwrap_steps(plain, is_wrapped=scale.is_wrapped)
     is_core = (rows[1:] >= core[0]) & (rows[1:] < core[1])
     for k in np.flatnonzero((plain != steps) & is_core):
-        found.wraps.append((int(rows[k + 1]), float(ONE_TURN * np.rint((plain[k] - steps[k]) / ONE_TURN))))
+        yield PositionDefect("wraps", int(rows[k + 1]), float(ONE_TURN * np.rint((plain[k] - steps[k]) / ONE_TURN)))
     least = max(SURPRISE * scale.surprise, STEPS * scale.step, SHARE_OF_MOVE * scale.move)
     if least == 0.0 or np.abs(steps).max() <= least:
-        return found
+        return
     surprise = steps - neighbours_median(steps)
     large = np.flatnonzero((np.abs(surprise) > least) & (steps != 0.0))  # a rest is judged by the step that ends it
     whole = np.diff(time) < LONGEST_STEP * interval
@@ -100,13 +92,13 @@ def scan_position(
         partner = next((b for b in later if _returns(surprise, a, b)), None)
         index += 1
         if frozen and is_core[a]:
-            found.frozen += [int(row) for row in rows[a - frozen + 1 : a + 1]]
+            yield from (PositionDefect("frozen", int(row)) for row in rows[a - frozen + 1 : a + 1])
         elif partner is not None:
-            found.spikes += [int(row) for row in rows[a + 1 : partner + 1] if core[0] <= row < core[1]]
+            spikes = (int(row) for row in rows[a + 1 : partner + 1] if core[0] <= row < core[1])
+            yield from (PositionDefect("spikes", row) for row in spikes)
             index = int(np.searchsorted(large, partner)) + 1
         elif is_core[a] and is_jump and whole[a]:
-            found.jumps.append((int(rows[a + 1]), float(surprise[a])))
-    return found
+            yield PositionDefect("jumps", int(rows[a + 1]), float(surprise[a]))
 
 
 def _returns(surprise: Array, a: int, b: int) -> bool:

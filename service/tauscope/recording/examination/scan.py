@@ -1,5 +1,6 @@
 """All samples of a recording that are none, found block by block."""
 
+from collections import defaultdict
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -8,7 +9,6 @@ from numpy.typing import NDArray
 from tauscope.recording.examination.dropouts import ZeroRuns
 from tauscope.recording.examination.edits import (
     NO_NUMBERS,
-    NO_ROWS,
     ColumnEdit,
     Numbers,
     Rows,
@@ -48,26 +48,19 @@ MOST_JUMPS = 20
 class JointDefects:
     """Defects of one joint's samples.
 
-    spikes, frozen, repeated, stuck, effort_spikes : (m,) int64
-        rows, ascending: of positions the first three, of efforts the others
-    jumps, wraps : list of (int, float)
-        first row behind a jump, and its height [rad or m]
     hold, effort_hold : int
         rows for which position, effort are held; 1 where they are not
-    zeros : (k, 2) int64
-        ranges of rows in which the effort dropped to zero
+    rows : dict of str to (m,) int64
+        rows, ascending: spikes, frozen, repeated of positions, zeros, stuck, effort_spikes of efforts
+    jumps, wraps : list of (int, float)
+        first row behind a jump, and its height [rad or m]
     """
 
     hold: int
     effort_hold: int
-    spikes: Numbers = field(default_factory=lambda: NO_NUMBERS)
-    frozen: Numbers = field(default_factory=lambda: NO_NUMBERS)
-    repeated: Numbers = field(default_factory=lambda: NO_NUMBERS)
+    rows: dict[str, Numbers] = field(default_factory=lambda: defaultdict(lambda: NO_NUMBERS))
     jumps: list[tuple[int, float]] = field(default_factory=list)
     wraps: list[tuple[int, float]] = field(default_factory=list)
-    zeros: Rows = field(default_factory=lambda: NO_ROWS)
-    stuck: Numbers = field(default_factory=lambda: NO_NUMBERS)
-    effort_spikes: Numbers = field(default_factory=lambda: NO_NUMBERS)
 
     def position_edit(self, count: int, lost: Numbers) -> ColumnEdit:
         """Edit of the position of a recording of `count` rows: jumps are relative to the longest piece.
@@ -82,13 +75,15 @@ class JointDefects:
             where = np.unique([0, *(row for row, _ in (*self.jumps, *self.wraps))])
             # Whole turns matter to nobody: the longest piece is that between jumps.
             offsets = _offsets(self.jumps, where, count) + _offsets(self.wraps, where, count)
-        blank = np.unique(np.concatenate([self.spikes, self.frozen, self.repeated, lost]))
-        return ColumnEdit(blank=join_ranges(blank), jumps=where, offsets=offsets)
+        return ColumnEdit(self._ranges("spikes", "frozen", "repeated", lost=lost), jumps=where, offsets=offsets)
 
     @property
     def lost_efforts(self) -> Rows:
         """Ranges of rows without a measured effort, (k, 2)."""
-        return join_ranges(np.unique(np.concatenate([row_numbers(self.zeros), self.stuck, self.effort_spikes])))
+        return self._ranges("zeros", "stuck", "effort_spikes")
+
+    def _ranges(self, *kinds: str, lost: Numbers = NO_NUMBERS) -> Rows:
+        return join_ranges(np.unique(np.concatenate([lost, *(self.rows[kind] for kind in kinds)])))
 
 
 @dataclass(eq=False)
@@ -170,13 +165,14 @@ class _Scan:
             known = np.isfinite(position) & ~close
             if place.hold > 1:
                 known[known] = is_new(position[known])
-            fault = scan_position(
-                rows[known], samples.time[known], position[known], scale, self.interval * place.hold, core
-            )
-            place.jumps += fault.jumps
-            place.wraps += fault.wraps
-            self._keep(joint, "spikes", np.array(fault.spikes, dtype=np.int64), core)
-            self._keep(joint, "frozen", np.array(fault.frozen, dtype=np.int64), (0, core[1]))
+            interval = self.interval * place.hold
+            for kind, row, height in scan_position(
+                rows[known], samples.time[known], position[known], scale, interval, core
+            ):
+                if kind in ("jumps", "wraps"):
+                    getattr(place, kind).append((row, height))
+                else:
+                    self._keep(joint, kind, np.array([row]), (0, core[1]))
             if place.hold > 1:
                 same = np.concatenate([[False], position[1:] == position[:-1]])
                 self._keep(joint, "repeated", rows[_find_repeated(same, place.hold)], core)
@@ -192,14 +188,17 @@ class _Scan:
         """Defects of all blocks."""
         defects = self.defects
         for (joint, name), parts in self.found.items():
-            target = defects if name in ("bunched", "paced") else defects.joints[joint]
-            setattr(target, name, np.unique(np.concatenate(parts)))
+            rows = np.unique(np.concatenate(parts))
+            if name in ("bunched", "paced"):
+                setattr(defects, name, rows)
+            else:
+                defects.joints[joint].rows[name] = rows
         if len(defects.bunched) > MOST_BUNCHED * len(recording):
             defects.bunched = NO_NUMBERS
         if len(defects.paced) < IN_STEP * (1.0 - 1.0 / self.pace) * len(recording):
             defects.paced = NO_NUMBERS
         for joint, ranges in zip(defects.joints, self.zeros.dropouts(recording), strict=True):
-            joint.zeros = ranges
+            joint.rows["zeros"] = row_numbers(ranges)
             if len(joint.jumps) > MOST_JUMPS:
                 joint.jumps.clear()
         return defects
