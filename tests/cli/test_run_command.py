@@ -58,6 +58,17 @@ def test_the_scenario_and_the_posture_count(run: Run, short: Path, tmp_path: Pat
     assert noise[1] > noise[0] + 2.0
 
 
+def test_a_link_that_no_body_can_be_is_simulated_as_the_nearest_body(run: Run, short: Path, tmp_path: Path) -> None:
+    robot = tmp_path / "robot.yaml"
+    text = Path(PAPER_ROBOT).read_text(encoding="utf-8")
+    robot.write_text(text.replace("{xx: 0, yy: 0.117", "{xx: 1, yy: 0.117", 1), encoding="utf-8")
+    ended = run("run", robot, "--trajectory", short, "--out", tmp_path / "out.csv", "--rate", "200", START)
+    assert (ended.status, ended.err) == (0, "")
+    warning = next(line for line in ended.out.splitlines() if line.startswith("! "))
+    assert "inertia breaks the triangle inequality" in warning
+    assert "the nearest body is used" in warning
+
+
 def test_a_recording_is_named_after_the_moment(
     run: Run, short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
