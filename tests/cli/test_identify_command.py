@@ -205,6 +205,7 @@ def test_a_link_that_no_body_can_be_stands_first(run: Run, files: SimulatedFiles
         ended = run(verb, robot, files.train[0], "--report", report)
         assert (ended.status, ended.err) == (0, "")
         assert words in next(line for line in ended.out.splitlines() if line.startswith("! "))
+        assert "mass -1.4 → 0 kg" in report.read_text(encoding="utf-8")
         ended = run(verb, robot, files.train[0], "--json", out)
         assert words in ended.out + ended.err
         (warning,) = [

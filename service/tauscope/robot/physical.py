@@ -63,8 +63,8 @@ def nearest_body(link: LinkInertia) -> LinkInertia:
     """The nearest body; the link itself where a body can have its parameters.
 
     min ‖A⁻¹ (J - J₀) A⁻ᵀ‖_F over J ⪰ 0, J the pseudo-inertia and A Aᵀ that of a compact body about the same centre of
-    mass: negative eigenvalues of A⁻¹ J₀ A⁻ᵀ become zero (Higham 1988). Positive mass and its centre stay, and so does
-    the answer in other units and frames. Without a mass that tells the centre, A is a body at the frame's origin.
+    mass: negative eigenvalues of A⁻¹ J₀ A⁻ᵀ become zero (Higham 1988). A positive mass and its centre stay. The answer
+    does not depend on units or on the frame. Without a mass that tells the centre, A is a body at the frame's origin.
     """
     if find_defect(link, ROUND_OFF) is None:
         return link
