@@ -177,7 +177,7 @@ def test_a_terminal_that_knows_ascii_only_is_no_bug(files: SimulatedFiles) -> No
 
 
 def test_a_reader_that_goes_away_is_no_bug(files: SimulatedFiles) -> None:
-    command = [*PROGRAM, "recording", "check", str(files.train[0])]
+    command = [*PROGRAM, "robot", "check", str(files.robot)]
     reading, writing = os.pipe()
     os.close(reading)
     ended = subprocess.run(command, check=False, stdout=writing, stderr=subprocess.PIPE, text=True, timeout=60)
