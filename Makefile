@@ -47,7 +47,7 @@ page: $(DEMO) ## the page at http://127.0.0.1:8000 with what `make demo` has mad
 	@test -d demo-output/service || { echo "nothing to show yet: run make demo first" >&2; exit 1; }
 	$(BIN)/tauscope serve --data demo-output/service
 
-# A file is one process's: its tests share what they have built. Quick tests often wait: a third process fills two cores.
+# A file is one process's: its tests share what they have built. Tests often wait: a third process fills two cores.
 BY_FILE := --dist loadfile --no-loadscope-reorder
 SELECTED = $(if $(CHANGED),--changed-only)
 NONE_NEEDED = test $$? -eq 5 -a -n "$(CHANGED)"
@@ -59,7 +59,7 @@ test: $(INSTALLED) ## the quick tests
 # Exit status 5: no test was selected, which is right where the change needs none.
 test-slow: $(INSTALLED) ## the tests that take long or need something of the host; CHANGED=1: those that the change needs
 	$(BIN)/pytest -m realtime --reruns 4 --only-rerun MachineStoodStill $(SELECTED) $(PYTEST_FLAGS) || $(NONE_NEEDED)
-	$(BIN)/pytest $(BY_FILE) -n 2 --timeout 1800 -m "(slow or system) and not realtime" $(SELECTED) $(PYTEST_FLAGS) || $(NONE_NEEDED)
+	$(BIN)/pytest $(BY_FILE) -n 3 --timeout 1800 -m "(slow or system) and not realtime" $(SELECTED) $(PYTEST_FLAGS) || $(NONE_NEEDED)
 
 test-all: test test-slow ## every test
 

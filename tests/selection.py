@@ -16,7 +16,7 @@ REPOSITORY = Path(__file__).resolve().parents[1]
 EMULATORS = ("tests/drivers", "tests/hardware_emulated", "tests/sim_backend")
 KILLS = ("tests/runtime", "tests/hardware_emulated")
 SERVICE = ("tests/server", "tests/reliability", "tests/browser", "tests/client")
-QUICK_PROOF = ("tests/concealed",)
+QUICK_PROOF = ("tests/concealed/test_proof.py", "tests/concealed/test_reduced_bench.py", "tests/concealed/real")
 
 NEEDED: dict[str, tuple[str, ...]] = {
     # moving the arm
@@ -35,6 +35,8 @@ NEEDED: dict[str, tuple[str, ...]] = {
     "service/tauscope/diagnosis/": ("tests/effects", "tests/diagnosis", "tests/report", *QUICK_PROOF),
     "service/tauscope/export/": ("tests/identification", "tests/diagnosis/test_extended_model.py"),
     "service/tauscope/report/": ("tests/report", "tests/browser/test_report_on_paper.py"),
+    "service/tauscope/library.py": ("tests/library", "tests/examples"),
+    "service/tauscope/results.py": ("tests/library", "tests/examples"),
     # serving it
     "service/tauscope/tasks/": (
         "tests/tasks",
@@ -73,14 +75,22 @@ def select_tests(changed: Iterable[str]) -> set[str] | None:
     selected: set[str] = set()
     for path in changed:
         prefix = max((each for each in NEEDED if path.startswith(each)), key=len, default=None)
-        parts = Path(path).parts
         if prefix is not None:
             selected.update(NEEDED[prefix])
-        elif parts[0] == "tests" and len(parts) > 2:
-            selected.add("/".join(parts[:2]))
+        elif path.startswith("tests/") and path.count("/") > 1:
+            is_test = Path(path).name.startswith("test_")
+            selected.update((path, *_test_files_that_import(path)) if is_test else ("/".join(path.split("/")[:2]),))
         else:
             return None
     return selected
+
+
+def _test_files_that_import(path: str) -> list[str]:
+    """Test files that take something from this one."""
+    module = ".".join(Path(path).relative_to("tests").with_suffix("").parts)
+    tests = REPOSITORY / "tests"
+    importing = (each for each in tests.rglob("test_*.py") if f"from {module} import" in each.read_text("utf-8"))
+    return [each.relative_to(REPOSITORY).as_posix() for each in importing]
 
 
 def is_selected(test_file: str, selected: set[str] | None) -> bool:

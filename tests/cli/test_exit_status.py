@@ -158,14 +158,11 @@ def test_interruption_is_130(files: SimulatedFiles, monkeypatch: pytest.MonkeyPa
 def test_the_process_ends_as_main_says(files: SimulatedFiles, tmp_path: Path) -> None:
     empty = tmp_path / "empty.csv"
     empty.touch()
-    for words, status in ((["--version"], 0), (["recording", "check", empty], 1), (["recording", "check"], 2)):
+    for words, status in ((["--version"], 0), (["robot", "check", empty], 1), (["robot", "check"], 2)):
         ended = subprocess.run([*PROGRAM, *map(str, words)], check=False, capture_output=True, text=True, timeout=60)
         assert ended.returncode == status
         assert "Traceback" not in ended.stderr
-    assert (
-        "empty.csv"
-        in subprocess.run([*PROGRAM, "robot", "check", empty], check=False, capture_output=True, text=True).stderr
-    )
+        assert ("empty.csv" in ended.stderr) == (status == 1)
 
 
 def test_a_terminal_that_knows_ascii_only_is_no_bug(files: SimulatedFiles) -> None:
@@ -177,7 +174,7 @@ def test_a_terminal_that_knows_ascii_only_is_no_bug(files: SimulatedFiles) -> No
 
 
 def test_a_reader_that_goes_away_is_no_bug(files: SimulatedFiles) -> None:
-    command = [*PROGRAM, "recording", "check", str(files.train[0])]
+    command = [*PROGRAM, "robot", "check", str(files.robot)]
     reading, writing = os.pipe()
     os.close(reading)
     ended = subprocess.run(command, check=False, stdout=writing, stderr=subprocess.PIPE, text=True, timeout=60)

@@ -9,12 +9,13 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+import tauscope.tasks.diagnose
 from diagnosis.diagnosed_arm import recordings
 from diagnosis.test_diagnosis_of_simulated_arms import spring
 from tauscope.cli.diagnose_command import diagnose
 from tauscope.cli.values import SeveralValuesCommand
 from tauscope.cli.verbs import add_verb
-from tauscope.diagnosis import DiagnosisDocument
+from tauscope.diagnosis import Diagnosis, DiagnosisDocument
 from tauscope.diagnosis.extended_model.saved import read_model
 from tauscope.errors import ExcitationError
 from tauscope.excitation import require_within_limits
@@ -41,7 +42,7 @@ def written(folder: Path, name: str, recording: Recording) -> Path:
 @pytest.fixture(scope="module")
 def files(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
     folder = tmp_path_factory.mktemp("recordings")
-    made = recordings((1, 2, 3), spring, np.random.default_rng(5))
+    made = recordings((1, 2), spring, np.random.default_rng(5))
     return [str(written(folder, f"motion-{place}", each)) for place, each in enumerate(made)]
 
 
@@ -57,6 +58,7 @@ class Written:
     status: int
     shown: str
     out: dict[str, Path]
+    found: Diagnosis
 
 
 @pytest.fixture(scope="module")
@@ -64,14 +66,19 @@ def written_once(files: list[str], tmp_path_factory: pytest.TempPathFactory) -> 
     folder = tmp_path_factory.mktemp("outputs")
     names = ["out.json", "model.json", "code.py", "code.h", "scenario.yaml", "robot.yaml", "next.json", "page.html"]
     out = {name: folder / name for name in names}
+    found: list[Diagnosis] = []
+    monkeypatch = pytest.MonkeyPatch()
+    diagnose = tauscope.tasks.diagnose.diagnose
+    monkeypatch.setattr("tauscope.tasks.diagnose.diagnose", lambda *of: found.append(diagnose(*of)) or found[0])
     status, shown = run(
-        *files[:2],
-        *("--held-out", files[2], "--json", str(out["out.json"])),
+        files[0],
+        *("--held-out", files[1], "--json", str(out["out.json"])),
         *("--model", str(out["model.json"]), "--export", str(out["code.py"]), "--export", str(out["code.h"])),
         *("--scenario", str(out["scenario.yaml"]), "--improved-robot", str(out["robot.yaml"])),
         *("--next-trajectory", str(out["next.json"]), "--report", str(out["page.html"])),
     )
-    return Written(status, shown, out)
+    monkeypatch.undo()
+    return Written(status, shown, out, found[0])
 
 
 def test_the_document_is_written(written_once: Written) -> None:
@@ -83,7 +90,7 @@ def test_the_document_is_written(written_once: Written) -> None:
 
 
 def test_a_terminal_shows_verdict_and_statement(files: list[str]) -> None:
-    status, shown = run(*files[:2])
+    status, shown = run(files[0])
     assert status == 0
     assert "explained" in shown
     assert "joint1: an elastic torque grows linearly with the angle" in shown
@@ -103,20 +110,21 @@ def test_everything_that_can_be_written_is_written_and_read_again(written_once: 
     assert "explained" in page
     assert "http://" not in page.replace("http://www.w3.org", "")
     compile(out["code.py"].read_text(), "code.py", "exec")
-    status, shown = run(*files[:2], "--against", str(out["model.json"]))
+    status, shown = run(*files, "--against", str(out["model.json"]))
     assert status == 0
     assert "consistent" in shown
 
 
 def test_limits_that_allow_no_next_experiment_cost_nobody_the_diagnosis(
-    files: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    files: list[str], written_once: Written, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refused(*_: object, **__: object) -> None:
         raise ExcitationError("joint1: no room; relax its limits")
 
     monkeypatch.setattr("tauscope.tasks.diagnose.planned_experiment", refused)
+    monkeypatch.setattr("tauscope.tasks.diagnose.diagnose", lambda *_: written_once.found)
     out, motion = tmp_path / "out.json", tmp_path / "next.json"
-    status, shown = run(*files[:2], "--json", str(out), "--next-trajectory", str(motion))
+    status, shown = run(files[0], "--json", str(out), "--next-trajectory", str(motion))
     assert status == 1
     assert DiagnosisDocument.model_validate_json(out.read_text()).findings
     assert not motion.exists()
@@ -138,7 +146,7 @@ def test_against_the_model_wrong_values_and_missing_structure_are_told_apart(fil
         text.replace("{stiction: 1.0, stribeck: -0.2, viscous: 0.277}", "{stiction: 1.0, stribeck: -0.2, viscous: 0.1}")
     )
     out = tmp_path / "out.json"
-    result = CliRunner().invoke(app, [str(robot), *files[:2], "--against", "model", "--json", str(out)])
+    result = CliRunner().invoke(app, [str(robot), *files, "--against", "model", "--json", str(out)])
     assert result.exit_code == 0
     found = DiagnosisDocument.model_validate_json(out.read_text())
     assert found.against == "model"
@@ -149,7 +157,7 @@ def test_against_the_model_wrong_values_and_missing_structure_are_told_apart(fil
 
 
 def test_against_something_that_is_no_file_is_wrong_usage(files: list[str]) -> None:
-    status, shown = run(*files[:2], "--against", "nothing-of-this-name.csv")
+    status, shown = run(*files, "--against", "nothing-of-this-name.csv")
     assert status == 2
     assert "nothing-of-this-name.csv" in shown
 

@@ -36,6 +36,7 @@ def values(found: DiagnosisDocument, effect: str) -> dict[str, float]:
     return {entry.name: entry.value for entry in finding.parameters}
 
 
+@pytest.mark.slow
 def test_the_worn_screw_of_emps_and_its_late_force_are_named() -> None:
     found = told("emps")
     assert {finding.effect for finding in found.findings[:2]} == {"asymmetric_viscous", "time_delay"}
@@ -44,6 +45,7 @@ def test_the_worn_screw_of_emps_and_its_late_force_are_named() -> None:
     assert -1.2e-3 < values(found, "time_delay")["d"] < -0.6e-3
 
 
+@pytest.mark.slow
 def test_emps_is_predicted_better_than_by_the_readme() -> None:
     found = told("emps")
     assert found.fit.held_out is not None

@@ -46,6 +46,7 @@ def test_a_sound_arm_is_looked_at_again_and_stays_sound() -> None:
     assert diagnosis.fitter.observations.as_measured is None, "what is reported is the first look"
 
 
+@pytest.mark.slow
 def test_what_is_slow_or_within_frictions_step_is_not_looked_for_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """Noise of the velocities blurs that step, in a bristle's column and in what is left to explain alike."""
     asked: list[Effect] = []

@@ -151,7 +151,7 @@ def filtered_torque(constant: float, order: int) -> Array:
     torque = SIGNALS.torque
     fine = np.linspace(0.0, 1.0, STEPS, endpoint=False) + 0.5 / STEPS
     filtered, states = np.empty_like(torque), [torque[:, 0]] * order
-    for _ in range(4):  # period after period
+    for _ in range(2):  # the second period begins where the first ended: no constant is a tenth of it
         for k in range(torque.shape[1]):
             for part in fine:
                 passed = torque[:, k - 1] + part * (torque[:, k] - torque[:, k - 1])

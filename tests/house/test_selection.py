@@ -55,7 +55,10 @@ def test_every_test_that_is_named_is_there() -> None:
         ("service/tauscope/effects/spring.py", "tests/diagnosis/test_springs.py", "tests/runtime/test_kill.py"),
         ("service/tauscope/server/store/index.py", "tests/reliability/test_fault_campaign.py", "tests/concealed"),
         ("deploy/systemd/tauscope.service", "tests/deploy/test_systemd_units.py", "tests/diagnosis"),
-        ("tests/diagnosis/test_fit.py", "tests/diagnosis/test_springs.py", "tests/runtime/test_kill.py"),
+        ("tests/diagnosis/diagnosed_arm.py", "tests/diagnosis/test_springs.py", "tests/runtime/test_kill.py"),
+        ("tests/diagnosis/test_fit.py", "tests/diagnosis/test_fit.py", "tests/diagnosis/test_springs.py"),
+        ("tests/diagnosis/test_fit.py", "tests/diagnosis/test_kinds.py", "tests/diagnosis/test_springs.py"),
+        ("service/tauscope/library.py", "tests/examples/test_examples.py", "tests/diagnosis"),
     ],
 )
 def test_a_change_runs_the_slow_tests_of_its_neighbours(changed: str, needed: str, unneeded: str) -> None:

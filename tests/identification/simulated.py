@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +58,7 @@ class SimulatedArm:
         return np.asarray(std) * rng.standard_normal(self.exact.torque_exact.shape)
 
 
+@cache
 def paper_robot() -> Robot:
     """The paper's arm as its robot file says, K_v and δ included."""
     return read_robot(example_robot("paper_arm"))

@@ -61,7 +61,7 @@ def rms_speed(arm: SimulatedArm) -> Array:
 @pytest.mark.parametrize(
     ("k_v", "delta", "period_s", "seed"), [(500.0, 10.0, 10.0, 2), (500.0, 10.0, 10.0, 3), (200.0, 8.0, 10.0, 2)]
 )
-@pytest.mark.parametrize("runs", [12, pytest.param(60, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("runs", [6, pytest.param(60, marks=pytest.mark.slow)])
 def test_constants_that_the_motion_shows_are_found_within_their_errors(
     k_v: float, delta: float, period_s: float, seed: int, runs: int
 ) -> None:
@@ -153,7 +153,7 @@ def test_a_k_v_between_grid_points_is_not_taken_for_stribeck(noise: float) -> No
 
 def test_noise_that_hides_the_reversals_leaves_the_constants_open() -> None:
     arm = simulate(paper_robot(), seed=2)
-    for seed in range(12):
+    for seed in range(6):
         result = identified(arm, 20.0, seed)
         for shape, speed in zip(result.shapes, rms_speed(arm), strict=True):
             assert not shape.k_v_identifiable

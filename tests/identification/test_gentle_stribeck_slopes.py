@@ -17,7 +17,7 @@ def arm(request: pytest.FixtureRequest) -> SimulatedArm:
     return simulate(with_shapes(paper_robot(), 60.0, request.param), seed=3, period_s=20.0)
 
 
-@pytest.mark.parametrize("runs", [12, pytest.param(60, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("runs", [6, pytest.param(60, marks=pytest.mark.slow)])
 def test_a_gentle_slope_is_found_within_its_error(arm: SimulatedArm, runs: int) -> None:
     delta = arm.robot.joints[0].friction_shape.delta
     results = [identified(arm, 0.1 * PAPER_NOISE, run) for run in range(runs)]

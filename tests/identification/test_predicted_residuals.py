@@ -37,8 +37,9 @@ def within(values: Array) -> float:
 
 
 @pytest.mark.parametrize("kind", MOTIONS)
-def test_poor_motion_gives_no_nonsense(kind: str, tmp_path: Path) -> None:
-    robot, train, held_out = poor_arm(1, kind, tmp_path)
+@pytest.mark.parametrize("seed", [11, pytest.param(1, marks=pytest.mark.slow)], ids=["three joints", "six joints"])
+def test_poor_motion_gives_no_nonsense(seed: int, kind: str, tmp_path: Path) -> None:
+    robot, train, held_out = poor_arm(seed, kind, tmp_path)
     result = identify(robot, [train], [held_out])
     assert result.held_out is not None
     free = identify(robot, [train], [held_out], Options(prior=False)).held_out

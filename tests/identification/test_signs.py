@@ -38,8 +38,9 @@ def assert_named(robot: Robot, recordings: list[Recording], joints: tuple[int, .
     return found
 
 
-def test_each_joint_of_a_simulated_arm_and_all(tmp_path: Path) -> None:
-    robot, train, _ = poor_arm(4, "short", tmp_path)
+@pytest.mark.parametrize("seed", [11, pytest.param(4, marks=pytest.mark.slow)], ids=["three joints", "seven joints"])
+def test_each_joint_of_a_simulated_arm_and_all(seed: int, tmp_path: Path) -> None:
+    robot, train, _ = poor_arm(seed, "short", tmp_path)
     for joints in sign_sets(robot.joint_count):
         found = assert_named(robot, [train], joints)
         warnings = [each for each in document(found).warnings if each.code == "wrong-sign"]

@@ -80,7 +80,7 @@ def naive_scores(recording: Recording, result: Identification, arm: SimulatedArm
     return (result.free_parameters - true_parameters(result, arm.robot)) / naive
 
 
-@pytest.mark.parametrize("runs", [25, pytest.param(100, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("runs", [12, pytest.param(100, marks=pytest.mark.slow)])
 def test_autocorrelated_noise_widens_the_standard_errors(slow_arm: SimulatedArm, runs: int) -> None:
     recordings = []
 
@@ -96,7 +96,8 @@ def test_autocorrelated_noise_widens_the_standard_errors(slow_arm: SimulatedArm,
     assert_unbiased(results, slow_arm)
 
 
-def test_autocorrelated_noise_with_samples_missed(slow_arm: SimulatedArm) -> None:
+@pytest.mark.parametrize("runs", [12, pytest.param(40, marks=pytest.mark.slow)])
+def test_autocorrelated_noise_with_samples_missed(slow_arm: SimulatedArm, runs: int) -> None:
     """A sample in twenty: pairs of neighbours are fewer, not less alike."""
 
     def draw(rng: np.random.Generator) -> Recording:
@@ -104,11 +105,11 @@ def test_autocorrelated_noise_with_samples_missed(slow_arm: SimulatedArm) -> Non
         noise[rng.random(noise.shape) < 0.05] = np.nan
         return slow_arm.recording(noise, periods=False)
 
-    assert 0.85 <= rms(scores(runs_of(slow_arm, 40, draw), slow_arm)) <= 1.2
+    assert 0.85 <= rms(scores(runs_of(slow_arm, runs, draw), slow_arm)) <= 1.2
 
 
 @pytest.mark.parametrize("seed", [3, 4])
-@pytest.mark.parametrize("runs", [25, pytest.param(100, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("runs", [12, pytest.param(100, marks=pytest.mark.slow)])
 def test_autocorrelated_noise_in_averaged_periods(seed: int, runs: int) -> None:
     """Six periods averaged into one: of their noise the single periods tell more than the few rows of the mean."""
     arm = simulate(paper_robot(), seed=seed, periods=6)
@@ -118,11 +119,12 @@ def test_autocorrelated_noise_in_averaged_periods(seed: int, runs: int) -> None:
 
 
 @pytest.mark.parametrize("coefficient", [-0.5, 0.5])
-def test_other_colours_of_noise(slow_arm: SimulatedArm, coefficient: float) -> None:
+@pytest.mark.parametrize("runs", [12, pytest.param(30, marks=pytest.mark.slow)])
+def test_other_colours_of_noise(slow_arm: SimulatedArm, coefficient: float, runs: int) -> None:
     def draw(rng: np.random.Generator) -> Recording:
         return slow_arm.recording(autoregressive(slow_arm, PAPER_NOISE, coefficient, rng))
 
-    assert 0.85 <= rms(scores(runs_of(slow_arm, 30, draw), slow_arm)) <= 1.15
+    assert 0.85 <= rms(scores(runs_of(slow_arm, runs, draw), slow_arm)) <= 1.15
 
 
 def test_joints_of_very_different_noise(slow_arm: SimulatedArm) -> None:
@@ -177,7 +179,7 @@ def test_periods_tell_the_noise_where_the_model_is_wrong(fast_arm: SimulatedArm)
 
 
 @pytest.mark.parametrize("periods", [True, False], ids=["averaged", "one motion"])
-@pytest.mark.parametrize("runs", [12, pytest.param(80, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("runs", [6, pytest.param(80, marks=pytest.mark.slow)])
 def test_encoder_noise_neither_biases_nor_fools(fast_arm: SimulatedArm, periods: bool, runs: int) -> None:
     def draw(rng: np.random.Generator) -> Recording:
         torque, position = fast_arm.white(PAPER_NOISE, rng), fast_arm.white(2e-5, rng)
@@ -193,7 +195,7 @@ def test_encoder_noise_neither_biases_nor_fools(fast_arm: SimulatedArm, periods:
 
 
 @pytest.mark.parametrize("seed", [3, 4])
-@pytest.mark.parametrize("runs", [12, pytest.param(60, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("runs", [6, pytest.param(60, marks=pytest.mark.slow)])
 def test_encoder_noise_does_not_bias_where_torque_noise_is_small(seed: int, runs: int) -> None:
     """The band has to end where the noise of q̈ makes less torque than the torque's own noise, not less than q̈."""
     arm = simulate(paper_robot(), seed=seed, rate_hz=200.0, periods=5)

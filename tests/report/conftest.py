@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 
+from figures import leave_figures_undrawn
 from tauscope.identification import Identification, identify
 from tauscope.recording import Recording
 from tauscope.report.identification_report import identification_report
@@ -59,3 +60,9 @@ def case() -> Case:
 @pytest.fixture(scope="session")
 def page(case: Case) -> str:
     return case.page()
+
+
+@pytest.fixture
+def undrawn_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pages have empty figures: Matplotlib takes a second a page."""
+    leave_figures_undrawn(monkeypatch)

@@ -116,7 +116,7 @@ def test_the_page_is_the_same_on_every_run(
     assert diagnosis_report(found, told, PROVENANCE, planned) == page
 
 
-def test_a_sound_arm_has_a_page_too(found: Diagnosis, told: DiagnosisDocument) -> None:
+def test_a_sound_arm_has_a_page_too(found: Diagnosis, told: DiagnosisDocument, undrawn_figures: None) -> None:
     sound = told.model_copy(
         update={"findings": [], "verdict": "consistent", "parameter_shifts": [], "next_experiment": None}
     )

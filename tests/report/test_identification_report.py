@@ -109,7 +109,7 @@ def test_it_is_small_and_the_same_on_every_run(case: Case, page: str) -> None:
     assert case.page() == page
 
 
-def test_without_held_out_recordings_it_says_so(case: Case) -> None:
+def test_without_held_out_recordings_it_says_so(case: Case, undrawn_figures: None) -> None:
     alone = replace(
         case.identification,
         held_out=None,

@@ -38,23 +38,28 @@ class Events(list[dict[str, Any]]):
         return [event["state"] for event in self if event["event"] == "state"]
 
 
-def start(
-    folder: Path, *, duration_s: float = 2.0, settings: dict | None = None, **options: Any
-) -> tuple[RunProcess, Events]:
-    """A run of the double in a control process of its own."""
+def write_order(folder: Path, *, duration_s: float = 2.0, settings: dict | None = None, **options: Any) -> RunOrder:
+    """The files of a run of the double, beside its folder, and its order."""
     folder.parent.mkdir(parents=True, exist_ok=True)
     robot_file, motion_file = folder.parent / "points.yaml", folder.parent / f"{folder.name}.json"
     robot_file.write_text(ROBOT, encoding="utf-8")
     motion = short_motion(point_robot(), repeats=round(duration_s / 0.5))
     write_trajectory(motion, motion_file)
-    order = RunOrder(
+    return RunOrder(
         robot=str(robot_file),
         trajectory=str(motion_file),
         backend=BackendOrder(name="double", settings=settings or {}),
         options=options,  # type: ignore[arg-type]
     )
+
+
+def start(
+    folder: Path, *, duration_s: float = 2.0, settings: dict | None = None, **options: Any
+) -> tuple[RunProcess, Events]:
+    """A run of the double in a control process of its own."""
+    order = write_order(folder, duration_s=duration_s, settings=settings, **options)
     events = Events()
-    return RunProcess(folder, order, read_robot(robot_file), report=events, command=DOUBLE), events
+    return RunProcess(folder, order, read_robot(Path(order.robot)), report=events, command=DOUBLE), events
 
 
 def wait_for(condition: Callable[[], bool], what: str, patience_s: float = LONG_S, poll_s: float = 0.005) -> None:

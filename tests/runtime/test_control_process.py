@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from runtime.control_runs import Events, start, state_of, states, wait_for
+from runtime.control_runs import Events, start, state_of, states, wait_for, write_order
 from tauscope.recording import read_recording
 from tauscope.recording.journal_reading import read_journal
 from tauscope.runtime.record import ProcessName, read_record
@@ -223,11 +223,9 @@ def test_a_stop_while_the_process_is_still_being_loaded(tmp_path: Path) -> None:
 
 
 def test_an_order_that_cannot_be_carried_out(tmp_path: Path) -> None:
-    run, events = start(tmp_path / "run", settings={"virtual": True})
-    run.wait(60)
+    order = write_order(tmp_path / "run", settings={"virtual": True}).model_dump_json()
     for name, words in (("robot", "no such file"), ("trajectory", "no such file")):
         folder = tmp_path / name
-        order = (tmp_path / "run" / "order.json").read_text()
         wrong = order.replace({"robot": "points.yaml", "trajectory": "run.json"}[name], "missing")
         run, events = _start_order(folder, wrong)
         record = run.wait(60)

@@ -80,7 +80,7 @@ def test_a_damage_is_named_and_costs_little(damage: Damage) -> None:
     assert held_out_error(recording) < 1.2 * sound
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(damage=st.sampled_from(list(DAMAGES)), seed=st.integers(0, 2**31))
 def test_a_damage_is_named_wherever_it_is(damage: Damage, seed: int) -> None:
     codes = {warning.code for warning in read_text(damaged(damage, seed)).warnings}

@@ -14,6 +14,7 @@ import pytest
 from server.conftest import IDENTIFICATIONS, RECORDINGS
 from server.http.problem_check import assert_problem
 from server.http.serving import served
+from server.queue.waiting import wait_until
 from tauscope.errors import TauscopeError
 from tauscope.server.http import Settings, serve
 
@@ -24,17 +25,28 @@ def data_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def server(data_folder: Path) -> Iterator[httpx2.Client]:
+def server(data_folder: Path, paper_robot: bytes, paper_recordings: tuple[bytes, bytes]) -> Iterator[httpx2.Client]:
+    """A service that is ended in the middle of work, and ends without a word: that waits for the next start."""
+    files = [("robot", ("arm.yaml", paper_robot)), ("recordings", ("train.csv", paper_recordings[0]))]
     with served(data_folder) as service:
         yield service.client
+        here = service.client.post(IDENTIFICATIONS, files=files).headers["location"]
+        wait_until(lambda: service.client.get(here).json()["state"] != "queued")
     assert service.process.returncode in (0, -signal.SIGTERM)
 
 
 def ended(server: httpx2.Client, here: str) -> dict[str, Any]:
-    """The state of an identification that has ended; the test's time limit is the only one."""
-    while (status := server.get(here).json())["state"] in ("queued", "running"):
-        assert status["links"]["result"] is None
-    return status
+    """The state of an identification that has ended."""
+
+    def has_ended() -> bool:
+        status = server.get(here).json()
+        if status["state"] in ("queued", "running"):
+            assert status["links"]["result"] is None
+            return False
+        return True
+
+    wait_until(has_ended)
+    return server.get(here).json()
 
 
 def test_all_the_way(server: httpx2.Client, paper_robot: bytes, paper_recordings: tuple[bytes, bytes]) -> None:
@@ -56,18 +68,6 @@ def test_all_the_way(server: httpx2.Client, paper_robot: bytes, paper_recordings
     assert [entry["stiction"] for entry in result["friction"]] == pytest.approx([2, 1, 2], abs=0.5)
     for link in status["links"]["exports"].values():
         assert server.get(link).status_code == 200
-
-
-def test_a_service_that_is_ended_in_the_middle_of_work_ends_without_a_word(
-    tmp_path: Path, paper_robot: bytes, paper_recordings: tuple[bytes, bytes]
-) -> None:
-    """Nothing unforeseen has happened: what is not done waits for the next start."""
-    files = [("robot", ("arm.yaml", paper_robot)), ("recordings", ("train.csv", paper_recordings[0]))]
-    with served(tmp_path) as service:
-        here = service.client.post(IDENTIFICATIONS, files=files).headers["location"]
-        while service.client.get(here).json()["state"] == "queued":
-            pass
-    assert service.process.returncode in (0, -signal.SIGTERM)
 
 
 def test_a_broken_recording(server: httpx2.Client, paper_robot: bytes) -> None:

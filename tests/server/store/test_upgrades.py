@@ -23,19 +23,26 @@ from sqlalchemy import event
 from tauscope.server.store.database.database import open_engine
 from tauscope.server.store.database.database import upgrade
 
-address, last = sys.argv[1], int(sys.argv[2])
-engine = open_engine(address if "://" in address else Path(address))
-count = 0
+def upgrade_until(address, last):
+    engine = open_engine(address if "://" in address else Path(address))
+    count = 0
 
-@event.listens_for(engine, "after_cursor_execute")
-def die(_connection, _cursor, statement, *_):
-    global count
-    count += statement.lstrip().split()[0].upper() in ("CREATE", "INSERT", "UPDATE", "DELETE", "ALTER", "DROP")
-    if count == last:
-        os.kill(os.getpid(), signal.SIGKILL)
+    @event.listens_for(engine, "after_cursor_execute")
+    def die(_connection, _cursor, statement, *_):
+        nonlocal count
+        count += statement.lstrip().split()[0].upper() in ("CREATE", "INSERT", "UPDATE", "DELETE", "ALTER", "DROP")
+        if count == last:
+            os.kill(os.getpid(), signal.SIGKILL)
 
-upgrade(engine)
-print(count)
+    upgrade(engine)
+    print("statements", count, flush=True)
+
+for line in sys.stdin:  # a process of its own each time, but the modules are loaded once
+    child = os.fork()
+    if child == 0:
+        upgrade_until(sys.argv[1], int(line))
+        os._exit(0)
+    print("ended", os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
 """
 
 
@@ -122,15 +129,21 @@ def test_a_program_that_is_killed_in_the_middle_leaves_the_form_of_before(
     address: Path | str, old: dict[str, list[dict[str, Any]]]
 ) -> None:
     """After each statement in turn, until there is none left; what is left open is taken back by the database."""
-    number = 0
-    while True:
-        number += 1
-        words = [sys.executable, "-c", KILLED_AT_STATEMENT, str(address), str(number)]
-        done = subprocess.run(words, check=False, capture_output=True, text=True, cwd=REPOSITORY)
-        if done.returncode != -signal.SIGKILL:
-            break
-        engine = open_engine(address)
-        assert rows_of(engine) == old, f"after statement {number}"
-        engine.dispose()
-    assert (done.returncode, int(done.stdout)) == (0, number - 1), done.stderr
+    words = [sys.executable, "-c", KILLED_AT_STATEMENT, str(address)]
+    with subprocess.Popen(
+        words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1, cwd=REPOSITORY
+    ) as upgrades:
+        assert upgrades.stdin is not None
+        assert upgrades.stdout is not None
+        number = 1
+        upgrades.stdin.write("1\n")
+        while (told := upgrades.stdout.readline()) == f"ended {-signal.SIGKILL}\n":
+            engine = open_engine(address)
+            assert rows_of(engine) == old, f"after statement {number}"
+            engine.dispose()
+            number += 1
+            upgrades.stdin.write(f"{number}\n")
+        assert told == f"statements {number - 1}\n"
+        assert upgrades.stdout.readline() == "ended 0\n"
+        upgrades.stdin.close()
     kept(address, old)

@@ -1,6 +1,7 @@
 """Frames and their bodies: what goes in comes out, and nothing else is ever accepted."""
 
 import json
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -91,12 +92,8 @@ _KEYS = ["mode", "limits", "stop_policy", "watchdog_s", "policy", "kind", "joint
 _DOCUMENTS = st.dictionaries(st.sampled_from(_KEYS), _JSON).map(lambda document: json.dumps(document).encode())
 
 
-@pytest.mark.parametrize("decode", DECODERS)
-@given(
-    body=st.binary(max_size=200) | st.dictionaries(st.sampled_from(_KEYS), _JSON).map(lambda d: json.dumps(d).encode())
-)
-def test_any_body_is_understood_or_refused(decode, body: bytes) -> None:
-    try:
-        decode(body)
-    except m.BadMessageError:
-        return
+@given(st.binary(max_size=200) | _DOCUMENTS)
+def test_any_body_is_understood_or_refused(body: bytes) -> None:
+    for decode in DECODERS:
+        with suppress(m.BadMessageError):
+            decode(body)

@@ -117,7 +117,7 @@ def row_at(recording: Recording, time_s: float, rows: tuple[int, int]) -> int:
     rows : (int, int)
         first and one-past-last row to look at
     """
-    found = bisect_left(range(*rows), time_s, key=lambda row: float(recording.samples(row, row + 1).time[0]))
+    found = bisect_left(range(*rows), time_s, key=lambda row: float(recording.table.rows(row, row + 1)[0, 0]))
     return rows[0] + found
 
 

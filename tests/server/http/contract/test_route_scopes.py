@@ -3,6 +3,7 @@
 import json
 import re
 from collections.abc import Iterator
+from functools import cache
 from typing import Any
 
 import pytest
@@ -68,6 +69,7 @@ UNDOCUMENTED: set[str] = {
 """Routes for people and programs of other kinds; nothing but reading."""
 
 
+@cache
 def documented_paths() -> dict[str, Any]:
     return json.loads(COMMITTED.read_text(encoding="utf-8"))["paths"]
 

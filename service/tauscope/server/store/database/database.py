@@ -3,6 +3,7 @@
 import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -101,7 +102,8 @@ def upgrade(engine: Engine, target: str = "head") -> None:
         if present is not None and present not in revisions():
             hint = "use the Tauscope that wrote it, or restore a backup of before"
             raise StoreError(f"{shown_address(engine)}: was written by a newer Tauscope (form {present}); {hint}")
-        command.upgrade(_configuration(connection), target)
+        if present != (revisions()[-1] if target == "head" else target):
+            command.upgrade(_configuration(connection), target)
 
 
 def present_revision(connection: Connection) -> str | None:
@@ -109,10 +111,11 @@ def present_revision(connection: Connection) -> str | None:
     return MigrationContext.configure(connection).get_current_revision()
 
 
-def revisions() -> list[str]:
+@cache
+def revisions() -> tuple[str, ...]:
     """All forms that this program knows, the oldest first."""
     scripts = ScriptDirectory.from_config(_configuration(None))
-    return [script.revision for script in scripts.walk_revisions()][::-1]
+    return tuple(script.revision for script in scripts.walk_revisions())[::-1]
 
 
 def _configuration(connection: Connection | None) -> Config:
