@@ -45,7 +45,7 @@ def with_torque(rows: MotionRows, law: Law, noise: Array) -> MotionRows:
 
 
 def recordings(
-    law: Law, noise_std: float, seed: int, count: int = 3, duration_s: float = 40.0
+    law: Law, noise_std: float, seed: int, count: int = 2, duration_s: float = 40.0
 ) -> tuple[list[MotionRows], list[MotionRows]]:
     """Training recordings, and one that is held out."""
     rng = np.random.default_rng(seed)

@@ -13,16 +13,16 @@ from diagnosis.held_out_residual import squares
 from diagnosis.test_diagnosis_of_simulated_arms import spring
 from identification.simulated import PAPER_NOISE, paper_robot
 from tauscope.cli.diagnose_summary import show_diagnosis
-from tauscope.diagnosis import Diagnosis, DiagnosisDocument, Verdict, diagnose, document
+from tauscope.diagnosis import Diagnosis, DiagnosisDocument, Verdict, document
 from tauscope.diagnosis.documents.result import HeadroomEntry
 from tauscope.errors import IdentificationError
-from tauscope.headroom import measure_headroom
 from tauscope.headroom.diagnosed_rows import leaves_open, motion_rows
 from tauscope.headroom.entries import headroom_entry
 from tauscope.headroom.floor import NoiseFloor, noise_above_band, noise_between_periods, noise_floors
 from tauscope.headroom.joint_headroom import JointHeadroom
 from tauscope.report.diagnosis_report import diagnosis_report
 from tauscope.report.provenance import Provenance
+from tauscope.results import DiagnosisResult
 
 FOUND = JointHeadroom(plain=0.5, explained=0.4, black_box=0.375, share=0.12, share_std=0.02, blocks=20)
 FLOOR = NoiseFloor(0.3, "repetitions")
@@ -30,15 +30,21 @@ SAID = "A black box still predicts 12 % of joint2's held-out residual: something
 
 
 @pytest.fixture(scope="module")
-def found() -> Diagnosis:
+def result() -> DiagnosisResult:
     """The paper's arm with a spring at its first joint, one motion held out."""
     train, held_out = recordings((1, 2), spring, np.random.default_rng(5))
-    return diagnose(paper_robot(), [train], [held_out])
+    return tauscope.diagnose(paper_robot(), train, held_out, headroom=True)
 
 
 @pytest.fixture(scope="module")
-def entries(found: Diagnosis) -> list[HeadroomEntry]:
-    return measure_headroom(found)
+def found(result: DiagnosisResult) -> Diagnosis:
+    return result.diagnosis
+
+
+@pytest.fixture(scope="module")
+def entries(result: DiagnosisResult) -> list[HeadroomEntry]:
+    assert result.headroom is not None
+    return result.headroom
 
 
 def test_residuals_are_those_of_the_diagnosis_in_its_band(found: Diagnosis, entries: list[HeadroomEntry]) -> None:
@@ -105,9 +111,10 @@ def test_a_verdict_is_refuted_by_a_significant_share_alone(
     assert (entry.refuted, entry.statement) == (refuted, words)
 
 
-def test_the_document_holds_it_where_it_was_asked_for(found: Diagnosis, entries: list[HeadroomEntry]) -> None:
-    told = document(found, headroom=entries)
+def test_the_document_holds_it_where_it_was_asked_for(found: Diagnosis, result: DiagnosisResult) -> None:
+    told = result.document
     assert DiagnosisDocument.model_validate_json(told.model_dump_json(by_alias=True)) == told
+    assert {"joint", "plain", "explained", "black_box", "floor", "floor_kind"} < result.to_dict()["headroom"][0].keys()
     assert document(found).headroom is None
     few = headroom_entry("joint2", replace(FOUND, black_box=np.nan, share=np.nan), FLOOR, is_open=False)
     assert (few.black_box, few.share) == (None, None)

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from headroom.black_box_rows import Law, motion, recordings, with_torque
+from tauscope.headroom import joint_headroom as joint_headroom_module
 from tauscope.headroom import learners
-from tauscope.headroom.choice import FOLDS, choose_black_box, fold_numbers
+from tauscope.headroom.choice import FOLDS, Choice, choose_black_box, fold_numbers
 from tauscope.headroom.entries import REFUTES_FROM
-from tauscope.headroom.joint_headroom import MOST_ROWS, compare_residuals, joint_headroom
+from tauscope.headroom.joint_headroom import compare_residuals, joint_headroom
 from tauscope.headroom.learners import LEARNERS, Learner
-from tauscope.headroom.motion_rows import MotionRows, joint_inputs, travel_since_reversal
+from tauscope.headroom.motion_rows import Inputs, MotionRows, joint_inputs, travel_since_reversal
 from tauscope.recording.recording import Array
 
 NOISE = 0.1
@@ -49,7 +50,8 @@ def test_a_hidden_law_is_predicted_near_its_true_share(law: Law) -> None:
 
 
 def test_noise_is_never_predicted(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(learners, "TREES", (10, 20, 40))  # more find no more in noise, and take their time
+    monkeypatch.setattr(learners, "TREES", (5, 20))  # larger ones take longer, and find no more in noise
+    monkeypatch.setattr(learners, "LANDMARKS", 60)
     for seed in range(50):
         training, held_out = recordings(nothing, NOISE, seed, count=1, duration_s=12.0)
         found = joint_headroom(training, held_out, 0)
@@ -125,12 +127,22 @@ def test_too_few_rows_teach_nothing() -> None:
     assert not found.is_significant
 
 
-def test_many_rows_are_thinned() -> None:
-    rows = [motion(1, 0, duration_s=400.0), motion(2, 1, duration_s=400.0)]
-    assert sum(len(each.time) for each in rows) > 2 * MOST_ROWS
-    made = [with_torque(each, spring, np.zeros(len(each.time))) for each in rows]
-    found = joint_headroom(made, made, 0)
-    assert found.share > 0.99
+def test_many_rows_are_thinned_evenly(monkeypatch: pytest.MonkeyPatch) -> None:
+    training, held_out = recordings(spring, 0.0, seed=8)
+    seen: list[Array] = []
+
+    def choose(inputs: Inputs, *_: object) -> Choice:
+        seen.append(inputs.columns[:, 0])
+        return Choice(1.0)
+
+    monkeypatch.setattr(joint_headroom_module, "MOST_ROWS", 240)
+    monkeypatch.setattr(joint_headroom_module, "choose_black_box", choose)
+    joint_headroom(training, held_out, 0)
+    every = np.concatenate([each.position[0] for each in training])
+    places = np.flatnonzero(np.isin(every, seen[0]))
+    assert len(places) == 240
+    assert set(np.diff(places)) == {10, 11}
+    assert (places[0], places[-1]) == (0, len(every) - 1)
 
 
 def test_folds_are_parts_of_the_motion_and_recordings() -> None:

@@ -82,7 +82,13 @@ def joint_inputs(motion: MotionRows, joint: int) -> Inputs:
 
 
 def shifted(values: Array, step: int) -> Array:
-    """Signals (n, M) some rows later, the row at the end repeated."""
+    """Signals some rows later, the row at the end repeated, (n, M).
+
+    Parameters
+    ----------
+    values : (n, M) float64
+        evenly spaced rows
+    """
     places = np.clip(np.arange(values.shape[-1]) + step, 0, values.shape[-1] - 1)
     return values[..., places]
 
