@@ -5,7 +5,6 @@ from threadpoolctl import threadpool_limits
 
 from tauscope.diagnosis import Diagnosis
 from tauscope.diagnosis.documents.result import HeadroomEntry
-from tauscope.effects.computation import side_by_side
 from tauscope.errors import IdentificationError
 from tauscope.extras import require_extra
 from tauscope.headroom.diagnosed_rows import leaves_open, motion_rows
@@ -49,13 +48,9 @@ def measure_headroom(diagnosis: Diagnosis) -> list[HeadroomEntry]:
     """
     training, held_out = motion_rows(diagnosis)
     require_black_box(len(held_out))
-
-    def measure(joint: int) -> JointHeadroom:
-        with threadpool_limits(1, user_api="openmp"):  # of this thread: joints are measured side by side
-            return joint_headroom(training, held_out, joint)
-
-    with threadpool_limits(1, user_api="blas"):
-        found = side_by_side(measure, range(diagnosis.robot.joint_count))
+    # One after another: scikit-learn's own use of warnings.catch_warnings allows no two threads.
+    with threadpool_limits(1):  # many small fits: threads of its own cost more than they bring
+        found = [joint_headroom(training, held_out, joint) for joint in range(diagnosis.robot.joint_count)]
     floors = noise_floors(diagnosis, [*training, *held_out])
     told = zip(diagnosis.robot.joints, found, floors, leaves_open(diagnosis), strict=True)
     return [headroom_entry(joint.name, own, floor, is_open=is_open) for joint, own, floor, is_open in told]

@@ -12,7 +12,7 @@ from tauscope.headroom.learners import LEARNERS
 from tauscope.headroom.motion_rows import Inputs, MotionRows, joint_inputs
 from tauscope.recording.recording import Array
 
-MOST_ROWS = 8000
+MOST_ROWS = 6000
 """Training rows of one joint that a black box learns from: evenly thinned beyond, to bound its time."""
 
 FEWEST_ROWS = 100
