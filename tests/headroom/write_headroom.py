@@ -14,6 +14,10 @@ import numpy as np
 TESTS = Path(__file__).parents[1]
 PAGE = TESTS.parent / "docs" / "reference" / "headroom.md"
 
+TITLE = """| recordings | verdict | joint | plain | explained | black box | floor | still predicted | refuted |
+|---|---|---|---|---|---|---|---|---|
+"""
+
 
 def main() -> None:
     """Diagnose every folder, train black boxes, and write the page."""
@@ -21,10 +25,8 @@ def main() -> None:
 
     places = [each for root in (SHARED_DATA, SHARED_CASES / "arms") for each in sorted(root.iterdir())]
     rows = [row for folder in places if any(folder.glob("train-*.csv")) for row in _rows(folder)]
-    head, table, _ = PAGE.read_text(encoding="utf-8").partition("| recordings | ")
-    rule = "|---|---|---|---|---|---|---|---|---|\n"
-    title = "recordings | verdict | joint | plain | explained | black box | floor | still predicted | refuted |\n"
-    PAGE.write_text(head + table + title + rule + "".join(rows), encoding="utf-8")
+    head, _, _ = PAGE.read_text(encoding="utf-8").partition(TITLE[:15])
+    PAGE.write_text(head + TITLE + "".join(rows), encoding="utf-8")
 
 
 def _rows(folder: Path) -> Iterator[str]:
