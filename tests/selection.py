@@ -33,6 +33,7 @@ NEEDED: dict[str, tuple[str, ...]] = {
     "service/tauscope/identification/": ("tests/identification", "tests/diagnosis", *QUICK_PROOF),
     "service/tauscope/effects/": ("tests/effects", "tests/diagnosis", *QUICK_PROOF),
     "service/tauscope/diagnosis/": ("tests/effects", "tests/diagnosis", "tests/report", *QUICK_PROOF),
+    "service/tauscope/headroom/": ("tests/headroom",),
     "service/tauscope/export/": ("tests/identification", "tests/diagnosis/test_extended_model.py"),
     "service/tauscope/report/": ("tests/report", "tests/browser/test_report_on_paper.py"),
     "service/tauscope/library.py": ("tests/library", "tests/examples"),

@@ -25,6 +25,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
     "fleet": ("distributed",),
     "parquet": ("pyarrow",),
     "pandas": ("pandas",),
+    "headroom": ("sklearn",),
 }
 """Top-level modules of each extra in pyproject.toml."""
 

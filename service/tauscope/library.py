@@ -108,6 +108,7 @@ def diagnose(
     *,
     against: Literal["identified", "model"] | Recordings = "identified",
     cutoff_hz: float | Literal["auto"] | None = "auto",
+    headroom: bool = False,
     progress: Callable[[str], None] = _ignore,
 ) -> "DiagnosisResult":
     """Say which physics an arm's model leaves out.
@@ -119,6 +120,8 @@ def diagnose(
         (``.json``), or recordings made in a simulator
     cutoff_hz : float, "auto" or None
         band of the identification [Hz]; None filters nothing
+    headroom : bool
+        whether a black box says how much of held-out motion is still predictable
 
     Raises
     ------
@@ -135,14 +138,19 @@ def diagnose(
     is_saved = isinstance(against, str | Path) and Path(against).suffix.lower() == ".json"
     saved = read_model(Path(str(against)), arm) if is_saved else None
     simulated = () if is_saved or against in ("identified", "model") else _recordings(against, arm)
-    found = diagnosis.diagnose(arm, _recordings(recordings, arm), _recordings(held_out, arm), options, progress)
+    train, judge = _recordings(recordings, arm), _recordings(held_out, arm)
+    if headroom:
+        from tauscope.headroom import measure_headroom, require_black_box
+
+        require_black_box(len(judge))
+    found = diagnosis.diagnose(arm, train, judge, options, progress)
     if saved is not None:
         found = diagnosis.against_saved(found, saved)
     elif simulated:
         found = diagnosis.against_simulation(found, simulated, options)
     elif against == "model":
         found = diagnosis.against_model(found)
-    return DiagnosisResult(found, planned_experiment(found, progress))
+    return DiagnosisResult(found, planned_experiment(found, progress), measure_headroom(found) if headroom else None)
 
 
 def design_excitation(

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from tauscope.diagnosis import Diagnosis, DiagnosisDocument
+    from tauscope.diagnosis.documents.result import HeadroomEntry
     from tauscope.diagnosis.next_experiment import PlannedExperiment
     from tauscope.excitation import ExcitationDesign
     from tauscope.identification import Identification, IdentificationDocument
@@ -72,13 +73,14 @@ class DiagnosisResult:
 
     diagnosis: "Diagnosis"
     planned: "PlannedExperiment | None"
+    headroom: "list[HeadroomEntry] | None" = None
 
     @cached_property
     def document(self) -> "DiagnosisDocument":
         """The result, typed."""
         from tauscope.diagnosis import document
 
-        return document(self.diagnosis, self.planned)
+        return document(self.diagnosis, self.planned, headroom=self.headroom)
 
     def to_dict(self) -> dict[str, Any]:
         """Schema ``tauscope.diagnosis/1``."""

@@ -72,7 +72,7 @@ def written_once(files: list[str], tmp_path_factory: pytest.TempPathFactory) -> 
     monkeypatch.setattr("tauscope.tasks.diagnose.diagnose", lambda *of: found.append(diagnose(*of)) or found[0])
     status, shown = run(
         files[0],
-        *("--held-out", files[1], "--json", str(out["out.json"])),
+        *("--held-out", files[1], "--headroom", "--json", str(out["out.json"])),
         *("--model", str(out["model.json"]), "--export", str(out["code.py"]), "--export", str(out["code.h"])),
         *("--scenario", str(out["scenario.yaml"]), "--improved-robot", str(out["robot.yaml"])),
         *("--next-trajectory", str(out["next.json"]), "--report", str(out["page.html"])),
@@ -87,6 +87,7 @@ def test_the_document_is_written(written_once: Written) -> None:
     found = DiagnosisDocument.model_validate_json(text)
     assert [(finding.effect, finding.joint) for finding in found.findings] == [("joint_spring", "joint1")]
     assert json.loads(text)["schema"] == "tauscope.diagnosis/1"
+    assert [each.joint for each in found.headroom or ()] == ["joint1", "joint2", "joint3"]
 
 
 def test_a_terminal_shows_verdict_and_statement(files: list[str]) -> None:
@@ -107,6 +108,7 @@ def test_everything_that_can_be_written_is_written_and_read_again(written_once: 
     page = out["page.html"].read_text()
     assert page.count("<figure") == 2 + 1 + 3 + 1  # maps before and after, shifts, proof by joint, the next motion
     assert "tauscope diagnose" in page
+    assert " --headroom" in page
     assert "explained" in page
     assert "http://" not in page.replace("http://www.w3.org", "")
     compile(out["code.py"].read_text(), "code.py", "exec")

@@ -22,7 +22,7 @@ PACKAGES = {
     "tauscope_sim": REPOSITORY / "sim_backend/tauscope_sim",
 }
 ABSENT = [module for modules in EXTRAS.values() for module in modules]
-FOREIGN = ["tauscope.server", "tauscope.runtime", "tauscope_drivers", "tauscope_sim"]
+FOREIGN = ["tauscope.server", "tauscope.runtime", "tauscope.headroom", "tauscope_drivers", "tauscope_sim"]
 
 CHILD = """
 import contextlib, io, json, sys
@@ -98,7 +98,9 @@ def test_the_core_answers_without_extras_and_without_posix(core: tuple[Path, lis
         assert (folder / name).stat().st_size > 0
 
 
-def test_core_verbs_load_nothing_of_server_hardware_and_simulator(core: tuple[Path, list[Any], list[str]]) -> None:
+def test_core_verbs_load_nothing_of_server_hardware_simulator_and_black_box(
+    core: tuple[Path, list[Any], list[str]],
+) -> None:
     loaded = [name for name in core[2] if name.startswith(tuple(FOREIGN))]
     assert not loaded
 
@@ -109,6 +111,7 @@ def test_a_missing_extra_is_one_line(arm: SimulatedFiles) -> None:
         "store": (["store", "check"], "service"),
         "key": (["key", "list"], "service"),
         "doctor": (["doctor", "--backend", "dynamixel"], "hardware"),
+        "diagnose --headroom": (["diagnose", str(arm.robot), str(arm.train[0]), "--headroom"], "headroom"),
     }
     ended, _ = run_without(ABSENT, [words for words, _ in wanted.values()], arm.robot.parent)
     for (verb, (_, extra)), (status, err) in zip(wanted.items(), ended, strict=True):

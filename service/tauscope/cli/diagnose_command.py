@@ -47,6 +47,9 @@ def diagnose(
     units: Units = None,
     rate: Rate = None,
     trust_units: TrustUnits = False,
+    headroom: Annotated[
+        bool, typer.Option("--headroom", help="Train a black box, and say what it still predicts of held-out motion.")
+    ] = False,
     json: Annotated[Path | None, _output("Write the result as JSON; - is standard output.")] = None,
     report: Annotated[Path | None, _output("Write a page with verdict, findings and residuals.", "OUT.html")] = None,
     next_trajectory: Annotated[
@@ -89,6 +92,7 @@ def diagnose(
         against=what,
         cutoff_hz=cutoff_hz,
         next_trajectory=next_trajectory is not None,
+        headroom=headroom,
         units=unit_of,
         rate_hz=rate,
         trust_units=trust_units,

@@ -4,8 +4,8 @@ from rich.console import Console
 
 from tauscope.cli.terminal import plain, table
 from tauscope.diagnosis import DiagnosisDocument
-from tauscope.report.diagnosis_tables import difference_table, residual_table, shift_table
-from tauscope.report.diagnosis_words import VERDICTS
+from tauscope.report.diagnosis_tables import difference_table, headroom_table, residual_table, shift_table
+from tauscope.report.diagnosis_words import VERDICTS, refutations
 from tauscope.report.quantities import significant
 from tauscope.report.table import Table
 
@@ -22,6 +22,11 @@ def show_diagnosis(console: Console, document: DiagnosisDocument) -> None:
         console.print()
     console.print(table("Mismatch with the nominal model", _mismatch(document)))
     console.print(table("Residual at the recorded rate [Nm or N]", residual_table(document)))
+    if document.headroom is not None:
+        title = f"Headroom: held-out residual below {significant(document.cutoff_hz, 3)} Hz [Nm or N]"
+        console.print(table(title, headroom_table(document)))
+        for sentence in refutations(document):
+            console.print(plain(f"* {sentence}"), soft_wrap=True)
     if document.parameter_differences:
         console.print(table("What the simulation has wrong", difference_table(document)))
     if document.parameter_shifts:

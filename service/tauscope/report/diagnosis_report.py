@@ -12,6 +12,7 @@ from tauscope.report.csv_text import csv_text
 from tauscope.report.diagnosis_tables import (
     detectable_table,
     difference_table,
+    headroom_table,
     located_table,
     residual_table,
     shift_table,
@@ -53,6 +54,7 @@ def diagnosis_report(
         _what(document),
         _how_much(document),
         _proof(plots, document, units),
+        *_headroom(document),
         _next(document, planned),
         _detectable(document),
         _reproduce(provenance),
@@ -181,6 +183,19 @@ def _proof(plots: DiagnosisPlots, document: DiagnosisDocument, units: list[str])
     motion = "on held-out motion, from which neither model was made" if held_out else "on the model's own motion"
     band = f"Torque below {significant(document.cutoff_hz, 3)} Hz {motion}."
     return Section("proof", "The proof", parts, [band])
+
+
+def _headroom(document: DiagnosisDocument) -> Iterator[Section]:
+    """What a black box still predicts; nothing where it was not asked for."""
+    if document.headroom is None:
+        return
+    sentence = (
+        "A black box learned from the training recordings what the findings leave there. The table shows the rms of the"
+        f" held-out residual below {significant(document.cutoff_hz, 3)} Hz, and the part of its energy that the black"
+        " box predicts."
+    )
+    statements = [entry.statement for entry in document.headroom]
+    yield Section("headroom", "Headroom", [Part(table=headroom_table(document))], [sentence, *statements])
 
 
 def _next(document: DiagnosisDocument, planned: PlannedExperiment | None) -> Section:

@@ -71,3 +71,19 @@ def shift_table(document: DiagnosisDocument) -> Table:
         for e in document.parameter_shifts[:MOST_SHIFTS]
     ]
     return Table(("parameter", "before", "after", "standard errors"), rows, words=1)
+
+
+def headroom_table(document: DiagnosisDocument) -> Table:
+    """What a black box still predicts of held-out motion; no row where it was not asked for."""
+    rows = [
+        (
+            entry.joint,
+            *(significant(value, 3) for value in (entry.plain, entry.explained, entry.black_box, entry.floor)),
+            entry.floor_kind.replace("_", " "),
+            " ± ".join(f"{100.0 * value:.0f}" for value in (entry.share, entry.share_std) if value is not None),
+            "yes" if entry.refuted else "no",
+        )
+        for entry in document.headroom or ()
+    ]
+    columns = ("joint", "plain", "explained", "black box", "floor", "floor from", "predicted [%]", "refuted")
+    return Table(columns, rows, words=1)

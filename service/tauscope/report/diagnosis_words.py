@@ -87,9 +87,15 @@ def summary_sentences(document: DiagnosisDocument) -> Iterator[str]:
         yield "No effect is named. The last table says what size each would have needed to show in these recordings."
 
 
+def refutations(document: DiagnosisDocument) -> Iterator[str]:
+    """Joints at which a black box predicts what the verdict calls noise."""
+    yield from (entry.statement for entry in document.headroom or () if entry.refuted)
+
+
 def cautions(document: DiagnosisDocument) -> Iterator[str]:
     """What a reader has to know before acting on it."""
     yield from (f"{each.sentence}." for each in document.warnings)
+    yield from refutations(document)
     if document.fit.held_out is None:
         yield "No recording was held out: nothing here was tested on motion that the model has not seen."
     for finding in document.findings:

@@ -61,6 +61,11 @@ class DiagnosisOptions(ReadingOptions):
     next_trajectory: bool = Field(
         default=False, description="whether the next motion is planned also where nothing is open"
     )
+    headroom: bool = Field(
+        default=False,
+        description="whether a black box says how much of held-out motion is still predictable; needs the headroom"
+        " extra and held-out recordings",
+    )
 
 
 class Request(StrictModel):
@@ -89,6 +94,7 @@ class Request(StrictModel):
             held_out=self.held_out,
             against=compared or (self.options.against,),
             cutoff=self.options.cutoff_hz,
+            **({"headroom": True} if self.options.headroom else {}),
             **self.options.words,
         )
 
@@ -166,6 +172,10 @@ def perform(request: Request, files: Files, progress: Progress) -> Result:
     """
     if request.options.against == "saved" and request.model is None:
         raise IdentificationError("against saved: no model was given; give one, or compare with something else")
+    if request.options.headroom:
+        from tauscope.headroom import require_black_box
+
+        require_black_box(len(request.held_out))
     progress("read robot and recordings")
     robot = read_robot(files.find("robot", request.robot))
     saved = None if request.model is None else read_model(files.find("model", request.model), robot)
@@ -189,6 +199,13 @@ def perform(request: Request, files: Files, progress: Progress) -> Result:
     except ExcitationError as error:
         progress(f"no next experiment: {error}")
         refusal = error
+    headroom = None
+    if request.options.headroom:
+        from tauscope.headroom import measure_headroom
+
+        progress("train a black box")
+        headroom = measure_headroom(found)
     target = files.target("trajectory.json") or files.target("trajectory.csv")
     name = None if planned is None or target is None else str(target)
-    return Result(request, files, recordings, held_out, found, document(found, planned, name), planned, refusal)
+    told = document(found, planned, name, headroom)
+    return Result(request, files, recordings, held_out, found, told, planned, refusal)

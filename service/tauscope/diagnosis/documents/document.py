@@ -12,6 +12,7 @@ from tauscope.diagnosis.documents.result import (
     FindingEntry,
     FitChangeEntry,
     FitChangesEntry,
+    HeadroomEntry,
     MismatchEntry,
     MovedEntry,
     NextExperimentEntry,
@@ -41,7 +42,10 @@ UNKNOWN = "unknown"
 
 
 def document(
-    diagnosis: Diagnosis, planned: PlannedExperiment | None = None, trajectory: str | None = None
+    diagnosis: Diagnosis,
+    planned: PlannedExperiment | None = None,
+    trajectory: str | None = None,
+    headroom: list[HeadroomEntry] | None = None,
 ) -> DiagnosisDocument:
     """The document of a diagnosis."""
     names = [joint.name for joint in diagnosis.robot.joints]
@@ -65,6 +69,7 @@ def document(
         parameter_differences=_differences(diagnosis),
         parameter_shifts=_shifts(diagnosis),
         next_experiment=_next_experiment(diagnosis, names, planned, trajectory),
+        headroom=headroom,
     )
 
 

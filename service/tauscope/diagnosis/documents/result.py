@@ -123,6 +123,31 @@ class NextExperimentEntry(ResultModel):
     why: str = Field(description="the motion in words, and what it decides")
 
 
+class HeadroomEntry(ResultModel):
+    """What a black box predicts of one joint's held-out residual, in the band of the comparison."""
+
+    joint: str = Field(description="name of the joint")
+    plain: float = Field(description="held-out rms that the nominal model leaves [Nm or N]")
+    explained: float = Field(description="that the model with all findings leaves [Nm or N]")
+    black_box: float | None = Field(
+        description="that a black box leaves, which learned from the training recordings what the findings leave there;"
+        " null where they are too few [Nm or N]"
+    )
+    floor: float | None = Field(description="rms of the noise; null where nothing tells it [Nm or N]")
+    floor_kind: Literal["repetitions", "high_frequency", "none"] = Field(
+        description="how the noise is known: by what repetitions of a motion differ, or by its density above the band"
+    )
+    share: float | None = Field(
+        description="part of the explained model's held-out residual energy that the black box predicts;"
+        " negative where it predicts worse"
+    )
+    share_std: float | None = Field(description="its standard error, over blocks of held-out motion")
+    refuted: bool = Field(
+        description="whether that is over 5 % and more than two standard errors, where the verdict says noise"
+    )
+    statement: str = Field(description="the same in one sentence")
+
+
 class DiagnosisDocument(ResultModel):
     """Result of a diagnosis, schema tauscope.diagnosis/1."""
 
@@ -149,3 +174,6 @@ class DiagnosisDocument(ResultModel):
     parameter_differences: list[DifferenceEntry] = Field(description="what the simulation has wrong")
     parameter_shifts: list[ShiftEntry] = Field(description="what the left-out effects had been doing to the parameters")
     next_experiment: NextExperimentEntry | None = Field(description="what would decide what is open")
+    headroom: list[HeadroomEntry] | None = Field(
+        default=None, description="one a joint: what a black box still predicts; null where it was not asked for"
+    )

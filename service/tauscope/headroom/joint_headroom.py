@@ -1,0 +1,127 @@
+"""What a black box predicts of one joint's held-out residual, and whether that is more than chance."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from tauscope.headroom.choice import choose_black_box, fold_numbers
+from tauscope.headroom.learners import LEARNERS
+from tauscope.headroom.motion_rows import Inputs, MotionRows, joint_inputs
+from tauscope.recording.recording import Array
+
+MOST_ROWS = 6000
+"""Training rows of one joint that a black box learns from: evenly thinned beyond, to bound its time."""
+
+FEWEST_ROWS = 100
+"""Training rows below which nothing is learned: five leaves of a tree."""
+
+BLOCK_S = 1.0
+"""Shortest block of held-out motion whose gains count as independent [s]."""
+
+MOST_BLOCKS = 20
+"""Blocks of all held-out motion: longer ones where there is more of it, so that slow errors stay within one."""
+
+STANDARD_ERRORS = 2.0
+"""Standard errors that a gain exceeds chance by, of normal blocks in any number."""
+
+
+@dataclass(frozen=True)
+class JointHeadroom:
+    """Rms of a joint's held-out residual [Nm or N], and what the black box predicts of it; NaN without a black box.
+
+    share, share_std : float
+        part of the explained model's residual energy that the black box predicts, and its standard error over blocks;
+        negative where it predicts worse
+    """
+
+    plain: float
+    explained: float
+    black_box: float
+    share: float
+    share_std: float
+    blocks: int
+
+    @property
+    def is_significant(self) -> bool:
+        """Whether the black box predicts more than by chance: Student's t of so many blocks, at the level of 2 σ."""
+        if self.blocks < 2:
+            return False
+        return bool(self.share > stats.t.isf(stats.norm.sf(STANDARD_ERRORS), self.blocks - 1) * self.share_std)
+
+
+def joint_headroom(training: Sequence[MotionRows], held_out: Sequence[MotionRows], joint: int) -> JointHeadroom:
+    """Train black boxes on the training motion, and judge the chosen one once on held-out motion.
+
+    They start from the model with all findings: from the nominal model they would have to learn those again.
+
+    Parameters
+    ----------
+    joint : int
+        index, from 0
+    """
+    known, asked = _rows(training, joint), _rows(held_out, joint)
+    plain, explained = (_residual(held_out, model, joint) for model in ("plain", "explained"))
+    left = np.full_like(explained, np.nan)
+    if len(known) >= FEWEST_ROWS and len(asked):
+        thinned = known[np.linspace(0, len(known) - 1, min(len(known), MOST_ROWS)).round().astype(np.intp)]
+        inputs, splits = _inputs(training, joint).at(thinned), [folds[thinned] for folds in fold_numbers(training)]
+        target = _residual(training, "explained", joint, thinned)
+        choice = choose_black_box(inputs, target, splits, LEARNERS)
+        left = explained - choice.predict(inputs, target, _inputs(held_out, joint).at(asked))
+    return compare_residuals(plain, explained, left, _blocks(held_out)[asked])
+
+
+def compare_residuals(plain: Array, explained: Array, left: Array, blocks: NDArray[np.intp]) -> JointHeadroom:
+    """Rms of each, and how much less is left than by the explained model.
+
+    Parameters
+    ----------
+    plain, explained, left : (R,) float64
+        residuals of both models and of the black box [Nm or N]
+    blocks : (R,) int
+        number of every row's block
+    """
+    energy = max(float(explained @ explained), np.finfo(float).tiny)
+    _, place = np.unique(blocks, return_inverse=True)
+    gains = np.bincount(place, explained**2 - left**2) if len(place) else np.zeros(0)
+    spread = float(np.sqrt(len(gains)) * gains.std(ddof=1)) if len(gains) > 1 else np.inf
+    return JointHeadroom(
+        _rms(plain), _rms(explained), _rms(left), float(gains.sum()) / energy, spread / energy, len(gains)
+    )
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else float("nan")
+
+
+def _rows(motions: Sequence[MotionRows], joint: int) -> NDArray[np.intp]:
+    """Places of the rows that were measured."""
+    return np.flatnonzero(np.concatenate([each.used[joint] for each in motions]))
+
+
+def _residual(motions: Sequence[MotionRows], model: str, joint: int, rows: NDArray[np.intp] | None = None) -> Array:
+    """What a model leaves of the measured torque, in all rows that were measured or in some."""
+    left = np.concatenate([each.torque[joint] - getattr(each, model)[joint] for each in motions])
+    return left[_rows(motions, joint) if rows is None else rows]
+
+
+def _inputs(motions: Sequence[MotionRows], joint: int) -> Inputs:
+    """Columns of all pieces."""
+    parts = [joint_inputs(each, joint) for each in motions]
+    return Inputs(np.concatenate([each.columns for each in parts]), parts[0].own)
+
+
+def _blocks(motions: Sequence[MotionRows]) -> NDArray[np.intp]:
+    """Number of every row's block, (R,)."""
+    lengths = {}
+    for each in motions:
+        lengths[each.recording] = max(lengths.get(each.recording, 0.0), float(each.time[-1]))
+    block_s = max(BLOCK_S, sum(lengths.values()) / MOST_BLOCKS)
+    most = int(max(lengths.values()) / block_s) + 1
+    recordings = sorted(lengths)
+    return np.concatenate(
+        [recordings.index(each.recording) * most + (each.time / block_s).astype(np.intp) for each in motions]
+    )

@@ -1,0 +1,106 @@
+"""One piece of motion with the torque of two models: all that a black box is given of a recording and a diagnosis."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.recording.recording import Array
+
+
+@dataclass(frozen=True, eq=False)
+class MotionRows:
+    """Evenly spaced rows of one piece of motion, in the band in which models and torque are compared.
+
+    recording : int
+        number of the recording
+    time : (M,) float64
+        since the beginning of the recording [s]
+    progress : (M,) float64
+        part of the recording's motion that is over, 0 to 1; alike in every repetition of a motion
+    position, velocity, acceleration, load : (n, M) float64
+        q, q̇, q̈ and the rigid-body torque [SI]
+    torque, plain, explained : (n, M) float64
+        measured, by the nominal model, and by the model with all findings [Nm or N]
+    used : (n, M) bool
+        rows that rest on measured torque
+    """
+
+    recording: int
+    time: Array
+    progress: Array
+    position: Array
+    velocity: Array
+    acceleration: Array
+    load: Array
+    torque: Array
+    plain: Array
+    explained: Array
+    used: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Inputs:
+    """Rows by the columns that a black box learns from.
+
+    columns : (R, d) float64
+        those of the joint itself first
+    own : int
+        how many these are
+    """
+
+    columns: Array
+    own: int
+
+    def at(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> "Inputs":
+        """Some of the rows.
+
+        Parameters
+        ----------
+        rows : (R,) bool or (k,) int
+            mask or places
+        """
+        return Inputs(self.columns[rows], self.own)
+
+
+def joint_inputs(motion: MotionRows, joint: int) -> Inputs:
+    """Columns of one joint's black box, a row each: q, q̇, q̈, load, and q̇, q̈ one row earlier and later, of all joints.
+
+    And the travel of the joint since its last reversal.
+
+    Parameters
+    ----------
+    joint : int
+        index, from 0
+    """
+    order = [joint, *(other for other in range(len(motion.position)) if other != joint)]
+    now = (motion.position, motion.velocity, motion.acceleration, motion.load)
+    beside = [shifted(values, step) for values in now[1:3] for step in (-1, 1)]
+    travel = travel_since_reversal(motion.position[joint], motion.velocity[joint])
+    own, *others = (np.stack([values[each] for values in (*now, *beside)]) for each in order)
+    return Inputs(np.concatenate([own, travel[None], *others]).T, len(own) + 1)
+
+
+def shifted(values: Array, step: int) -> Array:
+    """Signals some rows later, the row at the end repeated, (n, M).
+
+    Parameters
+    ----------
+    values : (n, M) float64
+        evenly spaced rows
+    """
+    places = np.clip(np.arange(values.shape[-1]) + step, 0, values.shape[-1] - 1)
+    return values[..., places]
+
+
+def travel_since_reversal(position: Array, velocity: Array) -> Array:
+    """Way since the velocity last changed its sign, with that sign, (M,) [rad or m].
+
+    Parameters
+    ----------
+    position, velocity : (M,) float64
+        of one joint
+    """
+    turns = np.flatnonzero(np.diff(np.signbit(velocity), prepend=np.signbit(velocity[:1])))
+    last = np.searchsorted(turns, np.arange(len(position)), side="right")
+    return position - position[np.append(0, turns)[last]]
