@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 REACHED = 0.3
 """Relative error of s up to which a trial counts as one of its series."""
 
-MOST_ATTEMPTS = 8
+MOST_ATTEMPTS = 16
 DIAGNOSIS_S = 900.0
 """A diagnosis that takes longer has failed [s]."""
 
