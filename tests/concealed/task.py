@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from concealed.baselines.columns import ground
+from concealed.baselines.comparison import RANKED
 from concealed.baselines.ranking import rankings
 from concealed.generator.case import Case
 from concealed.generator.trial import Trial
@@ -81,9 +82,12 @@ def _diagnosed(task: Task, case: Case, trial: Trial, these: Sealed) -> Outcome:
     found, seconds = diagnosis_apart(these.folder, plans=plans)
     again = diagnosis_apart(these.folder) if plans and with_recommended(these) else None
     truth = opened(these.truth, these.seal)
-    told: dict[str, Any] = {"name": case.name, "case": case.as_dict(), "seal": these.seal, "truth": asdict(truth)}
+    held_out_s = sum(float(each.samples().time[-1]) for each in trial.held_out)
+    drawn = {**case.as_dict(), "held_out_s": held_out_s}
+    told: dict[str, Any] = {"name": case.name, "case": drawn, "seal": these.seal, "truth": asdict(truth)}
     told |= {"score": asdict(compared(truth, found, seconds)), "seconds": seconds, "diagnosis": plain(found)}
-    told["baselines"] = rankings(ground(trial.robot, trial.train))
+    if task.series in RANKED:
+        told["baselines"] = rankings(ground(trial.robot, trial.train))
     if again is not None:
         told |= {"again": asdict(compared(truth, *again)), "diagnosis_again": plain(again[0])}
     if task.with_oracle and again is None and trial.concealed.entries:

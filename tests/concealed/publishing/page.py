@@ -10,6 +10,7 @@ from ruamel.yaml import YAML
 
 from concealed.baselines.comparison import ranked, table
 from concealed.generator.case import SERIES
+from concealed.publishing.overview import overview
 from concealed.publishing.pictures import draw_all
 from concealed.real.table import table as real_table
 from concealed.running.kept import Outcome
@@ -58,6 +59,7 @@ def write_page(everything: Sequence[Outcome], page: Path, command: str, planned:
         commits=", ".join(f"commit {name} ({count} trials)" for name, count in commits.items()),
         days=" to ".join(dict.fromkeys([days[0], days[-1]])),
         series=[(name, told.words, series[name]) for name, told in SERIES.items() if series[name]],
+        overview=overview(everything),
         figures="\n".join(_row(each) for each in figures if each.count),
         pictures=pictures,
         below=_below(figures),

@@ -1,0 +1,163 @@
+"""The table that the page begins with: simulated and real arms, what is right, wrong, missed, and how long it takes."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from concealed.real.trials import REAL
+from concealed.running.kept import Outcome
+from concealed.scoring.calibration import Claim, calibration_error
+from concealed.scoring.figures import CONFIDENT, interval
+from concealed.scoring.harm import worse_joints
+from concealed.scoring.score import UNKNOWN, Parameter
+from concealed.sealing.truth import label
+
+GOOD = (
+    "sound",
+    "weak",
+    "moderate",
+    "strong",
+    "constant",
+    "event",
+    "pair",
+    "triple",
+    "pair-one-joint",
+    "drift-beside",
+    "form",
+    "unknown",
+    "sign",
+)
+POOR = ("sound-sensing", "sound-coarse", "strong-sensing", "strong-coarse", "sound-poor", "poor", "sign-poor")
+CONCEALED, UNTOUCHED, KNOWN = "real-concealed", "real-untouched", "real"
+HEAD = ("trials on", "trials", "right", "wrong and confident", "missed", "joints made worse", "calibration", "time")
+
+
+@dataclass(frozen=True)
+class Counted:
+    """One trial as the table counts it.
+
+    right : bool
+        all that is concealed is within a finding's set; where nothing is, nothing is named
+    missed : bool
+        something that is there is in no set, or the trial failed
+    confident : bool
+        a wrong name with p > `CONFIDENT`
+    worse : (int, int)
+        joints that the findings make worse, of how many
+    claims : list of (float, bool)
+        probability of each finding, and whether it is right
+    seconds : float or None
+        of the diagnosis; None where the trial failed
+    """
+
+    right: bool
+    missed: bool
+    confident: bool = False
+    worse: tuple[int, int] = (0, 0)
+    claims: list[Claim] = field(default_factory=list)
+    seconds: float | None = None
+
+
+FAILED = Counted(right=False, missed=True)
+
+
+def overview(outcomes: Sequence[Outcome]) -> str:
+    """The table in Markdown; a row without trials says so."""
+    rows: dict[str, list[Counted]] = {
+        "simulated arms, good recordings": [_count(each) for each in outcomes if each["series"] in GOOD],
+        "simulated arms, poor recordings": [_count(each) for each in outcomes if each["series"] in POOR],
+        "real arms, an effect concealed": count_concealed(outcomes),
+        "real arms, as others know them": [_count(each) for each in outcomes if _is_known(each)],
+    }
+    lines = ["| " + " | ".join(HEAD) + " |", "|" + "---|" * len(HEAD)]
+    return "\n".join([*lines, *(f"| {name} | {' | '.join(_cells(these))} |" for name, these in rows.items())])
+
+
+def count_concealed(outcomes: Sequence[Outcome]) -> list[Counted]:
+    """Trials on real recordings, each beside the same set untouched: what is said there too is neither right nor wrong.
+
+    A trial whose set has no untouched diagnosis is left out until there is one, unless it failed itself.
+    """
+    before = {each["arm"]: _said(each) for each in outcomes if each["series"] == UNTOUCHED and "score" in each}
+    counted = []
+    for each in outcomes:
+        if each["series"] != CONCEALED:
+            continue
+        if "score" not in each:
+            counted.append(FAILED)
+        elif each["case"]["arm"] in before:
+            counted.append(_beside(each, before[each["case"]["arm"]]))
+    return counted
+
+
+def _beside(each: Outcome, before: Sequence[tuple[str, set[str], float]]) -> Counted:
+    there = {name for _, names, _ in before for name in names}
+    labels = [set(hidden["labels"]) for hidden in each["truth"]["hidden"]]
+    inside = any(Parameter(**told).inside for told in each["score"]["parameters"])
+    found = [any(one & names for _, names, _ in _said(each)) and (not one & there or inside) for one in labels]
+    claims = [
+        (probability, any(first in one for one in labels))
+        for first, _, probability in _said(each)
+        if first not in there or any(first in one for one in labels)
+    ]
+    return Counted(all(found), not all(found), _is_confident(claims), worse_joints(each), claims, each["seconds"])
+
+
+def _said(each: Outcome) -> list[tuple[str, set[str], float]]:
+    """First choice, set and probability of each finding."""
+    return [
+        (first, {first, *finding["equivalent"]}, float(finding["probability"]))
+        for finding in each["diagnosis"]["findings"]
+        if finding["effect"] != UNKNOWN
+        for first in [label(finding["effect"], finding["joint"])]
+    ]
+
+
+def _count(each: Outcome) -> Counted:
+    """A trial on a simulated arm, or on real recordings as they are."""
+    if "score" not in each:
+        return FAILED
+    score = each["score"]
+    claims: list[Claim] = [(float(p), bool(right)) for p, right in score["probabilities"]]
+    if each["series"] == "unknown":
+        right = score["verdict"] in ("partly_explained", "unexplained") and not _is_confident(claims)
+    elif each["truth"]["hidden"]:
+        right = bool(score["named"])
+    else:
+        right = not score["claimed"]
+    missed = bool(each["truth"]["hidden"]) and not right
+    return Counted(right, missed, _is_confident(claims), worse_joints(each), claims, each["seconds"])
+
+
+def _is_known(each: Outcome) -> bool:
+    """Recordings as they are, of which others have found something."""
+    told = REAL.get(each["arm"] or "") if each["series"] == KNOWN else None
+    return told is not None and told.edit is None and bool(told.labels)
+
+
+def _is_confident(claims: Sequence[Claim]) -> bool:
+    return any(p > CONFIDENT and not right for p, right in claims)
+
+
+def _cells(these: Sequence[Counted]) -> list[str]:
+    if not these:
+        return ["0", *["not tried"] * (len(HEAD) - 2)]
+    claims = [claim for each in these for claim in each.claims]
+    worse, joints = (sum(each.worse[place] for each in these) for place in (0, 1))
+    seconds = [each.seconds for each in these if each.seconds is not None]
+    return [
+        str(len(these)),
+        _share(these, lambda each: each.right),
+        _share(these, lambda each: each.confident),
+        _share(these, lambda each: each.missed),
+        f"{worse} of {joints}",
+        f"{calibration_error(claims):.2f} of {len(claims)}" if claims else "nothing named",
+        f"{np.mean(seconds):.1f} s" if seconds else "",
+    ]
+
+
+def _share(these: Sequence[Counted], counts: Callable[[Counted], bool]) -> str:
+    hits = sum(counts(each) for each in these)
+    low, high = interval(hits, len(these))
+    return f"{hits / len(these):.0%} ({low:.0%} to {high:.0%})"
