@@ -23,6 +23,7 @@ def main() -> None:
     parser.add_argument("--first-seed", type=int, default=0, help="below 10000: development; from a million: reports")
     parser.add_argument("--arm", help="one arm instead of all")
     parser.add_argument("--jobs", type=int, default=2, help="trials at the same time")
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster that makes the trials")
     parser.add_argument("--out", type=Path, default=Path("outcomes.jsonl"), help="outcomes, one a line")
     parser.add_argument("--oracle", action="store_true", help="compare with a diagnosis that knows the form")
     asked = parser.parse_args()
@@ -32,7 +33,7 @@ def main() -> None:
         for series in asked.series
         for number in range(asked.count)
     ]
-    with workers(asked.jobs) as executor:
+    with workers(asked.jobs, asked.scheduler) as executor:
         run(wanted, kept, executor, lambda each: print(line(each), flush=True))
     print(summary(kept.of({task.key for task in wanted})))
 

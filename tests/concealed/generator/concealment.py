@@ -126,7 +126,7 @@ def _law(
     unit = np.eye(sight.robot.joint_count)[joint]
 
     def shown(size: float) -> float:
-        return sight.strength([np.outer(torque(each, size), unit) for each in sight.passages])[0]
+        return sight.strength([torque(each, size)[:, None] * unit for each in sight.passages])[0]
 
     size, found = tuned(shown, wanted, drawn.size, drawn)
     return Concealed((drawn,), (), found, joint, lambda plain: torque(plain, size))

@@ -1,5 +1,6 @@
 """What the arm is asked to do: random Fourier series, slow reversals, motions too narrow or too slow, or stepwise."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -91,23 +92,30 @@ class Planned:
         return np.full(len(self.setpoints), np.nan)
 
 
-def campaign(robot: Robot, seed: int, kind: str = "rich", period_s: float = 8.0) -> tuple[list[Asked], list[Asked]]:
+def campaign(robot: Robot, seed: int, kind: str = "rich") -> tuple[Sequence[Asked], Sequence[Asked]]:
+    """Training and held-out motions: a `fourier_campaign`, or two stepwise recordings and a third held out."""
+    if kind not in STEPWISE:
+        return fourier_campaign(robot, seed, kind)
+    rng = np.random.default_rng([seed, 78])
+    first, second, held_out = (STEPWISE[kind](name, robot.joints, rng) for name in ("train1", "train2", "held-out"))
+    return [first, second], [held_out]
+
+
+def fourier_campaign(
+    robot: Robot, seed: int, kind: str = "rich", period_s: float = 8.0
+) -> tuple[list[Motion], list[Motion]]:
     """Training and held-out motions.
 
     `rich`: two Fourier motions and slow reversals; `narrow` and `slow`: training that hides much, held out as for
-    `rich`; `jogs` and `points`: two such recordings, and a third one held out.
+    `rich`.
     """
-    if kind in STEPWISE:
-        rng = np.random.default_rng([seed, 78])
-        first, second, held_out = (STEPWISE[kind](name, robot.joints, rng) for name in ("train1", "train2", "held-out"))
-        return [first, second], [held_out]
     rng = np.random.default_rng([seed, 77])
     joints = {
         "rich": robot.joints,
         "narrow": [_limited(joint, 0.25, 0.5) for joint in robot.joints],
         "slow": [_limited(joint, 0.9, 0.25) for joint in robot.joints],
     }[kind]
-    train: list[Asked] = [Motion(f"train{k}", _fourier(joints, rng, period_s), 2) for k in (1, 2)]
+    train = [Motion(f"train{k}", _fourier(joints, rng, period_s), 2) for k in (1, 2)]
     if kind == "rich":
         slow = [_limited(joint, 0.5, SLOW_SPEED) for joint in robot.joints]
         train.append(Motion("train3", _fourier(slow, rng, 1.5 * period_s), 1))

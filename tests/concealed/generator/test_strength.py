@@ -10,7 +10,7 @@ import pytest
 from concealed.generator.arms import NOISE_STD, arm_named, without_truth
 from concealed.generator.forward import Passage, physical
 from concealed.generator.laws import law_torque, with_law
-from concealed.generator.motions import campaign
+from concealed.generator.motions import fourier_campaign
 from concealed.generator.rates import FINE, RATE_HZ
 from concealed.generator.strength import Reference, Sight, strength
 from tauscope.dynamics import inverse_dynamics
@@ -23,7 +23,7 @@ COGGING = {"effect": "cogging", "joint": 1, "amplitude": 0.3, "order": 17.0, "ph
 def passage(arm: str) -> Passage:
     """A motion followed exactly, with the torque that it takes by our own inverse dynamics."""
     robot = arm_named(arm)
-    train, _ = campaign(robot, 3)
+    train, _ = fourier_campaign(robot, 3)
     time = np.arange(round(8.0 * FINE * RATE_HZ)) / (FINE * RATE_HZ)
     exact = train[0].series.evaluate(time)
     links = np.concatenate([link.to_vector() for link in robot.model.links or ()])
