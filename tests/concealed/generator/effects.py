@@ -192,8 +192,13 @@ def torque_ripple(g: Ground, rng: np.random.Generator) -> Drawn:
     return replace(drawn, largest=LARGEST_OF_LOAD)
 
 
+def _rotor(g: Ground) -> float:
+    """Reflected inertia of the motor: so small beside the noise that it hides no compliance [kg m² or kg]."""
+    return min(0.004, 0.02 * g.noise)
+
+
 def joint_elasticity(g: Ground, rng: np.random.Generator) -> Drawn:
-    joint, rotor = g.joint + 1, 0.004
+    joint, rotor = g.joint + 1, _rotor(g)
     return Drawn(
         lambda value: {
             "effect": "joint_elasticity",
@@ -213,7 +218,7 @@ def joint_elasticity(g: Ground, rng: np.random.Generator) -> Drawn:
 
 
 def backlash(g: Ground, rng: np.random.Generator) -> Drawn:
-    joint, rotor = g.joint + 1, 0.004
+    joint, rotor = g.joint + 1, _rotor(g)
     return Drawn(
         lambda value: {
             "effect": "backlash",

@@ -9,7 +9,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from ruamel.yaml import YAML
 
 from concealed.baselines.comparison import ranked, table
-from concealed.generator.case import SERIES
+from concealed.generator.case import SERIES, SIGNS
 from concealed.publishing.overview import overview
 from concealed.publishing.pictures import draw_all
 from concealed.real.table import table as real_table
@@ -155,6 +155,8 @@ def _failure(each: Outcome) -> str:
     if "score" not in each:
         return f"| {each['series']} {each['seed']} | | | error | {each['error'][:160].replace('|', '/')} |"
     score = each["again"] if "again" in each else each["score"]
-    places = ", ".join(f"{what} of joint {joint + 1}" for what, joint in each["case"]["places"]) or "nothing"
+    places = ", ".join(
+        what if what == SIGNS else f"{what} of joint {joint + 1}" for what, joint in each["case"]["places"]
+    )
     told = "; ".join(score["told"]) or "none"
-    return f"| {each['name']} | {places} | {each['score']['strength']:.0f} | {score['verdict']} | {told} |"
+    return f"| {each['name']} | {places or 'nothing'} | {each['score']['strength']:.0f} | {score['verdict']} | {told} |"
