@@ -66,8 +66,9 @@ def made(series: str, seed: int, arm: str | None = None) -> tuple[Case, Trial]:
 
     Nor can it where that takes a transmission too soft to carry the arm.
     """
+    kept = drawn(series, seed, arm).arm  # or arms on which effects hardly show would be tried less
     for attempt in range(MOST_ATTEMPTS):
-        case = drawn(series, seed, arm, attempt)
+        case = drawn(series, seed, kept, attempt)
         with contextlib.suppress(ScenarioError):
             concealed = case.concealed()
             if abs(concealed.strength - case.wanted) <= REACHED * case.wanted:
