@@ -101,7 +101,7 @@ def _beside(each: Outcome, before: Sequence[tuple[str, set[str], float]]) -> Cou
         for first, _, probability in _said(each)
         if first not in there or any(first in one for one in labels)
     ]
-    return Counted(all(found), not all(found), _is_confident(claims), worse_joints(each), claims, each["seconds"])
+    return Counted(all(found), not all(found), _is_confident(claims), _worse(each), claims, each["seconds"])
 
 
 def _said(each: Outcome) -> list[tuple[str, set[str], float]]:
@@ -127,7 +127,11 @@ def _count(each: Outcome) -> Counted:
     else:
         right = not score["claimed"]
     missed = bool(each["truth"]["hidden"]) and not right
-    return Counted(right, missed, _is_confident(claims), worse_joints(each), claims, each["seconds"])
+    return Counted(right, missed, _is_confident(claims), _worse(each), claims, each["seconds"])
+
+
+def _worse(each: Outcome) -> tuple[int, int]:
+    return len(worse_joints(each)), len(each["diagnosis"]["joints"])
 
 
 def _is_known(each: Outcome) -> bool:

@@ -68,6 +68,7 @@ def trial(series: str, seed: int, score: dict[str, Any]) -> dict[str, Any]:
         "score": score,
         "truth": {"hidden": [{"labels": [f"{what}@joint{joint + 1}"]} for what, joint in case.places]},
         "diagnosis": {
+            "joints": ["joint1", "joint2", "joint3"],
             "findings": [],
             "cutoff_hz": 10.0,
             "fit": {"held_out": {"rms_before": [1.0, 1.0, 1.0], "rms_after": [0.5, 1.0, 1.2]}},

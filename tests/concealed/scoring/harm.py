@@ -13,14 +13,14 @@ SHORTEST_S = 10.0
 """Length of the held-out motion of outcomes that do not state it [s]."""
 
 
-def worse_joints(each: Outcome) -> tuple[int, int]:
-    """Joints made worse by more than two standard errors of the difference, and joints with held-out motion."""
+def worse_joints(each: Outcome) -> list[str]:
+    """Joints made worse by more than two standard errors of the difference; none without held-out motion."""
     found = each["diagnosis"]
     change = found["fit"]["held_out"]
     if change is None:
-        return 0, 0
+        return []
     before, after = np.array(change["rms_before"], float), np.array(change["rms_after"], float)
     # A band so wide has so many independent samples.
     count = 2.0 * found["cutoff_hz"] * each["case"].get("held_out_s", SHORTEST_S)
     worse = after**2 > before**2 * (1.0 + HARM / max(count, 1.0))
-    return int(worse.sum()), len(worse)
+    return [name for name, is_worse in zip(found["joints"], worse, strict=True) if is_worse]
