@@ -8,6 +8,9 @@ import argparse
 from pathlib import Path
 
 from concealed.generator.case import SERIES
+from concealed.real.concealed_outcome import CONCEALED, UNTOUCHED
+from concealed.real.concealing.recorded_sets import set_of_seed
+from concealed.real.judging.concealed_table import concealed_table
 from concealed.running.kept import Kept, Outcome
 from concealed.running.run import commit, run
 from concealed.running.workers import workers
@@ -18,7 +21,8 @@ from concealed.task import REAL, Task
 def main() -> None:
     """Try some series, and say how it went."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("series", nargs="+", choices=list(SERIES), metavar="SERIES", help=", ".join(SERIES))
+    series = [*SERIES, CONCEALED]
+    parser.add_argument("series", nargs="+", choices=series, metavar="SERIES", help=", ".join(series))
     parser.add_argument("--count", type=int, default=16, help="trials of each series")
     parser.add_argument("--first-seed", type=int, default=0, help="below 10000: development; from a million: reports")
     parser.add_argument("--arm", help="one arm instead of all")
@@ -32,9 +36,13 @@ def main() -> None:
         for series in asked.series
         for number in range(asked.count)
     ]
+    sets = dict.fromkeys(each.arm or set_of_seed(each.seed) for each in wanted if each.series == CONCEALED)
+    wanted = [*(Task(UNTOUCHED, 0, name, state) for name in sets), *wanted]
     with workers(asked.jobs) as executor:
         run(wanted, kept, executor, lambda each: print(line(each), flush=True))
-    print(summary(kept.of({task.key for task in wanted})))
+    done = kept.of({task.key for task in wanted})
+    print(summary([each for each in done if each["series"] in SERIES]))
+    print(concealed_table(done))
 
 
 def line(each: Outcome) -> str:
@@ -44,7 +52,7 @@ def line(each: Outcome) -> str:
     score, places = each["score"], [f"{what}@{joint + 1}" for what, joint in each["case"]["places"]]
     again = f" -> {each['again']['verdict']} {each['again']['told']}" if "again" in each else ""
     extra = f" ratio {each['oracle_ratio']:.3f}" if "oracle_ratio" in each else ""
-    if each["series"] == REAL:
+    if each["series"] in (REAL, CONCEALED, UNTOUCHED):
         return f"{each['name']} {score['verdict']} {score['told']} {score['seconds']:.0f} s"
     return (
         f"{each['name']} {', '.join(places) or 'sound'} s {score['strength']:.0f} {each['case']['kind']}"

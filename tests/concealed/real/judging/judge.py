@@ -1,0 +1,171 @@
+"""What a diagnosis says of a trial on real recordings, beside the same set untouched."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from concealed.real.judging.found_size import found_size, has_order
+from concealed.running.kept import Outcome
+from concealed.scoring.score import INSIDE, UNKNOWN
+from concealed.sealing.truth import label
+
+CONFIDENT = 0.9
+
+HARM = 16.0
+"""Two standard errors of a joint's change for the worse, by closed form: a torque δ that is wrongly added to N
+independent residuals r changes their mean square by δ², with a standard error of 2 |r| |δ| / √N. So a rise of the mean
+square by a share of 16 / N is two standard errors."""
+
+OF_NO_TORQUE = ("delay_joint", "delay_all", "gravity", "link_length", "sign_joint", "sign_all", "gain_joint")
+"""Kinds whose torque goes with the measured one, or that are in the robot file."""
+
+SHOWN = 0.05
+"""Least energy that a trial conceals in held-out residuals, relative to the plain one, for a share of it to be told."""
+
+
+@dataclass(frozen=True)
+class Named:
+    """One concealed effect, and whether it is found.
+
+    multiple : float or None
+        of the plain residual; None for a sign
+    found, first : bool
+        within the set of a finding; its first choice
+    before : bool
+        whether the untouched set has it too
+    inside : bool or None
+        whether the interval of the finding's size holds what the trial holds; None where no first choice has a size
+    """
+
+    kind: str
+    multiple: float | None
+    found: bool
+    first: bool
+    before: bool
+    inside: bool | None
+
+    @property
+    def named(self) -> bool:
+        """Found and not there before; where it was there before, of the right size now."""
+        return self.found and (not self.before or bool(self.inside))
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One trial.
+
+    effects : list of Named
+        all that is concealed
+    wrong : list of (str, float)
+        findings that are neither concealed nor in the untouched set, and their probabilities
+    concealed, left : float
+        held-out energy that is concealed, and what is left of it; in plain residuals, summed over joints
+    worse : list of str
+        joints whose held-out residual the findings make larger
+    """
+
+    effects: list[Named]
+    wrong: list[tuple[str, float]]
+    concealed: float
+    left: float
+    worse: list[str]
+    seconds: float
+
+    @property
+    def removed(self) -> float | None:
+        """Share of the concealed energy that is gone, -1 to 1; None where hardly any is concealed."""
+        if self.concealed < SHOWN:
+            return None
+        return float(np.clip(1.0 - self.left / self.concealed, -1.0, 1.0))
+
+    @property
+    def confident(self) -> list[str]:
+        """Wrong names that are sure of themselves."""
+        return [name for name, probability in self.wrong if probability > CONFIDENT]
+
+
+def judge(outcome: Outcome, untouched: Outcome) -> Judged:
+    """A trial beside its set without it."""
+    findings, earlier = _findings(outcome), _findings(untouched)
+    told = outcome["case"]["effects"]
+    hidden = outcome["truth"]["hidden"]
+    effects = [_named(one, set(each["labels"]), findings, earlier) for one, each in zip(told, hidden, strict=True)]
+    right = [(one, set(each["labels"])) for one, each in zip(told, hidden, strict=True)]
+    there = {name for finding in earlier for name in _names(finding)}
+    wrong = [
+        (_first(finding), float(finding["probability"]))
+        for finding in findings
+        if not any(_is(finding, one, labels) for one, labels in right) and _first(finding) not in there
+    ]
+    concealed, left = energy(outcome, untouched)
+    return Judged(effects, wrong, concealed, left, worse_joints(outcome), float(outcome["seconds"]))
+
+
+def energy(outcome: Outcome, untouched: Outcome) -> tuple[float, float]:
+    """Held-out energy that is concealed, and what the diagnosis leaves of it, in plain residuals summed over joints.
+
+    What is left is what it leaves more than in the untouched set. What is concealed is the known torque less the
+    nominal model's share, or what the residual grew by where that is more. Time and file effects have no known torque
+    of their own: there it is what the residual grew by.
+    """
+    (before, after), (plain, best) = _held_out(outcome), _held_out(untouched)
+    unit = np.maximum(plain**2, 1e-300)
+    grown, left = float(np.sum((before**2 - plain**2) / unit)), float(np.sum((after**2 - best**2) / unit))
+    if all(one["kind"] in OF_NO_TORQUE for one in outcome["case"]["effects"]):
+        return grown, left
+    known = float(np.sum(np.array(outcome["case"]["held_out_rms"]) ** 2 / unit))
+    return max(known, grown), left
+
+
+def worse_joints(outcome: Outcome) -> list[str]:
+    """Joints whose held-out residual rises by more than two standard errors of the difference."""
+    before, after = _held_out(outcome)
+    found = outcome["diagnosis"]
+    count = 2.0 * found["cutoff_hz"] * outcome["case"]["held_out_s"]  # independent samples of a band so wide
+    rise = after**2 > before**2 * (1.0 + HARM / max(count, 1.0))
+    return [name for name, is_worse in zip(found["joints"], rise, strict=True) if is_worse]
+
+
+def _held_out(outcome: Outcome) -> tuple[np.ndarray, np.ndarray]:
+    change = outcome["diagnosis"]["fit"]["held_out"]
+    return np.array(change["rms_before"], float), np.array(change["rms_after"], float)
+
+
+def _findings(outcome: Outcome) -> list[dict[str, Any]]:
+    """What is named and not refuted by held-out motion."""
+    return [
+        each
+        for each in outcome["diagnosis"]["findings"]
+        if each["effect"] != UNKNOWN and each["confirmed"] is not False
+    ]
+
+
+def _first(finding: dict[str, Any]) -> str:
+    return label(finding["effect"], finding["joint"])
+
+
+def _names(finding: dict[str, Any]) -> set[str]:
+    return {_first(finding), *finding["equivalent"]}
+
+
+def _is(finding: dict[str, Any], concealed: dict[str, Any], labels: set[str]) -> bool:
+    """Whether a finding's set holds what is concealed; of waves, one of its orders has to be the right one."""
+    if not labels & _names(finding):
+        return False
+    return _first(finding) not in labels or has_order(finding, concealed)
+
+
+def _named(
+    concealed: dict[str, Any],
+    labels: set[str],
+    findings: Sequence[dict[str, Any]],
+    earlier: Sequence[dict[str, Any]],
+) -> Named:
+    hits = [each for each in findings if _is(each, concealed, labels)]
+    firsts = [each for each in hits if _first(each) in labels]
+    sizes = [size for each in firsts if (size := found_size(each, concealed)) is not None]
+    inside = any(abs(value - truth) <= INSIDE * std for value, std, truth in sizes) if sizes else None
+    before = any(_is(each, concealed, labels) for each in earlier)
+    return Named(concealed["kind"], concealed["multiple"], bool(hits), bool(firsts), before, inside)
