@@ -9,7 +9,7 @@ from pathlib import Path
 
 from concealed.generator.case import SERIES
 from concealed.real.concealed_outcome import CONCEALED, UNTOUCHED
-from concealed.real.concealing.recorded_sets import set_of_seed
+from concealed.real.concealed_sets import concealed_tasks
 from concealed.real.judging.concealed_table import concealed_table
 from concealed.running.kept import Kept, Outcome
 from concealed.running.run import commit, run
@@ -25,7 +25,7 @@ def main() -> None:
     parser.add_argument("series", nargs="+", choices=series, metavar="SERIES", help=", ".join(series))
     parser.add_argument("--count", type=int, default=16, help="trials of each series")
     parser.add_argument("--first-seed", type=int, default=0, help="below 10000: development; from a million: reports")
-    parser.add_argument("--arm", help="one arm instead of all")
+    parser.add_argument("--arm", help="one arm instead of all, or one set of real recordings")
     parser.add_argument("--jobs", type=int, default=2, help="trials at the same time")
     parser.add_argument("--out", type=Path, default=Path("outcomes.jsonl"), help="outcomes, one a line")
     parser.add_argument("--oracle", action="store_true", help="compare with a diagnosis that knows the form")
@@ -34,10 +34,12 @@ def main() -> None:
     wanted = [
         Task(series, asked.first_seed + number, asked.arm, state, asked.oracle)
         for series in asked.series
+        if series in SERIES
         for number in range(asked.count)
     ]
-    sets = dict.fromkeys(each.arm or set_of_seed(each.seed) for each in wanted if each.series == CONCEALED)
-    wanted = [*(Task(UNTOUCHED, 0, name, state) for name in sets), *wanted]
+    if CONCEALED in asked.series:
+        drawn = {"set_name": asked.arm, "with_oracle": asked.oracle}
+        wanted = [*concealed_tasks(asked.count, asked.first_seed, state, **drawn), *wanted]
     with workers(asked.jobs) as executor:
         run(wanted, kept, executor, lambda each: print(line(each), flush=True))
     done = kept.of({task.key for task in wanted})

@@ -54,7 +54,7 @@ class Concealment:
     rewrite: Callable[[float, Path, Path], None] | None = None
     fixed: float | None = None
     window: Callable[[Array], Array] | None = None
-    constants: Mapping[str, float | str] = field(default_factory=dict)
+    constants: Mapping[str, float] = field(default_factory=dict)
 
     def added(self, ground: Ground, size: float) -> list[Array]:
         """Torque (N, n) that it adds to every passage of the set as it was recorded."""

@@ -47,7 +47,7 @@ def _one_joint(
     parameters: Callable[[float], dict[str, float]],
     *,
     largest: float = np.inf,
-    **constants: float | str,
+    **constants: float,
 ) -> Concealment:
     """A law whose torque (N,) acts at its joint alone."""
     count = ground.robot.joint_count
@@ -239,8 +239,8 @@ def bristles(ground: Ground, joint: int, rng: np.random.Generator) -> Concealmen
     if not ground.reverses(joint) or shortest > longest:
         return None
     length = float(np.exp(rng.uniform(np.log(shortest), np.log(longest))))
-    model = str(rng.choice(["dahl", "lugre"]))
-    turn = 0.1 * float(ground.speed[joint]) if model == "lugre" else None
+    lugre = bool(rng.choice([False, True]))
+    turn = 0.1 * float(ground.speed[joint]) if lugre else None
     return _one_joint(
         ground,
         "bristles",
@@ -248,7 +248,7 @@ def bristles(ground: Ground, joint: int, rng: np.random.Generator) -> Concealmen
         "presliding_hysteresis",
         lambda passage, _: bristle_force(passage.position[:, joint], passage.velocity[:, joint], length, turn),
         lambda size: {"F": size, "x_s": length},
-        model=model,
+        lugre=float(lugre),
     )
 
 

@@ -67,7 +67,7 @@ def link_length(ground: Ground, joint: int, rng: np.random.Generator) -> Conceal
         lambda size: {"d": side * size},
         LENGTH_M,
         rewrite=lambda size, source, target: lengthen_link(source, target, place, side * size),
-        constants={"place": "/".join(str(each) for each in place), "side": side},
+        constants={"row": float(place[1]), "is_d": float(place[2] == "d"), "side": side},
     )
 
 

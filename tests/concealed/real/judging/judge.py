@@ -60,6 +60,8 @@ class Judged:
         all that is concealed
     wrong : list of (str, float)
         findings that are neither concealed nor in the untouched set, and their probabilities
+    claims : list of (float, bool)
+        probabilities of all findings that the untouched set has not, and whether their first choice is right
     concealed, left : float
         held-out energy that is concealed, and what is left of it; in plain residuals, summed over joints
     worse : list of str
@@ -68,6 +70,7 @@ class Judged:
 
     effects: list[Named]
     wrong: list[tuple[str, float]]
+    claims: list[tuple[float, bool]]
     concealed: float
     left: float
     worse: list[str]
@@ -94,13 +97,13 @@ def judge(outcome: Outcome, untouched: Outcome) -> Judged:
     effects = [_named(one, set(each["labels"]), findings, earlier) for one, each in zip(told, hidden, strict=True)]
     right = [(one, set(each["labels"])) for one, each in zip(told, hidden, strict=True)]
     there = {name for finding in earlier for name in _names(finding)}
-    wrong = [
-        (_first(finding), float(finding["probability"]))
-        for finding in findings
-        if not any(_is(finding, one, labels) for one, labels in right) and _first(finding) not in there
+    new = [each for each in findings if _first(each) not in there or any(_is(each, *one) for one in right)]
+    wrong = [(_first(each), float(each["probability"])) for each in new if not any(_is(each, *one) for one in right)]
+    claims = [
+        (float(each["probability"]), any(_is(each, *one) and _first(each) in one[1] for one in right)) for each in new
     ]
     concealed, left = energy(outcome, untouched)
-    return Judged(effects, wrong, concealed, left, worse_joints(outcome), float(outcome["seconds"]))
+    return Judged(effects, wrong, claims, concealed, left, worse_joints(outcome), float(outcome["seconds"]))
 
 
 def energy(outcome: Outcome, untouched: Outcome) -> tuple[float, float]:
