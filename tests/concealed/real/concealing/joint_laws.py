@@ -152,7 +152,7 @@ def ripple(ground: Ground, joint: int, rng: np.random.Generator) -> Concealment 
 
 
 def load_friction(ground: Ground, joint: int, rng: np.random.Generator) -> Concealment | None:
-    """τ = μ |τ_rb| sgn q̇, μ at most one: more would lock the gear. Where the joint reverses."""
+    """τ = μ |τ_rb| sgn q̇, μ at most a half, as a worm's. Where the joint reverses."""
     if not ground.reverses(joint):
         return None
     return _one_joint(
@@ -162,7 +162,7 @@ def load_friction(ground: Ground, joint: int, rng: np.random.Generator) -> Conce
         "load_dependent_friction",
         lambda passage, load: np.abs(load) * _sign(ground, joint, passage),
         lambda size: {"mu": size},
-        largest=1.0,
+        largest=0.5,
     )
 
 

@@ -6,16 +6,16 @@ whitened by an autoregression of every joint's residual.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
 
-from concealed.real.concealing.channels import delay_torque
+from concealed.real.concealing.channels import FLIPPED, delay_torque, scale_torque
 from concealed.real.concealing.concealment import Concealment
 from concealed.real.concealing.ground import Ground
-from concealed.real.concealing.nominal import RANK, Nominal, reweigh
+from concealed.real.concealing.nominal import PER_JOINT, RANK, Nominal, reweigh
 from concealed.real.concealing.sizing import nominal_of_file
 
 Array = NDArray[np.float64]
@@ -25,6 +25,9 @@ ORDER = 6
 """Of the autoregression: rows come 2.5 times a period of the band's corner."""
 
 STEPS = 12
+SIGN_STD = 0.5
+"""A sign is right or wrong by four of these."""
+
 WEIGHINGS = 3
 """Fits, each with the joints weighted by what the one before left."""
 
@@ -34,7 +37,7 @@ CLOSE = 0.02
 LARGEST_STEP = 0.1
 """Of Gauss and Newton, relative to the largest size."""
 
-LOAD_STEPS = 4
+LOAD_STEPS = 20
 SCAN = 13
 """Sizes that are looked at before the best of them is refined."""
 
@@ -61,43 +64,38 @@ def estimate_sizes(ground: Ground, laws: Sequence[Concealment], *, start: float 
 
 
 def _torque_sizes(ground: Ground, laws: Sequence[Concealment]) -> list[Estimate]:
-    """Least squares with a column a law; those of load again with the load that the fit gives."""
-    nominal, load = ground.nominal, ground.load
+    """Least squares with a column a law; again with the load and the residual that the fit before has."""
+    nominal, load, sizes = ground.nominal, ground.load, np.zeros(len(laws))
     observed = nominal.rows([each.torque for each in ground.passages])
-    sizes, found = np.zeros(len(laws)), []
+    found: list[Estimate] = []
     for _ in range(LOAD_STEPS):
         columns = [
             nominal.rows([law.torque(each, own) for each, own in zip(ground.passages, load, strict=True)])
             for law in laws
             if law.torque is not None
         ]
+        before = sizes
         sizes, std = _least_squares(nominal, observed, columns)
         found = [Estimate(float(size), float(error)) for size, error in zip(sizes, std, strict=True)]
-        load = _load_without(nominal, observed, columns, sizes)
+        if np.all(np.abs(sizes - before) < CLOSE * std):
+            break
+        cleared = [
+            rows - sum(size * each[number] for size, each in zip(sizes, columns, strict=True))
+            for number, rows in enumerate(observed)
+        ]
+        left = np.concatenate([nominal.left(cleared)[number] for number in nominal.training])
+        nominal = reweigh(nominal, np.sqrt(np.mean(left**2, axis=0)))
+        nominal = replace(nominal, coefficients=nominal.absorbed(cleared))
+        load = nominal.load()
     return found
-
-
-def _load_without(nominal: Nominal, observed: Rows, columns: Sequence[Rows], sizes: Array) -> list[Array]:
-    """The rigid-body torque of the model that is fitted beside the laws."""
-    cleared = [
-        rows - sum(size * each[number] for size, each in zip(sizes, columns, strict=True))
-        for number, rows in enumerate(observed)
-    ]
-    coefficients = nominal.absorbed(cleared)
-    return [
-        np.column_stack(
-            [np.interp(passage.time, grid.time, each) for each in (rigid @ coefficients[: rigid.shape[2]]).T]
-        )
-        for passage, grid, rigid in zip(nominal.passages, nominal.grids, nominal.rigid, strict=True)
-    ]
 
 
 def _least_squares(nominal: Nominal, observed: Rows, columns: Sequence[Rows]) -> tuple[Array, Array]:
     """Sizes of columns beside the nominal model's, and their standard errors, on whitened training rows."""
     training = nominal.training
     flat = [nominal.left(each) for each in (observed, *columns)]
-    first = np.stack([_stack(each, training, nominal.scale) for each in flat[1:]], axis=1)
-    rough, *_ = np.linalg.lstsq(first, _stack(flat[0], training, nominal.scale), rcond=None)
+    first = np.stack([_stack(each, training, nominal.weights) for each in flat[1:]], axis=1)
+    rough, *_ = np.linalg.lstsq(first, _stack(flat[0], training, nominal.weights), rcond=None)
     left = [
         flat[0][number] - sum(size * each[number] for size, each in zip(rough, flat[1:], strict=True))
         for number in range(len(observed))
@@ -213,17 +211,32 @@ def _newton(
 def _best_of_few(residual: Callable[[float], Rows], bounds: tuple[float, float]) -> float:
     sizes = [0.0, *np.geomspace(*bounds, SCAN - 1)]
     scale = np.sqrt(np.mean(np.concatenate(residual(0.0)) ** 2, axis=0))
-    energies = [sum(float(np.sum((each / scale) ** 2)) for each in residual(size)) for size in sizes]
+    energies = [_energy(residual(size), scale) for size in sizes]
     return float(sizes[int(np.argmin(energies))])
 
 
+def _energy(rows: Rows, scale: Array) -> float:
+    return sum(float(np.sum((each / scale) ** 2)) for each in rows)
+
+
 def _sign(ground: Ground, law: Concealment) -> Estimate:
-    """Friction that feeds the motion has a wrong sign: g is -2 there, and 0 where it dissipates."""
-    nominal, joint, power = ground.nominal, law.joint, 0.0
-    own = slice(nominal.columns[0].shape[2] - 5 * ground.robot.joint_count + 5 * joint, None)
+    """g is -2 where a sign is wrong, and 0 where it is right.
+
+    Joints of one arm share its links: with one wrong sign among them, more is left. Where all are wrong, friction feeds
+    the motion.
+    """
+    nominal, joint = ground.nominal, law.joint
+    if law.kind == "sign_joint":
+        turned = nominal.rows([scale_torque(each.torque, [joint], FLIPPED) for each in ground.passages])
+        energies = [
+            _energy([rows[number] for number in nominal.training], nominal.weights)
+            for rows in (nominal.residual(), nominal.left(turned))
+        ]
+        return Estimate(FLIPPED if energies[1] < energies[0] else 0.0, SIGN_STD)
+    power, own = 0.0, slice(nominal.columns[0].shape[2] - PER_JOINT * (ground.robot.joint_count - joint), None)
     for number in nominal.training:
         grid, passage = nominal.grids[number], ground.passages[number]
         velocity = grid.compared(grid.smoothed(passage, passage.velocity))[:, joint]
         friction = nominal.columns[number][:, joint, own][:, :3] @ nominal.coefficients[own][:3]
         power += float(np.sum(friction * velocity))
-    return Estimate(-2.0 if power < 0.0 else 0.0, 0.5)
+    return Estimate(FLIPPED if power < 0.0 else 0.0, SIGN_STD)
