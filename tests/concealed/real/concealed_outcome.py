@@ -1,5 +1,6 @@
 """One trial of an effect concealed in real recordings: drawn, sealed, diagnosed apart, opened, compared."""
 
+import resource
 import tempfile
 from dataclasses import asdict
 from pathlib import Path
@@ -42,14 +43,23 @@ def _outcome(case: RealCase, truth: Truth, *, with_oracle: bool) -> Outcome:
         case.write(folder)
         seal = truth.seal(sealed)
         print(f"sealed {case.name} {seal}", flush=True)
+        begin = _children_s()
         found, seconds = diagnosis_apart(folder)
+        processor = _children_s() - begin
         truth = opened(sealed, seal)
         solved = solve_case(case, folder) if with_oracle and case.effects else None
     told: dict[str, Any] = {"name": case.name, "case": truth.case, "seal": seal, "truth": asdict(truth)}
     told |= {"score": asdict(compared(truth, found, seconds)), "seconds": seconds, "diagnosis": plain(found)}
+    told["processor_s"] = processor
     if solved is not None:
         told["solved"] = [each.as_dict() for each in solved]
     return told
+
+
+def _children_s() -> float:
+    """Time that the processes begun by this one have had of a processor: the same on a busy machine [s]."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def truth_of_case(case: RealCase) -> Truth:

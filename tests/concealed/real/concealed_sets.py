@@ -7,8 +7,8 @@ from concealed.task import Task
 FULL = 19 * len(CYCLE)
 """Trials of the full set, 304: every set as often as its share, every kind as often as its rule allows."""
 
-QUICK = len(CYCLE)
-"""Trials of a quick sample: every set once or twice, no kind twice unless its rule refuses another."""
+QUICK = len(SETS)
+"""Trials of a quick sample: every set once, no kind twice unless its rule refuses another."""
 
 
 def concealed_tasks(

@@ -66,15 +66,15 @@ def test_a_force_at_the_tip_is_held_by_the_jacobian_transposed(arm: str) -> None
 @pytest.mark.parametrize("arm", ["seven", "six", "linear"])
 def test_a_mass_has_the_torque_that_pinocchio_gives_a_heavier_link(arm: str) -> None:
     robot, rng = arm_named(arm), np.random.default_rng(4)
-    state = [rng.normal(size=(4, robot.joint_count)) for _ in range(3)]
+    q, qd, qdd = (rng.normal(size=(4, robot.joint_count)) for _ in range(3))
     mass, place = 1.7, np.array([0.05, -0.02, 0.11])
     links = list(robot.model.links or ())
     cross = np.cross(np.eye(3), place)
     point = LinkInertia(mass, mass * place, mass * cross.T @ cross)
     heavier = LinkInertia.from_vector(links[-1].to_vector() + point.to_vector())
     loaded = replace(robot, model=Model((*links[:-1], heavier), None))
-    expected = pinocchio_torque(loaded, *state) - pinocchio_torque(robot, *state)
-    np.testing.assert_allclose(mass * mass_torque(robot, *state, place), expected, atol=1e-10)
+    expected = pinocchio_torque(loaded, q, qd, qdd) - pinocchio_torque(robot, q, qd, qdd)
+    np.testing.assert_allclose(mass * mass_torque(robot, q, qd, qdd, place), expected, atol=1e-10)
 
 
 def test_a_spring_pulls_to_the_middle_of_the_range(ground: Ground) -> None:
