@@ -21,9 +21,6 @@ square by a share of 16 / N is two standard errors."""
 OF_NO_TORQUE = ("delay_joint", "delay_all", "gravity", "link_length", "sign_joint", "sign_all", "gain_joint")
 """Kinds whose torque goes with the measured one, or that are in the robot file."""
 
-SHOWN = 0.05
-"""Least energy that a trial conceals in held-out residuals, relative to the plain one, for a share of it to be told."""
-
 
 @dataclass(frozen=True)
 class Named:
@@ -62,8 +59,8 @@ class Judged:
         findings that are neither concealed nor in the untouched set, and their probabilities
     claims : list of (float, bool)
         probabilities of all findings that the untouched set has not, and whether their first choice is right
-    concealed, left : float
-        held-out energy that is concealed, and what is left of it; in plain residuals, summed over joints
+    concealed, removed : float
+        held-out energy that is concealed, and how much of it is removed; in plain residuals, summed over joints
     worse : list of str
         joints whose held-out residual the findings make larger
     """
@@ -72,16 +69,9 @@ class Judged:
     wrong: list[tuple[str, float]]
     claims: list[tuple[float, bool]]
     concealed: float
-    left: float
+    removed: float
     worse: list[str]
     seconds: float
-
-    @property
-    def removed(self) -> float | None:
-        """Share of the concealed energy that is gone, -1 to 1; None where hardly any is concealed."""
-        if self.concealed < SHOWN:
-            return None
-        return float(np.clip(1.0 - self.left / self.concealed, -1.0, 1.0))
 
     @property
     def confident(self) -> list[str]:
@@ -102,24 +92,23 @@ def judge(outcome: Outcome, untouched: Outcome) -> Judged:
     claims = [
         (float(each["probability"]), any(_is(each, *one) and _first(each) in one[1] for one in right)) for each in new
     ]
-    concealed, left = energy(outcome, untouched)
-    return Judged(effects, wrong, claims, concealed, left, worse_joints(outcome), float(outcome["seconds"]))
+    concealed, removed = energy(outcome, untouched)
+    return Judged(effects, wrong, claims, concealed, removed, worse_joints(outcome), float(outcome["seconds"]))
 
 
 def energy(outcome: Outcome, untouched: Outcome) -> tuple[float, float]:
-    """Held-out energy that is concealed, and what the diagnosis leaves of it, in plain residuals summed over joints.
+    """Held-out energy that is concealed, and how much of it the findings remove, in plain residuals summed over joints.
 
-    What is left is what it leaves more than in the untouched set. What is concealed is the known torque less the
-    nominal model's share, or what the residual grew by where that is more. Time and file effects have no known torque
-    of their own: there it is what the residual grew by.
+    Removed is what they take off beyond what the findings of the untouched set take off there. Concealed is the known
+    torque less the nominal model's share. Time and file effects have no known torque of their own: there it is what the
+    residual grew by. What both residuals have in common with the torque averages out over trials.
     """
     (before, after), (plain, best) = _held_out(outcome), _held_out(untouched)
     unit = np.maximum(plain**2, 1e-300)
-    grown, left = float(np.sum((before**2 - plain**2) / unit)), float(np.sum((after**2 - best**2) / unit))
+    removed = float(np.sum((before**2 - after**2 - plain**2 + best**2) / unit))
     if all(one["kind"] in OF_NO_TORQUE for one in outcome["case"]["effects"]):
-        return grown, left
-    known = float(np.sum(np.array(outcome["case"]["held_out_rms"]) ** 2 / unit))
-    return max(known, grown), left
+        return max(float(np.sum((before**2 - plain**2) / unit)), 0.0), removed
+    return float(np.sum(np.array(outcome["case"]["held_out_rms"]) ** 2 / unit)), removed
 
 
 def worse_joints(outcome: Outcome) -> list[str]:

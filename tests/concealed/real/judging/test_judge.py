@@ -101,18 +101,27 @@ def test_wrong_names_are_those_that_the_untouched_set_has_not() -> None:
     assert told.confident == ["backlash@joint2"]
 
 
-@pytest.mark.parametrize(("after", "removed"), [((2.0, 1.5), 0.0), ((2.0, 1.0), 1.0), ((2.0, 1.25), 0.55)])
-def test_energy_is_removed_where_the_residual_comes_back_to_the_untouched(
-    after: tuple[float, float], removed: float
-) -> None:
-    trial = outcome(concealed=(SPRING,), before=(2.0, 1.5), after=after, rms=(0.0, 1.0))
+@pytest.mark.parametrize(("after", "removed"), [((2.0, 1.5), 0.0), ((2.0, 1.0), 1.25), ((2.0, 1.25), 0.6875)])
+def test_energy_is_removed_as_far_as_the_residual_comes_back(after: tuple[float, float], removed: float) -> None:
+    trial = outcome(concealed=(SPRING,), before=(2.0, 1.5), after=after, rms=(0.0, 1.1))
     told = judge(trial, outcome())
-    assert told.concealed == pytest.approx(1.25)  # (1.5² - 1²) / 1², more than 1² of the known torque
-    assert told.removed == pytest.approx(removed)
+    assert told.concealed == pytest.approx(1.21)  # 1.1² of a plain residual of 1
+    assert told.removed == pytest.approx(removed)  # of 1.5² - 1² by which the residual grew
 
 
-def test_nothing_is_removed_of_what_held_out_motion_does_not_show() -> None:
-    assert judge(outcome(concealed=(SPRING,)), outcome()).removed is None
+def test_what_the_untouched_set_loses_to_its_own_findings_is_not_counted() -> None:
+    there = outcome(before=(2.0, 1.0), after=(1.0, 1.0))
+    trial = outcome(concealed=(SPRING,), before=(2.0, 1.5), after=(1.0, 1.5), rms=(0.0, 1.1))
+    assert judge(trial, there).removed == pytest.approx(0.0)
+
+
+def test_a_wrong_sign_conceals_what_the_residual_grew_by() -> None:
+    sign = {**SPRING, "kind": "sign_joint", "total": {"g": -2.0}}
+    trial = outcome(before=(4.0, 1.0), after=(2.0, 1.0))
+    trial["series"], trial["case"]["effects"] = CONCEALED, [sign]
+    trial["truth"]["hidden"] = [{"labels": ["torque_gain_error@joint1"]}]
+    told = judge(trial, outcome())
+    assert told.concealed == told.removed == pytest.approx(3.0)
 
 
 def test_a_joint_is_worse_from_two_standard_errors_of_the_difference_on() -> None:
