@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from concealed.real.concealed_outcome import CONCEALED, UNTOUCHED
 from concealed.real.trials import REAL, data
 from concealed.scoring.figures import COMPARED
 from concealed.task import REAL as REAL_SERIES
@@ -58,7 +59,7 @@ REDUCED: dict[str, int] = {
 REPORTING = 1_000_000
 """First seed of reports. Seeds below 10,000 were looked at while the diagnosis was made."""
 
-LONG = frozenset({"aliased", "unknown", REAL_SERIES})
+LONG = frozenset({"aliased", "unknown", REAL_SERIES, CONCEALED, UNTOUCHED})
 """Series whose trials take minutes on a slow machine: a recommended motion is recorded too, nothing that is tried
 explains what is there, or a real arm's recordings are long."""
 

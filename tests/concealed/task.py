@@ -11,6 +11,7 @@ from concealed.baselines.comparison import RANKED
 from concealed.baselines.ranking import rankings
 from concealed.generator.case import Case
 from concealed.generator.trial import Trial
+from concealed.real.concealed_outcome import concealed_outcome, untouched_outcome
 from concealed.real.outcome import real_outcome
 from concealed.running.kept import Key, Outcome
 from concealed.scoring.oracle import against_oracle, oracle
@@ -61,9 +62,21 @@ def outcome(task: Task) -> Outcome:
     told: Outcome = {"series": task.series, "seed": task.seed, "arm": task.arm, "commit": task.commit}
     told["began"] = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
     try:
-        return {**told, **(real_outcome(task.arm or "") if task.series == REAL else _tried(task))}
+        return {**told, **_outcome_of_series(task)}
     except Exception as error:  # whatever it is, the other trials go on and this one is counted as failed
         return {**told, "error": repr(error)}
+
+
+def _outcome_of_series(task: Task) -> Outcome:
+    match task.series:
+        case "real":
+            return real_outcome(task.arm or "")
+        case "real-concealed":
+            return concealed_outcome(task.seed, task.arm, with_oracle=task.with_oracle)
+        case "real-untouched":
+            return untouched_outcome(task.arm or "")
+        case _:
+            return _tried(task)
 
 
 def _tried(task: Task) -> Outcome:

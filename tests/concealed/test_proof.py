@@ -15,6 +15,7 @@ SEED = 2
 def one_trial(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sets, "REDUCED", {"sound": 1})
     monkeypatch.setattr(proof, "QUICK", ())
+    monkeypatch.setattr(proof, "QUICK_CONCEALED", 0)
 
 
 def prove(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:

@@ -5,13 +5,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from concealed.real.concealed_outcome import CONCEALED
+from concealed.real.judging.concealed_table import judge_all
+from concealed.real.judging.judge import Judged
 from concealed.real.trials import REAL
 from concealed.running.kept import Outcome
 from concealed.scoring.calibration import Claim, calibration_error
 from concealed.scoring.figures import CONFIDENT, interval
 from concealed.scoring.harm import worse_joints
-from concealed.scoring.score import UNKNOWN, Parameter
-from concealed.sealing.truth import label
 
 GOOD = (
     "sound",
@@ -29,7 +30,7 @@ GOOD = (
     "sign",
 )
 POOR = ("sound-sensing", "sound-coarse", "strong-sensing", "strong-coarse", "sound-poor", "poor", "sign-poor")
-CONCEALED, UNTOUCHED, KNOWN = "real-concealed", "real-untouched", "real"
+KNOWN = "real"
 HEAD = ("trials on", "trials", "right", "wrong and confident", "missed", "joints made worse", "calibration", "time")
 
 
@@ -79,39 +80,13 @@ def count_concealed(outcomes: Sequence[Outcome]) -> list[Counted]:
 
     A trial whose set has no untouched diagnosis is left out until there is one, unless it failed itself.
     """
-    before = {each["arm"]: _said(each) for each in outcomes if each["series"] == UNTOUCHED and "score" in each}
-    counted = []
-    for each in outcomes:
-        if each["series"] != CONCEALED:
-            continue
-        if "score" not in each:
-            counted.append(FAILED)
-        elif each["case"]["arm"] in before:
-            counted.append(_beside(each, before[each["case"]["arm"]]))
-    return counted
+    failed = [FAILED for each in outcomes if each["series"] == CONCEALED and "score" not in each]
+    return [*(_beside(each, told) for each, told in judge_all(outcomes)), *failed]
 
 
-def _beside(each: Outcome, before: Sequence[tuple[str, set[str], float]]) -> Counted:
-    there = {name for _, names, _ in before for name in names}
-    labels = [set(hidden["labels"]) for hidden in each["truth"]["hidden"]]
-    inside = any(Parameter(**told).inside for told in each["score"]["parameters"])
-    found = [any(one & names for _, names, _ in _said(each)) and (not one & there or inside) for one in labels]
-    claims = [
-        (probability, any(first in one for one in labels))
-        for first, _, probability in _said(each)
-        if first not in there or any(first in one for one in labels)
-    ]
-    return Counted(all(found), not all(found), _is_confident(claims), _worse(each), claims, each["seconds"])
-
-
-def _said(each: Outcome) -> list[tuple[str, set[str], float]]:
-    """First choice, set and probability of each finding."""
-    return [
-        (first, {first, *finding["equivalent"]}, float(finding["probability"]))
-        for finding in each["diagnosis"]["findings"]
-        if finding["effect"] != UNKNOWN
-        for first in [label(finding["effect"], finding["joint"])]
-    ]
+def _beside(each: Outcome, told: Judged) -> Counted:
+    named = all(one.named for one in told.effects)
+    return Counted(named, not named, bool(told.confident), _worse(each), told.claims, each["seconds"])
 
 
 def _count(each: Outcome) -> Counted:
