@@ -121,19 +121,21 @@ def test_the_page_begins_with_the_four_rows(outcomes: list[dict[str, Any]], tmp_
 def test_what_a_set_says_untouched_too_is_neither_right_nor_wrong() -> None:
     def real(series: str, findings: list[tuple[str, float]], **more: Any) -> dict[str, Any]:
         told = [
-            {"effect": name.split("@")[0], "joint": name.split("@")[1], "equivalent": [], "probability": p}
+            {
+                "effect": name.split("@")[0],
+                "joint": name.split("@")[1],
+                "equivalent": [],
+                "probability": p,
+                "confirmed": None,
+                "parameters": [],
+            }
             for name, p in findings
         ]
         diagnosis = {**trial("sound", 1, QUIET)["diagnosis"], "findings": told}
-        case = {"arm": "emps", "places": [], "held_out_s": 20.0}
-        return {
-            **trial("sound", 1, QUIET),
-            "series": series,
-            "arm": "emps",
-            "case": case,
-            "diagnosis": diagnosis,
-            **more,
-        }
+        hidden = [{"kind": "spring", "multiple": 1.5, "total": {"k": 1.0}, "constants": {}}]
+        case = {"arm": "emps", "places": [], "held_out_s": 20.0, "effects": hidden, "held_out_rms": [0.5, 0.0, 0.0]}
+        made_up = {"series": series, "arm": "emps", "case": case, "diagnosis": diagnosis}
+        return {**trial("sound", 1, QUIET), **made_up, **more}
 
     before = real("real-untouched", [("time_delay@j", 0.99)])
     spring = {"hidden": [{"labels": ["joint_spring@j"]}]}
