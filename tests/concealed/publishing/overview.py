@@ -8,7 +8,7 @@ import numpy as np
 from concealed.real.trials import REAL
 from concealed.running.kept import Outcome
 from concealed.scoring.calibration import Claim, calibration_error
-from concealed.scoring.figures import CONFIDENT, interval
+from concealed.scoring.figures import CONFIDENT, POOR_SERIES, interval
 from concealed.scoring.harm import worse_joints
 from concealed.scoring.score import UNKNOWN, Parameter
 from concealed.sealing.truth import label
@@ -28,7 +28,6 @@ GOOD = (
     "unknown",
     "sign",
 )
-POOR = ("sound-sensing", "sound-coarse", "strong-sensing", "strong-coarse", "sound-poor", "poor", "sign-poor")
 CONCEALED, UNTOUCHED, KNOWN = "real-concealed", "real-untouched", "real"
 HEAD = ("trials on", "trials", "right", "wrong and confident", "missed", "joints made worse", "calibration", "time")
 
@@ -66,7 +65,7 @@ def overview(outcomes: Sequence[Outcome]) -> str:
     """The table in Markdown; a row without trials says so."""
     rows: dict[str, list[Counted]] = {
         "simulated arms, good recordings": [_count(each) for each in outcomes if each["series"] in GOOD],
-        "simulated arms, poor recordings": [_count(each) for each in outcomes if each["series"] in POOR],
+        "simulated arms, poor recordings": [_count(each) for each in outcomes if each["series"] in POOR_SERIES],
         "real arms, an effect concealed": count_concealed(outcomes),
         "real arms, as others know them": [_count(each) for each in outcomes if _is_known(each)],
     }
