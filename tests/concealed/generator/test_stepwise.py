@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from concealed.generator import forward
-from concealed.generator.arms import DRY, arm_named
+from concealed.generator.arms import DRY, arm_named, noise_std
 from concealed.generator.forward import Passage, physical
 from concealed.generator.laws import _load, law_torque
 from concealed.generator.motions import campaign
 from concealed.generator.rates import RATE_HZ
 from concealed.generator.stepwise import trapezoid
+from concealed.generator.strength import strength
 from tauscope.robot import Robot
 
 
@@ -66,6 +67,12 @@ def test_friction_at_rest_takes_any_value_up_to_breakaway() -> None:
     assert np.ptp(made.position[:, 3]) < 2e-3
     assert np.abs(friction).max() <= 1.02 * breakaway
     assert np.ptp(friction) > 0.1 * breakaway
+
+
+def test_a_dry_arm_that_conceals_nothing_shows_nothing_where_it_moves() -> None:
+    robot, made = one_move()
+    whole, _ = strength(robot, [], [made], noise_std("servo" + DRY))
+    assert whole < 0.2
 
 
 @pytest.mark.parametrize("level", [0.03, -0.03])

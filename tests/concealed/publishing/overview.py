@@ -11,7 +11,7 @@ from concealed.real.judging.judge import Judged
 from concealed.real.trials import REAL
 from concealed.running.kept import Outcome
 from concealed.scoring.calibration import Claim, calibration_error
-from concealed.scoring.figures import CONFIDENT, interval
+from concealed.scoring.figures import CONFIDENT, POOR_SERIES, interval
 from concealed.scoring.harm import worse_joints
 
 GOOD = (
@@ -29,7 +29,6 @@ GOOD = (
     "unknown",
     "sign",
 )
-POOR = ("sound-sensing", "sound-coarse", "strong-sensing", "strong-coarse", "sound-poor", "poor", "sign-poor")
 KNOWN = "real"
 HEAD = ("trials on", "trials", "right", "wrong and confident", "missed", "joints made worse", "calibration", "time")
 
@@ -67,7 +66,7 @@ def overview(outcomes: Sequence[Outcome]) -> str:
     """The table in Markdown; a row without trials says so."""
     rows: dict[str, list[Counted]] = {
         "simulated arms, good recordings": [_count(each) for each in outcomes if each["series"] in GOOD],
-        "simulated arms, poor recordings": [_count(each) for each in outcomes if each["series"] in POOR],
+        "simulated arms, poor recordings": [_count(each) for each in outcomes if each["series"] in POOR_SERIES],
         "real arms, an effect concealed": count_concealed(outcomes),
         "real arms, as others know them": [_count(each) for each in outcomes if _is_known(each)],
     }

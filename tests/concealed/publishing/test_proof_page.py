@@ -161,6 +161,13 @@ def test_the_interval_of_a_share_is_the_binomial_one() -> None:
     assert share("x", "x", [], 0.01).standing is None
 
 
+def test_promises_of_good_and_of_poor_recordings_are_counted_apart() -> None:
+    told = [trial("weak", 1, {**RIGHT, "promised": [True]}), trial("weak", 2, {**QUIET, "promised": [False]})]
+    told += [trial("poor", 3, {**QUIET, "promised": [False]}), trial("poor", 4, RIGHT)]
+    found = {each.id: (each.hits, each.count) for each in headline(told)}
+    assert (found["promised"], found["promised-poor"]) == ((1, 2), (0, 1))
+
+
 def test_a_failed_trial_excuses_nothing() -> None:
     failed = [{"series": series, "seed": 0, "arm": None, "error": "x"} for series in ("sound", "moderate", "form")]
     found = {each.id: each for each in headline(failed)}

@@ -18,6 +18,7 @@ AS_ORACLE = 1.05
 
 NAMED_SINGLE = ("moderate", "strong", "constant")
 POOR_SINGLE = ("strong-sensing", "strong-coarse")
+POOR_SERIES = ("sound-sensing", "sound-coarse", *POOR_SINGLE, "sound-poor", "poor", "sign-poor")
 COMPARED = frozenset(
     {"weak", "moderate", "strong", "pair", "triple", "constant", "event", "pair-one-joint", "drift-beside", "poor"}
     | set(POOR_SINGLE)
@@ -135,12 +136,8 @@ def headline(outcomes: Sequence[Outcome]) -> list[Figure]:
             f"held-out rms ≤ {AS_ORACLE} of a diagnosis that knows the form",
             [each.get("oracle_ratio", np.inf) <= AS_ORACLE for each in outcomes if _has_oracle(each)],
         ),
-        share(
-            "promised",
-            "effects that the diagnosis calls detectable at their size: something is said to be there",
-            [kept for each in done(outcomes) for kept in each["score"].get("promised", ())],
-            0.85,
-        ),
+        _promised("promised", PROMISED, outcomes, poor=False),
+        _promised("promised-poor", f"{PROMISED}, poor recordings", outcomes, poor=True),
         share("failed", "trials that ended in an error", ["error" in each for each in outcomes], 0.0, at_least=False),
         _mean("size", "effects in a set that holds the truth (mean)", sizes(hidden)),
         _mean("time", "time of a diagnosis [s] (mean)", [each["seconds"] for each in outcomes if "seconds" in each]),
@@ -208,6 +205,12 @@ def _mean(id_: str, words: str, values: Sequence[float]) -> Figure:
     return Figure(id_, words, mean, mean - half, mean + half, count, None)
 
 
+def _promised(id_: str, words: str, outcomes: Sequence[Outcome], *, poor: bool) -> Figure:
+    """How often something is said to be there where the diagnosis would see the concealed size by its own word."""
+    these = [each for each in done(outcomes) if (each["series"] in POOR_SERIES) == poor]
+    return share(id_, words, [kept for each in these for kept in each["score"].get("promised", ())], 0.85)
+
+
 def _has_oracle(each: Outcome) -> bool:
     """Whether a trial was compared with an oracle, or failed where it should have been."""
     return "oracle_ratio" in each or ("error" in each and each["series"] in COMPARED)
@@ -221,6 +224,7 @@ def _wrong_instead(each: Outcome) -> bool:
     return _confident_and_wrong(each) and _not_named(each)
 
 
+PROMISED = "effects called detectable at their size: something is said to be there"
 GOOD, POOR = "one effect, s ≥ 15", "the same, poor recordings"
 NOTHING = "nothing of the catalogue"
 PARTLY = "told as partly explained or unexplained"
