@@ -46,5 +46,6 @@ def test_its_options_reach_the_trials(run: Run, monkeypatch: pytest.MonkeyPatch,
     called: list[list[str]] = []
 
     monkeypatch.setattr("tauscope.cli.prove_command.become_trials", lambda repository, words: called.append(words))
-    assert run("prove", "--full", "--first-seed", "7", "--out", tmp_path, "--page", tmp_path / "p.md").status == 0
-    assert called == [["--out", str(tmp_path), "--first-seed", "7", "--full", "--page", str(tmp_path / "p.md")]]
+    words = ["--full", "--scheduler", "tcp://one:8786", "--page", str(tmp_path / "p.md")]
+    assert run("prove", "--first-seed", "7", "--out", tmp_path, *words).status == 0
+    assert called == [["--out", str(tmp_path), "--first-seed", "7", *words]]

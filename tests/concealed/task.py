@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from concealed.baselines.columns import ground
+from concealed.baselines.comparison import RANKED
 from concealed.baselines.ranking import rankings
 from concealed.generator.case import Case
 from concealed.generator.trial import Trial
+from concealed.real.concealed_outcome import concealed_outcome, untouched_outcome
 from concealed.real.outcome import real_outcome
 from concealed.running.kept import Key, Outcome
 from concealed.scoring.oracle import against_oracle, oracle
@@ -60,9 +62,21 @@ def outcome(task: Task) -> Outcome:
     told: Outcome = {"series": task.series, "seed": task.seed, "arm": task.arm, "commit": task.commit}
     told["began"] = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
     try:
-        return {**told, **(real_outcome(task.arm or "") if task.series == REAL else _tried(task))}
+        return {**told, **_outcome_of_series(task)}
     except Exception as error:  # whatever it is, the other trials go on and this one is counted as failed
         return {**told, "error": repr(error)}
+
+
+def _outcome_of_series(task: Task) -> Outcome:
+    match task.series:
+        case "real":
+            return real_outcome(task.arm or "")
+        case "real-concealed":
+            return concealed_outcome(task.seed, task.arm, with_oracle=task.with_oracle)
+        case "real-untouched":
+            return untouched_outcome(task.arm or "")
+        case _:
+            return _tried(task)
 
 
 def _tried(task: Task) -> Outcome:
@@ -81,9 +95,12 @@ def _diagnosed(task: Task, case: Case, trial: Trial, these: Sealed) -> Outcome:
     found, seconds = diagnosis_apart(these.folder, plans=plans)
     again = diagnosis_apart(these.folder) if plans and with_recommended(these) else None
     truth = opened(these.truth, these.seal)
-    told: dict[str, Any] = {"name": case.name, "case": case.as_dict(), "seal": these.seal, "truth": asdict(truth)}
+    held_out_s = sum(float(each.samples().time[-1]) for each in trial.held_out)
+    drawn = {**case.as_dict(), "held_out_s": held_out_s}
+    told: dict[str, Any] = {"name": case.name, "case": drawn, "seal": these.seal, "truth": asdict(truth)}
     told |= {"score": asdict(compared(truth, found, seconds)), "seconds": seconds, "diagnosis": plain(found)}
-    told["baselines"] = rankings(ground(trial.robot, trial.train))
+    if task.series in RANKED:
+        told["baselines"] = rankings(ground(trial.robot, trial.train))
     if again is not None:
         told |= {"again": asdict(compared(truth, *again)), "diagnosis_again": plain(again[0])}
     if task.with_oracle and again is None and trial.concealed.entries:

@@ -15,6 +15,7 @@ SEED = 2
 def one_trial(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sets, "REDUCED", {"sound": 1})
     monkeypatch.setattr(proof, "QUICK", ())
+    monkeypatch.setattr(proof, "QUICK_CONCEALED", 0)
 
 
 def prove(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
@@ -49,7 +50,7 @@ def test_one_trial_from_draw_to_page(
 
 @pytest.mark.parametrize(
     ("words", "until"),
-    [([], 720.0), (["--minutes", "2"], 120.0), (["--full"], None), (["--full", "--minutes", "2"], 120.0)],
+    [([], 360.0), (["--minutes", "2"], 120.0), (["--full"], None), (["--full", "--minutes", "2"], 120.0)],
 )
 def test_only_the_reduced_set_ends_by_itself(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], until: float | None

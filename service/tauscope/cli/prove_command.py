@@ -16,12 +16,15 @@ REPORTING = 1_000_000
 
 def prove(
     *,
-    full: Annotated[bool, typer.Option("--full", help="The full set instead of the quick one; takes hours.")] = False,
+    full: Annotated[bool, typer.Option("--full", help="The full set instead of the quick one; takes an hour.")] = False,
     first_seed: Annotated[
         int, typer.Option(metavar="N", min=0, help="First seed; below 10000 is for development.")
     ] = REPORTING,
     jobs: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="Trials at the same time; one a core by default.")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler of the cluster that makes the trials.")
     ] = None,
     out: Annotated[Path, typer.Option(metavar="DIR", file_okay=False, help="Folder for outcomes and page.")] = Path(
         "proof-output"
@@ -33,11 +36,12 @@ def prove(
     """Put the diagnosis to the test: conceal effects, seal the truth, diagnose, open it, count.
 
     Works in a clone of the repository. Outcomes are kept one by one, so that an interrupted set goes on. Uses all
-    cores, or the Dask cluster whose scheduler DASK_SCHEDULER_ADDRESS names.
+    cores, or a Dask cluster: the one of --scheduler, else of DASK_SCHEDULER_ADDRESS.
     """
     words = ["--out", str(out), "--first-seed", str(first_seed)]
     words += ["--full"] if full else []
     words += [] if jobs is None else ["--jobs", str(jobs)]
+    words += [] if scheduler is None else ["--scheduler", scheduler]
     words += [] if page is None else ["--page", str(page)]
     become_trials(REPOSITORY, words)
 

@@ -21,6 +21,9 @@ GROUPS = {
 }
 """Series in which the first choice can be right, or it is right to claim nothing."""
 
+RANKED = frozenset(series for group in GROUPS.values() for series in group)
+"""All of them."""
+
 COLOURS = {"tauscope": "#0072B2", "bic": "#E69F00", "sparse": "#009E73", "correlation": "#CC79A7"}
 MARKERS = {"tauscope": "o", "bic": "s", "sparse": "D", "correlation": "^"}
 

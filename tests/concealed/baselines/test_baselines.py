@@ -11,7 +11,7 @@ from concealed.baselines.comparison import shares, table
 from concealed.baselines.ranking import Best, rankings, sparse
 from concealed.baselines.tune import LOOKED_AT
 from concealed.generator.arms import arm_named, without_truth
-from concealed.generator.motions import campaign
+from concealed.generator.motions import fourier_campaign
 from tauscope.diagnosis.fitting.projection import JointColumns, project
 from tauscope.dynamics import inverse_dynamics
 from tauscope.recording import Recording
@@ -60,7 +60,7 @@ def test_the_criterion_finds_what_the_nominal_model_half_hides() -> None:
 def test_on_an_arm_the_criterion_names_a_cogging_that_stands_out() -> None:
     """A motion that is followed exactly, by our own inverse dynamics: no simulation is needed to see that all fits."""
     robot, rng = arm_named("paper"), np.random.default_rng(8)
-    train, _ = campaign(robot, 3)
+    train, _ = fourier_campaign(robot, 3)
     time = np.arange(1600) / 200.0
     recordings = []
     for motion in train[:2]:

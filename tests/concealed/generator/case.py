@@ -7,9 +7,18 @@ from typing import Any
 import numpy as np
 
 from concealed.generator.arms import arm_named
-from concealed.generator.concealment import Concealed, concealed_effects, concealed_form, concealed_unknown
+from concealed.generator.concealment import (
+    Concealed,
+    concealed_effects,
+    concealed_form,
+    concealed_signs,
+    concealed_unknown,
+)
 from concealed.generator.effects import CATALOGUE, EVENTS
 from concealed.generator.forms import FORMS
+from concealed.generator.motions import STEPWISE
+from concealed.generator.sensing import CORRELATION
+from concealed.generator.strength import Reference
 from concealed.generator.trial import Trial, recorded_trial
 from concealed.generator.unknown import UNKNOWN
 
@@ -25,6 +34,9 @@ SEEDS_OF_A_CAMPAIGN = 10_000
 ARMS = {"paper": 0.4, "six": 0.2, "seven": 0.2, "linear": 0.2}
 """Arms and how often each is drawn."""
 
+DRY_ARMS = {"servo-dry": 0.4, "paper-dry": 0.2, "six-dry": 0.2, "seven-dry": 0.2}
+"""The same for motion with rest in it."""
+
 SENSORS: tuple[dict[str, Any], ...] = (
     {"kind": "coloured"},
     {"kind": "heavy"},
@@ -38,6 +50,26 @@ SENSORS: tuple[dict[str, Any], ...] = (
 
 COARSE: tuple[dict[str, Any], ...] = ({"encoder_step": 2.0 * np.pi / 4096},)
 """What is wrong with those that end in ``-coarse``: 12 bit a turn, as small servos have it."""
+
+TWELVE_BIT = 2.0 * np.pi / 4096
+"""One count [rad]."""
+
+POOR: tuple[dict[str, Any], ...] = (
+    {"every": 2, "encoder_step": TWELVE_BIT, "position_std": 0.0},
+    {"every": 4, "encoder_step": TWELVE_BIT, "position_std": 0.0, "torque_step": 1.0},
+    {"every": 6},
+    {"every": 2, "torque_step": 1.0},
+    {"every": 2, "kind": "autoregressive"},
+    {"every": 4, "kind": "autoregressive"},
+    {"every": 2, "bunched": 0.05},
+    {"every": 2, "dropouts": 2},
+    {"every": 1, "held": 4},
+    {"every": 3, "dropped": 0.02, "encoder_step": TWELVE_BIT, "position_std": 0.0},
+)
+"""What first recordings of small and of industrial arms are like: 33 to 100 Hz, or 50 Hz held at 200 Hz."""
+
+SIGN, SIGNS = "wrong_sign", "wrong_signs"
+"""Places of series that turn the sign of a joint's torque, or of all joints'."""
 
 TURNING = ("paper", "six", "seven")
 """Arms without a linear axis, whose encoder no turn is divided by."""
@@ -96,7 +128,18 @@ class Case:
             return concealed_unknown(self.arm, what, joint, self.wanted, **drawn)
         if what in FORMS:
             return concealed_form(self.arm, what, joint, self.wanted, **drawn)
-        return concealed_effects(self.arm, self.places, self.wanted, **drawn)
+        if what in (SIGN, SIGNS):
+            return concealed_signs(joint if what == SIGN else None, arm_named(self.arm).joint_count)
+        return concealed_effects(self.arm, self.places, self.wanted, reference=self.reference, **drawn)
+
+    @property
+    def reference(self) -> Reference:
+        """What s is stated of: rich motion and good sensors, but stepwise motion by itself and by its own logger."""
+        if self.kind not in STEPWISE:
+            return Reference()
+        correlation = CORRELATION if self.sensors.get("kind") == "autoregressive" else 0.0
+        every = self.sensors.get("every", 1) * self.sensors.get("held", 1)
+        return Reference(self.kind, every, correlation)
 
     def recorded(self, concealed: Concealed) -> Trial:
         """The trial itself."""
@@ -124,6 +167,10 @@ class Series:
         whether the files hold currents
     arms : tuple of str
         on which; one is drawn
+    first : str or None
+        effect that each case has, beside those that are drawn
+    at_one_joint : bool
+        whether all effects of a case are at the same joint
     """
 
     words: str
@@ -134,9 +181,15 @@ class Series:
     sensors: tuple[dict[str, Any], ...] = ({},)
     logs_current: bool = False
     arms: tuple[str, ...] = tuple(ARMS)
+    first: str | None = None
+    at_one_joint: bool = False
 
 
 _EFFECTS = tuple(CATALOGUE)
+_RIGID = tuple(effect for effect in CATALOGUE if effect not in ("joint_elasticity", "backlash", "rotor_inertia"))
+"""Of which any two can be at one joint."""
+
+_STEPWISE: dict[str, Any] = {"kinds": tuple(STEPWISE), "sensors": POOR, "arms": tuple(DRY_ARMS)}
 SERIES: dict[str, Series] = {
     "sound": Series("nothing is concealed"),
     "sound-sensing": Series("nothing is concealed, and the recordings are poor", sensors=SENSORS),
@@ -159,6 +212,19 @@ SERIES: dict[str, Series] = {
     "constant": Series(
         "currents under a wrong nominal torque_constant", ("torque_gain_error",), 1, (15.0, 40.0), logs_current=True
     ),
+    "pair-one-joint": Series("two effects at one joint, s = 40 each", _RIGID, 2, (40.0,), at_one_joint=True),
+    "drift-beside": Series(
+        "friction that drifts, and another effect, s = 40 each", _EFFECTS, 2, (40.0,), first="friction_drift"
+    ),
+    "sign": Series("the torque of one joint, or of all, has the wrong sign", (SIGN, SIGNS), 1),
+    "sound-poor": Series("nothing is concealed; jogs or points, poor sensors", **_STEPWISE),
+    "poor": Series("one effect; jogs or points, poor sensors", _EFFECTS, 1, (15.0, 40.0), **_STEPWISE),
+    "sign-poor": Series(
+        "the torque of one joint, or of all, has the wrong sign; jogs or points, poor sensors",
+        (SIGN, SIGNS),
+        1,
+        **_STEPWISE,
+    ),
 }
 
 
@@ -168,13 +234,15 @@ def drawn(series: str, seed: int, arm: str | None = None, attempt: int = 0) -> C
     A further attempt draws another effect, where the first could not be made as strong as wanted.
     """
     told, rng = SERIES[series], np.random.default_rng([seed, zlib.crc32(series.encode()), attempt])
-    chances = np.array([ARMS[name] for name in told.arms])
+    chances = np.array([(ARMS | DRY_ARMS)[name] for name in told.arms])
     some = str(rng.choice(told.arms, p=chances / chances.sum()))
     where = arm or some
     joints = arm_named(where).joint_count
-    places: list[Place] = []
+    places: list[Place] = [] if told.first is None else [(told.first, int(rng.integers(joints)))]
     while len(places) < told.count:
         place = (str(rng.choice(told.from_)), int(rng.integers(joints)))
+        if told.at_one_joint and places:
+            place = (place[0], places[0][1])
         if place[0] not in [what for what, _ in places]:
             places.append(place)
     return Case(

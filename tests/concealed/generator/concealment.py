@@ -6,15 +6,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from concealed.generator.arms import NOISE_STD, arm_named
-from concealed.generator.effects import CATALOGUE, EVENTS, Drawn, Ground
+from concealed.generator.arms import noise_std
+from concealed.generator.effects import CATALOGUE, EVENTS, Drawn, Ground, flip_all, flip_one
 from concealed.generator.forms import FORMS, form_torque
 from concealed.generator.forward import Entry, Passage, passage, physical
 from concealed.generator.laws import with_law
-from concealed.generator.motions import RATE_HZ, Asked, campaign
+from concealed.generator.motions import Asked
+from concealed.generator.rates import FINE, RATE_HZ
 from concealed.generator.sizing import sized, tuned
-from concealed.generator.strength import strength
+from concealed.generator.strength import Reference, Sight, sight_of
 from concealed.generator.unknown import UNKNOWN
+from tauscope.errors import ScenarioError
 from tauscope.robot import Robot
 
 Array = NDArray[np.float64]
@@ -59,18 +61,41 @@ class Concealed:
 
 
 def concealed_effects(
-    arm: str, places: Sequence[tuple[str, int]], wanted: float, *, motion_seed: int, seed: int
+    arm: str,
+    places: Sequence[tuple[str, int]],
+    wanted: float,
+    *,
+    motion_seed: int,
+    seed: int,
+    reference: Reference | None = None,
 ) -> Concealed:
-    """Effects of the catalogue at their joints, each of the wanted s alone and drawn from random numbers of its own."""
+    """Effects of the catalogue at their joints, each of the wanted s alone and drawn from random numbers of its own.
+
+    Raises
+    ------
+    ScenarioError
+        where one would take more torque than all else that the arm does
+    """
     truth, entries, found = [], [], []
+    sight = sight_of(arm, motion_seed, reference or Reference())
     for number, (effect, joint) in enumerate(places):
         draw, rng = {**CATALOGUE, **EVENTS}[effect], np.random.default_rng([seed, 5 + number])
-        drawn = draw(_ground(arm, motion_seed, joint), rng)
-        entry, shown = sized(arm, drawn, wanted, motion_seed)
+        drawn = draw(_ground(arm, sight, joint), rng)
+        entry, shown = sized(sight, drawn, wanted)
+        if not sight.is_plausible(entry):
+            raise ScenarioError(f"{effect} of joint {joint + 1} shows with s = {wanted:g} only where no arm has it")
         truth.append(drawn)
         entries.append(entry)
         found.append(shown)
     return Concealed(tuple(truth), tuple(entries), float(np.mean(found)))
+
+
+def concealed_signs(joint: int | None, joint_count: int) -> Concealed:
+    """The torque of a joint, or of all joints, with the wrong sign."""
+    drawn = flip_all(joint_count) if joint is None else flip_one(joint)
+    joints = range(joint_count) if joint is None else [joint]
+    entries = [{"effect": "torque_gain_error", "joint": one + 1, "gain": -1.0} for one in joints]
+    return Concealed((drawn,), tuple(entries))
 
 
 def concealed_unknown(arm: str, law: str, joint: int, wanted: float, *, motion_seed: int, seed: int) -> Concealed:
@@ -79,54 +104,43 @@ def concealed_unknown(arm: str, law: str, joint: int, wanted: float, *, motion_s
     def torque(plain: Passage, size: float) -> Array:
         return size * UNKNOWN[law](plain, joint, np.random.default_rng([seed, 3]))
 
-    return _law(arm, torque, joint, ("unknown",), wanted, motion_seed)
+    return _law(sight_of(arm, motion_seed, Reference()), torque, joint, ("unknown",), wanted)
 
 
 def concealed_form(arm: str, form: str, joint: int, wanted: float, *, motion_seed: int, seed: int) -> Concealed:
     """An effect of a family that the catalogue has, under another formula."""
-    ground = _ground(arm, motion_seed, joint)
+    sight = sight_of(arm, motion_seed, Reference())
+    ground = _ground(arm, sight, joint)
 
     def torque(plain: Passage, size: float) -> Array:
         return form_torque(form, plain, ground, size, seed)
 
-    return _law(arm, torque, joint, FORMS[form].names, wanted, motion_seed)
+    return _law(sight, torque, joint, FORMS[form].names, wanted)
 
 
 def _law(
-    arm: str,
-    torque: Callable[[Passage, float], Array],
-    joint: int,
-    names: tuple[str, ...],
-    wanted: float,
-    motion_seed: int,
+    sight: Sight, torque: Callable[[Passage, float], Array], joint: int, names: tuple[str, ...], wanted: float
 ) -> Concealed:
     """A law of the motion at the size that has the wanted s."""
-    robot = arm_named(arm)
-    train, _ = campaign(robot, motion_seed)
     drawn = Drawn(lambda size: {}, 1.0, 1.0, (joint,), names)
-
-    def concealed(size: float) -> Concealed:
-        return Concealed((drawn,), (), wanted, joint, lambda plain: torque(plain, size))
+    unit = np.eye(sight.robot.joint_count)[joint]
 
     def shown(size: float) -> float:
-        return strength(robot, [], concealed(size).passages(robot, train), NOISE_STD[arm])[0]
+        return sight.strength([torque(each, size)[:, None] * unit for each in sight.passages])[0]
 
     size, found = tuned(shown, wanted, drawn.size, drawn)
-    return replace(concealed(size), strength=found)
+    return Concealed((drawn,), (), found, joint, lambda plain: torque(plain, size))
 
 
-def _ground(arm: str, motion_seed: int, joint: int) -> Ground:
+def _ground(arm: str, sight: Sight, joint: int) -> Ground:
     """What an effect's draw needs to know of the joint."""
-    robot = arm_named(arm)
-    train, _ = campaign(robot, motion_seed)
-    passages = [passage(robot, [], motion) for motion in train]
-    lengths = [len(motion.setpoints) / RATE_HZ for motion in train]
-    position = np.concatenate([each.position[:, joint] for each in passages])
-    torque = np.concatenate([each.torque[:, joint] for each in passages])
+    lengths = [len(each.position) / (FINE * RATE_HZ) for each in sight.passages]
+    position = np.concatenate([each.position[:, joint] for each in sight.passages])
+    torque = np.concatenate([each.torque[:, joint] for each in sight.passages])
     return Ground(
-        robot,
+        sight.robot,
         joint,
-        NOISE_STD[arm][joint],
+        noise_std(arm)[joint],
         float(torque.std()),
         float(position.min()),
         float(position.max()),

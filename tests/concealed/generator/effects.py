@@ -64,6 +64,8 @@ class Drawn:
         ids under which it may be named
     also : tuple of str
         ids that come with it: a second mass that an elastic transmission brings, teeth that give way
+    also_places : tuple of int or None
+        joints at which what comes with it may be named; `places` where empty
     smallest : float
         size below which the effect is another: bristles shorter than the encoder's noise are a step
     largest : float
@@ -76,6 +78,7 @@ class Drawn:
     places: tuple[int | None, ...]
     names: tuple[str, ...]
     also: tuple[str, ...] = ()
+    also_places: tuple[int | None, ...] = ()
     smallest: float = 0.0
     largest: float = np.inf
 
@@ -189,8 +192,13 @@ def torque_ripple(g: Ground, rng: np.random.Generator) -> Drawn:
     return replace(drawn, largest=LARGEST_OF_LOAD)
 
 
+def _rotor(g: Ground) -> float:
+    """Reflected inertia of the motor: so small beside the noise that it hides no compliance [kg m² or kg]."""
+    return min(0.004, 0.02 * g.noise)
+
+
 def joint_elasticity(g: Ground, rng: np.random.Generator) -> Drawn:
-    joint, rotor = g.joint + 1, 0.004
+    joint, rotor = g.joint + 1, _rotor(g)
     return Drawn(
         lambda value: {
             "effect": "joint_elasticity",
@@ -210,7 +218,7 @@ def joint_elasticity(g: Ground, rng: np.random.Generator) -> Drawn:
 
 
 def backlash(g: Ground, rng: np.random.Generator) -> Drawn:
-    joint, rotor = g.joint + 1, 0.004
+    joint, rotor = g.joint + 1, _rotor(g)
     return Drawn(
         lambda value: {
             "effect": "backlash",
@@ -331,6 +339,17 @@ def external_contact(g: Ground, rng: np.random.Generator) -> Drawn:
         "duration": round(float(rng.uniform(0.5, 3.0)), 2),
     }
     return _law("external_contact", g, "torque", 2.0 * g.noise * _sign(rng), profile=profile, **when)
+
+
+def flip_one(joint: int) -> Drawn:
+    """A torque channel wired the other way round."""
+    return Drawn(lambda value: {}, 1.0, 1.0, (joint,), ("torque_gain_error",))
+
+
+def flip_all(joint_count: int) -> Drawn:
+    """The reaction on the drives in place of their torque, at every joint."""
+    gain = ("torque_gain_error",)
+    return Drawn(lambda value: {}, 1.0, 1.0, (None,), gain, gain, tuple(range(joint_count)))
 
 
 EVENTS: dict[str, Draw] = {draw.__name__: draw for draw in (payload_change, external_contact)}

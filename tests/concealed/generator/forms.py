@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from concealed.generator.effects import LARGEST_VARIATION, Ground
-from concealed.generator.forward import FINE, Passage
-from concealed.generator.motions import RATE_HZ
+from concealed.generator.forward import Passage
+from concealed.generator.rates import FINE, RATE_HZ
 
 Array = NDArray[np.float64]
 STEP_S = 1.0 / (FINE * RATE_HZ)

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from concealed.generator.motions import RATE_HZ, Asked
+from concealed.generator.motions import Asked
+from concealed.generator.rates import FINE, RATE_HZ
 from tauscope.robot import Robot, robot_to_dict
 from tauscope_drivers import ControlMode, DriveLimits, Setpoint, StopPolicy
 from tauscope_sim.driver import SimulatedArm
@@ -26,9 +27,6 @@ from tauscope_sim.scenario import Scenario
 Array = NDArray[np.float64]
 Entry = dict[str, Any]
 """An effect as a scenario file writes it."""
-
-FINE = 5
-"""Readings of the true state between two setpoints: 1 kHz."""
 
 CACHE = Path(os.environ.get("TAUSCOPE_CONCEALED_CACHE", Path(tempfile.gettempdir()) / "tauscope-concealed"))
 """Where passages are kept; never in the repository."""

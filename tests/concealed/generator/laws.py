@@ -2,7 +2,9 @@
 
 τ = H q̈ + h + c + τ_f + x holds along any motion: where x is a law of the motion, the drives of an arm that conceals it
 need just x more for the same motion. So one passage under the drives' own loop, with all its sticking at reversals,
-serves for many effects without another simulation. Transmissions that give way move otherwise: they are simulated.
+serves for many effects without another simulation. A transmission that gives way lets its link move otherwise, which
+`concealed.generator.transmissions` works out; where it stands beside other effects, they act on that link too, and the
+arm is simulated.
 """
 
 from dataclasses import replace
@@ -10,14 +12,17 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from concealed.generator.forward import FINE, Passage
-from concealed.generator.motions import RATE_HZ
+from concealed.generator.forward import Passage
+from concealed.generator.rates import FINE, RATE_HZ
+from concealed.generator.transmissions import transmission_torque
 from tauscope.robot import Robot
 from tauscope_sim.effects import Effect
+from tauscope_sim.effects.backlash import Backlash
 from tauscope_sim.effects.base_tilt import BaseTilt
 from tauscope_sim.effects.external_contact import ExternalContact
 from tauscope_sim.effects.friction_coupling import FrictionCoupling
 from tauscope_sim.effects.friction_drift import FrictionDrift
+from tauscope_sim.effects.joint_elasticity import JointElasticity
 from tauscope_sim.effects.joint_law import JointLaw
 from tauscope_sim.effects.kinematic_error import KinematicError
 from tauscope_sim.effects.load_dependent_friction import LoadDependentFriction
@@ -35,7 +40,9 @@ STEP_S = 1.0 / (FINE * RATE_HZ)
 
 
 def with_law(robot: Robot, effects: tuple[Effect, ...], passage: Passage) -> Passage | None:
-    """The passage as it is under some effects; None where one of them is no law of the motion."""
+    """The passage as it is under some effects; None where that takes a simulation."""
+    if len(effects) > 1 and any(isinstance(effect, Backlash | JointElasticity) for effect in effects):
+        return None
     torques = [law_torque(robot, effect, passage) for effect in effects]
     if any(each is None for each in torques):
         return None
@@ -73,6 +80,8 @@ def law_torque(robot: Robot, effect: Effect, passage: Passage) -> Array | None:
         case PayloadChange():
             carries = Payload(mass=effect.mass, offset=effect.offset, moments=effect.moments)
             torque = _carrying(effect, len(q)) * (_load(carries.alter(robot), passage) - _load(robot, passage))
+        case Backlash() | JointElasticity():
+            torque = transmission_torque(robot, effect, q, v)
         case BaseTilt() | Payload() | KinematicError():
             torque = _load(effect.alter(robot), passage) - _load(robot, passage)
         case _:

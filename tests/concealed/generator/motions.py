@@ -1,20 +1,22 @@
-"""What the arm is asked to do: random Fourier series, slow reversals, and motions too narrow or too slow to tell."""
+"""What the arm is asked to do: random Fourier series, slow reversals, motions too narrow or too slow, or stepwise."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from concealed.generator.rates import HOLD_S, RATE_HZ
+from concealed.generator.stepwise import jog, visit_points
 from tauscope.robot import Joint, JointLimits, Robot
 from tauscope.trajectory import Trajectory
 from tauscope_sim.motion import FourierMotion, random_fourier_motion
 
 Array = NDArray[np.float64]
 
-RATE_HZ = 200.0
-HOLD_S = 0.5
-"""Rest before the motion begins [s]."""
+STEPWISE = {"jogs": jog, "points": visit_points}
+"""Motions with rest between the moves."""
 
 SLOW_SPEED = 0.12
 """Speed limit of slow reversals [rad/s]."""
@@ -90,7 +92,18 @@ class Planned:
         return np.full(len(self.setpoints), np.nan)
 
 
-def campaign(robot: Robot, seed: int, kind: str = "rich", period_s: float = 8.0) -> tuple[list[Motion], list[Motion]]:
+def campaign(robot: Robot, seed: int, kind: str = "rich") -> tuple[Sequence[Asked], Sequence[Asked]]:
+    """Training and held-out motions: a `fourier_campaign`, or two stepwise recordings and a third held out."""
+    if kind not in STEPWISE:
+        return fourier_campaign(robot, seed, kind)
+    rng = np.random.default_rng([seed, 78])
+    first, second, held_out = (STEPWISE[kind](name, robot.joints, rng) for name in ("train1", "train2", "held-out"))
+    return [first, second], [held_out]
+
+
+def fourier_campaign(
+    robot: Robot, seed: int, kind: str = "rich", period_s: float = 8.0
+) -> tuple[list[Motion], list[Motion]]:
     """Training and held-out motions.
 
     `rich`: two Fourier motions and slow reversals; `narrow` and `slow`: training that hides much, held out as for
@@ -106,8 +119,7 @@ def campaign(robot: Robot, seed: int, kind: str = "rich", period_s: float = 8.0)
     if kind == "rich":
         slow = [_limited(joint, 0.5, SLOW_SPEED) for joint in robot.joints]
         train.append(Motion("train3", _fourier(slow, rng, 1.5 * period_s), 1))
-    held_out = [Motion("held-out", _fourier(robot.joints, rng, period_s), 2)]
-    return train, held_out
+    return train, [Motion("held-out", _fourier(robot.joints, rng, period_s), 2)]
 
 
 def _fourier(joints: list[Joint] | tuple[Joint, ...], rng: np.random.Generator, period_s: float) -> FourierMotion:

@@ -1,14 +1,20 @@
 """The size of a wanted strength is found where there is one, and where there is none, the nearest."""
 
 import math
+from functools import cache
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from concealed.generator import sizing
-from concealed.generator.effects import Drawn
+from concealed.generator import forward
+from concealed.generator.arms import NOISE_STD, arm_named
+from concealed.generator.effects import CATALOGUE, EVENTS, Drawn, Ground
+from concealed.generator.motions import Motion
 from concealed.generator.sizing import CLOSE_ENOUGH, tuned
+from concealed.generator.strength import Sight
+from tauscope_sim.motion import random_fourier_motion
 
 
 def knob(power: float = 1.0, largest: float = math.inf) -> Drawn:
@@ -34,21 +40,29 @@ def test_at_a_bound_it_looks_no_further() -> None:
     assert looks == [1.0, 5.0]
 
 
-def test_what_has_to_be_simulated_is_simulated_whole_only_at_its_size(monkeypatch: pytest.MonkeyPatch) -> None:
-    played: list[tuple[float, str]] = []
+def test_every_effect_is_sized_without_a_simulation(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Sound passages are made once; an effect is a law along them."""
+    sight = short_sight()
 
-    def passage(robot: object, entries: list[dict[str, float]], motion: object) -> tuple[float, str]:
-        if entries:
-            played.append((entries[0]["size"], motion.name))  # type: ignore[attr-defined]
-        return entries[0]["size"] if entries else 0.0, motion.name  # type: ignore[attr-defined]
+    def play(*_: object) -> None:
+        pytest.fail("an effect was simulated to find its size")
 
-    monkeypatch.setattr(sizing, "passage", passage)
-    monkeypatch.setattr(sizing, "foreseen_strength", lambda *_: None)
-    # Every motion shows the same per second, so that three show more than one by the root of their time.
-    monkeypatch.setattr(
-        sizing, "strength", lambda robot, entries, made, noise: (made[0][0] * (1.0 if len(made) == 1 else 1.66), None)
-    )
-    entry, found = sizing.sized("paper", knob(), 40.0, 0)
-    assert found == pytest.approx(40.0, rel=CLOSE_ENOUGH)
-    whole = [size for size, motion in played if motion == "train3"]
-    assert whole == [entry["size"]]
+    monkeypatch.setattr(forward, "_played", play)
+    ground = Ground(sight.robot, 1, noise=0.3, load=5.0, low=-1.0, high=1.0, duration=3.0, shortest=3.0)
+    for effect, draw in {**CATALOGUE, **EVENTS}.items():
+        drawn = draw(ground, np.random.default_rng(3))
+        assert sight.foreseen(drawn.entry(drawn.size)) >= 0.0, effect
+
+
+def test_an_effect_that_takes_more_torque_than_all_else_is_not_plausible() -> None:
+    sight = short_sight()
+    entry = {"effect": "cogging", "joint": 2, "order": 9.0, "phase": 0.0}
+    assert sight.is_plausible({**entry, "amplitude": 0.5})
+    assert not sight.is_plausible({**entry, "amplitude": 500.0})
+
+
+@cache
+def short_sight() -> Sight:
+    robot = arm_named("paper")
+    series = random_fourier_motion(robot.joints, np.random.default_rng(4), period_s=3.0, limit_fraction=0.5)
+    return Sight(robot, [forward._played(robot, (), Motion("short", series, 1).setpoints)], NOISE_STD["paper"])

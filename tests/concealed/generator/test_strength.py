@@ -2,15 +2,17 @@
 
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
 
 from concealed.generator.arms import NOISE_STD, arm_named, without_truth
-from concealed.generator.forward import FINE, Passage, physical
+from concealed.generator.forward import Passage, physical
 from concealed.generator.laws import law_torque, with_law
-from concealed.generator.motions import RATE_HZ, campaign
-from concealed.generator.strength import foreseen_strength, strength
+from concealed.generator.motions import fourier_campaign
+from concealed.generator.rates import FINE, RATE_HZ
+from concealed.generator.strength import Reference, Sight, strength
 from tauscope.dynamics import inverse_dynamics
 from tauscope_sim.friction import static_friction_torque
 
@@ -21,7 +23,7 @@ COGGING = {"effect": "cogging", "joint": 1, "amplitude": 0.3, "order": 17.0, "ph
 def passage(arm: str) -> Passage:
     """A motion followed exactly, with the torque that it takes by our own inverse dynamics."""
     robot = arm_named(arm)
-    train, _ = campaign(robot, 3)
+    train, _ = fourier_campaign(robot, 3)
     time = np.arange(round(8.0 * FINE * RATE_HZ)) / (FINE * RATE_HZ)
     exact = train[0].series.evaluate(time)
     links = np.concatenate([link.to_vector() for link in robot.model.links or ()])
@@ -58,14 +60,43 @@ def test_half_the_noise_is_twice_the_strength_and_what_is_foreseen_comes_true() 
     assert made is not None
     whole, _ = strength(robot, [], [made], noise)
     assert strength(robot, [], [made], 0.5 * noise)[0] == pytest.approx(2.0 * whole)
-    assert foreseen_strength(robot, COGGING, [passage("paper")], noise) == pytest.approx(whole, rel=1e-6)
+    assert sight().foreseen(COGGING) == pytest.approx(whole, rel=1e-6)
 
 
-def test_what_the_nominal_model_has_itself_does_not_show() -> None:
-    entry = {"effect": "viscous_friction", "joint": 2, "coefficient": 0.4}
-    found = foreseen_strength(arm_named("paper"), entry, [passage("paper")], NOISE_STD["paper"])
-    assert found is not None
-    assert found < 0.2
+@pytest.mark.parametrize(
+    "entry",
+    [
+        {"effect": "viscous_friction", "joint": 2, "coefficient": 0.4},
+        {"effect": "torque_offset", "joint": 2, "torque": 3.0},
+    ],
+)
+def test_what_the_nominal_model_has_itself_does_not_show(entry: dict[str, Any]) -> None:
+    assert sight().foreseen(entry) < 0.2
+
+
+def sight() -> Sight:
+    return Sight(arm_named("paper"), [passage("paper")], NOISE_STD["paper"])
+
+
+def test_correlated_noise_hides_what_is_slow_and_half_the_samples_hide_alike() -> None:
+    spring = {"effect": "joint_spring", "joint": 2, "stiffness": 3.0}
+    robot, seen, noise = arm_named("paper"), [passage("paper")], NOISE_STD["paper"]
+    good = sight().foreseen(spring)
+    half = Sight(robot, seen, noise, Reference(every=2)).foreseen(spring)
+    slow = Sight(robot, seen, noise, Reference(correlation=0.95)).foreseen(spring)
+    assert half == pytest.approx(good / np.sqrt(2.0), rel=0.05)
+    # At frequencies far below the noise's corner its power is (1 + ρ) / (1 - ρ) times that of white noise.
+    assert good / np.sqrt(39.0) < slow < 0.6 * good
+
+
+def test_rest_under_dry_friction_shows_nothing() -> None:
+    """A cogging torque at a place where the joint stands still is one with the friction that holds it."""
+    robot = arm_named("paper-dry")
+    still = Passage(np.full((8000, 3), 0.3), np.full((8000, 3), 3e-6), np.zeros((8000, 3)))
+    looking = Sight(robot, [still, passage("paper")], NOISE_STD["paper"])
+    bump = np.zeros((8000, 3))
+    bump[3000:4000, 1] = 5.0
+    assert looking.strength([bump, np.zeros_like(passage("paper").torque)])[0] == 0.0
 
 
 def test_what_a_sensor_changes_counts_in_the_band_alone() -> None:

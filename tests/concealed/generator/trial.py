@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from concealed.generator.arms import NOISE_STD, arm_named, without_truth
+from concealed.generator.arms import arm_named, is_dry, noise_std, without_truth
 from concealed.generator.concealment import Concealed, concealed_effects, concealed_unknown
 from concealed.generator.effects import Drawn
 from concealed.generator.motions import Asked, campaign
@@ -70,7 +70,7 @@ def recorded_trial(
     **noise: Any,
 ) -> Trial:
     """The recordings of an arm that conceals something: every motion of a campaign, seen by sensors with some noise."""
-    robot, sensors = arm_named(arm), Noise(NOISE_STD[arm], **noise)
+    robot, sensors = arm_named(arm), Noise(noise_std(arm), **noise)
     rng = np.random.default_rng([seed, 9])
     train, held_out = (
         [
@@ -79,7 +79,7 @@ def recorded_trial(
         ]
         for motions in campaign(robot, motion_seed, motion)
     )
-    stripped = without_truth(robot, states_friction=states_friction)
+    stripped = without_truth(robot, states_friction=states_friction and not is_dry(arm))
     return Trial(arm, concealed, stripped, train, held_out, sensors, every)
 
 

@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from concealed.generator.forward import FINE, Passage
-from concealed.generator.motions import RATE_HZ
+from concealed.generator.forward import Passage
+from concealed.generator.rates import FINE, RATE_HZ
 
 Array = NDArray[np.float64]
 Law = Callable[[Passage, int, np.random.Generator], Array]

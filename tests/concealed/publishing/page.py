@@ -9,7 +9,8 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from ruamel.yaml import YAML
 
 from concealed.baselines.comparison import ranked, table
-from concealed.generator.case import SERIES
+from concealed.generator.case import SERIES, SIGNS
+from concealed.publishing.overview import overview
 from concealed.publishing.pictures import draw_all
 from concealed.real.table import table as real_table
 from concealed.running.kept import Outcome
@@ -58,6 +59,7 @@ def write_page(everything: Sequence[Outcome], page: Path, command: str, planned:
         commits=", ".join(f"commit {name} ({count} trials)" for name, count in commits.items()),
         days=" to ".join(dict.fromkeys([days[0], days[-1]])),
         series=[(name, told.words, series[name]) for name, told in SERIES.items() if series[name]],
+        overview=overview(everything),
         figures="\n".join(_row(each) for each in figures if each.count),
         pictures=pictures,
         below=_below(figures),
@@ -153,6 +155,8 @@ def _failure(each: Outcome) -> str:
     if "score" not in each:
         return f"| {each['series']} {each['seed']} | | | error | {each['error'][:160].replace('|', '/')} |"
     score = each["again"] if "again" in each else each["score"]
-    places = ", ".join(f"{what} of joint {joint + 1}" for what, joint in each["case"]["places"]) or "nothing"
+    places = ", ".join(
+        what if what == SIGNS else f"{what} of joint {joint + 1}" for what, joint in each["case"]["places"]
+    )
     told = "; ".join(score["told"]) or "none"
-    return f"| {each['name']} | {places} | {each['score']['strength']:.0f} | {score['verdict']} | {told} |"
+    return f"| {each['name']} | {places or 'nothing'} | {each['score']['strength']:.0f} | {score['verdict']} | {told} |"

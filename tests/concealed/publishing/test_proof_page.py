@@ -9,6 +9,7 @@ import pytest
 
 from concealed.generator.case import drawn
 from concealed.publishing import page as page_module
+from concealed.publishing.overview import count_concealed
 from concealed.publishing.page import write_page
 from concealed.scoring.breakdown import confusion
 from concealed.scoring.calibration import calibration_error, calibration_interval
@@ -65,6 +66,13 @@ def trial(series: str, seed: int, score: dict[str, Any]) -> dict[str, Any]:
         "began": "2026-11-22T08:00:00Z",
         "seconds": 3.0,
         "score": score,
+        "truth": {"hidden": [{"labels": [f"{what}@joint{joint + 1}"]} for what, joint in case.places]},
+        "diagnosis": {
+            "joints": ["joint1", "joint2", "joint3"],
+            "findings": [],
+            "cutoff_hz": 10.0,
+            "fit": {"held_out": {"rms_before": [1.0, 1.0, 1.0], "rms_after": [0.5, 1.0, 1.2]}},
+        },
     }
 
 
@@ -93,12 +101,78 @@ def test_figures_count_what_they_say(outcomes: list[dict[str, Any]]) -> None:
     assert found["calibration"].value == pytest.approx(0.98 - 24 / 32)
 
 
+def row_of(table: str, name: str) -> list[str]:
+    (line,) = [line for line in table.splitlines() if line.startswith(f"| {name}")]
+    return [cell.strip() for cell in line.strip("|").split("|")]
+
+
+def test_the_page_begins_with_the_four_rows(outcomes: list[dict[str, Any]], tmp_path: Path) -> None:
+    text = write_page(outcomes, tmp_path / "proof.md", "x")[0].read_text()
+    table = text.split("# The proof\n\n")[1].split("\n\n")[0]
+    good = row_of(table, "simulated arms, good")
+    # 98 quiet sound arms, 19 effects and 5 forms are right; one effect, 5 forms and the failed trial are missed
+    assert good[1:5] == ["131", "93% (87% to 97%)", "6% (3% to 12%)", "5% (2% to 11%)"]
+    assert good[5] == "130 of 390"
+    assert good[7] == "3.0 s"
+    assert row_of(table, "simulated arms, poor")[1:3] == ["0", "not tried"]
+    assert row_of(table, "real arms, an effect concealed")[1:3] == ["0", "not tried"]
+
+
+def test_what_a_set_says_untouched_too_is_neither_right_nor_wrong() -> None:
+    def real(series: str, findings: list[tuple[str, float]], **more: Any) -> dict[str, Any]:
+        told = [
+            {
+                "effect": name.split("@")[0],
+                "joint": name.split("@")[1],
+                "equivalent": [],
+                "probability": p,
+                "confirmed": None,
+                "parameters": [],
+            }
+            for name, p in findings
+        ]
+        diagnosis = {**trial("sound", 1, QUIET)["diagnosis"], "findings": told}
+        hidden = [{"kind": "spring", "multiple": 1.5, "total": {"k": 1.0}, "constants": {}}]
+        case = {"arm": "emps", "places": [], "held_out_s": 20.0, "effects": hidden, "held_out_rms": [0.5, 0.0, 0.0]}
+        made_up = {"series": series, "arm": "emps", "case": case, "diagnosis": diagnosis}
+        return {**trial("sound", 1, QUIET), **made_up, **more}
+
+    before = real("real-untouched", [("time_delay@j", 0.99)])
+    spring = {"hidden": [{"labels": ["joint_spring@j"]}]}
+    right = real("real-concealed", [("time_delay@j", 0.99), ("joint_spring@j", 0.95)], truth=spring)
+    wrong = real("real-concealed", [("time_delay@j", 0.99), ("cogging@j", 0.95)], truth=spring)
+    late = real("real-concealed", [("time_delay@j", 0.99)], truth={"hidden": [{"labels": ["time_delay@j"]}]})
+    failed = {"series": "real-concealed", "seed": 4, "arm": None, "error": "TimeoutExpired"}
+    told = count_concealed([before, right, wrong, late, failed])
+    assert [(each.right, each.confident, each.missed) for each in told] == [
+        (True, False, False),
+        (False, True, True),
+        (False, False, True),
+        (False, False, True),
+    ]
+    assert told[0].claims == [(0.95, True)]
+
+
 def test_the_interval_of_a_share_is_the_binomial_one() -> None:
     none = share("x", "x", [False] * 300, 0.01, at_least=False)
     assert none.high == pytest.approx(1.0 - 0.025 ** (1 / 300))  # closed form where nothing was seen
     assert none.standing is Standing.MET
     assert share("x", "x", [False] * 400, 0.01, at_least=False).standing is Standing.SHOWN
     assert share("x", "x", [], 0.01).standing is None
+
+
+def test_promises_of_good_and_of_poor_recordings_are_counted_apart() -> None:
+    told = [trial("weak", 1, {**RIGHT, "promised": [True]}), trial("weak", 2, {**QUIET, "promised": [False]})]
+    told += [trial("poor", 3, {**QUIET, "promised": [False]}), trial("poor", 4, RIGHT)]
+    found = {each.id: (each.hits, each.count) for each in headline(told)}
+    assert (found["promised"], found["promised-poor"]) == ((1, 2), (0, 1))
+
+
+def test_a_failed_trial_excuses_nothing() -> None:
+    failed = [{"series": series, "seed": 0, "arm": None, "error": "x"} for series in ("sound", "moderate", "form")]
+    found = {each.id: each for each in headline(failed)}
+    assert (found["sound"].hits, found["named"].hits, found["form-partly"].hits) == (1, 0, 0)
+    assert (found["form-partly"].count, found["oracle"].count, found["oracle"].hits) == (1, 1, 0)
 
 
 def test_findings_that_mean_what_they_say_are_calibrated() -> None:

@@ -3,16 +3,19 @@
 import os
 import warnings
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import pytest
 
 from concealed.running.kept import Kept
 from concealed.running.run import run
-from concealed.running.workers import SCHEDULER, workers
+from concealed.running.workers import workers
 from concealed.sealing.sealed import made
 from concealed.sealing.truth import truth_of
 from concealed.task import Task
+from tauscope.errors import TauscopeError
+from tauscope.server.queue.cluster_executor import SCHEDULER
 
 
 def test_without_a_scheduler_they_are_processes_of_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -21,25 +24,37 @@ def test_without_a_scheduler_they_are_processes_of_this_machine(monkeypatch: pyt
         assert executor.submit(os.getppid).result(timeout=60) == os.getpid()
 
 
+def test_without_a_number_they_are_as_many_as_there_are_cores_to_use(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(SCHEDULER, raising=False)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 3, 7})
+    with workers() as executor:
+        assert isinstance(executor, ProcessPoolExecutor)
+        assert executor._max_workers == 3  # type: ignore[attr-defined]
+
+
+def test_a_scheduler_that_does_not_answer_is_named() -> None:
+    with pytest.raises(TauscopeError, match=r"tcp://127\.0\.0\.1:9"), workers(scheduler="tcp://127.0.0.1:9"):
+        pass
+
+
 @pytest.fixture
-def cluster(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def cluster() -> Iterator[str]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         from distributed import LocalCluster
 
         local = LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address="")
-        monkeypatch.setenv(SCHEDULER, local.scheduler_address)
-        yield
+        yield local.scheduler_address
         local.close()
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(1200)
 @pytest.mark.filterwarnings("ignore")
-def test_a_dask_cluster_makes_the_same_trials(cluster: None, tmp_path: Path) -> None:
+def test_a_dask_cluster_makes_the_same_trials(cluster: str, tmp_path: Path) -> None:
     tasks = [Task("sound", seed, "paper") for seed in (2, 3)]
     kept = Kept(tmp_path / "outcomes.jsonl")
-    with workers() as executor:
+    with workers(scheduler=cluster) as executor:
         processes = {each.result() for each in [executor.submit(os.getpid) for _ in range(40)]}
         run(tasks, kept, executor, lambda each: None)
     assert os.getpid() not in processes

@@ -7,6 +7,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from concealed.generator.case import SIGN, SIGNS
 from concealed.generator.forms import FORMS
 from concealed.running.kept import Outcome
 from concealed.scoring.figures import done, interval
@@ -41,6 +42,8 @@ def effect_of(each: Outcome) -> str:
     if not each["case"]["places"]:
         return NOTHING
     what = str(each["case"]["places"][0][0])
+    if what in (SIGN, SIGNS):
+        return "torque_gain_error"
     if what in FORMS:
         return FORMS[what].names[0]
     return UNKNOWN if each["series"] == "unknown" else what

@@ -18,6 +18,12 @@ AS_ORACLE = 1.05
 
 NAMED_SINGLE = ("moderate", "strong", "constant")
 POOR_SINGLE = ("strong-sensing", "strong-coarse")
+POOR_SERIES = ("sound-sensing", "sound-coarse", *POOR_SINGLE, "sound-poor", "poor", "sign-poor")
+COMPARED = frozenset(
+    {"weak", "moderate", "strong", "pair", "triple", "constant", "event", "pair-one-joint", "drift-beside", "poor"}
+    | set(POOR_SINGLE)
+)
+"""Series whose truth has a form in the catalogue, so that an oracle can know it."""
 
 
 class Standing(StrEnum):
@@ -99,7 +105,7 @@ class Asked:
     among : callable
         which trials are asked at all
     fault : bool
-        whether what counts is a fault: a trial that failed shows none, and does nothing well either
+        whether what counts is a fault; a trial that failed is one, and does nothing well either
     """
 
     id: str
@@ -114,7 +120,7 @@ class Asked:
     def measured(self, outcomes: Sequence[Outcome]) -> Figure:
         """The figure on some trials."""
         own = [each for each in outcomes if each["series"] in self.series and self.among(each)]
-        hits = [self.counts(each) for each in done(own)] if self.fault else _each(own, self.counts)
+        hits = [self.counts(each) if "score" in each else self.fault for each in own]
         return share(self.id, self.words, hits, self.target, at_least=self.at_least)
 
 
@@ -128,8 +134,10 @@ def headline(outcomes: Sequence[Outcome]) -> list[Figure]:
         share(
             "oracle",
             f"held-out rms ≤ {AS_ORACLE} of a diagnosis that knows the form",
-            [each["oracle_ratio"] <= AS_ORACLE for each in outcomes if "oracle_ratio" in each],
+            [each.get("oracle_ratio", np.inf) <= AS_ORACLE for each in outcomes if _has_oracle(each)],
         ),
+        _promised("promised", PROMISED, outcomes, poor=False),
+        _promised("promised-poor", f"{PROMISED}, poor recordings", outcomes, poor=True),
         share("failed", "trials that ended in an error", ["error" in each for each in outcomes], 0.0, at_least=False),
         _mean("size", "effects in a set that holds the truth (mean)", sizes(hidden)),
         _mean("time", "time of a diagnosis [s] (mean)", [each["seconds"] for each in outcomes if "seconds" in each]),
@@ -150,11 +158,6 @@ def sizes(outcomes: Sequence[Outcome]) -> list[float]:
     """Mean size of each trial's sets that hold a truth."""
     found = [each["score"]["size"] for each in done(outcomes)]
     return [size for size in found if np.isfinite(size)]
-
-
-def _each(outcomes: Sequence[Outcome], counts: Callable[[Outcome], bool]) -> list[bool]:
-    """Whether each trial does well; one that failed does not."""
-    return ["score" in each and counts(each) for each in outcomes]
 
 
 def _key(name: str) -> Callable[[Outcome], bool]:
@@ -202,17 +205,30 @@ def _mean(id_: str, words: str, values: Sequence[float]) -> Figure:
     return Figure(id_, words, mean, mean - half, mean + half, count, None)
 
 
+def _promised(id_: str, words: str, outcomes: Sequence[Outcome], *, poor: bool) -> Figure:
+    """How often something is said to be there where the diagnosis would see the concealed size by its own word."""
+    these = [each for each in done(outcomes) if (each["series"] in POOR_SERIES) == poor]
+    return share(id_, words, [kept for each in these for kept in each["score"].get("promised", ())], 0.85)
+
+
+def _has_oracle(each: Outcome) -> bool:
+    """Whether a trial was compared with an oracle, or failed where it should have been."""
+    return "oracle_ratio" in each or ("error" in each and each["series"] in COMPARED)
+
+
 def _not_named(each: Outcome) -> bool:
-    return "score" in each and not each["score"]["named"]
+    return "score" not in each or not each["score"]["named"]
 
 
 def _wrong_instead(each: Outcome) -> bool:
     return _confident_and_wrong(each) and _not_named(each)
 
 
+PROMISED = "effects called detectable at their size: something is said to be there"
 GOOD, POOR = "one effect, s ≥ 15", "the same, poor recordings"
 NOTHING = "nothing of the catalogue"
 PARTLY = "told as partly explained or unexplained"
+STEPWISE = "jogs or points, poor sensors"
 WRONG = f"name with p > {CONFIDENT}"
 
 ASKED: tuple[Asked, ...] = (
@@ -236,6 +252,23 @@ ASKED: tuple[Asked, ...] = (
     Asked("named-poor", f"{POOR}: truth within a set", POOR_SINGLE, _key("named"), 0.95),
     Asked("joint-poor", f"{POOR}: its joint is right", POOR_SINGLE, _key("placed"), 0.99),
     Asked("event", "something that happens for a while: truth within a set", ("event",), _key("named")),
+    Asked(
+        "sound-stepwise",
+        f"sound arms, {STEPWISE}: an effect is named",
+        ("sound-poor",),
+        _claimed,
+        0.01,
+        at_least=False,
+        fault=True,
+    ),
+    Asked("stepwise", f"one effect, {STEPWISE}: detected", ("poor",), _key("detected")),
+    Asked("stepwise-named", f"one effect, {STEPWISE}: truth within a set", ("poor",), _key("named")),
+    Asked("stepwise-joint", f"one effect, {STEPWISE}: its joint is right", ("poor",), _key("placed")),
+    Asked("stepwise-wrong", f"one effect, {STEPWISE}: a wrong {WRONG}", ("poor",), _confident_and_wrong, fault=True),
+    Asked("sign", "a wrong sign: within a set", ("sign",), _key("named")),
+    Asked("sign-stepwise", f"a wrong sign, {STEPWISE}: within a set", ("sign-poor",), _key("named")),
+    Asked("pair-one-joint", "two effects at one joint: both within sets", ("pair-one-joint",), _key("named")),
+    Asked("drift-beside", "drift beside another effect: both within sets", ("drift-beside",), _key("named")),
     Asked("pair", "two effects: both within sets", ("pair",), _key("named"), 0.90),
     Asked("triple", "three effects: all within sets", ("triple",), _key("named")),
     Asked("form", "another formula than the catalogue's: right family", ("form",), _key("named"), 0.85),

@@ -4,7 +4,7 @@ from typing import Any
 
 from tauscope.diagnosis.documents.document import DiagnosisDocument
 
-NOT_KEPT = {"detectable", "parameter_differences", "parameter_shifts"}
+NOT_KEPT = {"parameter_differences", "parameter_shifts"}
 """What of a diagnosis no figure needs."""
 
 

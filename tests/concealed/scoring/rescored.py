@@ -9,7 +9,7 @@ from concealed.scoring.score import compared
 from concealed.sealing.truth import Hidden, Truth
 from tauscope.diagnosis.documents.document import DiagnosisDocument
 
-NEEDED_TO_READ: dict[str, list[Any]] = {name: [] for name in NOT_KEPT}
+NEEDED_TO_READ: dict[str, list[Any]] = {name: [] for name in (*NOT_KEPT, "detectable")}
 
 
 def rescored(each: Outcome) -> Outcome:

@@ -1,19 +1,25 @@
 """What a diagnosis said of a trial, beside what was concealed."""
 
+import math
 import time
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from concealed.generator.trial import Trial
+from concealed.scoring.promises import is_promised, is_shown
 from concealed.sealing.truth import Hidden, Truth, label, truth_of
 from tauscope.diagnosis import diagnose, document
 from tauscope.diagnosis.documents.document import DiagnosisDocument
 from tauscope.diagnosis.documents.result import FindingEntry
 
 UNKNOWN = "unknown"
-FRAME = ("link", "axis")
-"""Parameters that say of what the others are, and have no interval."""
+KINDS = ("link", "axis", "alpha", "p", "k")
+"""Parameters that, where they have no interval, say of what the others are: of a frame, an exponent, a wave."""
+
+SAME = 1e-3
+"""Relative difference up to which two of those are the same."""
+
 INSIDE = 1.96
 """Standard errors of a 95 % interval."""
 
@@ -60,6 +66,9 @@ class Score:
         largest rms after ÷ noise of any joint
     seconds : float
         of the diagnosis
+    promised : list of bool
+        for each concealed effect that the diagnosis calls detectable at its size, whether it says that something is
+        there
     told : list of str
         all findings with their equivalents
     """
@@ -78,6 +87,7 @@ class Score:
     parameters: list[Parameter]
     held_out: float
     seconds: float
+    promised: list[bool] = field(default_factory=list)
     told: list[str] = field(default_factory=list)
 
 
@@ -121,6 +131,7 @@ def compared(truth: Truth, found: DiagnosisDocument, seconds: float) -> Score:
         parameters=_parameters(truth, found),
         held_out=float(max(a / s for a, s in zip(after, truth.torque_std, strict=True))) if after else np.nan,
         seconds=seconds,
+        promised=[is_shown(found) for hidden in truth.hidden if is_promised(hidden, found)],
         told=[
             f"{first} {finding.probability:.2f} {{{', '.join(finding.equivalent)}}}"
             for first, finding in zip(firsts, findings, strict=True)
@@ -148,12 +159,18 @@ def _parameters(truth: Truth, found: DiagnosisDocument) -> list[Parameter]:
                 told += [
                     Parameter(each.name, hidden.parameters[each.name], each.value, each.std)
                     for each in finding.parameters
-                    if each.name in hidden.parameters and each.name not in FRAME and each.std > 0.0
+                    if each.name in hidden.parameters and each.std > 0.0
                 ]
     return told
 
 
 def _of_another(hidden: Hidden, finding: FindingEntry) -> bool:
-    """Whether a finding is of another frame than the truth: its displacement is another quantity then."""
-    said = {each.name: each.value for each in finding.parameters}
-    return any(said.get(name) != hidden.parameters[name] for name in FRAME if name in hidden.parameters)
+    """Whether a finding is of another kind than the truth: its sizes are other quantities then.
+
+    A displacement belongs to its link and axis, the coefficient of a power to that power, of a decay to its exponent.
+    """
+    return any(
+        not math.isclose(each.value, hidden.parameters[each.name], rel_tol=SAME)
+        for each in finding.parameters
+        if each.name in KINDS and each.name in hidden.parameters and each.std == 0.0
+    )

@@ -108,6 +108,42 @@ def test_the_displacement_of_another_frame_is_no_estimate_of_this_one(link: floa
     assert len(found.parameters) == counted
 
 
+@pytest.mark.parametrize(("exponent", "counted"), [(2.0, 2), (1.0, 0)])
+def test_a_decay_of_another_exponent_is_no_estimate_of_this_one(exponent: float, counted: int) -> None:
+    values = {"s": (1.2, 0.1), "v_s": (0.2, 0.01), "alpha": (exponent, 0.0)}
+    said = [{"name": name, "value": value, "std": std, "unit": ""} for name, (value, std) in values.items()]
+    stribeck = hidden("stribeck_friction@joint1", s=1.2, v_s=0.2, alpha=2.0)
+    found = compared(truth(stribeck), diagnosis(finding("stribeck_friction", "joint1", parameters=said)), 1.0)
+    assert len(found.parameters) == counted
+
+
+def test_a_power_that_is_estimated_is_a_parameter_and_no_kind() -> None:
+    said = [{"name": "c", "value": 2.1, "std": 0.1, "unit": ""}, {"name": "p", "value": 1.8, "std": 0.1, "unit": "1"}]
+    drag = hidden("nonlinear_viscous@joint1", c=2.0, p=1.7)
+    found = compared(truth(drag), diagnosis(finding("nonlinear_viscous", "joint1", parameters=said)), 1.0)
+    assert [each.name for each in found.parameters] == ["c", "p"]
+
+
+@pytest.mark.parametrize(
+    ("minimum", "verdict", "promised"),
+    [
+        (1.9, "explained", [True]),
+        (1.9, "consistent", [False]),
+        (1.9, "inconclusive", [False]),
+        (2.1, "consistent", []),
+        (None, "consistent", []),
+    ],
+)
+def test_what_is_called_detectable_has_to_be_detected(
+    minimum: float | None, verdict: str, promised: list[bool]
+) -> None:
+    told = diagnosis(verdict=verdict).model_dump(mode="json", by_alias=True)
+    entry = {"effect": "cogging", "joint": "joint1", "minimum": minimum, "unit": "Nm", "visible": minimum is not None}
+    other = {**entry, "joint": "joint2", "minimum": 0.1}
+    found = DiagnosisDocument.model_validate({**told, "detectable": [other, entry]}, strict=False)
+    assert compared(truth(COGGING), found, 1.0).promised == promised
+
+
 def test_the_largest_mismatch_has_to_be_at_the_joint() -> None:
     assert compared(truth(COGGING), diagnosis(), 1.0).located
     assert not compared(truth(hidden("cogging@joint2")), diagnosis(), 1.0).located

@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 REACHED = 0.3
 """Relative error of s up to which a trial counts as one of its series."""
 
-MOST_ATTEMPTS = 8
+MOST_ATTEMPTS = 16
 DIAGNOSIS_S = 900.0
 """A diagnosis that takes longer has failed [s]."""
 
@@ -66,8 +66,9 @@ def made(series: str, seed: int, arm: str | None = None) -> tuple[Case, Trial]:
 
     Nor can it where that takes a transmission too soft to carry the arm.
     """
+    kept = drawn(series, seed, arm).arm  # or arms on which effects hardly show would be tried less
     for attempt in range(MOST_ATTEMPTS):
-        case = drawn(series, seed, arm, attempt)
+        case = drawn(series, seed, kept, attempt)
         with contextlib.suppress(ScenarioError):
             concealed = case.concealed()
             if abs(concealed.strength - case.wanted) <= REACHED * case.wanted:

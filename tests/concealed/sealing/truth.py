@@ -114,19 +114,21 @@ def truth_of(trial: Trial, case: Case | None = None) -> Truth:
     """What a trial conceals."""
     names = [joint.name for joint in trial.robot.joints]
     entries = trial.concealed.entries or ({},) * len(trial.truth)
-    hidden = [_hidden(drawn, entry, names) for drawn, entry in zip(trial.truth, entries, strict=True)]
+    # Signs of all joints are several entries and one truth.
+    hidden = [_hidden(drawn, entry, names) for drawn, entry in zip(trial.truth, entries, strict=False)]
     told = {} if case is None else case.as_dict()
     return Truth(told, hidden, float(trial.strength), [float(each) for each in trial.noise.torque_std])
 
 
 def _hidden(drawn: Drawn, entry: Entry, names: list[str]) -> Hidden:
-    def labels(effects: tuple[str, ...]) -> list[str]:
-        return [label(name, None if place is None else names[place]) for name in effects for place in drawn.places]
+    def labels(effects: tuple[str, ...], places: tuple[int | None, ...]) -> list[str]:
+        return [label(name, None if place is None else names[place]) for name in effects for place in places]
 
     known = PARAMETERS.get(entry.get("effect", ""))
     values = {} if known is None else {name: float(value) for name, value in known(entry).items()}
     joints = [None if place is None else names[place] for place in drawn.places]
-    return Hidden(labels(drawn.names), labels(drawn.also), joints, values)
+    also = labels(drawn.also, drawn.also_places or drawn.places)
+    return Hidden(labels(drawn.names, drawn.places), also, joints, values)
 
 
 def label(effect: str, joint: str | None) -> str:
