@@ -5,10 +5,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from concealed.real.concealed_outcome import CONCEALED, UNTOUCHED
-from concealed.real.judging.judge import Judged, Named, judge
+from concealed.real.judging.judge import Judged, Named, judge, worse_joints
 from concealed.running.kept import Outcome
-
-Row = tuple[str, list[tuple[Named, Judged]], list[Judged]]
 
 HEAD = (
     "trials",
@@ -41,7 +39,11 @@ def concealed_table(outcomes: Sequence[Outcome]) -> str:
     tried = [each for each in outcomes if each["series"] == CONCEALED]
     if not tried:
         return ""
-    parts = [f"{len(tried)} trials, {len(tried) - len(judged)} of them failed"]
+    plain = [worse_joints(each) for each in outcomes if each["series"] == UNTOUCHED and "diagnosis" in each]
+    parts = [
+        f"{len(tried)} trials, {len(tried) - len(judged)} of them failed; in {len(plain)} untouched sets"
+        f" {sum(len(each) for each in plain)} joints are made worse"
+    ]
     groups: tuple[tuple[str, Callable[[Outcome, Named], str]], ...] = (
         ("size", lambda _, one: "a sign" if one.multiple is None else f"{one.multiple:g} ×"),
         ("kind", lambda _, one: one.kind),

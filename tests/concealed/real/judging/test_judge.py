@@ -146,7 +146,7 @@ def test_the_bound_of_harm_is_two_standard_errors() -> None:
 def test_the_table_counts_effects_and_trials() -> None:
     done = [outcome(), outcome(cogging(), concealed=(COGGING, SPRING)), {"series": CONCEALED, "error": "no"}]
     rows = concealed_table(done).splitlines()
-    assert rows[0] == "2 trials, 1 of them failed"
+    assert rows[0] == "2 trials, 1 of them failed; in 1 untouched sets 0 joints are made worse"
     assert any(row.startswith("| 1.5 × | 1 | 1 | 1/1 (100%) |") for row in rows)
     assert any(row.startswith("| 0.7 × | 1 | 1 | 0/1 (0%) |") for row in rows)
     assert rows[-1].startswith("| all | 1 | 2 | 1/2 (50%) |")
