@@ -71,7 +71,7 @@ def _row(name: str, these: Sequence[tuple[Named, Judged]]) -> str:
     effects = [one for one, _ in these]
     trials = list({id(told): told for _, told in these}.values())
     sizes = [one.inside for one in effects if one.inside is not None]
-    concealed = sum(told.concealed for told in trials)
+    removed = [told.share for told in trials if told.share is not None]
     cells = [
         str(len(trials)),
         str(len(effects)),
@@ -81,7 +81,7 @@ def _row(name: str, these: Sequence[tuple[Named, Judged]]) -> str:
         _share(sizes),
         f"{sum(len(told.wrong) for told in trials) / max(len(trials), 1):.2f} a trial",
         str(sum(len(told.confident) for told in trials)),
-        f"{sum(told.removed for told in trials) / concealed:.0%}" if concealed else "",
+        f"{np.mean(removed):.0%} of {len(removed)}" if removed else "",
         f"{sum(len(told.worse) for told in trials) / max(len(trials), 1):.2f} a trial",
         f"{np.mean([told.seconds for told in trials]):.0f}" if trials else "",
     ]
