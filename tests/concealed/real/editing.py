@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
 
+from concealed.real.concealing.passage import with_effort
 from tauscope.recording import Recording
 from tauscope.robot import Model, Robot
 from tauscope.robot.robot import LinkInertia
@@ -32,7 +33,7 @@ def later(samples: int, joint: int | None = None) -> Edit:
         effort = recording.samples().effort.copy()
         columns = slice(None) if joint is None else joint
         effort[samples:, columns] = effort[:-samples, columns].copy()
-        return _with_effort(recording, effort, samples)
+        return with_effort(recording, effort, slice(samples, None))
 
     return edit
 
@@ -43,7 +44,7 @@ def scaled(joint: int, gain: float) -> Edit:
     def edit(robot: Robot, recording: Recording) -> Recording:
         effort = recording.samples().effort.copy()
         effort[:, joint] *= gain
-        return _with_effort(recording, effort)
+        return with_effort(recording, effort)
 
     return edit
 
@@ -56,7 +57,7 @@ def carried(mass: float, place: tuple[float, float, float], from_share: float = 
         torque = point_mass_torque(robot, recording, mass, place)
         span = told.time[-1] - told.time[0]
         torque[told.time < told.time[0] + from_share * span] = 0.0
-        return _with_effort(recording, told.effort + torque)
+        return with_effort(recording, told.effort + torque)
 
     return edit
 
@@ -76,7 +77,7 @@ def cogging_of(source: Recording, joint: int, rms: float) -> Edit:
         phases = np.outer(told.position[:, joint], COGGING_ORDERS)
         effort = told.effort.copy()
         effort[:, joint] += size * (np.cos(phases) @ cosines + np.sin(phases) @ sines)
-        return _with_effort(recording, effort)
+        return with_effort(recording, effort)
 
     return edit
 
@@ -108,20 +109,3 @@ def motion(recording: Recording) -> tuple[Array, Array, Array]:
         return np.column_stack([np.interp(told.time, even, each) for each in values.T])
 
     return back(position), back(velocity), back(acceleration)
-
-
-def _with_effort(recording: Recording, effort: Array, first: int = 0) -> Recording:
-    """The same recording with other efforts, from a sample on."""
-    told = recording.samples()
-    rest = {
-        name: None if (values := getattr(told, name)) is None else values[first:]
-        for name in ("velocity", "acceleration", "reference", "temperature", "link_position", "period")
-    }
-    return Recording.from_arrays(
-        recording.name,
-        told.time[first:],
-        told.position[first:],
-        effort[first:],
-        effort_kind=recording.effort_kind,
-        **rest,
-    )

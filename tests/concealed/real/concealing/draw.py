@@ -13,7 +13,7 @@ from concealed.real.concealing.concealment import Concealment
 from concealed.real.concealing.ground import Ground, ground_of_set
 from concealed.real.concealing.kinds import KINDS
 from concealed.real.concealing.oracle import Estimate, estimate_sizes
-from concealed.real.concealing.passage import Passage
+from concealed.real.concealing.passage import with_effort
 from concealed.real.concealing.recorded_sets import CYCLE, set_of_seed
 from concealed.real.concealing.robot_file import copy_robot
 from concealed.real.concealing.sizing import multiple_left, size_for
@@ -120,23 +120,6 @@ class RealCase:
         return with_effort(passage.recording, torque / passage.gain, kept)
 
 
-def with_effort(recording: Recording, effort: Array, kept: slice = slice(None)) -> Recording:
-    """The same recording with other efforts, or a stretch of it."""
-    told = recording.samples()
-    rest = {
-        name: None if (values := getattr(told, name)) is None else values[kept]
-        for name in ("velocity", "acceleration", "reference", "temperature", "link_position", "period")
-    }
-    return Recording.from_arrays(
-        recording.name,
-        told.time[kept],
-        told.position[kept],
-        effort[kept],
-        effort_kind=recording.effort_kind,
-        **rest,
-    )
-
-
 @lru_cache(maxsize=4)
 def draw_case(seed: int, set_name: str | None = None) -> RealCase:
     """The trial of a seed; on a certain set where one is named.
@@ -199,11 +182,3 @@ def _go_together(one: Concealment, other: Concealment) -> bool:
     """Whether two effects can be told in one trial: of other kinds, only one of them in the robot file or a sign."""
     rare = [each.rewrite is not None or each.fixed is not None for each in (one, other)]
     return one.kind != other.kind and not all(rare) and not set(one.labels) & set(other.labels)
-
-
-def passages_with(case: RealCase) -> list[Passage]:
-    """The set's passages with what is concealed, without the way through files."""
-    return [
-        each.with_torque(case.recording(number).samples().effort * each.gain)
-        for number, each in enumerate(case.ground.passages)
-    ]

@@ -111,6 +111,23 @@ def _sections(rate_hz: float, corner_hz: float) -> Array:
     return np.asarray(signal.butter(4, corner_hz, fs=rate_hz, output="sos"))
 
 
+def with_effort(recording: Recording, effort: Array, kept: slice = slice(None)) -> Recording:
+    """The same recording with other efforts, or a stretch of it."""
+    told = recording.samples()
+    rest = {
+        name: None if (values := getattr(told, name)) is None else values[kept]
+        for name in ("velocity", "acceleration", "reference", "temperature", "link_position", "period")
+    }
+    return Recording.from_arrays(
+        recording.name,
+        told.time[kept],
+        told.position[kept],
+        effort[kept],
+        effort_kind=recording.effort_kind,
+        **rest,
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class Grid:
     """Where columns are made of a passage, and which of its instants are compared.

@@ -230,3 +230,12 @@ def test_what_a_motion_cannot_show_is_not_drawn(ground: Ground) -> None:
         assert KINDS[kind](sliding, 1, rng) is None
     coarse = replace(ground, count=0.01 * ground.reach)
     assert KINDS["bristles"](coarse, 1, rng) is None
+
+
+def test_the_concealing_code_has_nothing_of_the_catalogue_or_the_diagnosis() -> None:
+    own = [path for path in Path(joint_laws.__file__).parent.glob("*.py") if not path.name.startswith("test_")]
+    assert len(own) > 10
+    for path in own:
+        text = path.read_text(encoding="utf-8")
+        for package in ("tauscope.effects", "tauscope.diagnosis", "tauscope.identification", "tauscope_sim"):
+            assert package not in text

@@ -5,10 +5,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from concealed.real.concealed_outcome import CONCEALED, UNTOUCHED
-from concealed.real.judging.judge import Judged, Named, judge
+from concealed.real.judging.judge import Judged, Named, judge, worse_joints
 from concealed.running.kept import Outcome
-
-Row = tuple[str, list[tuple[Named, Judged]], list[Judged]]
 
 HEAD = (
     "trials",
@@ -41,7 +39,11 @@ def concealed_table(outcomes: Sequence[Outcome]) -> str:
     tried = [each for each in outcomes if each["series"] == CONCEALED]
     if not tried:
         return ""
-    parts = [f"{len(tried)} trials, {len(tried) - len(judged)} of them failed"]
+    plain = [worse_joints(each) for each in outcomes if each["series"] == UNTOUCHED and "diagnosis" in each]
+    parts = [
+        f"{len(tried)} trials, {len(tried) - len(judged)} of them failed; in {len(plain)} untouched sets"
+        f" {sum(len(each) for each in plain)} joints are made worse"
+    ]
     groups: tuple[tuple[str, Callable[[Outcome, Named], str]], ...] = (
         ("size", lambda _, one: "a sign" if one.multiple is None else f"{one.multiple:g} ×"),
         ("kind", lambda _, one: one.kind),
@@ -69,7 +71,7 @@ def _row(name: str, these: Sequence[tuple[Named, Judged]]) -> str:
     effects = [one for one, _ in these]
     trials = list({id(told): told for _, told in these}.values())
     sizes = [one.inside for one in effects if one.inside is not None]
-    concealed = sum(told.concealed for told in trials)
+    removed = [told.share for told in trials if told.share is not None]
     cells = [
         str(len(trials)),
         str(len(effects)),
@@ -79,7 +81,7 @@ def _row(name: str, these: Sequence[tuple[Named, Judged]]) -> str:
         _share(sizes),
         f"{sum(len(told.wrong) for told in trials) / max(len(trials), 1):.2f} a trial",
         str(sum(len(told.confident) for told in trials)),
-        f"{sum(told.removed for told in trials) / concealed:.0%}" if concealed else "",
+        f"{np.mean(removed):.0%} of {len(removed)}" if removed else "",
         f"{sum(len(told.worse) for told in trials) / max(len(trials), 1):.2f} a trial",
         f"{np.mean([told.seconds for told in trials]):.0f}" if trials else "",
     ]

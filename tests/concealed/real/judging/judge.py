@@ -14,6 +14,9 @@ from concealed.sealing.truth import label
 
 CONFIDENT = 0.9
 
+SHOWN = 0.05
+"""Least energy concealed in held-out residuals, in plain ones, of which a share is told."""
+
 OF_NO_TORQUE = ("delay_joint", "delay_all", "gravity", "link_length", "sign_joint", "sign_all", "gain_joint")
 """Kinds whose torque goes with the measured one, or that are in the robot file."""
 
@@ -70,6 +73,11 @@ class Judged:
     seconds: float
 
     @property
+    def share(self) -> float | None:
+        """Share of the concealed energy that is removed, -1 to 1; None where held-out motion hardly shows any."""
+        return float(np.clip(self.removed / self.concealed, -1.0, 1.0)) if self.concealed > SHOWN else None
+
+    @property
     def confident(self) -> list[str]:
         """Wrong names that are sure of themselves."""
         return [name for name, probability in self.wrong if probability > CONFIDENT]
@@ -96,15 +104,16 @@ def energy(outcome: Outcome, untouched: Outcome) -> tuple[float, float]:
     """Held-out energy that is concealed, and how much of it the findings remove, in plain residuals summed over joints.
 
     Removed is what they take off beyond what the findings of the untouched set take off there. Concealed is the known
-    torque less the nominal model's share. Time and file effects have no known torque of their own: there it is what the
-    residual grew by. What both residuals have in common with the torque averages out over trials.
+    torque less the nominal model's share, or what the residual grew by where that is more: where training excites
+    little, a torque spoils held-out motion by the parameters that it bends. Time and file effects have no known torque.
     """
     (before, after), (plain, best) = _held_out(outcome), _held_out(untouched)
     unit = np.maximum(plain**2, 1e-300)
     removed = float(np.sum((before**2 - after**2 - plain**2 + best**2) / unit))
+    grown = max(float(np.sum((before**2 - plain**2) / unit)), 0.0)
     if all(one["kind"] in OF_NO_TORQUE for one in outcome["case"]["effects"]):
-        return max(float(np.sum((before**2 - plain**2) / unit)), 0.0), removed
-    return float(np.sum(np.array(outcome["case"]["held_out_rms"]) ** 2 / unit)), removed
+        return grown, removed
+    return max(float(np.sum(np.array(outcome["case"]["held_out_rms"]) ** 2 / unit)), grown), removed
 
 
 def _held_out(outcome: Outcome) -> tuple[np.ndarray, np.ndarray]:

@@ -106,14 +106,19 @@ def test_wrong_names_are_those_that_the_untouched_set_has_not() -> None:
 def test_energy_is_removed_as_far_as_the_residual_comes_back(after: tuple[float, float], removed: float) -> None:
     trial = outcome(concealed=(SPRING,), before=(2.0, 1.5), after=after, rms=(0.0, 1.1))
     told = judge(trial, outcome())
-    assert told.concealed == pytest.approx(1.21)  # 1.1² of a plain residual of 1
-    assert told.removed == pytest.approx(removed)  # of 1.5² - 1² by which the residual grew
+    assert told.concealed == pytest.approx(1.25)  # 1.5² - 1² by which the residual grew, more than the 1.1² known
+    assert told.removed == pytest.approx(removed)
+    assert told.share == pytest.approx(removed / 1.25)
 
 
 def test_what_the_untouched_set_loses_to_its_own_findings_is_not_counted() -> None:
     there = outcome(before=(2.0, 1.0), after=(1.0, 1.0))
     trial = outcome(concealed=(SPRING,), before=(2.0, 1.5), after=(1.0, 1.5), rms=(0.0, 1.1))
     assert judge(trial, there).removed == pytest.approx(0.0)
+
+
+def test_no_share_is_told_of_what_held_out_motion_does_not_show() -> None:
+    assert judge(outcome(concealed=(SPRING,)), outcome()).share is None
 
 
 def test_a_wrong_sign_conceals_what_the_residual_grew_by() -> None:
@@ -147,7 +152,7 @@ def test_the_bound_of_harm_is_two_standard_errors() -> None:
 def test_the_table_counts_effects_and_trials() -> None:
     done = [outcome(), outcome(cogging(), concealed=(COGGING, SPRING)), {"series": CONCEALED, "error": "no"}]
     rows = concealed_table(done).splitlines()
-    assert rows[0] == "2 trials, 1 of them failed"
+    assert rows[0] == "2 trials, 1 of them failed; in 1 untouched sets 0 joints are made worse"
     assert any(row.startswith("| 1.5 × | 1 | 1 | 1/1 (100%) |") for row in rows)
     assert any(row.startswith("| 0.7 × | 1 | 1 | 0/1 (0%) |") for row in rows)
     assert rows[-1].startswith("| all | 1 | 2 | 1/2 (50%) |")
