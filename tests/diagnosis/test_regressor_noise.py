@@ -9,10 +9,10 @@ from diagnosis.test_repetitions import observed
 from tauscope.diagnosis.fitting.regressor_noise import (
     MOVED,
     ROUNDED,
-    shared_errors,
     _step_error,
     _steps,
     row_weightings,
+    shared_errors,
     weightings_of_motion,
 )
 from tauscope.diagnosis.model.extended import ExtendedModel

@@ -1,9 +1,9 @@
 """Physics of no catalogue: torque that is smooth in a joint's speed, in its position, or in both.
 
 A Gaussian process of unit length on motion that is scaled to its range, by random Fourier features (Rahimi & Recht
-2007): √(2/b) cos(ω·z + φ) with ω normal. Direction of motion is a coordinate of its own, so that each direction may have
-its own curve. What the nominal model can say itself is taken out of the features (Plumlee 2017): else they would take
-the links' torque from the links.
+2007): √(2/b) cos(ω·z + φ) with ω normal. Direction of motion is a coordinate of its own, so that each direction may
+have its own curve. What the nominal model can say itself is taken out of the features (Plumlee 2017): else they would
+take the links' torque from the links.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ COORDINATES = np.array([[0.0, 1.0, 1.0], [1.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
 """Which of position, speed and direction each kind of discrepancy depends on: speed, position, both."""
 
 FEATURES = (24, 24, 60)
-"""Features of each kind; twice as many change no log evidence by one on the open recordings."""
+"""Features of each kind."""
 
 LENGTH = 1.0 / 1.5
 """Length over which the torque changes, relative to half the range of motion."""
@@ -57,7 +57,9 @@ class Reach:
         speed = np.abs(np.concatenate([piece.prepared.motion.velocity for piece in observations]))
         low, high = position.min(axis=0), position.max(axis=0)
         least = np.finfo(float).tiny
-        return Reach((low + high) / 2.0, np.maximum((high - low) / 2.0, least), np.quantile(speed, 0.98, axis=0) + least)
+        return Reach(
+            (low + high) / 2.0, np.maximum((high - low) / 2.0, least), np.quantile(speed, 0.98, axis=0) + least
+        )
 
 
 def smooth_features(observations: Observations, model: ExtendedModel, joint: int, reach: Reach) -> Array:

@@ -207,7 +207,8 @@ class _Sum:
 
 def _root(matrix: Array, scale: Array) -> Array:
     """Lower Cholesky factor of a matrix whose rows are divided by their scale."""
-    return np.linalg.cholesky(matrix / np.outer(scale, scale) + ROUNDING * np.eye(len(scale)))
+    correlation = matrix / np.outer(scale, scale) + ROUNDING * np.eye(len(scale))
+    return np.asarray(np.linalg.cholesky(correlation), dtype=np.float64)
 
 
 def _starts(scales: Scales) -> Iterator[Array]:

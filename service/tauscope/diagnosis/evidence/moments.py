@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-from tauscope.diagnosis.evidence.scales import REST_SHARES, Scales
+from tauscope.diagnosis.evidence.scales import Scales
 from tauscope.recording.recording import Array
 
 Index = NDArray[np.intp]
@@ -143,7 +143,8 @@ class JointMoments:
         inner = amplitudes[:, None] * whole[visible:, visible:] * amplitudes
         root = np.linalg.cholesky(np.eye(len(amplitudes)) + inner)
         outer = amplitudes[:, None] * whole[visible:, :visible]
-        return np.asarray(solve_triangular(root, outer, lower=True)), root
+        half = solve_triangular(root, outer, lower=True)
+        return np.asarray(half, dtype=np.float64), np.asarray(root, dtype=np.float64)
 
     def reduced(self, scales: Scales, crossed: Array, mutual: Array) -> tuple[Array, Array]:
         """Products of other columns with target and columns, (g, 1 + k), and of their fellows, (s, c, c), after C⁻¹.
@@ -190,13 +191,12 @@ class JointMoments:
         inside = whole[visible:, :visible] - whole[visible:, visible:] @ taken
         energy = np.einsum("bi,ij,bj->b", inside, spread, inside)
         of_feature = 2.0 * amplitudes**2 * (np.diag(whole)[visible:] - energy)
-        of_feature -= 2.0 * amplitudes**2 * np.einsum("bc,cd,db->b", whole[visible:, visible:], kernel, whole[visible:, visible:])
+        of_feature -= (
+            2.0 * amplitudes**2 * np.einsum("bc,cd,db->b", whole[visible:, visible:], kernel, whole[visible:, visible:])
+        )
         return scales.collect(by_class, of_feature, self.groups)
 
 
 def _split(rows: Array, bounds: Index) -> list[Array]:
     """Rows (..., R) of each class."""
     return np.split(rows, bounds[1:-1], axis=-1)
-
-
-CLASSES = len(REST_SHARES)

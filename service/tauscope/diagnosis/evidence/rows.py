@@ -4,7 +4,6 @@ Near rest friction takes any value up to breakaway, which no curve of the veloci
 their own (`Scales`), and those of a stop, where friction holds with whatever torque there is, say nothing.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -112,15 +111,11 @@ def rest_of(observations: Observations, model: ExtendedModel, joint: int) -> tup
     joint : int
         joint index, from 0
     """
-    near = [_near_rest(piece, model, joint) for piece in observations]
-    stopped = [_stopped(piece, joint) for piece in observations]
-    order, kept = observations.noise[joint].order if observations.noise else 0, observations.kept(joint)
-    return _joined(near, order)[kept], _joined(stopped, order)[kept]
-
-
-def _joined(pieces: Sequence[NDArray[np.generic]], order: int) -> NDArray[np.generic]:
-    """Rows of all pieces without those that a filter takes from the beginning of each."""
-    return np.concatenate([piece[order:] for piece in pieces])
+    order = observations.noise[joint].order if observations.noise else 0
+    kept = observations.kept(joint)
+    near = np.concatenate([_near_rest(piece, model, joint)[order:] for piece in observations])
+    stopped = np.concatenate([_stopped(piece, joint)[order:] for piece in observations])
+    return near[kept], stopped[kept]
 
 
 def _near_rest(piece: Piece, model: ExtendedModel, joint: int) -> Array:
@@ -137,7 +132,6 @@ def _near_rest(piece: Piece, model: ExtendedModel, joint: int) -> Array:
 def _stopped(piece: Piece, joint: int) -> BoolArray:
     """Rows of a stop of a joint, (P M,)."""
     stopped = np.zeros(piece.rows, dtype=bool)
-    for owner, stop in piece.prepared.stops:
-        if owner == joint:
-            stopped[max(stop.start - AROUND_STOP, 0) : stop.stop + AROUND_STOP] = True
+    for stop in piece.prepared.stops(joint):
+        stopped[max(stop.start - AROUND_STOP, 0) : stop.stop + AROUND_STOP] = True
     return np.tile(stopped, piece.repetitions)

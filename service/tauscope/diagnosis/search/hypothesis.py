@@ -96,7 +96,8 @@ class Prior:
         own = [place for place in range(structure.base_count, structure.size) if place not in rotors]
         covariance = np.linalg.inv(posterior.precision)[np.ix_(own, own)]
         spreads = [SLOPE_SPREAD if stated is None else STATED_ERROR for stated in model.stated]
-        return Prior(BodyPrior.of(identification), np.linalg.inv(covariance), _slopes(model), np.array(spreads))
+        friction = np.asarray(np.linalg.inv(covariance), dtype=np.float64)
+        return Prior(BodyPrior.of(identification), friction, _slopes(model), np.array(spreads))
 
 
 @dataclass(frozen=True, eq=False)

@@ -60,9 +60,7 @@ class Scorer:
     def __init__(self, rows: EvidenceRows, at: Hypothesis) -> None:
         self._rows, self._at = rows, at
         self._plain = _without_discrepancy(at)
-        self._settings = [
-            (scales, at.linear.posterior(scales)) for scales in (at.scales, self._plain)
-        ]
+        self._settings = [(scales, at.linear.posterior(scales)) for scales in (at.scales, self._plain)]
 
     def scored(self, effect: Effect, shapes: Array, columns: Mapping[int, Array]) -> tuple[Scored, Scored]:
         """Shapes of an effect beside the discrepancy, and as if there were none.

@@ -16,6 +16,9 @@ MOST_EFFECTS = 12
 WORSE = 2.7
 """Standard errors by which no joint may be predicted worse: of seven joints one is so by chance in thirty findings."""
 
+BETTER = 1.64
+"""…and by which a joint on which an effect acts is predicted better, at least: one in twenty is so by chance."""
+
 CATALOGUED = 3.0
 """Log odds before the data that torque which is left out has a name: one in twenty laws is in no catalogue."""
 
@@ -58,15 +61,9 @@ class Search:
 
     def run(self, nominal: Hypothesis) -> Found:
         """Add what makes the data most probable and held-out motion no worse."""
-        at, steps, refused = nominal, [], set[Place]()
+        at, steps, refused = nominal, list[Step](), set[Place]()
         while len(at.model.terms) - len(nominal.model.terms) < MOST_EFFECTS:
-            present = _places(at)
-
-            def wanted(effect: Effect, present: set[Place] = present) -> bool:
-                place = effect.id, effect.joint
-                return place not in refused and (effect.repeats or place not in present)
-
-            proposals = self.proposer.propose(at, wanted)
+            proposals = self.proposer.propose(at, _Wanted(_places(at), refused))
             tried, found = self._best(at, proposals)
             refused.update(step.proposal.place for step in tried if not step.is_confirmed)
             steps += tried
@@ -147,13 +144,24 @@ class Search:
         return reduced.evidence(scales) - at.log_evidence - self._prior_odds(effect)
 
 
+@dataclass(frozen=True)
+class _Wanted:
+    """Whether an effect may be added: none a second time, but what repeats, and none that was refused."""
+
+    present: set[Place]
+    refused: set[Place]
+
+    def __call__(self, effect: Effect) -> bool:
+        place = effect.id, effect.joint
+        return place not in self.refused and (effect.repeats or place not in self.present)
+
+
 def _places(at: Hypothesis) -> set[Place]:
     """Effects of a hypothesis, and where."""
     return {(term.effect.id, term.effect.joint) for term in at.model.terms}
 
 
 def _is_better(change: Change, touched: tuple[int, ...]) -> bool:
-    """Whether held-out motion is predicted better where an effect acts, and nowhere worse."""
-    own = list(touched)
-    gains = bool(change.relative[own].min() < 0.0 and float(np.log1p(change.relative).sum()) < 0.0)
+    """Whether held-out motion is predicted better where an effect acts and on the whole, and nowhere worse."""
+    gains = bool(change.standard[list(touched)].min() < -BETTER and float(np.log1p(change.relative).sum()) < 0.0)
     return gains and not bool((change.standard > WORSE).any())
