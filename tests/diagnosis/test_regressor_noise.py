@@ -9,10 +9,10 @@ from diagnosis.test_repetitions import observed
 from tauscope.diagnosis.fitting.regressor_noise import (
     MOVED,
     ROUNDED,
-    _shared_errors,
     _step_error,
     _steps,
     row_weightings,
+    shared_errors,
     weightings_of_motion,
 )
 from tauscope.diagnosis.model.extended import ExtendedModel
@@ -118,5 +118,5 @@ def test_a_band_moves_reversals_by_a_part_of_its_period_and_more_where_steps_are
     for joint, band_hz in enumerate(piece.state_hz):
         slope = np.gradient(_steps(model, joint, motion.velocity[:, joint])) * motion.rate_hz
         white = known.white(joint, [piece.reduced(slope[None])])[0]
-        _, moved = _shared_errors(known, model, joint, np.ones(len(white)))
+        _, moved = shared_errors(known, model, joint, np.ones(len(white)))
         np.testing.assert_allclose(moved, MOVED[part] / band_hz * white, atol=1e-9 * np.abs(moved).max())

@@ -133,7 +133,7 @@ class Fitter:
             step = bounded_step(projection.step, projection.spread, curved, low, high, reach)
             if last is not None and np.array_equal(step, last):
                 continue  # it was within these limits before
-            tried, last = self.linear_optimum(_stepped(at.model, step)), step
+            tried, last = self.linear_optimum(stepped(at.model, step)), step
             if tried.energy <= at.energy * (1.0 + 1e-12):
                 return tried
         return None
@@ -154,7 +154,7 @@ class Fitter:
         free = [JointColumns(places[own.index[moves]], own.rows[moves]) for own, moves in columns]
         step = np.zeros(model.size)
         step[linear] = fitted_parameters(free, at.residual, int(linear.sum()))
-        return self._tried(_stepped(model, step))
+        return self._tried(stepped(model, step))
 
     def without(self, fit: Fit, places: Sequence[int]) -> Fit:
         """The model fitted anew without some of its terms; the last few are kept, as several ask for the same."""
@@ -239,7 +239,7 @@ def _room(model: ExtendedModel, limits: Array) -> tuple[NDArray[np.intp], Array,
     return told[:, 0].astype(np.intp), np.minimum(told[:, 1], 0.0), np.maximum(told[:, 2], 0.0), told[:, 3]
 
 
-def _stepped(model: ExtendedModel, step: Array) -> ExtendedModel:
+def stepped(model: ExtendedModel, step: Array) -> ExtendedModel:
     """The model moved by a step; rounding leads no shape out of its bounds."""
     size = model.structure.size
     terms = list(model.structure.terms)

@@ -79,11 +79,11 @@ def weightings_of_motion(observations: Observations, model: ExtendedModel) -> tu
             for piece in observations
         ]
         weights = np.concatenate(parts)[observations.kept(joint)]
-        weightings.append(RowWeighting.of(weights, _shared_errors(whole, model, joint, weights)))
+        weightings.append(RowWeighting.of(weights, shared_errors(whole, model, joint, weights)))
     return tuple(weightings)
 
 
-def _shared_errors(observations: Observations, model: ExtendedModel, joint: int, weights: Array) -> Array:
+def shared_errors(observations: Observations, model: ExtendedModel, joint: int, weights: Array) -> Array:
     """What the band may have made of all reversals alike, rounded and moved, among weighted rows, (2, R)."""
     changes, slopes = [], []
     for piece in observations:

@@ -47,7 +47,7 @@ class WhiteColumns:
         for joint in self._joints:
             rigid, friction = self._white_rigid(joint), self._white_friction(model, joint)
             links, plain = np.split(model.parameters[model.structure.joint_columns(joint)], [len(rigid)])
-            found.append(self._white_measured(joint) - links @ rigid - plain @ friction)
+            found.append(self.measured(joint) - links @ rigid - plain @ friction)
         for term in model.terms:
             for joint, columns in self._white_term(model, term).items():
                 found[joint] -= term.coefficients @ columns
@@ -116,7 +116,7 @@ class WhiteColumns:
         }
         return {joint: self._observations.white(joint, parts) for joint, parts in rows.items()}
 
-    def _white_measured(self, joint: int) -> Array:
+    def measured(self, joint: int) -> Array:
         """Measured torque, (R,)."""
         if joint not in self._measured:
             (self._measured[joint],) = self._observations.white(joint, self._observations.torque(joint))

@@ -53,7 +53,7 @@ def with_pure_error(observations: Observations, model: ExtendedModel) -> Observa
     pure = [[(rows[j], used[j], factor) for rows, used, factor in differences] for j in _joints(observations)]
     if any(sum(int(used.sum()) for _, used, _ in parts) < FEWEST_ROWS for parts in pure):
         return None
-    share = _band_share(observations)
+    share = band_share(observations)
     return observations.with_noise([fitted_noise(parts, share) for parts in pure])
 
 
@@ -85,7 +85,7 @@ def _joints(observations: Observations) -> range:
     return range(observations.robot.joint_count)
 
 
-def _band_share(observations: Observations) -> float:
+def band_share(observations: Observations) -> float:
     """Cut-off of the common band relative to the highest frequency of the rows; 1 where nothing is filtered."""
     shares = []
     for piece in observations:
@@ -107,7 +107,7 @@ def _saturated_noise(
         power = float(np.mean(np.concatenate([rows[0] for rows in residual[joint]]) ** 2)) + np.finfo(float).tiny
         plain.append(JointNoise(Autoregression(np.empty(0), power, power)))
     left = _saturated(observations.with_noise(plain), model, effects, joints)
-    share = _band_share(observations)
+    share = band_share(observations)
     return {j: fitted_noise(_by_piece(observations, j, rows * plain[j].std), share) for j, rows in left.items()}
 
 

@@ -1,0 +1,155 @@
+"""What is believed of the links while a diagnosis looks for more: bodies near the stated ones, none impossible.
+
+    log p(x) = -½ ‖W (x - μ)‖² + κ Σ_i log det J_i(x),
+
+x the standard parameters of all links, J_i a link's 4x4 pseudo-inertia (Wensing, Kim & Slotine 2018). The determinant
+keeps every link a body with no inequality, so that the evidence stays that of a normal distribution: at a body x it is
+expanded to second order. κ = 1, so that the prior does not depend on the unit of mass (Jeffreys).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
+
+from tauscope.identification import Identification
+from tauscope.identification.consistency.triangle import UPPER_TRIANGLE, congruence, triangle_of_parameters
+from tauscope.identification.full_parameters import FullParameters
+from tauscope.recording.recording import Array
+
+WITHIN = 0.9
+"""Part of the way to the nearest body without volume that one step may take."""
+
+_ROWS, _COLUMNS = np.array(UPPER_TRIANGLE).T
+_WEIGHT = np.where(_ROWS == _COLUMNS, 1.0, np.sqrt(2.0))
+_TRIANGLE = triangle_of_parameters()
+
+
+@dataclass(frozen=True, eq=False)
+class NormalBodies:
+    """The prior about one body, as normal distribution of the base parameters Θ_L = M x.
+
+    centre : (10 n,) float64
+        of the links' standard parameters
+    gain : (10 n, m) float64
+        dx/dΘ_L of the most probable links
+    mean, precision : (m,), (m, m) float64
+        of the base parameters
+    """
+
+    centre: Array
+    gain: Array
+    mean: Array
+    precision: Array
+
+    def links(self, base: Array) -> Array:
+        """Most probable standard parameters of links with these base parameters, (10 n,).
+
+        Parameters
+        ----------
+        base : (m,) float64
+            Θ_L
+        """
+        return self.centre + self.gain @ (base - self.mean)
+
+
+@dataclass(frozen=True, eq=False)
+class BodyPrior:
+    """The prior itself.
+
+    base : (m, 10 n) float64
+        M
+    mean : (10 n,) float64
+        μ
+    precision : (10 n, 10 n) float64
+        WᵀW
+    """
+
+    base: Array
+    mean: Array
+    precision: Array
+
+    @staticmethod
+    def of(identification: Identification) -> "BodyPrior":
+        """The prior of an identification, as wide as its estimate believes it."""
+        full, prior = FullParameters.of(identification.structure), identification.posterior.prior
+        links = 10 * prior.link_count
+        root = prior.root[:links, :links]
+        return BodyPrior(full.map[: full.base_count, :links], prior.mean[:links], root.T @ root)
+
+    def start(self, links: Array) -> Array:
+        """Bodies with some volume near given ones, which may have none.
+
+        Parameters
+        ----------
+        links : (10 n,) float64
+            standard parameters
+        """
+        near = WITHIN * links + (1.0 - WITHIN) * self.mean
+        for own in _each(near):
+            if np.linalg.eigvalsh(pseudo_inertia(near[own]))[0] <= 0.0:
+                near[own] = self.mean[own]
+        return near
+
+    def about(self, links: Array) -> NormalBodies:
+        """The prior to second order about bodies.
+
+        Parameters
+        ----------
+        links : (10 n,) float64
+            standard parameters of bodies with volume
+        """
+        precision, slope = self.precision.copy(), self.precision @ (links - self.mean)
+        for own in _each(links):
+            inverse = np.linalg.inv(pseudo_inertia(links[own]))
+            precision[own, own] += _TRIANGLE.T @ congruence(inverse) @ _TRIANGLE
+            slope[own] -= _TRIANGLE.T @ (_WEIGHT * inverse[_ROWS, _COLUMNS])
+        scale = 1.0 / np.sqrt(np.diag(precision))
+        factor = cho_factor(scale[:, None] * precision * scale)
+        centre = links - scale * cho_solve(factor, scale * slope)
+        spread = scale[:, None] * cho_solve(factor, (self.base * scale).T)
+        of_base = _inverse(self.base @ spread)
+        return NormalBodies(centre, spread @ of_base, self.base @ centre, of_base)
+
+    def share(self, links: Array, step: Array) -> float:
+        """Part of a step that leaves every link its volume, at most 1.
+
+        Parameters
+        ----------
+        links, step : (10 n,) float64
+            standard parameters and their change
+        """
+        share = 1.0
+        for own in _each(links):
+            root = cholesky(pseudo_inertia(links[own]), lower=True)
+            half = solve_triangular(root, pseudo_inertia(step[own]), lower=True)
+            least = float(np.linalg.eigvalsh(solve_triangular(root, half.T, lower=True))[0])
+            share = min(share, -WITHIN / least) if least < 0.0 else share
+        return share
+
+
+def pseudo_inertia(parameters: Array) -> Array:
+    """J of one link, (4, 4).
+
+    Parameters
+    ----------
+    parameters : (10,) float64
+        its standard parameters
+    """
+    values = (_TRIANGLE @ parameters) / _WEIGHT
+    found = np.empty((4, 4))
+    found[_ROWS, _COLUMNS] = found[_COLUMNS, _ROWS] = values
+    return found
+
+
+def _each(links: Array) -> list[slice]:
+    """Where each link's parameters are."""
+    return [slice(first, first + 10) for first in range(0, len(links), 10)]
+
+
+def _inverse(matrix: Array) -> Array:
+    """Inverse of a positive definite matrix whose rows have different units."""
+    scale = 1.0 / np.sqrt(np.diag(matrix))
+    size = len(matrix)
+    factor = cho_factor(scale[:, None] * matrix * scale + 1e-12 * np.eye(size))
+    return np.asarray(scale[:, None] * cho_solve(factor, np.eye(size)) * scale)

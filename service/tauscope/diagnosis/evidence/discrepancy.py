@@ -1,0 +1,108 @@
+"""Physics of no catalogue: torque that is smooth in a joint's speed, in its position, or in both.
+
+A Gaussian process of unit length on motion that is scaled to its range, by random Fourier features (Rahimi & Recht
+2007): √(2/b) cos(ω·z + φ) with ω normal. Direction of motion is a coordinate of its own, so that each direction may
+have its own curve. What the nominal model can say itself is taken out of the features (Plumlee 2017): else they would
+take the links' torque from the links.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tauscope.diagnosis.model.extended import ExtendedModel
+from tauscope.diagnosis.observations.observations import Observations
+from tauscope.recording.recording import Array
+
+COORDINATES = np.array([[0.0, 1.0, 1.0], [1.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
+"""Which of position, speed and direction each kind of discrepancy depends on: speed, position, both."""
+
+FEATURES = (24, 24, 60)
+"""Features of each kind."""
+
+LENGTH = 1.0 / 1.5
+"""Length over which the torque changes, relative to half the range of motion."""
+
+SHARPEST = 20.0
+"""Slope at which the direction turns, at most, relative to the top speed: no corner is sharper than the motion."""
+
+DIRECTION = 1e-6
+"""Singular values of the scaled columns below this share of the largest are no direction."""
+
+GROUP = np.repeat(np.arange(len(FEATURES)), FEATURES)
+"""Kind of each feature."""
+
+SEED = 20
+"""Of the frequencies and phases: the same recordings get the same features."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reach:
+    """Range of every joint's motion.
+
+    middle, half : (n,) float64
+        middle and half width of the positions [rad or m]
+    top : (n,) float64
+        speed that one row in fifty exceeds [rad/s or m/s]
+    """
+
+    middle: Array
+    half: Array
+    top: Array
+
+    @staticmethod
+    def of(observations: Observations) -> "Reach":
+        """That of some recordings."""
+        position = np.concatenate([piece.prepared.motion.position for piece in observations])
+        speed = np.abs(np.concatenate([piece.prepared.motion.velocity for piece in observations]))
+        low, high = position.min(axis=0), position.max(axis=0)
+        least = np.finfo(float).tiny
+        return Reach(
+            (low + high) / 2.0, np.maximum((high - low) / 2.0, least), np.quantile(speed, 0.98, axis=0) + least
+        )
+
+
+def smooth_features(observations: Observations, model: ExtendedModel, joint: int, reach: Reach) -> Array:
+    """White rows of the features of one joint, (b, R).
+
+    Parameters
+    ----------
+    joint : int
+        joint index, from 0
+    """
+    draws = np.random.default_rng(SEED)
+    frequency = draws.standard_normal((len(GROUP), 3)) * COORDINATES[GROUP] / LENGTH
+    phase = draws.uniform(0.0, 2.0 * np.pi, len(GROUP))
+    size = np.sqrt(2.0 / np.array(FEATURES))[GROUP]
+    steepness = min(model.steepness[joint] or np.inf, SHARPEST / reach.top[joint])
+    rows = []
+    for piece in observations:
+        motion = piece.prepared.motion
+        velocity = motion.velocity[:, joint]
+        state = np.stack(
+            [
+                (motion.position[:, joint] - reach.middle[joint]) / reach.half[joint],
+                velocity / reach.top[joint],
+                np.tanh(steepness * velocity),
+            ]
+        )
+        values = size[:, None] * np.cos(frequency @ state + phase[:, None])
+        rows.append(piece.repeated(motion.band.reduce(values)))
+    return observations.white(joint, rows)
+
+
+def beyond(columns: Array, features: Array) -> Array:
+    """Features without what columns can make, (b, R).
+
+    Parameters
+    ----------
+    columns : (k, R) float64
+        white columns of the nominal model
+    features : (b, R) float64
+        white rows
+    """
+    length = np.linalg.norm(columns, axis=1, keepdims=True)
+    unit = columns / np.where(length > 0.0, length, 1.0)
+    _, sizes, basis = np.linalg.svd(unit, full_matrices=False)
+    basis = basis[sizes > DIRECTION * sizes.max(initial=0.0)]
+    return features - (features @ basis.T) @ basis

@@ -1,0 +1,217 @@
+"""A model linear in its parameters, its evidence, and the scales under which the data are most probable.
+
+    y_j = X_j Θ + e_j,   e_j ~ N(0, C_j),   Θ ~ N(μ, P⁻¹)
+
+    2 log p(y) = -(y - Xμ)ᵀ C⁻¹ (y - Xμ) + bᵀ A⁻¹ b - log det C - log det A + log det P,   A = P + XᵀC⁻¹X,
+
+b = XᵀC⁻¹(y - Xμ): Θ is integrated out (MacKay 1992; Kass & Raftery 1995). Scales of C are those of highest evidence.
+"""
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import cho_solve
+from scipy.optimize import minimize
+
+from tauscope.diagnosis.evidence.moments import Index, JointMoments
+from tauscope.diagnosis.evidence.scales import Scales
+from tauscope.recording.recording import Array
+
+STEPS = 30
+"""Most steps to the most probable scales of a joint."""
+
+SETTLED = 0.02
+"""Change of the log evidence at which a step is the last."""
+
+ROUNDING = 1e-12
+"""Added to the diagonal of a correlation matrix: what rounding takes off it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Mean and covariance of the parameters, and the log evidence.
+
+    mean : (p,) float64
+        of Θ
+    factor : (p, p) float64
+        lower Cholesky factor of A / (s sᵀ)
+    scale : (p,) float64
+        s
+    """
+
+    mean: Array
+    factor: Array
+    scale: Array
+    log_evidence: float
+
+    def solve(self, right: Array) -> Array:
+        """A⁻¹ r.
+
+        Parameters
+        ----------
+        right : (p,) or (p, k) float64
+            r
+        """
+        scale = self.scale if right.ndim == 1 else self.scale[:, None]
+        return np.asarray(cho_solve((self.factor, True), right / scale) / scale)
+
+    @property
+    def covariance(self) -> Array:
+        """A⁻¹, (p, p)."""
+        return self.solve(np.eye(len(self.mean)))
+
+
+@dataclass(frozen=True, eq=False)
+class LinearModel:
+    """Rows of all joints, and what is believed of the parameters.
+
+    mean : (p,) float64
+        μ
+    precision : (p, p) float64
+        P
+    """
+
+    joints: tuple[JointMoments, ...]
+    mean: Array
+    precision: Array
+
+    @property
+    def size(self) -> int:
+        """Number of parameters p."""
+        return len(self.mean)
+
+    def extended(self, columns: Mapping[int, Array], mean: Array, std: Array) -> "LinearModel":
+        """The same with more parameters.
+
+        Parameters
+        ----------
+        columns : mapping of int to (c, R_j) float64
+            their white columns at every joint that they act on
+        mean, std : (c,) float64
+            of what is believed of them
+        """
+        index = np.arange(self.size, self.size + len(mean))
+        joints = tuple(
+            own.extended(index, columns[joint]) if joint in columns else own for joint, own in enumerate(self.joints)
+        )
+        precision = np.pad(self.precision, (0, len(mean)))
+        precision[index, index] = 1.0 / std**2
+        return LinearModel(joints, np.concatenate([self.mean, mean]), precision)
+
+    def without(self, places: Index, values: Array) -> "LinearModel":
+        """The same with some parameters held at a value; their places stay, with no column.
+
+        Parameters
+        ----------
+        places : (c,) int
+            their places among all
+        values : (c,) float64
+            what they are held at
+        """
+        return replace(self, joints=tuple(own.without(places, values) for own in self.joints))
+
+    def posterior(self, scales: Sequence[Scales]) -> Posterior:
+        """Parameters and evidence under given scales, one entry a joint."""
+        return self._solved(self._sum(scales, range(len(self.joints)), self._believed()))
+
+    def evidence(self, scales: Sequence[Scales]) -> float:
+        """Log evidence of data and scales."""
+        return self.posterior(scales).log_evidence - sum(each.penalty() for each in scales)
+
+    def most_probable(self, scales: Sequence[Scales], joints: Collection[int]) -> tuple[Scales, ...]:
+        """The scales of highest evidence at some joints, one joint after the other.
+
+        Parameters
+        ----------
+        joints : collection of int
+            joint indices, from 0
+        """
+        found = list(scales)
+        for joint in joints:
+            others = [place for place in range(len(self.joints)) if place != joint]
+            rest = self._sum(found, others, self._believed())
+            found[joint] = self._tuned(joint, found[joint], rest)
+        return tuple(found)
+
+    def _tuned(self, joint: int, start: Scales, rest: "_Sum") -> Scales:
+        """Scales of one joint beside what the others say, from those at hand and from none of the discrepancy."""
+        own = self.joints[joint]
+
+        def objective(values: Array) -> tuple[float, Array]:
+            scales = replace(start, values=values)
+            posterior = self._solved(self._added(joint, scales, rest))
+            direction = np.concatenate([[1.0], -posterior.mean[own.index]])
+            covariance = posterior.covariance[np.ix_(own.index, own.index)]
+            slopes = 0.5 * own.slopes(scales, direction, covariance) + scales.penalty_slopes()
+            return scales.penalty() - posterior.log_evidence, slopes
+
+        limits = start.bounds()
+        low, high = np.array(limits).T
+        ends = [
+            minimize(
+                objective,
+                np.clip(values, low, high),
+                jac=True,
+                method="L-BFGS-B",
+                bounds=limits,
+                options={"maxiter": STEPS, "ftol": SETTLED / 1e4},
+            )
+            for values in _starts(start)
+        ]
+        return replace(start, values=min(ends, key=lambda each: float(each.fun)).x)
+
+    def _believed(self) -> "_Sum":
+        """The prior alone."""
+        inner = self.precision @ self.mean
+        return _Sum(self.precision, inner, float(self.mean @ inner), 0.0)
+
+    def _sum(self, scales: Sequence[Scales], joints: Collection[int], start: "_Sum") -> "_Sum":
+        """A, its right-hand side, energy and log det C over some joints."""
+        total = start
+        for joint in joints:
+            total = self._added(joint, scales[joint], total)
+        return total
+
+    def _added(self, joint: int, scales: Scales, total: "_Sum") -> "_Sum":
+        """The same with one joint more."""
+        own = self.joints[joint]
+        found, index = own.weighted(scales), own.index
+        matrix, right = total.matrix.copy(), total.right.copy()
+        matrix[np.ix_(index, index)] += found.products[1:, 1:]
+        right[index] += found.products[1:, 0]
+        return _Sum(
+            matrix, right, total.energy + float(found.products[0, 0]), total.determinant + found.log_determinant
+        )
+
+    def _solved(self, total: "_Sum") -> Posterior:
+        scale = np.sqrt(np.diag(total.matrix))
+        factor = _root(total.matrix, scale)
+        right = total.right / scale
+        mean = cho_solve((factor, True), right)
+        believed = np.sqrt(np.diag(self.precision))
+        gained = np.log(np.diag(_root(self.precision, believed)) * believed) - np.log(np.diag(factor) * scale)
+        value = 0.5 * (float(right @ mean) - total.energy - total.determinant) + float(gained.sum())
+        return Posterior(mean / scale, factor, scale, value)
+
+
+@dataclass(frozen=True, eq=False)
+class _Sum:
+    """Sums over joints: A, XᵀC⁻¹y + Pμ, yᵀC⁻¹y + μᵀPμ, log det C."""
+
+    matrix: Array
+    right: Array
+    energy: float
+    determinant: float
+
+
+def _root(matrix: Array, scale: Array) -> Array:
+    """Lower Cholesky factor of a matrix whose rows are divided by their scale."""
+    correlation = matrix / np.outer(scale, scale) + ROUNDING * np.eye(len(scale))
+    return np.asarray(np.linalg.cholesky(correlation), dtype=np.float64)
+
+
+def _starts(scales: Scales) -> Iterator[Array]:
+    """Where the search for scales begins: one optimum has the discrepancy that another has not."""
+    yield scales.values
+    yield scales.without_discrepancy(float(np.exp(scales.values[0]))).values

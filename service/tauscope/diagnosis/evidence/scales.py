@@ -1,0 +1,94 @@
+"""Sizes of what is not known at a joint: torque noise, discrepancy of each kind, friction near rest."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauscope.recording.recording import Array
+
+GROUPS = 3
+"""Kinds of discrepancy: of speed, of position, of both."""
+
+REST_SHARES = np.array([0.0, 0.15, 0.5, 1.0])
+"""Share of a row's samples near rest by which a class of rows counts."""
+
+REST_BOUNDS = (0.02, 0.3, 0.7)
+"""Shares that part the classes."""
+
+NOISE_SPREAD = 1.5
+"""Standard deviation of log σ about the noise that was estimated before."""
+
+REST_SPREAD = 2.0
+"""Standard deviation of log r about…"""
+
+REST = -1.0
+"""…friction near rest that is known to about a third of the noise."""
+
+LEAST = 1e-3
+"""Amplitude of a discrepancy, relative to what the plain model leaves, below which it is none."""
+
+LIMIT = 9.0
+"""Magnitude that no logarithm of a scale exceeds."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scales:
+    """Logarithms of the scales of one joint's covariance C = σ² (1 + r² c²) + Σ_g a_g² B_g B_gᵀ.
+
+    values : (2 + G,) float64
+        log σ, log a_g of every group, log r; in units of white noise
+    level : float
+        rms of what the plain model leaves, white
+    """
+
+    values: Array
+    level: float
+
+    @staticmethod
+    def start(level: float) -> "Scales":
+        """Noise as it was estimated, and a discrepancy of a tenth of what is left."""
+        return Scales(np.array([0.0, *[np.log(0.1 * level)] * GROUPS, REST]), level)
+
+    def bounds(self) -> list[tuple[float, float]]:
+        """Range of each logarithm."""
+        least = float(np.log(LEAST * self.level))
+        return [(-LIMIT, LIMIT), *[(least, least + LIMIT)] * GROUPS, (-LIMIT, LIMIT)]
+
+    def weights(self) -> Array:
+        """1 / (σ² (1 + r² c²)) of each class, (K,)."""
+        return np.exp(-2.0 * self.values[0]) / (1.0 + np.exp(2.0 * self.values[-1]) * REST_SHARES**2)
+
+    def amplitudes(self, groups: NDArray[np.intp]) -> Array:
+        """A of each feature; 1 for an error of known size, group -1."""
+        return np.where(groups < 0, 1.0, np.exp(self.values[1:-1])[groups])
+
+    def collect(self, by_class: Array, by_feature: Array, groups: NDArray[np.intp]) -> Array:
+        """Slopes in the logarithms, (2 + G,), from d/dv of each class's variance v and d/dlog a of each feature."""
+        rest = np.exp(2.0 * self.values[-1]) * REST_SHARES**2
+        variance = np.exp(2.0 * self.values[0])
+        of_noise = float(by_class @ (2.0 * variance * (1.0 + rest)))
+        of_rest = float(by_class @ (2.0 * variance * rest))
+        return np.array([of_noise, *(by_feature[groups == group].sum() for group in range(GROUPS)), of_rest])
+
+    def penalty(self) -> float:
+        """-log p of the scales: a discrepancy is hardly larger than what the plain model leaves."""
+        noise, rest = self.values[0] / NOISE_SPREAD, (self.values[-1] - REST) / REST_SPREAD
+        return 0.5 * float(noise**2 + rest**2 + np.sum(np.exp(2.0 * self.values[1:-1])) / self.level**2)
+
+    def penalty_slopes(self) -> Array:
+        """Slopes of the penalty, (2 + G,)."""
+        noise, rest = self.values[0] / NOISE_SPREAD**2, (self.values[-1] - REST) / REST_SPREAD**2
+        return np.array([noise, *np.exp(2.0 * self.values[1:-1]) / self.level**2, rest])
+
+    def without_discrepancy(self, noise: float) -> "Scales":
+        """The same with no discrepancy and another noise.
+
+        Parameters
+        ----------
+        noise : float
+            σ
+        """
+        values = self.values.copy()
+        values[0], values[1:-1] = np.log(noise), np.log(LEAST * self.level)
+        return Scales(values, self.level)
