@@ -101,7 +101,7 @@ class BodyPrior:
         """
         precision, slope = self.precision.copy(), self.precision @ (links - self.mean)
         for own in _each(links):
-            inverse = np.linalg.inv(pseudo_inertia(links[own]))
+            inverse = np.asarray(np.linalg.inv(pseudo_inertia(links[own])), dtype=np.float64)
             precision[own, own] += _TRIANGLE.T @ congruence(inverse) @ _TRIANGLE
             slope[own] -= _TRIANGLE.T @ (_WEIGHT * inverse[_ROWS, _COLUMNS])
         scale = 1.0 / np.sqrt(np.diag(precision))
