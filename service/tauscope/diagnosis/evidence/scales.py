@@ -64,7 +64,17 @@ class Scales:
         return np.where(groups < 0, 1.0, np.exp(self.values[1:-1])[groups])
 
     def collect(self, by_class: Array, by_feature: Array, groups: NDArray[np.intp]) -> Array:
-        """Slopes in the logarithms, (2 + G,), from d/dv of each class's variance v and d/dlog a of each feature."""
+        """Slopes in the logarithms, (2 + G,).
+
+        Parameters
+        ----------
+        by_class : (K,) float64
+            slope in the variance of each class
+        by_feature : (b,) float64
+            slope in log a of each feature
+        groups : (b,) int
+            group of each feature
+        """
         rest = np.exp(2.0 * self.values[-1]) * REST_SHARES**2
         variance = np.exp(2.0 * self.values[0])
         of_noise = float(by_class @ (2.0 * variance * (1.0 + rest)))

@@ -240,7 +240,13 @@ def _room(model: ExtendedModel, limits: Array) -> tuple[NDArray[np.intp], Array,
 
 
 def stepped(model: ExtendedModel, step: Array) -> ExtendedModel:
-    """The model moved by a step; rounding leads no shape out of its bounds."""
+    """The model moved by a step; rounding leads no shape out of its bounds.
+
+    Parameters
+    ----------
+    step : (p,) float64
+        change of every parameter, of slopes their logarithm's
+    """
     size = model.structure.size
     terms = list(model.structure.terms)
     for place, (joint, name) in enumerate(model.constants):

@@ -84,7 +84,15 @@ def weightings_of_motion(observations: Observations, model: ExtendedModel) -> tu
 
 
 def shared_errors(observations: Observations, model: ExtendedModel, joint: int, weights: Array) -> Array:
-    """What the band may have made of all reversals alike, rounded and moved, among weighted rows, (2, R)."""
+    """What the band may have made of all reversals alike, rounded and moved, among weighted rows, (2, R).
+
+    Parameters
+    ----------
+    joint : int
+        joint index, from 0
+    weights : (R,) float64
+        of the white rows
+    """
     changes, slopes = [], []
     for piece in observations:
         motion = piece.prepared.motion

@@ -179,7 +179,13 @@ class Laboratory:
         return None
 
     def with_term(self, at: Hypothesis, term: Term, size: Array) -> Hypothesis:
-        """A model with one effect more, as it is."""
+        """A model with one effect more, as it is.
+
+        Parameters
+        ----------
+        size : (c,) float64
+            standard deviation believed of its coefficients
+        """
         return self.at(with_terms(at.model, [*at.model.terms, term]), [*at.sizes, size], at.scales)
 
     def without_term(self, at: Hypothesis, place: int) -> Hypothesis:
