@@ -38,7 +38,16 @@ def nothing(rows: MotionRows) -> Array:
     return np.zeros(len(rows.time))
 
 
-@pytest.mark.parametrize("law", [spring, load_friction, cogging, coupling])
+@pytest.fixture
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Smaller learners, where their size is not what is asked."""
+    monkeypatch.setattr(learners, "TREES", (5, 20))
+    monkeypatch.setattr(learners, "LANDMARKS", 60)
+
+
+@pytest.mark.parametrize(
+    "law", [load_friction, *(pytest.param(each, marks=pytest.mark.slow) for each in (spring, cogging, coupling))]
+)
 def test_a_hidden_law_is_predicted_near_its_true_share(law: Law) -> None:
     training, held_out = recordings(law, NOISE, seed=1)
     truth = float(np.sum(law(held_out[0]) ** 2))
@@ -49,15 +58,16 @@ def test_a_hidden_law_is_predicted_near_its_true_share(law: Law) -> None:
     assert 0.95 * NOISE < found.black_box < found.explained == found.plain
 
 
-def test_noise_is_never_predicted(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(learners, "TREES", (5, 20))  # larger ones take longer, and find no more in noise
-    monkeypatch.setattr(learners, "LANDMARKS", 60)
-    for seed in range(50):
+@pytest.mark.usefixtures("small")
+@pytest.mark.parametrize("seeds", [range(3), pytest.param(range(3, 50), marks=pytest.mark.slow)], ids=len)
+def test_noise_is_never_predicted(seeds: range) -> None:
+    for seed in seeds:
         training, held_out = recordings(nothing, NOISE, seed, count=1, duration_s=12.0)
         found = joint_headroom(training, held_out, 0)
         assert not (found.is_significant and found.share > REFUTES_FROM), seed
 
 
+@pytest.mark.usefixtures("small")
 def test_held_out_torque_is_not_learned() -> None:
     """Held-out torque in another order: what a black box knew of it would show as a gain."""
     training, held_out = recordings(load_friction, NOISE, seed=2)
@@ -67,6 +77,7 @@ def test_held_out_torque_is_not_learned() -> None:
     assert found.share < 0.0
 
 
+@pytest.mark.usefixtures("small")
 def test_a_law_that_changes_with_the_recording_is_no_gain() -> None:
     rng = np.random.default_rng(4)
     made = [motion(seed, place) for place, seed in enumerate((5, 6, 7))]
@@ -76,6 +87,7 @@ def test_a_law_that_changes_with_the_recording_is_no_gain() -> None:
     assert not (found.is_significant and found.share > REFUTES_FROM)
 
 
+@pytest.mark.usefixtures("small")
 def test_the_black_box_learns_what_the_findings_leave() -> None:
     training, held_out = recordings(spring, NOISE, seed=3)
     training, held_out = (
@@ -105,6 +117,7 @@ def test_one_block_proves_nothing() -> None:
     assert not compare_residuals(residual, residual, 0.1 * residual, np.zeros(100, dtype=np.intp)).is_significant
 
 
+@pytest.mark.usefixtures("small")
 def test_rows_that_were_not_measured_count_nowhere() -> None:
     training, held_out = recordings(spring, NOISE, seed=6)
 

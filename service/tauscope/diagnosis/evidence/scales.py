@@ -60,7 +60,18 @@ class Scales:
         return np.exp(-2.0 * self.values[0]) / (1.0 + np.exp(2.0 * self.values[-1]) * REST_SHARES**2)
 
     def amplitudes(self, groups: NDArray[np.intp]) -> Array:
-        """A of each feature; 1 for an error of known size, group -1."""
+        """Amplitude of each feature; 1 for an error of known size, group -1.
+
+        Parameters
+        ----------
+        groups : (b,) int
+            group of each feature
+
+        Returns
+        -------
+        (b,) float64
+            amplitudes
+        """
         return np.where(groups < 0, 1.0, np.exp(self.values[1:-1])[groups])
 
     def collect(self, by_class: Array, by_feature: Array, groups: NDArray[np.intp]) -> Array:
