@@ -25,6 +25,9 @@ STUCK_RUNS = 5
 USUAL_RUN = 3
 """Rows for which noise lets no value be repeated: where it does, the effort comes in coarse steps and may rest."""
 
+ONE_STEP = 1.5
+"""Smallest steps of the effort below which a change is one of them."""
+
 LEAST_MOVE = 0.01
 """Distance above which a joint moves within some rows [rad or m]."""
 
@@ -43,9 +46,27 @@ def find_stuck(rows: Numbers, effort: Array, position: Array, scale: EffortScale
     """
     if scale.run > USUAL_RUN * scale.hold:
         return NO_NUMBERS
-    same = np.diff(effort, prepend=np.nan) == 0.0
-    same &= (effort > scale.low) & (effort < scale.high)  # a clipped value is not stuck
-    return _stuck_rows(rows, same, position, max(STUCK_ROWS, STUCK_RUNS * scale.run))
+    change = np.diff(effort, prepend=np.nan)
+    same = (change == 0.0) & (effort > scale.low) & (effort < scale.high)  # a clipped value is not stuck
+    found = _stuck_rows(np.arange(len(effort)), same, position, max(STUCK_ROWS, STUCK_RUNS * scale.run))
+    return rows[_without_turns(found, change)]
+
+
+def _without_turns(stuck: Numbers, change: Array) -> Numbers:
+    """Rows of values that end with a jump: one that goes on by a single step of the drive's was turning, not stuck.
+
+    Parameters
+    ----------
+    change : (N,) float64
+        of the effort, from row to row
+    """
+    steps = np.abs(change[np.isfinite(change) & (change != 0.0)])
+    if not len(stuck) or not len(steps):
+        return stuck
+    runs = np.split(stuck, np.flatnonzero(np.diff(stuck) > 1) + 1)
+    after = [min(run[-1] + 1, len(change) - 1) for run in runs]
+    turns = [0.0 < abs(change[place]) < ONE_STEP * steps.min() for place in after]
+    return np.concatenate([NO_NUMBERS, *(run for run, turn in zip(runs, turns, strict=True) if not turn)])
 
 
 def find_all_stuck(rows: Numbers, effort: Array, position: Array, scales: Sequence[EffortScale]) -> Numbers:
