@@ -70,6 +70,7 @@ def written_once(files: list[str], tmp_path_factory: pytest.TempPathFactory) -> 
     monkeypatch = pytest.MonkeyPatch()
     diagnose = tauscope.tasks.diagnose.diagnose
     monkeypatch.setattr("tauscope.tasks.diagnose.diagnose", lambda *of: found.append(diagnose(*of)) or found[0])
+    monkeypatch.setattr("tauscope.headroom.learners.TREES", (5, 20))  # how much they learn is not asked here
     status, shown = run(
         files[0],
         *("--held-out", files[1], "--headroom", "--json", str(out["out.json"])),
