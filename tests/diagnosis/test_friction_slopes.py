@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from identification.simulated import PAPER_NOISE, paper_robot, simulate, with_shapes
 from tauscope.diagnosis.fitting.fit import Fitter
@@ -14,6 +15,8 @@ from tauscope.diagnosis.observations.observations import Observations
 from tauscope.identification import identify
 from tauscope.recording.conditioning import Conditioner
 from tauscope.robot import FrictionCoefficients
+
+pytestmark = pytest.mark.slow
 
 SPEED = np.full(3, 1.0)
 NO_STRIBECK = tuple(FrictionCoefficients(stiction, 0.0, 0.3) for stiction in (2.0, 1.0, 2.0))

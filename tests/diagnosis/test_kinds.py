@@ -21,6 +21,8 @@ from tauscope.diagnosis.selection.kinds import with_best_kinds
 from tauscope.diagnosis.selection.selector import Selector
 from tauscope.effects import Quantity
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def diagnosis() -> Diagnosis:

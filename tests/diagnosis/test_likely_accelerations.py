@@ -17,6 +17,8 @@ from tauscope.dynamics import mass_matrix
 from tauscope.effects.rotor_inertia import RotorInertia
 from tauscope.recording.recording import Array
 
+pytestmark = pytest.mark.slow
+
 RATE_HZ, CUTOFF_HZ, SAMPLES = 200.0, 12.0, 8192
 DENSITY = np.array([2e-11, 5e-11])
 TORQUE_NOISE = np.array([0.04, 0.01])

@@ -13,6 +13,8 @@ from tauscope.diagnosis.fitting.fit import Fit
 from tauscope.diagnosis.screening.screen import SAME_LOAD, Screen
 from tauscope.effects import Effect, Signals
 
+pytestmark = pytest.mark.slow
+
 SHAPED_BY_LOAD = ("backlash", "joint_elasticity", "torque_ripple")
 
 

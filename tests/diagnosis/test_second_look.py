@@ -18,6 +18,8 @@ from tauscope.diagnosis.selection.selector import Selector
 from tauscope.effects import Effect
 from tauscope.effects.joint_spring import JointSpring
 
+pytestmark = pytest.mark.slow
+
 WIDER = "look again in a wider band"
 
 

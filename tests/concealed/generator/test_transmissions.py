@@ -17,6 +17,8 @@ from tauscope_sim.inverse_dynamics import rigid_body_torque
 from tauscope_sim.model import build_model
 from tauscope_sim.motion import random_fourier_motion
 
+pytestmark = pytest.mark.slow
+
 SOFT = {"effect": "joint_elasticity", "joint": 2, "stiffness": 500.0, "damping": 1.0, "rotor_inertia": 0.004}
 STIFF = {**SOFT, "stiffness": 2e4, "damping": 40.0}
 TEETH = {"effect": "backlash", "joint": 2, "gap": 0.02, "contact_stiffness": 1e4, "rotor_inertia": 0.004}

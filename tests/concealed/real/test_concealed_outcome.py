@@ -20,7 +20,10 @@ from tauscope.diagnosis.documents.document import DiagnosisDocument
 from tauscope.effects import catalogue
 
 absent = [each.name for each in SETS.values() if not each.is_there]
-pytestmark = pytest.mark.skipif(bool(absent), reason=f"no recordings of {absent}; TAUSCOPE_DATA and TAUSCOPE_CASES")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(bool(absent), reason=f"no recordings of {absent}; TAUSCOPE_DATA and TAUSCOPE_CASES"),
+]
 
 QUICK = (7, 23)
 """Seeds of the set that is read fastest: 30 Hz."""

@@ -14,6 +14,8 @@ from concealed.real.concealing.nominal import fit_nominal
 from concealed.real.concealing.oracle import estimate_sizes
 from concealed.real.concealing.sizing import multiple_left, size_for, solve_size
 
+pytestmark = pytest.mark.slow
+
 OF_TORQUE = ("spring", "cogging", "asymmetric_viscous", "coupling", "payload_change", "contact")
 OTHERS = ("delay_all", "gain_joint", "saturation", "gravity")
 
