@@ -12,7 +12,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(1800)]
 
 AT_40 = {
     "asymmetric_viscous": 1,
-    "nonlinear_viscous": 2,
+    "nonlinear_viscous": 1,
     "load_dependent_friction": 1,
     "position_dependent_friction": 2,
     "presliding_hysteresis": 0,

@@ -36,13 +36,13 @@ def uncertain_torque(
     (n,) float64
         in the common band [Nm or N]
     """
-    squares, count = np.zeros(structure.robot.joint_count), np.zeros(structure.robot.joint_count)
+    squares, resting, count = np.zeros((3, structure.robot.joint_count))
     for prepared in motions:
         for joint, used in enumerate(prepared.used):
             columns, index = columns_with_shapes(prepared, structure, joint, parameters, shapes)
             columns = columns if used.all() else columns[:, used]
             squares[joint] += np.sum((covariance[np.ix_(index, index)] @ columns) * columns)
-            resting = prepared.rest_variance[joint] * prepared.at_rest[joint][used]
-            squares[joint] += noise_std[joint] ** 2 * resting.sum()
+            resting[joint] += prepared.rest_variance[joint] * prepared.at_rest[joint][used].sum()
             count[joint] += columns.shape[1]
-    return np.sqrt(np.maximum(squares, 0.0) / np.maximum(count, 1))
+    rows = np.maximum(count, 1)
+    return np.hypot(np.sqrt(np.maximum(squares, 0.0) / rows), noise_std * np.sqrt(resting / rows))
