@@ -13,7 +13,7 @@ from tauscope.diagnosis.evidence.discrepancy import GROUP, Reach, beyond, smooth
 from tauscope.diagnosis.evidence.moments import JointMoments
 from tauscope.diagnosis.evidence.scales import REST_BOUNDS, REST_SHARES
 from tauscope.diagnosis.fitting.projection import JointColumns
-from tauscope.diagnosis.fitting.regressor_noise import shared_errors
+from tauscope.diagnosis.fitting.regressor_noise import certainty, shared_errors
 from tauscope.diagnosis.fitting.white_columns import WhiteColumns
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.observations.observations import BoolArray, Observations, Piece
@@ -25,6 +25,9 @@ REVERSAL = 2.0
 UNCERTAIN = 3.0
 """…or in standard deviations of the velocity's noise, where that is more."""
 
+OPEN = 1.0
+"""Part of the power of a step's error that a row is held to be off by: all of it."""
+
 AROUND_STOP = 1
 """Rows on either side of a stop that share its samples."""
 
@@ -35,6 +38,8 @@ class EvidenceRows:
 
     order : tuple of (R_j,) int
         which of the white rows count, class by class
+    certain : tuple of (R_j,) float64
+        weight of each of them beside friction's step, whose place the velocity's noise leaves open
     bounds : tuple of (K + 1,) int
         where each class begins
     features : tuple of (b, R_j) float64
@@ -44,6 +49,7 @@ class EvidenceRows:
     observations: Observations
     white: WhiteColumns
     order: tuple[NDArray[np.intp], ...]
+    certain: tuple[Array, ...]
     bounds: tuple[NDArray[np.intp], ...]
     features: tuple[Array, ...]
     groups: NDArray[np.intp]
@@ -52,20 +58,21 @@ class EvidenceRows:
     def prepare(observations: Observations, model: ExtendedModel) -> "EvidenceRows":
         """Rows of training recordings beside a nominal model."""
         reach, white = Reach.of(observations), WhiteColumns(observations)
-        order, bounds, features = [], [], []
+        order, certain, bounds, features = [], [], [], []
         shared = 0
         for joint in range(observations.robot.joint_count):
             near, stopped = rest_of(observations, model, joint)
             kinds = np.digitize(near, REST_BOUNDS)
             places = [np.flatnonzero((kinds == kind) & ~stopped) for kind in range(len(REST_SHARES))]
             order.append(np.concatenate(places))
+            certain.append(certainty(observations, model, joint, OPEN)[order[-1]])
             bounds.append(np.cumsum([0, *map(len, places)]))
             smooth = smooth_features(observations, model, joint, reach)
             errors = shared_errors(observations, model, joint, np.ones(smooth.shape[1]))
             shared = len(errors)
-            features.append(np.vstack([smooth, errors])[:, order[-1]])
+            features.append(np.vstack([smooth, errors])[:, order[-1]] * certain[-1])
         groups = np.concatenate([GROUP, np.full(shared, -1)])
-        return EvidenceRows(observations, white, tuple(order), tuple(bounds), tuple(features), groups)
+        return EvidenceRows(observations, white, tuple(order), tuple(certain), tuple(bounds), tuple(features), groups)
 
     def take(self, joint: int, rows: Array) -> Array:
         """The rows of a joint that count, in order of their class, (…, R_j).
@@ -77,7 +84,7 @@ class EvidenceRows:
         rows : (…, R) float64
             white rows
         """
-        return rows[..., self.order[joint]]
+        return rows[..., self.order[joint]] * self.certain[joint]
 
     def moments(self, model: ExtendedModel, *, owned: bool = False) -> tuple[JointMoments, ...]:
         """What a model leaves, and the slopes of that in all its parameters, one entry a joint.

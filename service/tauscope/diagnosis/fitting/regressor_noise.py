@@ -72,15 +72,25 @@ def weightings_of_motion(observations: Observations, model: ExtendedModel) -> tu
     """The same by a model that is right about friction, whatever torque was measured."""
     whole = observations.with_weightings(())
     weightings = []
-    for joint, noise in enumerate(observations.noise):
-        power = noise.model.variance
-        parts = [
-            1.0 / np.sqrt(1.0 + REALISED * _uncertain_power(piece, model, joint)[noise.order :] / power)
-            for piece in observations
-        ]
-        weights = np.concatenate(parts)[observations.kept(joint)]
+    for joint in range(len(observations.noise)):
+        weights = certainty(observations, model, joint, REALISED)
         weightings.append(RowWeighting.of(weights, shared_errors(whole, model, joint, weights)))
     return tuple(weightings)
+
+
+def certainty(observations: Observations, model: ExtendedModel, joint: int, share: float) -> Array:
+    """1 / √(1 + s u² / σ²) of every white row, (R,): how much it counts beside a step that is known to u.
+
+    Parameters
+    ----------
+    joint : int
+        joint index, from 0
+    share : float
+        s, part of u² that a row is held to be off by
+    """
+    noise = observations.noise[joint]
+    parts = [_uncertain_power(piece, model, joint)[noise.order :] / noise.model.variance for piece in observations]
+    return 1.0 / np.sqrt(1.0 + share * np.concatenate(parts)[observations.kept(joint)])
 
 
 def shared_errors(observations: Observations, model: ExtendedModel, joint: int, weights: Array) -> Array:

@@ -14,7 +14,10 @@ MOST_EFFECTS = 12
 """Effects that are added at most."""
 
 WORSE = 2.7
-"""Standard errors by which no joint may be predicted worse: of seven joints one is so by chance in thirty findings."""
+"""Standard errors by which no joint may be predicted worse: of seven joints one is so by chance in thirty findings…"""
+
+SPILLED = 0.25
+"""…unless what it loses is less than this part of what all joints gain [log rms]."""
 
 BETTER = 1.64
 """…and by which a joint on which an effect acts is predicted better, at least: one in twenty is so by chance."""
@@ -162,6 +165,11 @@ def _places(at: Hypothesis) -> set[Place]:
 
 
 def _is_better(change: Change, touched: tuple[int, ...]) -> bool:
-    """Whether held-out motion is predicted better where an effect acts and on the whole, and nowhere worse."""
-    gains = bool(change.standard[list(touched)].min() < -BETTER and float(np.log1p(change.relative).sum()) < 0.0)
-    return gains and not bool((change.standard > WORSE).any())
+    """Whether held-out motion is predicted better where an effect acts, and hardly worse anywhere.
+
+    All joints share the links. What is believed of these moves with an effect, and other joints with it.
+    """
+    gain = np.log1p(change.relative)
+    lost = float(gain[change.standard > WORSE].sum())
+    gained = -float(np.minimum(gain, 0.0).sum())
+    return bool(change.standard[list(touched)].min() < -BETTER) and lost < SPILLED * gained and gain.sum() < 0.0
