@@ -18,6 +18,8 @@ from concealed.generator.strength import Reference, Sight, sight_of
 from concealed.generator.unknown import UNKNOWN
 from tauscope.errors import ScenarioError
 from tauscope.robot import Robot
+from tauscope_sim.effects.backlash import Backlash
+from tauscope_sim.effects.joint_elasticity import JointElasticity
 
 Array = NDArray[np.float64]
 
@@ -49,7 +51,10 @@ class Concealed:
         return [self._disturbed(self._passage(robot, motion, simulated)) for motion in motions]
 
     def _passage(self, robot: Robot, motion: Asked, simulated: bool) -> Passage:
-        along = None if simulated else with_law(robot, physical(self.entries), passage(robot, [], motion))
+        effects = physical(self.entries)
+        if simulated or any(isinstance(effect, Backlash | JointElasticity) for effect in effects):
+            return passage(robot, self.entries, motion)  # the drive feels its link: along another motion it is another
+        along = with_law(robot, effects, passage(robot, [], motion))
         return passage(robot, self.entries, motion) if along is None else along
 
     def _disturbed(self, plain: Passage) -> Passage:
