@@ -22,7 +22,7 @@ NEEDED: dict[str, tuple[str, ...]] = {
     # moving the arm
     "drivers/": (*EMULATORS, *KILLS),
     "service/tauscope/runtime/": (*KILLS, "tests/drivers", "tests/cli"),
-    "sim_backend/tauscope_sim/": (*EMULATORS, *KILLS, "tests/concealed/running"),
+    "sim_backend/tauscope_sim/": (*EMULATORS, *KILLS, "tests/concealed/running", "tests/concealed/generator"),
     "sim_backend/tauscope_sim/effects/": ("tests/sim_backend", *QUICK_PROOF),
     # from recordings to models and findings
     "service/tauscope/robot/": ("tests/robot", "tests/identification", "tests/excitation"),

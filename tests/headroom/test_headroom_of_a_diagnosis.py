@@ -24,6 +24,8 @@ from tauscope.report.diagnosis_report import diagnosis_report
 from tauscope.report.provenance import Provenance
 from tauscope.results import DiagnosisResult
 
+pytestmark = pytest.mark.slow
+
 FOUND = JointHeadroom(plain=0.5, explained=0.4, black_box=0.375, share=0.12, share_std=0.02, blocks=20)
 FLOOR = NoiseFloor(0.3, "repetitions")
 SAID = "A black box still predicts 12 % of joint2's held-out residual: something is left."
