@@ -78,11 +78,11 @@ def choose_black_box(inputs: Inputs, target: Array, splits: Sequence[Folds], lea
     target : (R,) float64
         what is to be predicted [Nm or N]
     """
-    choices = [_stacked(inputs, target, folds, learners) for folds in splits]
+    choices = [_stack(inputs, target, folds, learners) for folds in splits]
     return min(choices, key=lambda each: each.error)
 
 
-def _stacked(inputs: Inputs, target: Array, folds: Folds, learners: Sequence[Learner]) -> Choice:
+def _stack(inputs: Inputs, target: Array, folds: Folds, learners: Sequence[Learner]) -> Choice:
     """Stacking (Breiman 1996): min ‖y - Σ w_l ŷ_l‖² over w ≥ 0, ŷ_l predicted of every fold from all others."""
     numbers, energy = np.unique(folds), float(target @ target)
     if len(numbers) < 2 or energy == 0.0:

@@ -84,7 +84,7 @@ def test_evidence_is_that_of_the_multivariate_normal(seed: int) -> None:
 def test_more_parameters_count_as_if_they_had_been_there(seed: int) -> None:
     case, draws = problem(seed), np.random.default_rng([seed, 1])
     extra, std = draws.standard_normal((2, ROWS)), draws.uniform(0.2, 3.0, 2)
-    found = case.model.extended({0: extra}, np.zeros(2), std)
+    found = case.model.extend({0: extra}, np.zeros(2), std)
     assert found.posterior(case.scales).log_evidence == pytest.approx(case.log_density(extra, std), abs=1e-7)
 
 

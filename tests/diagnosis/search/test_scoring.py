@@ -44,7 +44,7 @@ def test_a_factor_is_the_ratio_of_two_evidences(beside: tuple[Proposer, Hypothes
     shapes = effect.grid[:2]
     signals = [at.model.signals(piece) for piece in proposer.rows.observations]
     columns = proposer.columns(effect, shapes, signals)
-    found, _ = Scorer(proposer.rows, at).scored(effect, shapes, columns)
+    found, _ = Scorer(proposer.rows, at).score(effect, shapes, columns)
     before = at.posterior.log_evidence
     for place in range(len(shapes)):
         own = {joint: rows[place] for joint, rows in columns.items()}
@@ -54,7 +54,7 @@ def test_a_factor_is_the_ratio_of_two_evidences(beside: tuple[Proposer, Hypothes
         )
         width = len(effect.coefficients)
         gains = [
-            at.linear.extended(own, np.zeros(width), size / shares).posterior(at.scales).log_evidence - before
+            at.linear.extend(own, np.zeros(width), size / shares).posterior(at.scales).log_evidence - before
             for size in SIZES
         ]
         one_sided = sum(each.positive for each in effect.coefficients)

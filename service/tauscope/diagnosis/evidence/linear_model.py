@@ -81,7 +81,7 @@ class LinearModel:
         """Number of parameters p."""
         return len(self.mean)
 
-    def extended(self, columns: Mapping[int, Array], mean: Array, std: Array) -> "LinearModel":
+    def extend(self, columns: Mapping[int, Array], mean: Array, std: Array) -> "LinearModel":
         """The same with more parameters.
 
         Parameters
@@ -93,7 +93,7 @@ class LinearModel:
         """
         index = np.arange(self.size, self.size + len(mean))
         joints = tuple(
-            own.extended(index, columns[joint]) if joint in columns else own for joint, own in enumerate(self.joints)
+            own.extend(index, columns[joint]) if joint in columns else own for joint, own in enumerate(self.joints)
         )
         precision = np.pad(self.precision, (0, len(mean)))
         precision[index, index] = 1.0 / std**2
@@ -113,7 +113,7 @@ class LinearModel:
 
     def posterior(self, scales: Sequence[Scales]) -> Posterior:
         """Parameters and evidence under given scales, one entry a joint."""
-        return self._solved(self._sum(scales, range(len(self.joints)), self._believed()))
+        return self._solve(self._sum(scales, range(len(self.joints)), self._sum_prior()))
 
     def evidence(self, scales: Sequence[Scales]) -> float:
         """Log evidence of data and scales."""
@@ -130,17 +130,17 @@ class LinearModel:
         found = list(scales)
         for joint in joints:
             others = [place for place in range(len(self.joints)) if place != joint]
-            rest = self._sum(found, others, self._believed())
-            found[joint] = self._tuned(joint, found[joint], rest)
+            rest = self._sum(found, others, self._sum_prior())
+            found[joint] = self._tune(joint, found[joint], rest)
         return tuple(found)
 
-    def _tuned(self, joint: int, start: Scales, rest: "_Sum") -> Scales:
+    def _tune(self, joint: int, start: Scales, rest: "_Sum") -> Scales:
         """Scales of one joint beside what the others say, from those at hand and from none of the discrepancy."""
         own = self.joints[joint]
 
         def objective(values: Array) -> tuple[float, Array]:
             scales = replace(start, values=values)
-            posterior = self._solved(self._added(joint, scales, rest))
+            posterior = self._solve(self._add(joint, scales, rest))
             direction = np.concatenate([[1.0], -posterior.mean[own.index]])
             covariance = posterior.covariance[np.ix_(own.index, own.index)]
             slopes = 0.5 * own.slopes(scales, direction, covariance) + scales.penalty_slopes()
@@ -161,7 +161,7 @@ class LinearModel:
         ]
         return replace(start, values=min(ends, key=lambda each: float(each.fun)).x)
 
-    def _believed(self) -> "_Sum":
+    def _sum_prior(self) -> "_Sum":
         """The prior alone."""
         inner = self.precision @ self.mean
         return _Sum(self.precision, inner, float(self.mean @ inner), 0.0)
@@ -170,10 +170,10 @@ class LinearModel:
         """A, its right-hand side, energy and log det C over some joints."""
         total = start
         for joint in joints:
-            total = self._added(joint, scales[joint], total)
+            total = self._add(joint, scales[joint], total)
         return total
 
-    def _added(self, joint: int, scales: Scales, total: "_Sum") -> "_Sum":
+    def _add(self, joint: int, scales: Scales, total: "_Sum") -> "_Sum":
         """The same with one joint more."""
         own = self.joints[joint]
         found, index = own.weighted(scales), own.index
@@ -184,7 +184,7 @@ class LinearModel:
             matrix, right, total.energy + float(found.products[0, 0]), total.determinant + found.log_determinant
         )
 
-    def _solved(self, total: "_Sum") -> Posterior:
+    def _solve(self, total: "_Sum") -> Posterior:
         scale = np.sqrt(np.diag(total.matrix))
         factor = _root(total.matrix, scale)
         right = total.right / scale

@@ -77,7 +77,7 @@ class JointMoments:
         mutual = [own.reshape(*columns.shape[:2], -1) for own, _ in parts]
         return np.stack([own @ rows.T for own, rows in parts]), np.stack([m @ m.transpose(0, 2, 1) for m in mutual])
 
-    def extended(self, index: Index, columns: Array) -> "JointMoments":
+    def extend(self, index: Index, columns: Array) -> "JointMoments":
         """The same with columns of more parameters.
 
         Parameters

@@ -61,7 +61,7 @@ class EvidenceRows:
         order, certain, bounds, features = [], [], [], []
         shared = 0
         for joint in range(observations.robot.joint_count):
-            near, stopped = rest_of(observations, model, joint)
+            near, stopped = find_rest(observations, model, joint)
             kinds = np.digitize(near, REST_BOUNDS)
             places = [np.flatnonzero((kinds == kind) & ~stopped) for kind in range(len(REST_SHARES))]
             order.append(np.concatenate(places))
@@ -110,7 +110,7 @@ class EvidenceRows:
         return float(np.sqrt(np.mean(torque**2))) if torque.size else 0.0
 
 
-def rest_of(observations: Observations, model: ExtendedModel, joint: int) -> tuple[Array, BoolArray]:
+def find_rest(observations: Observations, model: ExtendedModel, joint: int) -> tuple[Array, BoolArray]:
     """Share of every white row's samples near rest, (R,), and which rows are of a stop, (R,).
 
     Parameters
@@ -120,12 +120,12 @@ def rest_of(observations: Observations, model: ExtendedModel, joint: int) -> tup
     """
     order = observations.noise[joint].order if observations.noise else 0
     kept = observations.kept(joint)
-    near = np.concatenate([_near_rest(piece, model, joint)[order:] for piece in observations])
-    stopped = np.concatenate([_stopped(piece, joint)[order:] for piece in observations])
+    near = np.concatenate([_measure_rest(piece, model, joint)[order:] for piece in observations])
+    stopped = np.concatenate([_find_stops(piece, joint)[order:] for piece in observations])
     return near[kept], stopped[kept]
 
 
-def _near_rest(piece: Piece, model: ExtendedModel, joint: int) -> Array:
+def _measure_rest(piece: Piece, model: ExtendedModel, joint: int) -> Array:
     """Share of each row's samples at which a joint hardly moves, (P M,)."""
     motion = piece.prepared.motion
     steepness = model.structure.terms[joint].k_v
@@ -136,7 +136,7 @@ def _near_rest(piece: Piece, model: ExtendedModel, joint: int) -> Array:
     return np.clip(piece.repeated(motion.band.reduce(slow[None]))[0], 0.0, 1.0)
 
 
-def _stopped(piece: Piece, joint: int) -> BoolArray:
+def _find_stops(piece: Piece, joint: int) -> BoolArray:
     """Rows of a stop of a joint, (P M,)."""
     stopped = np.zeros(piece.rows, dtype=bool)
     for stop in piece.prepared.stops(joint):

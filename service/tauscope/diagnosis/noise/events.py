@@ -11,16 +11,13 @@ import numpy as np
 
 from tauscope.diagnosis.fitting.fit import Fit, Fitter
 from tauscope.diagnosis.model.extended import ExtendedModel, with_terms
-from tauscope.diagnosis.model.residual import residual_rows
 from tauscope.diagnosis.model.term import Term
-from tauscope.diagnosis.noise.floor import with_noise, with_pure_error
+from tauscope.diagnosis.noise.floor import white_noise, with_noise, with_pure_error
 from tauscope.diagnosis.observations.observations import Observations
-from tauscope.diagnosis.observations.whitening import JointNoise
 from tauscope.diagnosis.screening.refinement import refined
 from tauscope.diagnosis.screening.screen import Candidate, Screen, model_signals
 from tauscope.effects import Effect
 from tauscope.effects.computation import side_by_side
-from tauscope.identification.autocorrelation import Autoregression
 from tauscope.recording.recording import Array
 
 MOST_EVENTS = 3
@@ -43,7 +40,7 @@ def beside_events(
     """The observations with the noise that is left beside what happens once, and whether repetitions still tell it."""
     passing = [effect for effect in effects if not effect.repeats_with_motion]
     best, pure_error = known, True
-    rows = observations.with_noise(_white(observations, model))
+    rows = observations.with_noise(white_noise(observations, model))
     screen, fitter = Screen(rows, passing, count_all=True), Fitter(rows)
     fit = fitter.projected(model)
     for _ in range(MOST_EVENTS):
@@ -72,15 +69,6 @@ def _fitted(candidates: Sequence[Candidate], fit: Fit, screen: Screen, fitter: F
         return fitter.fit(with_terms(fit.model, [*fit.model.terms, term]), steps=0)
 
     return side_by_side(fitted, candidates)
-
-
-def _white(observations: Observations, model: ExtendedModel) -> list[JointNoise]:
-    """Noise of the size of all that the model leaves."""
-    found = []
-    for pieces in residual_rows(model, observations):
-        power = float(np.mean(np.concatenate([rows[0] for rows in pieces]) ** 2)) + np.finfo(float).tiny
-        found.append(JointNoise(Autoregression(np.empty(0), power, power)))
-    return found
 
 
 def _variances(observations: Observations) -> Array:

@@ -85,6 +85,21 @@ def _joints(observations: Observations) -> range:
     return range(observations.robot.joint_count)
 
 
+def white_noise(observations: Observations, model: ExtendedModel, share: float = 1.0) -> list[JointNoise]:
+    """White noise as large as all that a model leaves.
+
+    Parameters
+    ----------
+    share : float
+        independent rows among all
+    """
+    found = []
+    for pieces in residual_rows(model, observations):
+        power = float(np.mean(np.concatenate([rows[0] for rows in pieces]) ** 2)) + np.finfo(float).tiny
+        found.append(JointNoise(Autoregression(np.empty(0), power, power), share))
+    return found
+
+
 def band_share(observations: Observations) -> float:
     """Cut-off of the common band relative to the highest frequency of the rows; 1 where nothing is filtered."""
     shares = []
@@ -101,11 +116,7 @@ def _saturated_noise(
     observations: Observations, model: ExtendedModel, effects: Sequence[Effect], joints: Iterable[int]
 ) -> dict[int, JointNoise]:
     """Noise of what a saturated fit leaves at some joints."""
-    residual = residual_rows(model, observations)
-    plain = []
-    for joint in _joints(observations):
-        power = float(np.mean(np.concatenate([rows[0] for rows in residual[joint]]) ** 2)) + np.finfo(float).tiny
-        plain.append(JointNoise(Autoregression(np.empty(0), power, power)))
+    plain = white_noise(observations, model)
     left = _saturated(observations.with_noise(plain), model, effects, joints)
     share = band_share(observations)
     return {j: fitted_noise(_by_piece(observations, j, rows * plain[j].std), share) for j, rows in left.items()}

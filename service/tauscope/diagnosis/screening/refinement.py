@@ -61,9 +61,9 @@ def _zoomed(candidate: Candidate, best_of: Callable[[Array], tuple[int, Candidat
     """One shape parameter after the other between its neighbours on the grid."""
     effect = candidate.effect
     for place in filter(effect.is_free, range(len(effect.shapes))):
-        low, high = _neighbours(effect, candidate.shape, place)
+        low, high = neighbours(effect, candidate.shape, place)
         for _ in range(ZOOMS):
-            values = _spread(low, high, effect.shapes[place].logarithmic)
+            values = spread(low, high, effect.shapes[place].logarithmic)
             shapes = np.tile(candidate.shape, (POINTS, 1))
             shapes[:, place] = values
             best, found = best_of(shapes)
@@ -73,8 +73,16 @@ def _zoomed(candidate: Candidate, best_of: Callable[[Array], tuple[int, Candidat
     return candidate
 
 
-def _neighbours(effect: Effect, shape: Array, place: int) -> tuple[float, float]:
-    """The grid's values of a shape parameter below and above, or its bounds."""
+def neighbours(effect: Effect, shape: Array, place: int) -> tuple[float, float]:
+    """The grid's values of a shape parameter below and above, or its bounds.
+
+    Parameters
+    ----------
+    shape : (k,) float64
+        values of all shape parameters
+    place : int
+        of the one among them
+    """
     values = np.unique(effect.grid[:, place])
     at = int(np.argmin(np.abs(values - shape[place])))
     low = values[at - 1] if at > 0 else effect.lower[place]
@@ -82,5 +90,6 @@ def _neighbours(effect: Effect, shape: Array, place: int) -> tuple[float, float]
     return float(low), float(high)
 
 
-def _spread(low: float, high: float, logarithmic: bool) -> Array:
+def spread(low: float, high: float, logarithmic: bool) -> Array:
+    """`POINTS` values of a shape parameter, the ends among them, (p,)."""
     return np.geomspace(low, high, POINTS) if logarithmic else np.linspace(low, high, POINTS)

@@ -147,25 +147,14 @@ class Screen:
         return moments(fit.projection, self.white_columns(effect, shapes, signals))
 
     def white_columns(self, effect: Effect, shapes: Array, signals: Sequence[Signals]) -> dict[int, Array]:
-        """Whitened columns (g, c, R_j) of an effect at every joint that it touches.
+        """`white_columns` of these observations.
 
         Parameters
         ----------
         shapes : (g, k) float64
             shapes
         """
-        touched = effect.touched(self.observations.robot.joint_count)
-        rows: dict[int, list[Array]] = {joint: [] for joint in touched}
-        count = 1
-        for piece, own in zip(self.observations, signals, strict=True):
-            columns = effect.columns(own, shapes)
-            count = columns.shape[1]
-            for slot, joint in enumerate(touched):
-                values = columns[:, :, slot]
-                flat = values.reshape(len(shapes) * count, *values.shape[2:])
-                rows[joint].append(piece.reduced(np.ascontiguousarray(flat)))
-        white = {joint: self.observations.white(joint, parts) for joint, parts in rows.items()}
-        return {joint: each.reshape(len(shapes), count, -1) for joint, each in white.items()}
+        return white_columns(self.observations, effect, shapes, signals)
 
     def _candidate(self, place: int, effect: Effect, fit: Fit, signals: Sequence[Signals]) -> Candidate:
         if isinstance(effect, TimeLocalEffect):
@@ -242,3 +231,27 @@ class Screen:
 def model_signals(model: ExtendedModel, observations: Observations) -> list[Signals]:
     """Signals of every piece under a model."""
     return [model.signals(piece) for piece in observations]
+
+
+def white_columns(
+    observations: Observations, effect: Effect, shapes: Array, signals: Sequence[Signals]
+) -> dict[int, Array]:
+    """Whitened columns (g, c, R_j) of an effect at every joint that it touches.
+
+    Parameters
+    ----------
+    shapes : (g, k) float64
+        shapes
+    """
+    touched = effect.touched(observations.robot.joint_count)
+    rows: dict[int, list[Array]] = {joint: [] for joint in touched}
+    count = 1
+    for piece, own in zip(observations, signals, strict=True):
+        columns = effect.columns(own, shapes)
+        count = columns.shape[1]
+        for slot, joint in enumerate(touched):
+            values = columns[:, :, slot]
+            flat = values.reshape(len(shapes) * count, *values.shape[2:])
+            rows[joint].append(piece.reduced(np.ascontiguousarray(flat)))
+    white = {joint: observations.white(joint, parts) for joint, parts in rows.items()}
+    return {joint: each.reshape(len(shapes), count, -1) for joint, each in white.items()}

@@ -8,14 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from tauscope.diagnosis.evidence.rows import EvidenceRows
-from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.model.nominal import delivered_model, identified_rotors, setting_of
-from tauscope.diagnosis.model.residual import residual_rows
 from tauscope.diagnosis.model.term import Term
-from tauscope.diagnosis.noise.floor import band_share, with_pure_error
+from tauscope.diagnosis.noise.floor import band_share, white_noise, with_pure_error
 from tauscope.diagnosis.observations.band import diagnosis_cutoff
 from tauscope.diagnosis.observations.observations import Observations
-from tauscope.diagnosis.observations.whitening import JointNoise
 from tauscope.diagnosis.search.held_out import HeldOut
 from tauscope.diagnosis.search.hypothesis import Hypothesis, Laboratory, Prior
 from tauscope.diagnosis.search.proposals import Proposer
@@ -23,7 +20,6 @@ from tauscope.diagnosis.search.search import Found, Search
 from tauscope.effects import Effect, possible_effects
 from tauscope.effects.rotor_inertia import RotorInertia
 from tauscope.identification import Identification
-from tauscope.identification.autocorrelation import Autoregression
 from tauscope.recording.conditioning import Conditioner
 from tauscope.recording.recording import Recording
 
@@ -42,23 +38,15 @@ def search(
     cutoff = diagnosis_cutoff(surveyed, identification, model.steepness)
     bare = Observations.prepare(surveyed, robot, base, cutoff, model.steepness)
     effects = possible_effects(setting_of(model, bare, surveyed, cutoff))
-    rows = EvidenceRows.prepare(with_pure_error(bare, model) or _with_white_noise(bare, model), model)
+    white = bare.with_noise(white_noise(bare, model, band_share(bare)))
+    rows = EvidenceRows.prepare(with_pure_error(bare, model) or white, model)
     laboratory = Laboratory(rows, Prior.of(identification, model))
     nominal = _with_rotors(laboratory.start(model), laboratory, identification, effects)
     confirming = None
     if unseen:
         prepared = Observations.prepare(unseen, robot, base, cutoff, model.steepness)
-        confirming = HeldOut(_with_white_noise(prepared, model))
+        confirming = HeldOut(prepared.with_noise(white_noise(prepared, model)))
     return Search(laboratory, Proposer(rows, effects), confirming).run(nominal)
-
-
-def _with_white_noise(observations: Observations, model: ExtendedModel) -> Observations:
-    """The observations with white noise as large as what a model leaves; evidence tells the discrepancy from it."""
-    share, noise = band_share(observations), []
-    for pieces in residual_rows(model, observations):
-        power = float(np.mean(np.concatenate([rows[0] for rows in pieces]) ** 2)) + np.finfo(float).tiny
-        noise.append(JointNoise(Autoregression(np.empty(0), power, power), share))
-    return observations.with_noise(noise)
 
 
 def _with_rotors(

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tauscope.diagnosis.evidence.rows import rest_of
+from tauscope.diagnosis.evidence.rows import find_rest
 from tauscope.diagnosis.evidence.scales import REST_BOUNDS, Scales
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.model.residual import residual_rows
@@ -51,7 +51,7 @@ class HeldOut:
         """What a second hypothesis predicts better than a first."""
         pairs = zip(self._errors(before.model), self._errors(after.model), strict=True)
         found = [
-            self._of_joint(joint, *errors, after.model, scales)
+            self._compare_joint(joint, *errors, after.model, scales)
             for joint, (errors, scales) in enumerate(zip(pairs, after.scales, strict=True))
         ]
         relative, error, gain = np.array(found).T
@@ -61,10 +61,10 @@ class HeldOut:
         """Measured less predicted torque of every joint, (R,)."""
         return [np.concatenate([rows[0] for rows in pieces]) for pieces in residual_rows(model, self.observations)]
 
-    def _of_joint(
+    def _compare_joint(
         self, joint: int, before: Array, after: Array, model: ExtendedModel, scales: Scales
     ) -> tuple[float, float, float]:
-        near, stopped = rest_of(self.observations, model, joint)
+        near, stopped = find_rest(self.observations, model, joint)
         kept = self.observations.kept(joint)
         counted = np.where(stopped, 0.0, scales.weights()[np.digitize(near, REST_BOUNDS)])
         first, second = counted * before[kept] ** 2, counted * after[kept] ** 2

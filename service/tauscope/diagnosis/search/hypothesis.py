@@ -167,7 +167,7 @@ class Laboratory:
 
     def _nearer(self, at: Hypothesis) -> Hypothesis | None:
         """The model after a step under which data and parameters are more probable; None where there is none."""
-        step = _limited(at.model, at.posterior.mean)
+        step = _limit(at.model, at.posterior.mean)
         base = len(at.bodies.mean)
         links = at.bodies.links(at.model.parameters[:base] + step[:base]) - at.model.links
         whole = self.prior.bodies.share(at.model.links, links)
@@ -219,7 +219,7 @@ def _shape_spreads(term: Term) -> Array:
     )
 
 
-def _limited(model: ExtendedModel, step: Array) -> Array:
+def _limit(model: ExtendedModel, step: Array) -> Array:
     """A step whose curved parameters stay where their columns are straight."""
     limited, first = step.copy(), model.structure.size
     slopes = slice(first, first + len(model.constants))

@@ -8,16 +8,16 @@ import numpy as np
 from tauscope.diagnosis.evidence.linear_model import LinearModel
 from tauscope.diagnosis.evidence.rows import EvidenceRows
 from tauscope.diagnosis.evidence.scales import Scales
-from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.model.term import Term
+from tauscope.diagnosis.screening.refinement import POINTS, neighbours, spread
+from tauscope.diagnosis.screening.screen import SHAPES_AT_ONCE, white_columns
 from tauscope.diagnosis.search.hypothesis import Hypothesis
 from tauscope.diagnosis.search.scoring import SIZES, Scored, Scorer
+from tauscope.diagnosis.selection.choice import Place, has_possible_values
 from tauscope.effects import Effect, Signals
 from tauscope.effects.computation import side_by_side
+from tauscope.identification.excitation import thin
 from tauscope.recording.recording import Array
-
-Place = tuple[str, int | None]
-"""Effect id and joint index, from 0; None for the whole arm."""
 
 LOOKED_AT = 5
 """Effects that are looked at closer of those that explain most, and of those that explain most if nothing else can."""
@@ -25,14 +25,11 @@ LOOKED_AT = 5
 WORTH_A_LOOK = 2.0
 """Log Bayes factor on the grid below which nothing comes of a closer look."""
 
-SHAPES_AT_ONCE = 48
-"""Shapes whose columns are made together: bounds memory."""
-
 MOST_SHAPES = 200
 """Shapes of a grid of thousands that are looked at first."""
 
-POINTS, ZOOMS = 7, 2
-"""Values of one shape parameter that are compared at once, and how often the best one's neighbourhood is."""
+ZOOMS = 2
+"""How often the neighbourhood of a shape parameter's best value is looked at."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +59,7 @@ class Proposal:
 
 
 class Proposer:
-    """Proposes effects for the same rows; columns that no model changes are made once."""
+    """Proposes effects for the same rows."""
 
     def __init__(self, rows: EvidenceRows, effects: Sequence[Effect]) -> None:
         self.rows, self.effects = rows, tuple(effects)
@@ -75,7 +72,7 @@ class Proposer:
         scored = side_by_side(lambda effect: self._on_grid(effect, scorer, signals), wanted)
         chosen = _shortlist([pair[0] for pair in scored]) | _shortlist([pair[1] for pair in scored])
         pairs = [scored[place] for place in sorted(chosen)]
-        found = [self._looked_at(pair, scorer, at, signals) for pair in pairs]
+        found = [self._look_at(pair, scorer, at, signals) for pair in pairs]
         best: dict[Place, Proposal] = {}
         for proposal in sorted((each for each in found if each is not None), key=lambda each: -each.log_factor):
             best.setdefault(proposal.place, proposal)
@@ -84,13 +81,13 @@ class Proposer:
     def _on_grid(self, effect: Effect, scorer: Scorer, signals: Sequence[Signals]) -> tuple[Scored, Scored]:
         """Every shape of an effect's grid."""
         parts = [
-            scorer.scored(effect, shapes, self.columns(effect, shapes, signals))
-            for shapes in _parts(_thinned(effect.grid))
+            scorer.score(effect, shapes, self.columns(effect, shapes, signals))
+            for shapes in _parts(thin(effect.grid, MOST_SHAPES))
         ]
         beside, alone = ([part[kind] for part in parts] for kind in (0, 1))
-        return _joined(beside), _joined(alone)
+        return _join(beside), _join(alone)
 
-    def _looked_at(
+    def _look_at(
         self, scored: tuple[Scored, Scored], scorer: Scorer, at: Hypothesis, signals: Sequence[Signals]
     ) -> Proposal | None:
         """An effect with scales of its own, at its most probable shape; None where no such effect can be."""
@@ -100,22 +97,24 @@ class Proposer:
             return None
         effect, place = on_grid.effect, on_grid.best
         joints = effect.touched(len(at.scales))
-        shape, size = self._zoomed(effect, on_grid.shapes[place], on_grid.sizes[place], at, signals)
-        scales, gained = self._tuned(effect, shape, size, at, joints, signals)
-        if effect.shapes and any(effect.is_free(each) for each in range(len(effect.shapes))):
-            shape, size = self._zoomed(effect, shape, size, replace(at, scales=scales), signals)
-            scales, gained = self._tuned(effect, shape, size, replace(at, scales=scales), joints, signals)
-        linear = self._extended(effect, shape, size, at.linear, signals)
+        shape, size = self._zoom(effect, on_grid.shapes[place], on_grid.sizes[place], at, signals)
+        scales, gained = self._tune(effect, shape, size, at, joints, signals)
+        if any(effect.is_free(each) for each in range(len(effect.shapes))):
+            shape, size = self._zoom(effect, shape, size, replace(at, scales=scales), signals)
+            scales, gained = self._tune(effect, shape, size, replace(at, scales=scales), joints, signals)
+        linear = self._extend(effect, shape, size, at.linear, signals)
         coefficients = linear.posterior(scales).mean[at.linear.size :]
-        if not _is_possible(effect, coefficients, shape, at.model):
+        k_v = None if effect.joint is None else at.model.structure.terms[effect.joint].k_v
+        term = Term(effect, shape, coefficients)
+        if not (has_possible_values(term, k_v) and effect.is_consistent(coefficients, shape)):
             return None
         one_sided = sum(each.positive for each in effect.coefficients)
         averaged = on_grid.log_evidence - float(on_grid.log_factors.max())
         sized = float(np.log(2.0)) * one_sided - float(np.log(len(SIZES)))
         factor = gained - at.log_evidence + averaged + sized
-        return Proposal(Term(effect, shape, coefficients), size, factor, alone.log_evidence, scales)
+        return Proposal(term, size, factor, alone.log_evidence, scales)
 
-    def _tuned(
+    def _tune(
         self,
         effect: Effect,
         shape: Array,
@@ -125,17 +124,17 @@ class Proposer:
         signals: Sequence[Signals],
     ) -> tuple[tuple[Scales, ...], float]:
         """Scales of highest evidence with an effect, and that log evidence."""
-        linear = self._extended(effect, shape, size, at.linear, signals)
+        linear = self._extend(effect, shape, size, at.linear, signals)
         scales = linear.most_probable(at.scales, joints)
         return scales, linear.evidence(scales)
 
-    def _extended(
+    def _extend(
         self, effect: Effect, shape: Array, size: Array, linear: LinearModel, signals: Sequence[Signals]
     ) -> LinearModel:
         columns = self.columns(effect, shape[None], signals)
-        return linear.extended({joint: own[0] for joint, own in columns.items()}, np.zeros(len(size)), size)
+        return linear.extend({joint: own[0] for joint, own in columns.items()}, np.zeros(len(size)), size)
 
-    def _zoomed(
+    def _zoom(
         self, effect: Effect, shape: Array, size: Array, at: Hypothesis, signals: Sequence[Signals]
     ) -> tuple[Array, Array]:
         """One free shape parameter after the other between its neighbours on the grid."""
@@ -144,13 +143,12 @@ class Proposer:
             return shape, size
         scorer = Scorer(self.rows, at)
         for place in free:
-            low, high = _neighbours(effect, shape, place)
+            low, high = neighbours(effect, shape, place)
             for _ in range(ZOOMS):
-                logarithmic = effect.shapes[place].logarithmic
-                values = np.geomspace(low, high, POINTS) if logarithmic else np.linspace(low, high, POINTS)
+                values = spread(low, high, effect.shapes[place].logarithmic)
                 shapes = np.tile(shape, (POINTS + 1, 1))
                 shapes[:POINTS, place] = values
-                found, _ = scorer.scored(effect, shapes, self.columns(effect, shapes, signals))
+                found, _ = scorer.score(effect, shapes, self.columns(effect, shapes, signals))
                 if not np.isfinite(found.log_factors.max()):
                     break
                 best = found.best
@@ -167,20 +165,8 @@ class Proposer:
         shapes : (s, k) float64
             values of its shape parameters
         """
-        observations = self.rows.observations
-        touched = effect.touched(observations.robot.joint_count)
-        pieces: dict[int, list[Array]] = {joint: [] for joint in touched}
-        width = len(effect.coefficients)
-        for piece, own in zip(observations, signals, strict=True):
-            columns = effect.columns(own, shapes)
-            for slot, joint in enumerate(touched):
-                values = columns[:, :, slot]
-                flat = np.ascontiguousarray(values.reshape(len(shapes) * width, *values.shape[2:]))
-                pieces[joint].append(piece.reduced(flat))
-        return {
-            joint: self.rows.take(joint, observations.white(joint, rows)).reshape(len(shapes), width, -1)
-            for joint, rows in pieces.items()
-        }
+        white = white_columns(self.rows.observations, effect, shapes, signals)
+        return {joint: self.rows.take(joint, rows) for joint, rows in white.items()}
 
 
 def _parts(shapes: Array) -> Iterator[Array]:
@@ -189,12 +175,7 @@ def _parts(shapes: Array) -> Iterator[Array]:
         yield shapes[first : first + SHAPES_AT_ONCE]
 
 
-def _thinned(grid: Array) -> Array:
-    """At most `MOST_SHAPES` shapes of a grid, evenly: of many windows in time neighbours overlap."""
-    return grid[:: max(1, len(grid) // MOST_SHAPES)] if len(grid) > 2 * MOST_SHAPES else grid
-
-
-def _joined(parts: Sequence[Scored]) -> Scored:
+def _join(parts: Sequence[Scored]) -> Scored:
     """All shapes of one effect."""
     names = ("shapes", "log_factors", "coefficients", "sizes")
     return Scored(parts[0].effect, *(np.concatenate([getattr(part, name) for part in parts]) for name in names))
@@ -210,23 +191,3 @@ def _shortlist(scored: Sequence[Scored]) -> set[int]:
         effect = scored[place].effect
         chosen.setdefault((effect.id, effect.joint), place)
     return set(chosen.values())
-
-
-def _is_possible(effect: Effect, coefficients: Array, shape: Array, model: ExtendedModel) -> bool:
-    """Whether an effect can have these values."""
-    signs = zip(effect.coefficients, coefficients, strict=True)
-    if not all(
-        each.smallest <= abs(value) <= each.largest and (value >= 0.0 or not each.positive) for each, value in signs
-    ):
-        return False
-    k_v = None if effect.joint is None else model.structure.terms[effect.joint].k_v
-    return effect.is_possible(shape, k_v) and effect.is_consistent(coefficients, shape)
-
-
-def _neighbours(effect: Effect, shape: Array, place: int) -> tuple[float, float]:
-    """The grid's values of a shape parameter below and above, or its bounds."""
-    values = np.unique(effect.grid[:, place])
-    at = int(np.argmin(np.abs(values - shape[place])))
-    low = values[at - 1] if at > 0 else effect.lower[place]
-    high = values[at + 1] if at + 1 < len(values) else effect.upper[place]
-    return float(low), float(high)

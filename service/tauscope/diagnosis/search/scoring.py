@@ -62,7 +62,7 @@ class Scorer:
         self._plain = _without_discrepancy(at)
         self._settings = [(scales, at.linear.posterior(scales)) for scales in (at.scales, self._plain)]
 
-    def scored(self, effect: Effect, shapes: Array, columns: Mapping[int, Array]) -> tuple[Scored, Scored]:
+    def score(self, effect: Effect, shapes: Array, columns: Mapping[int, Array]) -> tuple[Scored, Scored]:
         """Shapes of an effect beside the discrepancy, and as if there were none.
 
         Parameters

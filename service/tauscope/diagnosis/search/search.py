@@ -6,7 +6,8 @@ import numpy as np
 
 from tauscope.diagnosis.search.held_out import Change, HeldOut
 from tauscope.diagnosis.search.hypothesis import Hypothesis, Laboratory
-from tauscope.diagnosis.search.proposals import Place, Proposal, Proposer
+from tauscope.diagnosis.search.proposals import Proposal, Proposer
+from tauscope.diagnosis.selection.choice import Place
 from tauscope.effects import Effect
 from tauscope.effects.computation import side_by_side
 
@@ -85,18 +86,18 @@ class Search:
         refusals: list[Step] = []
         likely = [each for each in proposals if self._log_odds(each) > 0.0]
         for proposal in likely:
-            step, found = self._tried(at, proposal, proposals)
+            step, found = self._try(at, proposal, proposals)
             if step.is_confirmed:
                 return [*refusals, step], found
             refusals.append(step)
         others = [each for each in proposals if each not in likely and self._names(each)]
         for proposal in sorted(others, key=lambda each: -each.log_factor_alone):
-            step, found = self._tried(at, proposal, proposals)
+            step, found = self._try(at, proposal, proposals)
             if step.is_confirmed and step.change is not None and bool((step.change.standard < -WORSE).any()):
                 return [*refusals, step], found
         return refusals, None
 
-    def _tried(self, at: Hypothesis, proposal: Proposal, proposals: list[Proposal]) -> tuple[Step, Hypothesis]:
+    def _try(self, at: Hypothesis, proposal: Proposal, proposals: list[Proposal]) -> tuple[Step, Hypothesis]:
         """A proposal in the model, and what held-out motion says of it."""
         touched = proposal.term.effect.touched(len(at.scales))
         added = self.laboratory.with_term(at, proposal.term, proposal.size)

@@ -81,16 +81,26 @@ def place_of(candidate: Candidate) -> Place:
 def is_physical(option: Option, before: Fit, *, instead: bool = False) -> bool:
     """Whether the term explains anything with coefficients that can be, and leaves friction that can be."""
     term = option.fit.model.terms[-1]
+    joint = term.effect.joint
+    possible = has_possible_values(term, None if joint is None else option.fit.model.structure.terms[joint].k_v)
+    alone = instead or all(each.effect.is_expected for each in before.model.terms)
+    possible = possible and term.effect.is_consistent(term.coefficients, term.shape, alone=alone)
+    return option.gain > 0.0 and possible and not driving(option.fit) - driving(before)
+
+
+def has_possible_values(term: Term, k_v: float | None) -> bool:
+    """Whether an effect can have these coefficients and this shape.
+
+    Parameters
+    ----------
+    k_v : float or None
+        of the effect's joint; None where there is none [s/rad or s/m]
+    """
     signs = zip(term.effect.coefficients, term.coefficients, strict=True)
     possible = all(
         each.smallest <= abs(value) <= each.largest and (value >= 0.0 or not each.positive) for each, value in signs
     )
-    joint = term.effect.joint
-    k_v = None if joint is None else option.fit.model.structure.terms[joint].k_v
-    possible = possible and term.effect.is_possible(term.shape, k_v)
-    alone = instead or all(each.effect.is_expected for each in before.model.terms)
-    possible = possible and term.effect.is_consistent(term.coefficients, term.shape, alone=alone)
-    return option.gain > 0.0 and possible and not driving(option.fit) - driving(before)
+    return possible and term.effect.is_possible(term.shape, k_v)
 
 
 def driving(fit: Fit, *, certain: float = CERTAIN) -> set[tuple[int, str]]:
