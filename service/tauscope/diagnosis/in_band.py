@@ -81,16 +81,7 @@ def confirming_rows(
     if not held_out:
         return None
     base = identification.structure.base
-    return _apart(Observations.prepare(held_out, identification.robot, base, cutoff_hz, steepness))
-
-
-def _apart(observations: Observations) -> Observations:
-    """The same pieces with negative indices of recordings: none of them is one of training."""
-    pieces = [
-        replace(piece, prepared=replace(piece.prepared, recording=-1 - piece.prepared.recording))
-        for piece in observations
-    ]
-    return replace(observations, pieces=tuple(pieces))
+    return Observations.prepare(held_out, identification.robot, base, cutoff_hz, steepness).apart()
 
 
 def selected(

@@ -224,6 +224,13 @@ class Observations:
         noise = [own.times(LEFT_OUT) if joint in joints else own for joint, own in enumerate(self.noise)]
         return replace(self, noise=tuple(noise))
 
+    def apart(self) -> "Observations":
+        """The same pieces with negative indices of recordings: none of them is one of training."""
+        pieces = [
+            replace(piece, prepared=replace(piece.prepared, recording=-1 - piece.prepared.recording)) for piece in self
+        ]
+        return replace(self, pieces=tuple(pieces))
+
     def torque(self, joint: int) -> list[Array]:
         """Measured torque of one joint in the common band, piece by piece, (1, P M) each.
 
