@@ -26,7 +26,7 @@ from tauscope.errors import AcquisitionError
 from tauscope.excitation import ExcitationOptions, OptimiserProgress, design_excitation
 from tauscope.export.formats import EXPORT_FILES
 from tauscope.identification import Identification
-from tauscope.report.quantities import given, with_uncertainty
+from tauscope.number_text import given, with_uncertainty
 from tauscope.report.table import Table
 from tauscope.robot import Robot, read_robot
 from tauscope.runtime.options import RunOptions

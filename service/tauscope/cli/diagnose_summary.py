@@ -4,9 +4,9 @@ from rich.console import Console
 
 from tauscope.cli.terminal import plain, table
 from tauscope.diagnosis import DiagnosisDocument
+from tauscope.number_text import significant
 from tauscope.report.diagnosis_tables import difference_table, headroom_table, residual_table, shift_table
 from tauscope.report.diagnosis_words import VERDICTS, refutations
-from tauscope.report.quantities import significant
 from tauscope.report.table import Table
 
 

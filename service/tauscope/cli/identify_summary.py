@@ -4,7 +4,7 @@ from rich.console import Console
 
 from tauscope.cli.terminal import plain, table
 from tauscope.identification import IdentificationDocument
-from tauscope.report.quantities import counted, percent, significant
+from tauscope.number_text import counted, percent, significant
 from tauscope.report.table import Table
 from tauscope.report.tables import base_parameter_table, fit_table, friction_table, rotor_table
 from tauscope.report.words import band_words, cautions, fit_sentences, masked_samples, noise_words

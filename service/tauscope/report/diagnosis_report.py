@@ -8,6 +8,7 @@ from markupsafe import Markup
 from tauscope.diagnosis import Diagnosis, DiagnosisDocument
 from tauscope.diagnosis.documents.plots import DiagnosisPlots, diagnosis_plots
 from tauscope.diagnosis.next_experiment import PlannedExperiment
+from tauscope.number_text import chance, counted, significant
 from tauscope.report.csv_text import csv_text
 from tauscope.report.diagnosis_tables import (
     detectable_table,
@@ -34,7 +35,7 @@ from tauscope.report.motion_figure import motion_figure
 from tauscope.report.page import Card, Drawing, KeyFigure, Numbers, Page, Part, Section, render
 from tauscope.report.proof_figure import proof_figure
 from tauscope.report.provenance import Provenance
-from tauscope.report.quantities import chance, counted, significant, torque_unit
+from tauscope.report.quantities import torque_unit
 from tauscope.report.shift_figure import difference_figure, shift_figure
 from tauscope.report.tables import input_table
 from tauscope.robot import JointType

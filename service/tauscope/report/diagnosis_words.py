@@ -5,7 +5,8 @@ from pathlib import PurePath
 
 from tauscope.diagnosis import DiagnosisDocument
 from tauscope.diagnosis.documents.result import FindingEntry, MismatchEntry
-from tauscope.report.quantities import ABSENT, counted, percent, significant, state_unit, torque_unit, with_uncertainty
+from tauscope.number_text import ABSENT, counted, percent, significant, with_uncertainty
+from tauscope.report.quantities import state_unit, torque_unit
 from tauscope.report.words import noise_ratio
 from tauscope.robot import JointType
 

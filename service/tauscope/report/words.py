@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 
 from tauscope.identification import IdentificationDocument
+from tauscope.number_text import percent, significant
 from tauscope.recording.words import listed
-from tauscope.report.quantities import percent, significant
 
 AT_NOISE = 1.1
 """A residual of at most this many times the noise holds nothing but noise."""
