@@ -221,6 +221,16 @@ class Effect(ABC):
         """
         return ()
 
+    def recurs(self, shape: Array) -> bool:
+        """Whether it acts in recordings that it was not found in, too.
+
+        Parameters
+        ----------
+        shape : (k,) float64
+            values of the shape parameters
+        """
+        return True
+
     def is_possible(self, shape: Array, k_v: float | None) -> bool:
         """Whether this shape is still what the effect means, beside the joint's friction as it was fitted with it.
 
