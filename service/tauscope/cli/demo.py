@@ -193,6 +193,6 @@ def _show_findings(console: Console, found: DiagnosisDocument) -> None:
     console.print()
     console.print(plain("The same arm once more, a spring concealed at its first joint; what the diagnosis found:"))
     for finding in found.findings:
-        console.print(plain(f"{finding.effect} at {finding.joint}: {finding.statement}"), soft_wrap=True)
+        console.print(plain(finding.statement), soft_wrap=True)
     console.print(plain(f"verdict: {found.verdict}"))
     console.print()

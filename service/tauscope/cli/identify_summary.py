@@ -41,7 +41,7 @@ def _whole_arm(document: IdentificationDocument) -> Table:
         ("relative error, held out", percent(fit.held_out.relative_error if fit.held_out else None)),
         ("condition number", significant(document.condition_number, 3)),
         ("band", band_words(document)),
-        ("noise", noise_words(document)),
+        ("noise", noise_words(document.noise_method)),
         ("samples", str(sum(entry.samples for entry in entries))),
         ("masked samples", str(masked_samples(document))),
     ]

@@ -104,7 +104,8 @@ def _fit_section(result: IdentificationDocument, identification: Identification)
     figure = Drawing(
         Markup(residual_figure("fit", result)),  # noqa: S704 - our own drawing; its text is escaped
         "Residual of every joint as a multiple of its sensor noise",
-        f"Residual rms at the recorded rate, unfiltered, as a multiple of the sensor noise σ ({noise_words(result)})."
+        "Residual rms at the recorded rate, unfiltered, as a multiple of the sensor noise σ"
+        f" ({noise_words(result.noise_method)})."
         " A joint at one has nothing but noise left.",
     )
     return Section("fit", "Fit", [Part(figure=figure, table=fit_table(result, identification.robot))])
