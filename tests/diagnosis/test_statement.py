@@ -199,6 +199,12 @@ def test_a_tentative_finding_advises_nothing_and_names_the_joint_that_loses() ->
     assert "Add a spring" not in text
 
 
+def test_a_finding_less_likely_than_something_else_advises_nothing() -> None:
+    text = stated(finding(form(JointSpring), [0.6], probability=0.4)).text
+    assert "(40 %)" in text
+    assert text.endswith("Something else is likelier: do not act on this alone.")
+
+
 def test_doubts_are_told_in_words_that_a_reader_knows() -> None:
     small = stated(finding(form(JointSpring), [0.6], behind=form(CableForce), as_law=0.2)).text
     assert f"It is small: the formula of cable force{AT} may cause it." in small

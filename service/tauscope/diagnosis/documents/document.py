@@ -170,7 +170,7 @@ def _finding(finding: Finding, diagnosis: Diagnosis, names: Sequence[str], *, te
         parameters=[QuantityEntry(name=q.name, value=q.value, std=q.std, unit=q.unit) for q in quantities],
         statement=state_finding(finding, quantities, diagnosis, tentative=tentative).text,
         gain=finding.gain,
-        share=_share(finding, diagnosis),
+        share=_share(finding, diagnosis, tentative=tentative),
         confirmed=False if tentative else finding.confirmed,
         held_out_change=_held_out_change(finding),
         rms_before=_floats(before.train),
@@ -207,14 +207,13 @@ def _told(term: Term, diagnosis: Diagnosis, covariance: Array | None = None) -> 
     return term.effect.quantities(diagnosis.setting, term.coefficients, term.shape, covariance)
 
 
-def _share(finding: Finding, diagnosis: Diagnosis) -> float | None:
-    """Part of the energy that all findings explain at its joints that it explains; None where they explain none."""
-    before, after = finding.before.train**2, finding.after.train**2
-    touched = list(finding.terms[0].effect.touched(len(before)))
-    weights = 1.0 / np.maximum(diagnosis.noise_std[touched], np.finfo(float).tiny) ** 2
-    explained = np.maximum(diagnosis.before.train**2, before) - after
-    own, whole = (float(np.maximum(each[touched], 0.0) @ weights) for each in (before - after, explained))
-    return own / whole if whole > 0.0 else None
+def _share(finding: Finding, diagnosis: Diagnosis, *, tentative: bool) -> float | None:
+    """Part of the energy that is explained at its joints that it explains; None where nothing is."""
+    touched = finding.terms[0].effect.touched(len(diagnosis.mismatch))
+    explained = sum(max(diagnosis.mismatch[joint].explained, 0.0) for joint in touched)
+    if tentative or not finding.in_model:  # what the model's findings explain is without it
+        explained += finding.gain
+    return min(max(finding.gain / explained, 0.0), 1.0) if explained > 0.0 else None
 
 
 def _held_out_change(finding: Finding) -> HeldOutChangeEntry | None:

@@ -26,6 +26,11 @@ DEVIATIONS = 1.96
 
 MOST_NUMBERS = 4
 
+LIKELY = 0.5
+"""Probability from which a finding advises: below, something else is likelier."""
+
+UNLIKELY = "Something else is likelier: do not act on this alone"
+
 MOST_RIVALS = 2
 """Equivalents named in a headline; a finding's entry has them all."""
 
@@ -63,7 +68,7 @@ def state_finding(
     sentences = [numbers_text(quantities), *_doubts(finding, names)]
     sentences += [_sentence(_held_out(finding, names, tentative=tentative))]
     if not tentative:
-        sentences.append(_sentence(effect.advice(found)))
+        sentences.append(_sentence(effect.advice(found)) if finding.probability >= LIKELY else UNLIKELY)
     claim = _claim(finding, found, diagnosis, names)
     headline = f"{_sentence(claim)} ({chance(finding.probability)}{_rivals(finding, names)})"
     return Statement(headline, tuple(filter(None, sentences)))
