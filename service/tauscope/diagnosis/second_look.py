@@ -58,6 +58,8 @@ def looked_again(
     if not selection.choices or not agrees(first, selection):
         return first
     second = concluded(identification, setting, selector, selection, cutoff)
+    if not second.findings:
+        return replace(first, tentative=(*first.tentative, *second.tentative))
     return replace(second, detectable=_detectable(first, second))
 
 

@@ -24,7 +24,6 @@ from tauscope.effects.effect import (
     percent_text,
     size_text,
 )
-from tauscope.number_text import significant
 from tauscope.recording.recording import Array
 from tauscope.robot import JointType, Robot
 
@@ -229,8 +228,8 @@ class Cogging(_Periodic):
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
         """Amplitude and order."""
-        order = significant(found["order"].value, 3)
-        return f"a cogging torque of {size_text(found['amplitude'])} and order {order} is missing"
+        size, order = size_text(found["amplitude"]), found["order"].value
+        return f"a cogging torque of {size} and order {order:.4g} is missing"
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """Sin kq, cos kq."""
@@ -261,8 +260,8 @@ class TorqueRipple(_Periodic):
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
         """Amplitude and order."""
-        size, order = percent_text(found["amplitude"].value), significant(found["order"].value, 3)
-        return f"torque ripples by {size} of the load with order {order}"
+        size, order = percent_text(found["amplitude"].value), found["order"].value
+        return f"torque ripples by {size} of the load with order {order:.4g}"
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """τ_rb sin kq, τ_rb cos kq."""

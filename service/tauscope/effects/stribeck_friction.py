@@ -63,6 +63,10 @@ class StribeckFriction(Effect):
         verb = "rises" if found["s"].value >= 0.0 else "falls"
         return f"friction {verb} by {size_text(found['s'])} towards zero velocity"
 
+    def advice(self, found: Sizes) -> str:
+        """More or less friction at low speed."""
+        return self.remedy if found["s"].value >= 0.0 else "lower friction near zero velocity by a Stribeck term"
+
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
         """One decay."""
         return [{"amplitude": coefficients[0], "velocity": shape[0], "exponent": shape[1]}]
