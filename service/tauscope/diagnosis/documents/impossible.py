@@ -47,9 +47,8 @@ def impossible_warnings(diagnosis: Diagnosis) -> list[ResultWarning]:
     return [
         ResultWarning(
             code="impossible-value",
-            text=f"with the findings the fit gives impossible values ({_listed(structure, parameters, places)}); the"
-            " tables leave them out",
-            remedy="do not use them; record motion that excites these joints more, and diagnose again",
+            text=f"the findings make values impossible, and the tables omit them: {_listed(structure, parameters, places)}",
+            remedy="record motion that excites these joints more, and diagnose again",
         )
     ]
 

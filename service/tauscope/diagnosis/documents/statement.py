@@ -65,7 +65,8 @@ def state_finding(
     names = [joint.name for joint in diagnosis.robot.joints]
     found = {each.name: each for each in quantities}
     effect = finding.terms[0].effect
-    sentences = [numbers_text(quantities), *_doubts(finding, names)]
+    of_first = quantities[: len(quantities) // len(finding.terms)]
+    sentences = [numbers_text(of_first), *_doubts(finding, names)]
     sentences += [_sentence(_held_out(finding, names, tentative=tentative))]
     if not tentative:
         sentences.append(_sentence(effect.advice(found)) if finding.probability >= LIKELY else UNLIKELY)
