@@ -163,7 +163,8 @@ def held_out_words(finding: FindingEntry, joints: Sequence[str]) -> str:
     else:
         place = list(joints).index(finding.joint)
     size = change_text(change.relative[place], change.std[place])
-    return f"{CONFIRMED[finding.confirmed]}: the rms of {joints[place]} changes by {size}"
+    changes = f"the rms of {joints[place]} changes by {size}"
+    return changes if finding.confirmed is None else f"{CONFIRMED[finding.confirmed]}: {changes}"
 
 
 def constancy_sentence(document: DiagnosisDocument) -> str:

@@ -1,6 +1,6 @@
 """Parameters to which findings gave values that no body, no rotor and no friction can have."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -44,10 +44,11 @@ def impossible_warnings(diagnosis: Diagnosis) -> list[ResultWarning]:
     places = [each for each in impossible_places(structure, parameters) if parameters[each] < -CLEARLY * std[each]]
     if not places:
         return []
+    values = ", ".join(f"{structure.names[place]} = {significant(parameters[place], 2)}" for place in places)
     return [
         ResultWarning(
             code="impossible-value",
-            text=f"the findings make values impossible, and the tables omit them: {_listed(structure, parameters, places)}",
+            text=f"the findings make values impossible, and the tables omit them: {values}",
             remedy="record motion that excites these joints more, and diagnose again",
         )
     ]
@@ -56,7 +57,3 @@ def impossible_warnings(diagnosis: Diagnosis) -> list[ResultWarning]:
 def _is_positive(terms: Mapping[str, float]) -> bool:
     """Whether no body makes a base parameter negative."""
     return all(weight > 0.0 and name.rstrip("0123456789") in POSITIVE for name, weight in terms.items())
-
-
-def _listed(structure: ModelStructure, parameters: Array, places: Sequence[int]) -> str:
-    return ", ".join(f"{structure.names[place]} = {significant(parameters[place], 2)}" for place in places)

@@ -140,7 +140,8 @@ function heldOut(each, joints) {
   if (!change) return CONFIRMED.get(each.confirmed);
   const sizes = change.relative.map(Math.abs);
   const at = each.joint ? joints.indexOf(each.joint) : sizes.indexOf(Math.max(...sizes));
-  return t`${CONFIRMED.get(each.confirmed)}: the rms of ${joints[at]} changes by ${withError(100 * change.relative[at], 196 * (change.std[at] ?? 0))} % (95 %)`;
+  const changes = t`the rms of ${joints[at]} changes by ${withError(100 * change.relative[at], 196 * (change.std[at] ?? 0))} % (95 %)`;
+  return each.confirmed === null ? changes : `${CONFIRMED.get(each.confirmed)}: ${changes}`;
 }
 
 function howMuchSection(result) {

@@ -97,7 +97,7 @@ export const SENTENCES = {
   "{0} more": "{0} weitere",
   "Tentative: held-out motion does not confirm these ({0})": "Vorläufig: zurückgehaltene Bewegung bestätigt diese nicht ({0})",
   "{0} of the explained energy there": "{0} der dort erklärten Energie",
-  "{0}: the rms of {1} changes by {2} % (95 %)": "{0}: der Effektivwert von {1} ändert sich um {2} % (95 %)",
+  "the rms of {0} changes by {1} % (95 %)": "der Effektivwert von {0} ändert sich um {1} % (95 %)",
   "No competing explanation": "Keine andere Erklärung",
   "Could also be": "Könnte auch sein",
   "probable": "wahrscheinlich",
