@@ -59,7 +59,9 @@ def looked_again(
         return first
     second = concluded(identification, setting, selector, selection, cutoff)
     if not second.findings:
-        return replace(first, tentative=(*first.tentative, *second.tentative))
+        known = {each.place for each in first.tentative}
+        new = [each for each in second.tentative if each.place not in known]
+        return replace(first, tentative=(*first.tentative, *new))
     return replace(second, detectable=_detectable(first, second))
 
 
