@@ -30,7 +30,7 @@ simulated = tauscope.simulate(robot, motion, rate_hz=100, name="simulated")
 result = tauscope.diagnose(robot, real, held_out=judge, against=simulated)
 print(f"verdict: {result.document.verdict}")
 for finding in result.document.findings:
-    print(f"{finding.effect} at {finding.joint}: {finding.statement}")
+    print(finding.statement)
 print(result.to_frame().to_string())
 
 # %%

@@ -16,6 +16,7 @@ from tauscope.diagnosis import Diagnosis, DiagnosisDocument, diagnose, document
 from tauscope.diagnosis.next_experiment import PlannedExperiment, plan_experiment
 from tauscope.recording import read_recording
 from tauscope.report.diagnosis_report import diagnosis_report
+from tauscope.report.diagnosis_words import summary_sentences
 from tauscope.report.provenance import InputFile, Provenance
 from tauscope.robot import Model, read_robot
 from tauscope_sim.examples import example_robot
@@ -85,7 +86,9 @@ def test_the_finding_is_stated_with_interval_and_evidence(reading: Reading, told
     assert finding.effect == "joint_spring"
     assert finding.statement in text
     assert "Joint spring" in text
-    assert "seen again on held-out motion" in text
+    assert told.headline in text
+    assert f"confirmed: the rms of {JOINTS[0]} changes by -" in text
+    assert "from differences between repeated periods" in text
     value = finding.parameters[0]
     shown = re.search(rf"([0-9.]+) ± ([0-9.]+) {re.escape(value.unit)} \(95 %\)", text)
     assert shown is not None
@@ -118,12 +121,44 @@ def test_the_page_is_the_same_on_every_run(
 
 def test_a_sound_arm_has_a_page_too(found: Diagnosis, told: DiagnosisDocument, undrawn_figures: None) -> None:
     sound = told.model_copy(
-        update={"findings": [], "verdict": "consistent", "parameter_shifts": [], "next_experiment": None}
+        update={
+            "headline": "Nothing but noise is left: the model explains the recordings.",
+            "findings": [],
+            "verdict": "consistent",
+            "parameter_shifts": [],
+            "next_experiment": None,
+        }
     )
     text = "".join(Reading(diagnosis_report(found, sound, PROVENANCE)).text)
-    assert "nothing but noise is left" in text
+    assert "Nothing but noise is left" in text
     assert "No effect is named" in text
     assert "Nothing is open" in text
+
+
+def test_five_findings_stand_before_the_fold_and_tentative_ones_within(
+    found: Diagnosis, told: DiagnosisDocument, undrawn_figures: None
+) -> None:
+    (finding,) = told.findings
+    refuted = finding.model_copy(update={"confirmed": False, "statement": "Only tentative."})
+    many = told.model_copy(update={"findings": [finding] * 7, "tentative": [refuted]})
+    what = diagnosis_report(found, many, PROVENANCE).split('<section id="what">')[1].split("</section>")[0]
+    before, folded = what.split("<details>", 1)
+    assert before.count("<article") == 5
+    assert "2 more findings" in folded
+    assert "Tentative: held-out motion does not confirm 1 effect<" in folded
+    assert folded.count("<article") == 2 + 1
+    assert "Only tentative." not in before
+
+
+def test_joints_that_held_out_motion_shows_worse_are_named(told: DiagnosisDocument) -> None:
+    held_out = told.fit.held_out
+    assert held_out is not None
+    assert "predicted worse" not in " ".join(summary_sentences(told))
+    worse = held_out.model_copy(
+        update={"rms_after": [held_out.rms_after[0], *(2.0 * r for r in held_out.rms_before[1:])]}
+    )
+    text = " ".join(summary_sentences(told.model_copy(update={"fit": told.fit.model_copy(update={"held_out": worse})})))
+    assert f"It is predicted worse: the residual of {JOINTS[1]} goes from" in text
 
 
 @pytest.mark.slow

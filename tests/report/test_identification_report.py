@@ -8,7 +8,7 @@ import pytest
 
 from report.conftest import HOSTILE, JOINTS, Case
 from tauscope.identification import document
-from tauscope.report.quantities import with_uncertainty
+from tauscope.number_text import with_uncertainty
 
 VOID = {"meta", "img", "br", "link", "hr", "input"}
 LOADING = {"src", "srcset", "href", "xlink:href", "data", "action", "poster", "formaction", "background"}

@@ -6,17 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tauscope.report import quantities
-from tauscope.report.quantities import (
-    ABSENT,
-    base_parameter_unit,
-    counted,
-    percent,
-    significant,
-    torque_unit,
-    velocity_unit,
-    with_uncertainty,
-)
+from tauscope import number_text
+from tauscope.number_text import ABSENT, counted, percent, significant, with_uncertainty
+from tauscope.report.quantities import base_parameter_unit, torque_unit, velocity_unit
 from tauscope.robot import JointType
 
 numbers = st.floats(-1e12, 1e12)
@@ -55,7 +47,7 @@ def test_significant_digits_are_kept(value: float, digits: int) -> None:
 
 @pytest.mark.parametrize("value", [None, math.nan, math.inf])
 def test_what_is_no_number_is_absent(value: float | None) -> None:
-    assert significant(value) == percent(value) == quantities.given(value) == ABSENT
+    assert significant(value) == percent(value) == number_text.given(value) == ABSENT
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from tauscope.cli.output_files import require_new
 from tauscope.cli.store_run import open_database
 from tauscope.cli.terminal import output, plain, shown_progress
 from tauscope.errors import StoreError
-from tauscope.report.quantities import counted
+from tauscope.number_text import counted
 from tauscope.server.http.settings import default_data_folder
 from tauscope.server.store.backup import restore_backup, write_backup
 from tauscope.version import tauscope_version

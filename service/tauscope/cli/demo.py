@@ -26,7 +26,7 @@ from tauscope.errors import AcquisitionError
 from tauscope.excitation import ExcitationOptions, OptimiserProgress, design_excitation
 from tauscope.export.formats import EXPORT_FILES
 from tauscope.identification import Identification
-from tauscope.report.quantities import given, with_uncertainty
+from tauscope.number_text import given, with_uncertainty
 from tauscope.report.table import Table
 from tauscope.robot import Robot, read_robot
 from tauscope.runtime.options import RunOptions
@@ -193,6 +193,6 @@ def _show_findings(console: Console, found: DiagnosisDocument) -> None:
     console.print()
     console.print(plain("The same arm once more, a spring concealed at its first joint; what the diagnosis found:"))
     for finding in found.findings:
-        console.print(plain(f"{finding.effect} at {finding.joint}: {finding.statement}"), soft_wrap=True)
+        console.print(plain(finding.statement), soft_wrap=True)
     console.print(plain(f"verdict: {found.verdict}"))
     console.print()

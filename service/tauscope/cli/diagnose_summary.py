@@ -1,25 +1,31 @@
 """The result of a diagnosis as tables and sentences on a terminal."""
 
+from collections.abc import Sequence
+
 from rich.console import Console
 
 from tauscope.cli.terminal import plain, table
 from tauscope.diagnosis import DiagnosisDocument
+from tauscope.diagnosis.documents.result import FindingEntry
+from tauscope.number_text import significant
 from tauscope.report.diagnosis_tables import difference_table, headroom_table, residual_table, shift_table
-from tauscope.report.diagnosis_words import VERDICTS, refutations
-from tauscope.report.quantities import significant
+from tauscope.report.diagnosis_words import MOST_FINDINGS, VERDICTS, refutations
 from tauscope.report.table import Table
+from tauscope.report.words import noise_words
 
 
 def show_diagnosis(console: Console, document: DiagnosisDocument) -> None:
     """Show the verdict, the findings, and what they change."""
-    console.print(plain(f"Robot {document.robot}: {document.verdict}: {VERDICTS[document.verdict]}"), soft_wrap=True)
+    console.print(plain(f"Robot {document.robot}: {document.headline}"), soft_wrap=True)
+    console.print(plain(f"Verdict {document.verdict}: {VERDICTS[document.verdict]}"), soft_wrap=True)
+    console.print(plain(f"Noise: {noise_words(document.noise_method)}"), soft_wrap=True)
     for warning in document.warnings:
         console.print(plain(f"! {warning.sentence}."), soft_wrap=True)
     console.print()
-    for finding in document.findings:
-        console.print(plain(f"* {finding.statement}"), soft_wrap=True)
-    if document.findings:
-        console.print()
+    _show_findings(console, document.findings)
+    if document.tentative:
+        console.print(plain("Tentative: held-out motion does not confirm these"), soft_wrap=True)
+        _show_findings(console, document.tentative)
     console.print(table("Mismatch with the nominal model", _mismatch(document)))
     console.print(table("Residual at the recorded rate [Nm or N]", residual_table(document)))
     if document.headroom is not None:
@@ -36,6 +42,16 @@ def show_diagnosis(console: Console, document: DiagnosisDocument) -> None:
         console.print(plain(f"No such data can show: {', '.join(invisible)}"), soft_wrap=True)
     if document.next_experiment is not None:
         console.print(plain(f"Next: {document.next_experiment.why}"), soft_wrap=True)
+
+
+def _show_findings(console: Console, findings: Sequence[FindingEntry]) -> None:
+    """The first few, and how many more there are."""
+    for finding in findings[:MOST_FINDINGS]:
+        console.print(plain(f"* {finding.statement}"), soft_wrap=True)
+    if len(findings) > MOST_FINDINGS:
+        console.print(plain(f"  and {len(findings) - MOST_FINDINGS} more, see --json"), soft_wrap=True)
+    if findings:
+        console.print()
 
 
 def _mismatch(document: DiagnosisDocument) -> Table:

@@ -7,7 +7,7 @@ from rich.console import Console
 
 from tauscope.cli.terminal import output, plain, shown_progress
 from tauscope.errors import AcquisitionError
-from tauscope.report.quantities import counted
+from tauscope.number_text import counted
 from tauscope.robot import read_robot
 from tauscope.runtime.drivers import (
     Finding,

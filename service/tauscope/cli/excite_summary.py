@@ -4,7 +4,7 @@ from rich.console import Console
 
 from tauscope.cli.terminal import plain, table
 from tauscope.excitation import ExcitationDesign
-from tauscope.report.quantities import ABSENT, counted, percent, significant
+from tauscope.number_text import ABSENT, counted, percent, significant
 from tauscope.report.table import Table
 from tauscope.robot import Robot
 

@@ -7,7 +7,7 @@ from typing import Literal
 from tauscope.cli.output_files import require_new
 from tauscope.cli.terminal import output, plain, shown_progress
 from tauscope.errors import ExportError, IdentificationError
-from tauscope.report.quantities import counted
+from tauscope.number_text import counted
 from tauscope.server.queue.cluster_executor import ClusterExecutor
 from tauscope.server.queue.executors import open_executor
 from tauscope.server.queue.fleet import (

@@ -4,7 +4,7 @@ from rich.console import Console
 
 from tauscope.cli.terminal import plain, table
 from tauscope.identification import IdentificationDocument
-from tauscope.report.quantities import counted, percent, significant
+from tauscope.number_text import counted, percent, significant
 from tauscope.report.table import Table
 from tauscope.report.tables import base_parameter_table, fit_table, friction_table, rotor_table
 from tauscope.report.words import band_words, cautions, fit_sentences, masked_samples, noise_words
@@ -41,7 +41,7 @@ def _whole_arm(document: IdentificationDocument) -> Table:
         ("relative error, held out", percent(fit.held_out.relative_error if fit.held_out else None)),
         ("condition number", significant(document.condition_number, 3)),
         ("band", band_words(document)),
-        ("noise", noise_words(document)),
+        ("noise", noise_words(document.noise_method)),
         ("samples", str(sum(entry.samples for entry in entries))),
         ("masked samples", str(masked_samples(document))),
     ]

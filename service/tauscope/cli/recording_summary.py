@@ -5,9 +5,9 @@ from pathlib import Path
 import typer
 
 from tauscope.cli.terminal import output, plain, shown_progress, table
+from tauscope.number_text import ABSENT, counted, significant
 from tauscope.recording import EffortKind, Reading, RecordingReport, check_recording, convert_recording
 from tauscope.recording.convert import FORMATS
-from tauscope.report.quantities import ABSENT, counted, significant
 from tauscope.report.table import Table
 from tauscope.robot import read_robot
 

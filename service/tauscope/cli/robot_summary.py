@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from tauscope.cli.terminal import output, plain, table
-from tauscope.report.quantities import ABSENT, counted, given
+from tauscope.number_text import ABSENT, counted, given
 from tauscope.report.table import Table
 from tauscope.robot import JointSummary, RobotReport, check_robot
 

@@ -3,7 +3,7 @@
 from rich.console import Console
 
 from tauscope.cli.terminal import plain, table
-from tauscope.report.quantities import ABSENT, counted, significant
+from tauscope.number_text import ABSENT, counted, significant
 from tauscope.report.table import Table
 from tauscope.robot import JointType, Robot
 from tauscope.runtime.record import RunRecord

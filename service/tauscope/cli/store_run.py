@@ -8,7 +8,7 @@ from pathlib import Path
 
 from tauscope.cli.terminal import output, plain, shown_progress, table
 from tauscope.errors import StoreError
-from tauscope.report.quantities import ABSENT, counted
+from tauscope.number_text import ABSENT, counted
 from tauscope.report.table import Table
 from tauscope.server.history.indexer import Indexer, open_index
 from tauscope.server.history.model_history import ModelHistory

@@ -9,9 +9,10 @@ from tauscope.diagnosis.findings.constancy import constancy
 from tauscope.diagnosis.findings.constant_torque import with_better_than_constants
 from tauscope.diagnosis.findings.detectability import Detectable, detectable, detectable_parameters
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
-from tauscope.diagnosis.findings.finding import selected_findings, sizes
+from tauscope.diagnosis.findings.finding import Finding, selected_findings, sizes
 from tauscope.diagnosis.findings.location import locate
 from tauscope.diagnosis.findings.plain import states_friction
+from tauscope.diagnosis.findings.tentative import set_refuted_apart
 from tauscope.diagnosis.fitting.fit import Fitter
 from tauscope.diagnosis.fitting.lack_of_fit import lack_of_fit
 from tauscope.diagnosis.fitting.regressor_noise import row_weightings
@@ -158,15 +159,22 @@ def concluded(
     """
     screen, fitter, held_out, pure_error = selector.screen, selector.fitter, selector.held_out, selector.pure_error
     observations = fitter.observations
-    inflation = 1.0 if pure_error else selection.fit.inflation()
     level = selector.admission.level
+
+    def find(at: Selection) -> tuple[Finding, ...]:
+        left = lack_of_fit(at.fit, observations, pure_error=pure_error)
+        return selected_findings(at, screen, fitter, held_out, left, 1.0 if pure_error else at.fit.inflation())
+
+    selection, findings, tentative = set_refuted_apart(selection, find, fitter)
+    inflation = 1.0 if pure_error else selection.fit.inflation()
     misfit_before = lack_of_fit(selection.nominal, observations, pure_error=pure_error)
     misfit_after = lack_of_fit(selection.fit, observations, pure_error=pure_error)
     return Diagnosis(
         identification=identification,
         setting=setting,
         selection=selection,
-        findings=selected_findings(selection, screen, fitter, held_out, misfit_after, inflation),
+        findings=findings,
+        tentative=tentative,
         mismatch=locate(selection, observations, misfit_after.significant),
         misfit_before=without_spilled(misfit_before, selection.nominal, fitter, pure_error=pure_error),
         misfit_after=misfit_after,

@@ -58,6 +58,10 @@ def looked_again(
     if not selection.choices or not agrees(first, selection):
         return first
     second = concluded(identification, setting, selector, selection, cutoff)
+    if not second.findings:
+        known = {each.place for each in first.tentative}
+        new = [each for each in second.tentative if each.place not in known]
+        return replace(first, tentative=(*first.tentative, *new))
     return replace(second, detectable=_detectable(first, second))
 
 

@@ -1,11 +1,12 @@
 """Viscous friction that differs with the direction of motion."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Entry, per_joint_columns
+from tauscope.effects.effect import Coefficient, Effect, Entry, Sizes, per_joint_columns, size_text
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
@@ -33,6 +34,12 @@ class AsymmetricViscous(Effect):
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """|q̇|."""
         return per_joint_columns(np.abs(signals.velocity[self.joint])[None, None])
+
+    def claim(self, found: Sizes, context: ArmContext) -> str:
+        """In which direction friction is larger."""
+        larger, smaller = ("positive", "negative") if found["b"].value >= 0.0 else ("negative", "positive")
+        size = replace(found["b"], value=2.0 * found["b"].value)
+        return f"viscous friction is {size_text(size)} larger in {larger} than in {smaller} direction"
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
         """Twice the amplitude in one direction, and that much less viscous friction in both."""

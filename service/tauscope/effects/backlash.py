@@ -13,7 +13,7 @@ from scipy.interpolate import CubicSpline
 
 from tauscope.effects.context import ArmContext
 from tauscope.effects.deflection import BAND, Deflection
-from tauscope.effects.effect import Coefficient, Effect, Quantity, Shape, mesh
+from tauscope.effects.effect import Coefficient, Effect, Quantity, Shape, Sizes, mesh, size_text
 from tauscope.recording.recording import Array
 
 GAPS = np.array([1e-4, 3e-4, 1e-3, 3e-3, 1e-2])
@@ -197,6 +197,10 @@ class Backlash(Deflection):
         (found,) = super().quantities(context, coefficients, shape, covariance)
         apart = max(float(shape[0]) - found.value, 0.0)
         return (replace(found, value=found.value + apart, std=float(np.hypot(found.std, 0.5 * apart))),)
+
+    def claim(self, found: Sizes, context: ArmContext) -> str:
+        """How wide."""
+        return f"the transmission has {size_text(found['b'])} of backlash"
 
     def is_consistent(self, coefficients: Array, shape: Array, *, alone: bool = False) -> bool:
         """Whether the gap that the link flies over is the one by which it moves."""

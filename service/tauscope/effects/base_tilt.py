@@ -7,7 +7,7 @@ import numpy as np
 
 from tauscope.dynamics import gravity_torque
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Entry
+from tauscope.effects.effect import Coefficient, Effect, Entry, Sizes, size_text
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
@@ -57,6 +57,11 @@ class BaseTilt(Effect):
             for direction in tilt_directions(signals.robot.gravity)
         ]
         return np.stack(torques)[None]
+
+    def claim(self, found: Sizes, context: ArmContext) -> str:
+        """By which angle."""
+        size = replace(found["alpha_1"], value=float(np.hypot(found["alpha_1"].value, found["alpha_2"].value)))
+        return f"gravity in the base frame is off by {size_text(size)}"
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
         """For gravity along -z: R_x(α) R_y(β) (0, 0, -g) is g (-β, α, -1) to first order."""

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, mesh, per_joint_columns
+from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, Sizes, mesh, per_joint_columns
+from tauscope.number_text import significant
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
@@ -67,6 +68,12 @@ class CableForce(Effect):
         """±max(±(q - q_t), 0)^p."""
         beyond = np.maximum(self.side * (signals.position[self.joint] - shapes[:, :1]), 0.0)
         return per_joint_columns((self.side * beyond ** shapes[:, 1:])[:, None])
+
+    def claim(self, found: Sizes, context: ArmContext) -> str:
+        """On which side of which angle it pulls."""
+        side = "above" if self.side > 0 else "below"
+        angle = found["q_t"]
+        return f"an elastic force {side} {significant(angle.value, 2)} {angle.unit} is missing"
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
         """One side."""

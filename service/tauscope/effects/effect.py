@@ -6,14 +6,15 @@ equation, its columns and the forms that it can take on a given arm.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tauscope.effects.context import ArmContext, Signals
+from tauscope.number_text import significant
 from tauscope.recording.recording import Array
 from tauscope.robot import JointType, Robot
 
@@ -26,6 +27,9 @@ _STEP = "atan({k_v} * v) * 0.6366197723675814"
 _POSITION = {JointType.REVOLUTE: "rad", JointType.PRISMATIC: "m"}
 _TORQUE = {JointType.REVOLUTE: "Nm", JointType.PRISMATIC: "N"}
 
+
+SHORT_S = 0.5
+"""Times below this are told in milliseconds [s]."""
 
 NO_SHAPE = np.zeros((1, 0))
 """The grid of an effect without shape parameters."""
@@ -62,6 +66,28 @@ class Quantity:
     std: float
     unit: str
     period: float = np.inf
+
+    @property
+    def in_usual_unit(self) -> "Quantity":
+        """The same in milliseconds where it is a short time."""
+        if self.unit != "s" or abs(self.value) >= SHORT_S:
+            return self
+        return replace(self, value=1e3 * self.value, std=1e3 * self.std, unit="ms", period=1e3 * self.period)
+
+
+Sizes = Mapping[str, Quantity]
+"""Parameters of a finding by name."""
+
+
+def size_text(quantity: Quantity) -> str:
+    """The magnitude of a quantity with its unit, two digits."""
+    shown = quantity.in_usual_unit
+    return significant(abs(shown.value), 2) + ("" if shown.unit == "1" else f" {shown.unit}")
+
+
+def percent_text(value: float) -> str:
+    """The magnitude of a share as per cent, two digits."""
+    return f"{significant(100.0 * abs(value), 2)} %"
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,6 +247,16 @@ class Effect(ABC):
         """
         return ()
 
+    def recurs(self, shape: Array) -> bool:
+        """Whether it acts in recordings that it was not found in, too.
+
+        Parameters
+        ----------
+        shape : (k,) float64
+            values of the shape parameters
+        """
+        return True
+
     def is_possible(self, shape: Array, k_v: float | None) -> bool:
         """Whether this shape is still what the effect means, beside the joint's friction as it was fitted with it.
 
@@ -273,9 +309,17 @@ class Effect(ABC):
         """``effect@joint``, or the effect alone where it belongs to the whole arm."""
         return self.id if self.joint is None else f"{self.id}@{joint_names[self.joint]}"
 
-    def where(self, joint_names: Sequence[str]) -> str:
-        """The place in words."""
-        return "the whole arm" if self.joint is None else joint_names[self.joint]
+    def place(self, joint_names: Sequence[str]) -> str:
+        """Where it acts, as the end of a sentence; empty where it belongs to the whole arm."""
+        return "" if self.joint is None else f"at {joint_names[self.joint]}"
+
+    def claim(self, found: Sizes, context: ArmContext) -> str:
+        """What the arm does and the model does not, with its size, as its sign says: a clause without its place."""
+        return self.meaning
+
+    def advice(self, found: Sizes) -> str:
+        """What to do about a finding of such a sign and size."""
+        return self.remedy
 
     def unit(self, template: str, context: ArmContext) -> str:
         """A unit with the joint's own units of torque and position."""

@@ -7,7 +7,7 @@ import numpy as np
 
 from tauscope.dynamics import gravity_torque
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Entry, Shape
+from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, Sizes, size_text
 from tauscope.effects.time_local import EVERY, HALF_SINE, TimeLocalEffect
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
@@ -70,6 +70,13 @@ class ExternalContact(TimeLocalEffect):
         middle = 0.5 * (start + end)
         return [np.array([[scope, max(middle - half, 0.0), middle + half, 0.0 if was_sine else HALF_SINE]])]
 
+    def claim(self, found: Sizes, context: ArmContext) -> str:
+        """How strong a force at the tool."""
+        force = replace(
+            found["F_x"], value=float(np.linalg.norm([found[name].value for name in ("F_x", "F_y", "F_z")]))
+        )
+        return f"a force of {size_text(force)} acts on the tool"
+
     def torque(self, signals: Signals, shape: Array) -> Array:
         """J(q)ᵀ, (3, n, N)."""
         return signals.remembered_of_motion("transposed Jacobian", lambda: transposed_jacobian(signals))
@@ -89,6 +96,11 @@ class JointContact(ExternalContact):
 
     is_variant = True
     coefficients = (Coefficient("c", "{tau}"),)
+
+    def claim(self, found: Sizes, context: ArmContext) -> str:
+        """How strong a torque, and which way."""
+        sign = "+" if found["c"].value >= 0.0 else "-"
+        return f"an outside torque of {sign}{size_text(found['c'])} acts"
 
     def torque(self, signals: Signals, shape: Array) -> Array:
         """One, (1, 1, N)."""

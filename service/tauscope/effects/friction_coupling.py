@@ -7,7 +7,7 @@ import numpy as np
 
 from tauscope.dynamics import smooth_sign
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Entry, Shape
+from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, Sizes, size_text
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
@@ -53,10 +53,14 @@ class FrictionCoupling(Effect):
         """Both joints."""
         return (self.partner, self.joint or 0)
 
-    def where(self, joint_names: Sequence[str]) -> str:
+    def place(self, joint_names: Sequence[str]) -> str:
         """Both joints by name."""
+        return f"at {joint_names[self.partner]} and {joint_names[self.joint or 0]}"
+
+    def claim(self, found: Sizes, context: ArmContext) -> str:
+        """On the sum or the difference of two speeds."""
         relation = "sum" if self.sign > 0 else "difference"
-        return f"{joint_names[self.partner]} and {joint_names[self.joint or 0]} (on the {relation} of their speeds)"
+        return f"{size_text(found['f'])} of Coulomb friction on the {relation} of two speeds is missing"
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """A(K v) and v on both joints."""

@@ -1,13 +1,13 @@
 """Friction that changes over time: grease that warms up, by the clock or by the heat that friction itself makes."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import signal
 
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Shape
+from tauscope.effects.effect import Coefficient, Effect, Shape, Sizes, size_text
 from tauscope.recording.recording import Array
 
 TIMES = np.array([0.08, 0.2, 0.5, 1.2, 3.0])
@@ -52,6 +52,12 @@ class FrictionDrift(Effect):
         grid = times[:, None], 0.5 * times[:1], 1.5 * times[-1:]
         moving = [joint for joint in context.joints if context.moves(joint)]
         return [cls(joint, *grid, longest, by_heat) for joint in moving for by_heat in (False, True)]
+
+    def claim(self, found: Sizes, context: ArmContext) -> str:
+        """Whether friction rises or falls, at the joint's usual speed."""
+        change = found["f"].value + found["w"].value * float(context.speed[self.joint or 0])
+        verb, size = "rises" if change >= 0.0 else "falls", size_text(replace(found["f"], value=change))
+        return f"friction {verb} by {size} {'per watt of its own heat' if self.by_heat else 'during a recording'}"
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """A(q̇) h, q̇ h, repetition by repetition."""

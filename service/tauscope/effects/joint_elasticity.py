@@ -8,7 +8,7 @@ from scipy.linalg import solve_banded
 
 from tauscope.effects.context import ArmContext
 from tauscope.effects.deflection import BAND, Deflection
-from tauscope.effects.effect import Coefficient, Effect, Quantity, Shape
+from tauscope.effects.effect import Coefficient, Effect, Quantity, Shape, Sizes, size_text
 from tauscope.recording.recording import Array
 
 BANDS = np.array([1.41, 1.0, 0.35, 0.12])
@@ -126,6 +126,14 @@ class JointElasticity(Deflection):
             return (found,)
         apart = 0.5 * (found.value - swinging)
         return (replace(found, value=found.value - apart, std=float(np.hypot(found.std, apart))),)
+
+    def claim(self, found: Sizes, context: ArmContext) -> str:
+        """How stiff."""
+        compliance = found["c"].value
+        if compliance <= 0.0:
+            return self.meaning
+        stiffness = Quantity("K", 1.0 / compliance, 0.0, self.unit("{tau}/{q}", context))
+        return f"a transmission stiffness of {size_text(stiffness)} is missing"
 
     def deflection(self, load: Array, inertia: Array, shape: Array, rate_hz: float) -> Array:
         """What the spring transmits."""

@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from tauscope.effects.context import Signals
-from tauscope.effects.effect import Coefficient, Effect, Entry, per_joint_columns
+from tauscope.effects.context import ArmContext, Signals
+from tauscope.effects.effect import Coefficient, Effect, Entry, Sizes, per_joint_columns, size_text
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
@@ -31,6 +31,16 @@ class JointSpring(Effect):
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """The angle."""
         return per_joint_columns(signals.position[self.joint][None, None])
+
+    def claim(self, found: Sizes, context: ArmContext) -> str:
+        """A spring, or a counterbalance where its stiffness is negative."""
+        if found["k"].value < 0.0:
+            return f"a counterbalance of {size_text(found['k'])} (a spring of negative stiffness) is missing"
+        return f"a {size_text(found['k'])} spring is missing"
+
+    def advice(self, found: Sizes) -> str:
+        """A spring of that sign."""
+        return self.remedy if found["k"].value >= 0.0 else "add a spring of negative stiffness to the joint"
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
         """One stiffness."""

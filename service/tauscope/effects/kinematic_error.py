@@ -10,7 +10,7 @@ import numpy as np
 
 from tauscope.dynamics import inverse_dynamics
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Entry, Shape
+from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, Sizes, size_text
 from tauscope.recording.recording import Array
 from tauscope.robot import Placement, Robot
 
@@ -58,6 +58,12 @@ class KinematicError(Effect):
         """Torque of the arm as it is less that of the arm as the file has it, (n, N)."""
         longer, exact = _torques(signals, [(shape, float(coefficients[0])), (shape, 0.0)])
         return longer - exact
+
+    def claim(self, found: Sizes, context: ArmContext) -> str:
+        """Which frame, along which axis, and which way."""
+        link, axis = int(found["link"].value), "xyz"[int(found["axis"].value) - 1]
+        sign = "+" if found["d"].value >= 0.0 else "-"
+        return f"the frame of link {link} is off by {size_text(found['d'])} along {sign}{axis}"
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
         """One displacement."""

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Entry, per_joint_columns
+from tauscope.effects.effect import Coefficient, Effect, Entry, Sizes, per_joint_columns, percent_text
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
@@ -34,6 +34,11 @@ class LoadDependentFriction(Effect):
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """|τ_rb| A(q̇)."""
         return per_joint_columns((np.abs(signals.load[self.joint]) * signals.step[self.joint])[None, None])
+
+    def claim(self, found: Sizes, context: ArmContext) -> str:
+        """By which part of the load friction rises or falls."""
+        verb = "rises" if found["mu"].value >= 0.0 else "falls"
+        return f"friction {verb} by {percent_text(found['mu'].value)} of the transmitted torque"
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
         """One coefficient."""

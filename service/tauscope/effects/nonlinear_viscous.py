@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, per_joint_columns
+from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, Sizes, per_joint_columns
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
@@ -46,6 +46,11 @@ class NonlinearViscous(Effect):
         """sgn(q̇) |q̇|ᵖ."""
         velocity = signals.velocity[self.joint]
         return per_joint_columns((np.sign(velocity) * np.abs(velocity) ** shapes)[:, None])
+
+    def claim(self, found: Sizes, context: ArmContext) -> str:
+        """Whether friction bends up or down: a coefficient and its power less one say it together."""
+        faster = found["c"].value * (found["p"].value - 1.0) >= 0.0
+        return f"friction grows {'faster' if faster else 'more slowly'} than in proportion to speed"
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
         """One power of speed."""

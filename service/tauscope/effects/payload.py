@@ -9,7 +9,7 @@ import numpy as np
 
 from tauscope.effects.carried_body import FARTHEST_M, MASS, PLACE, body_columns, body_quantities, unit_body
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Effect, Quantity
+from tauscope.effects.effect import Effect, Quantity, Sizes, size_text
 from tauscope.recording.recording import Array
 
 
@@ -40,6 +40,16 @@ class Payload(Effect):
         """Torque of one kilogramme at r."""
         body = body_columns(signals)
         return np.stack([np.tensordot(unit_body(place), body, axes=1)[None] for place in shapes])
+
+    def claim(self, found: Sizes, context: ArmContext) -> str:
+        """How heavy."""
+        if found["m"].value < 0.0:
+            return f"the model's tool is {size_text(found['m'])} too heavy"
+        return f"a {size_text(found['m'])} payload is missing"
+
+    def advice(self, found: Sizes) -> str:
+        """More or less mass."""
+        return self.remedy if found["m"].value >= 0.0 else "lower the mass of the last link"
 
     def quantities(
         self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array

@@ -6,7 +6,7 @@ import numpy as np
 
 from tauscope.effects.carried_body import FARTHEST_M, MASS, PLACE, body_columns, body_quantities, unit_body
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Effect, Entry, Quantity, Shape
+from tauscope.effects.effect import Effect, Entry, Quantity, Shape, Sizes, size_text
 from tauscope.effects.time_local import EVERY, OUTSIDE, TimeLocalEffect, since
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
@@ -72,13 +72,17 @@ class PayloadChange(TimeLocalEffect):
         found += [Quantity(name, float(shape[place]), float(std[1 + place]), "s") for name, place in instants.items()]
         return tuple(found)
 
+    def claim(self, found: Sizes, context: ArmContext) -> str:
+        """How heavy."""
+        return f"a {size_text(found['m'])} mass"
+
     def when(self, coefficients: Array, shape: Array, names: Sequence[str], durations: Sequence[float]) -> str:
         """When it is picked up and dropped, in words."""
         _, instants = carried(float(coefficients[0]), shape, durations)
-        verbs = {"t_on": "picked up", "t_off": "dropped"}
+        verbs = {"t_on": "is picked up", "t_off": "is dropped"}
         said = [f"{verbs[name]} at {shape[place]:.2f} s" for name, place in instants.items()]
         where = self.recording_words(shape, names)
-        return f"{' and '.join(said)} of {where}" if said else f"carried in {where}"
+        return f"{' and '.join(said)} of {where}" if said else f"is carried in {where}"
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
         """A load that is carried in every recording: a scenario starts anew each time."""

@@ -13,7 +13,17 @@ import numpy as np
 
 from tauscope.effects.computation import THREADS, LastFew
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Entry, Quantity, Shape, per_joint_columns
+from tauscope.effects.effect import (
+    Coefficient,
+    Effect,
+    Entry,
+    Quantity,
+    Shape,
+    Sizes,
+    per_joint_columns,
+    percent_text,
+    size_text,
+)
 from tauscope.recording.recording import Array
 from tauscope.robot import JointType, Robot
 
@@ -216,6 +226,11 @@ class Cogging(_Periodic):
     revealing_motion = "slow constant speed over the whole range, the load changed by other joints' poses"
     coefficients = (Coefficient("sine", "{tau}"), Coefficient("cosine", "{tau}"))
 
+    def claim(self, found: Sizes, context: ArmContext) -> str:
+        """Amplitude and order."""
+        size, order = size_text(found["amplitude"]), found["order"].value
+        return f"a cogging torque of {size} and order {order:.4g} is missing"
+
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """Sin kq, cos kq."""
         return per_joint_columns(self._waves(signals, shapes))
@@ -242,6 +257,11 @@ class TorqueRipple(_Periodic):
     @classmethod
     def _places(cls, context: ArmContext) -> Sequence[int]:
         return [joint for joint in super()._places(context) if context.is_loaded(joint)]
+
+    def claim(self, found: Sizes, context: ArmContext) -> str:
+        """Amplitude and order."""
+        size, order = percent_text(found["amplitude"].value), found["order"].value
+        return f"torque ripples by {size} of the load with order {order:.4g}"
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """τ_rb sin kq, τ_rb cos kq."""

@@ -10,8 +10,8 @@ from typing import ClassVar
 import numpy as np
 
 from tauscope.dynamics import smooth_sign
-from tauscope.effects.context import Signals
-from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, per_joint_columns
+from tauscope.effects.context import ArmContext, Signals
+from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, Sizes, per_joint_columns, size_text
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
@@ -42,6 +42,11 @@ class ViscousFriction(PlainTerm):
     revealing_motion = "several speeds"
     coefficients = (Coefficient("c", "{tau} s/{q}", positive=True),)
 
+    def claim(self, found: Sizes, context: ArmContext) -> str:
+        """How much is missing, or too much."""
+        state = "missing" if found["c"].value >= 0.0 else "too much"
+        return f"viscous friction of {size_text(found['c'])} is {state}"
+
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """q̇."""
         return per_joint_columns(signals.velocity[self.joint][None, None])
@@ -61,6 +66,11 @@ class CoulombFriction(PlainTerm):
     revealing_motion = "slow motion both ways"
     coefficients = (Coefficient("f", "{tau}", positive=True),)
 
+    def claim(self, found: Sizes, context: ArmContext) -> str:
+        """How much is missing, or too much."""
+        state = "missing" if found["f"].value >= 0.0 else "too much"
+        return f"Coulomb friction of {size_text(found['f'])} is {state}"
+
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """A(q̇)."""
         return per_joint_columns(signals.step[self.joint][None, None])
@@ -79,6 +89,11 @@ class TorqueOffset(PlainTerm):
     remedy = "zero the torque sensor, or add the constant to the joint's torque"
     revealing_motion = "slow motion both ways in several poses"
     coefficients = (Coefficient("c", "{tau}"),)
+
+    def claim(self, found: Sizes, context: ArmContext) -> str:
+        """Which way."""
+        sign = "+" if found["c"].value >= 0.0 else "-"
+        return f"the torque has an offset of {sign}{size_text(found['c'])}"
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """One."""
@@ -102,6 +117,11 @@ class StribeckTerm(PlainTerm):
     revealing_motion = "slow sweeps beside motion at top speed"
     coefficients = (Coefficient("s", "{tau}"),)
     shapes = (Shape("delta", "s/{q}", fixed=True),)
+
+    def claim(self, found: Sizes, context: ArmContext) -> str:
+        """What is added at speed only makes friction fall towards zero velocity."""
+        verb = "falls" if found["s"].value >= 0.0 else "rises"
+        return f"friction {verb} by {size_text(found['s'])} towards zero velocity"
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """A(δ q̇)."""

@@ -1,13 +1,13 @@
 """A friction level that varies with position: an eccentric bearing, an oval one, a rail that is worn in its middle."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import atan2, hypot
 
 import numpy as np
 
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, per_joint_columns
+from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, Sizes, per_joint_columns, size_text
 from tauscope.recording.recording import Array
 from tauscope.robot import JointType, Robot
 
@@ -62,6 +62,11 @@ class PositionDependentFriction(Effect):
         """A(q̇) cos kq, A(q̇) sin kq."""
         step, angle = signals.step[self.joint], shapes * signals.position[self.joint]
         return per_joint_columns(np.stack([step * np.cos(angle), step * np.sin(angle)], axis=1))
+
+    def claim(self, found: Sizes, context: ArmContext) -> str:
+        """By how much."""
+        size = replace(found["a"], value=hypot(found["a"].value, found["b"].value))
+        return f"friction varies by ±{size_text(size)} with position"
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
         """One wave."""

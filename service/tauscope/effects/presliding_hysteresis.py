@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, per_joint_columns
+from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, Sizes, per_joint_columns, size_text
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
@@ -94,6 +94,11 @@ class PreslidingHysteresis(Effect):
             start = bristle_deflection(position, lengths, start)[:, -1]
         deflection = bristle_deflection(position, lengths, start)
         return per_joint_columns((deflection - signals.step[self.joint])[:, None])
+
+    def claim(self, found: Sizes, context: ArmContext) -> str:
+        """Over which distance, and whether friction rises to its level or falls to it."""
+        verb = "rises" if found["F"].value >= 0.0 else "falls"
+        return f"friction {verb} over {size_text(found['x_s'])} after each reversal instead of at once"
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
         """Dahl's bristles in place of the robot file's Coulomb friction, whatever F is."""

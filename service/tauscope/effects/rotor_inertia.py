@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from tauscope.effects.context import Signals
-from tauscope.effects.effect import Coefficient, Effect, Entry, per_joint_columns
+from tauscope.effects.context import ArmContext, Signals
+from tauscope.effects.effect import Coefficient, Effect, Entry, Sizes, per_joint_columns, size_text
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
@@ -27,6 +27,15 @@ class RotorInertia(Effect):
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """q̈."""
         return per_joint_columns(signals.acceleration[self.joint][None, None])
+
+    def claim(self, found: Sizes, context: ArmContext) -> str:
+        """How much is missing, or too much."""
+        state = "missing" if found["I_a"].value >= 0.0 else "too much"
+        return f"a rotor inertia of {size_text(found['I_a'])} is {state}"
+
+    def advice(self, found: Sizes) -> str:
+        """More or less armature inertia."""
+        return self.remedy if found["I_a"].value >= 0.0 else "lower the joint's armature inertia"
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
         """One inertia."""

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, mesh, per_joint_columns
+from tauscope.effects.effect import Coefficient, Effect, Entry, Shape, Sizes, mesh, per_joint_columns, size_text
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
@@ -57,6 +57,15 @@ class StribeckFriction(Effect):
         speed = np.abs(signals.velocity[self.joint])
         decay = np.exp(-((speed / shapes[:, :1]) ** shapes[:, 1:]))
         return per_joint_columns((signals.step[self.joint] * decay)[:, None])
+
+    def claim(self, found: Sizes, context: ArmContext) -> str:
+        """Whether friction rises or falls towards zero velocity."""
+        verb = "rises" if found["s"].value >= 0.0 else "falls"
+        return f"friction {verb} by {size_text(found['s'])} towards zero velocity"
+
+    def advice(self, found: Sizes) -> str:
+        """More or less friction at low speed."""
+        return self.remedy if found["s"].value >= 0.0 else "lower friction near zero velocity by a Stribeck term"
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:
         """One decay."""

@@ -7,7 +7,7 @@ import numpy as np
 from scipy import signal
 
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Entry, Quantity, Shape
+from tauscope.effects.effect import Coefficient, Effect, Entry, Quantity, Shape, Sizes, size_text
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
@@ -39,6 +39,20 @@ class LateTorque(Effect):
     def places(context: ArmContext) -> Sequence[int | None]:
         """The whole arm, and every joint of an arm with several."""
         return (None, *(context.joints if context.robot.joint_count > 1 else ()))
+
+    def claim(self, found: Sizes, context: ArmContext) -> str:
+        """Whether torque lags or leads."""
+        verb = "lags" if found["d"].value >= 0.0 else "leads"
+        return f"torque {verb} position by {size_text(found['d'])}"
+
+    def advice(self, found: Sizes) -> str:
+        """The way to shift it."""
+        way = "earlier" if found["d"].value >= 0.0 else "later"
+        return f"shift the torque channel {size_text(found['d'])} {way}"
+
+    def place(self, joint_names: Sequence[str]) -> str:
+        """Its joint, or all."""
+        return super().place(joint_names) or "at every joint"
 
     def measured(self, signals: Signals) -> Array:
         """Torque of the model at the joints that are late, (m, N)."""
@@ -140,6 +154,14 @@ class Lag(Shift):
         """One a place and order."""
         places = cls.places(context)
         return [cls(place, *_constants(context), order=order) for place in places for order in ORDERS]
+
+    def claim(self, found: Sizes, context: ArmContext) -> str:
+        """How late."""
+        return f"a low-pass filter delays torque by {size_text(found['d'])}"
+
+    def advice(self, found: Sizes) -> str:
+        """A filter has no shift that undoes it."""
+        return self.remedy
 
     def late(self, torque: Array, constant: float, signals: Signals) -> Array:
         """Torque (m, N) behind the filter."""

@@ -71,6 +71,10 @@ class TimeLocalEffect(Effect):
         """
         return None
 
+    def recurs(self, shape: Array) -> bool:
+        """Whether the window lies at the same instants of every recording."""
+        return bool(shape[0] == EVERY)
+
     def rough_grid(self) -> Array:
         """Few of the many windows, (g, k)."""
         return self.grid[:: max(1, len(self.grid) // ROUGHLY)]

@@ -3,9 +3,13 @@
 from collections.abc import Sequence
 
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Entry, per_joint_columns
+from tauscope.effects.effect import Coefficient, Effect, Entry, Sizes, per_joint_columns, percent_text
+from tauscope.number_text import significant
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
+
+ALIKE = 0.05
+"""Part of a torque constant by which motors of one kind differ: so much is no scale."""
 
 
 class TorqueGainError(Effect):
@@ -30,6 +34,27 @@ class TorqueGainError(Effect):
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """The model's torque."""
         return per_joint_columns(signals.torque[self.joint][None, None])
+
+    def claim(self, found: Sizes, context: ArmContext) -> str:
+        """A wrong sign first; else which way it is wrong."""
+        gain = 1.0 + found["g"].value
+        off = f"{percent_text(abs(gain) - 1.0)} too {'large' if abs(gain) > 1.0 else 'small'}"
+        if gain >= 0.0:
+            return f"the recorded torque is {off}"
+        sign = "the recorded torque has the wrong sign"
+        return sign if abs(abs(gain) - 1.0) < ALIKE else f"{sign} and is {off}"
+
+    def advice(self, found: Sizes) -> str:
+        """The sign and the constant that are right."""
+        gain = 1.0 + found["g"].value
+        constant = f"divide the joint's torque_constant by {significant(abs(gain), 3)}"
+        if gain >= 0.0:
+            return constant
+        return "invert the joint's sign" if abs(abs(gain) - 1.0) < ALIKE else f"invert the joint's sign and {constant}"
+
+    def place(self, joint_names: Sequence[str]) -> str:
+        """Its joint, or all."""
+        return super().place(joint_names) or "at every joint"
 
     def factor(self, coefficients: Array) -> float:
         """1 + g: with a wrong sign every parameter works the other way round."""

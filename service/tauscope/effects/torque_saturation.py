@@ -7,7 +7,7 @@ from math import sqrt
 import numpy as np
 
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Entry, Quantity, Shape, per_joint_columns
+from tauscope.effects.effect import Coefficient, Effect, Entry, Quantity, Shape, Sizes, per_joint_columns, size_text
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
@@ -61,6 +61,10 @@ class Saturation(Effect):
         levels : (g, 1) float64
             c [Nm or N]
         """
+
+    def claim(self, found: Sizes, context: ArmContext) -> str:
+        """At which level."""
+        return f"the recorded torque saturates near {size_text(found['c'])}"
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """What the recorded torque falls short by."""

@@ -1,13 +1,15 @@
 """The diagnosis as a page that tells one story: where, what, how much, the proof, what next."""
 
 import shlex
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from markupsafe import Markup
 
 from tauscope.diagnosis import Diagnosis, DiagnosisDocument
 from tauscope.diagnosis.documents.plots import DiagnosisPlots, diagnosis_plots
+from tauscope.diagnosis.documents.result import FindingEntry
 from tauscope.diagnosis.next_experiment import PlannedExperiment
+from tauscope.number_text import chance, counted, significant
 from tauscope.report.csv_text import csv_text
 from tauscope.report.diagnosis_tables import (
     detectable_table,
@@ -18,7 +20,7 @@ from tauscope.report.diagnosis_tables import (
     shift_table,
 )
 from tauscope.report.diagnosis_words import (
-    HEADLINES,
+    MOST_FINDINGS,
     cautions,
     constancy_sentence,
     effect_title,
@@ -31,12 +33,13 @@ from tauscope.report.diagnosis_words import (
 )
 from tauscope.report.heat_map import heat_map, heat_table
 from tauscope.report.motion_figure import motion_figure
-from tauscope.report.page import Card, Drawing, KeyFigure, Numbers, Page, Part, Section, render
+from tauscope.report.page import Card, Drawing, Fold, KeyFigure, Numbers, Page, Part, Section, render
 from tauscope.report.proof_figure import proof_figure
 from tauscope.report.provenance import Provenance
-from tauscope.report.quantities import chance, counted, significant, torque_unit
+from tauscope.report.quantities import torque_unit
 from tauscope.report.shift_figure import difference_figure, shift_figure
 from tauscope.report.tables import input_table
+from tauscope.report.words import noise_words
 from tauscope.robot import JointType
 
 
@@ -65,7 +68,7 @@ def diagnosis_report(
         Page(
             kind="diagnosis",
             robot=document.robot,
-            headline=HEADLINES[document.verdict],
+            headline=document.headline,
             subtitle=f"{joints} · band {significant(document.cutoff_hz, 3)} Hz · {created}",
             key_figures=list(_key_figures(document)),
             sentences=list(summary_sentences(document)),
@@ -88,8 +91,8 @@ def _key_figures(document: DiagnosisDocument) -> Iterator[KeyFigure]:
         f"{significant(before[most], 3)} → {significant(after[most], 3)}",
         f"{document.joints[most]}, {'held-out' if held_out else 'its own'} motion",
     )
-    noise = "repeated periods" if document.noise_method == "periods" else "the residual"
-    yield KeyFigure("Noise known from", noise, "per joint, a sample")
+    source = "repeated periods" if document.noise_method == "periods" else "the residual"
+    yield KeyFigure("Noise known from", source, noise_words(document.noise_method))
 
 
 def _where(plots: DiagnosisPlots, document: DiagnosisDocument, types: list[JointType]) -> Section:
@@ -117,25 +120,34 @@ def _where(plots: DiagnosisPlots, document: DiagnosisDocument, types: list[Joint
 
 
 def _what(document: DiagnosisDocument) -> Section:
-    """Findings, ranked."""
-    total = sum(finding.gain for finding in document.findings)
-    parts = [
-        Part(
-            card=Card(
-                effect_title(finding.effect),
-                place_title(finding.joint),
-                finding.probability,
-                chance(finding.probability),
-                f"{finding.statement}.",
-                finding_facts(finding, total),
-            )
-        )
-        for finding in document.findings
-    ]
-    sentences = [] if parts else ["No effect of the catalogue is named."]
-    if len(parts) > 1:
+    """Findings, ranked: the first few, then the others and the tentative ones, folded."""
+    cards, tentative = (_cards(entries, document.joints) for entries in (document.findings, document.tentative))
+    parts = [Part(card=card) for card in cards[:MOST_FINDINGS]]
+    if len(cards) > MOST_FINDINGS:
+        parts.append(Part(fold=Fold(f"{counted(len(cards) - MOST_FINDINGS, 'more finding')}", cards[MOST_FINDINGS:])))
+    if tentative:
+        title = f"Tentative: held-out motion does not confirm {counted(len(tentative), 'effect')}"
+        parts.append(Part(fold=Fold(title, tentative)))
+    sentences = [] if cards else ["No effect of the catalogue is named."]
+    if len(cards) > 1:
         sentences = ["In order of the residual energy that each explains."]
     return Section("what", "What", parts, sentences)
+
+
+def _cards(entries: Sequence[FindingEntry], joints: Sequence[str]) -> list[Card]:
+    """A card a finding."""
+    return [
+        Card(
+            rank,
+            effect_title(entry.effect),
+            place_title(entry.joint),
+            entry.probability,
+            chance(entry.probability),
+            entry.statement,
+            finding_facts(entry, joints),
+        )
+        for rank, entry in enumerate(entries, start=1)
+    ]
 
 
 def _how_much(document: DiagnosisDocument) -> Section:

@@ -1,8 +1,8 @@
 """A diagnosis in tables, the same on terminal and page."""
 
 from tauscope.diagnosis import DiagnosisDocument
+from tauscope.number_text import ABSENT, percent, significant
 from tauscope.report.diagnosis_words import effect_title
-from tauscope.report.quantities import ABSENT, percent, significant
 from tauscope.report.table import Table
 
 MOST_SHIFTS = 12

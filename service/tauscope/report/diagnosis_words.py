@@ -1,28 +1,23 @@
 """A diagnosis in words, the same on terminal and page."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import PurePath
 
 from tauscope.diagnosis import DiagnosisDocument
 from tauscope.diagnosis.documents.result import FindingEntry, MismatchEntry
-from tauscope.report.quantities import ABSENT, counted, percent, significant, state_unit, torque_unit, with_uncertainty
+from tauscope.diagnosis.documents.statement import DEVIATIONS, change_text
+from tauscope.diagnosis.model.held_out_change import SHOWN
+from tauscope.number_text import ABSENT, counted, percent, significant, with_uncertainty
+from tauscope.report.quantities import state_unit, torque_unit
 from tauscope.report.words import noise_ratio
 from tauscope.robot import JointType
 
 VERDICTS = {
     "consistent": "nothing but noise is left",
     "explained": "the findings bring the residual to the noise",
-    "partly_explained": "the findings improve the fit, and a significant remainder stays",
-    "unexplained": "a significant mismatch that nothing in the catalogue explains",
-    "inconclusive": "the parameters do not hold from one recording to the next, and nothing can be named",
-}
-
-HEADLINES = {
-    "consistent": "The model explains the recordings: nothing but noise is left.",
-    "explained": "The findings explain all that the model left.",
-    "partly_explained": "The findings explain part of what the model left; something remains.",
-    "unexplained": "Something is missing that nothing in the catalogue explains.",
-    "inconclusive": "These recordings cannot decide it.",
+    "partly_explained": "a significant remainder stays beside the findings",
+    "unexplained": "a significant mismatch that no confirmed effect explains",
+    "inconclusive": "these recordings cannot decide it",
 }
 
 AGAINST = {
@@ -31,14 +26,12 @@ AGAINST = {
     "simulation": "recordings of the simulator",
 }
 
-CONFIRMED = {
-    True: "seen again on held-out motion",
-    False: "not seen on held-out motion",
-    None: "not asked: no recording was held out",
-}
+CONFIRMED = {True: "confirmed", False: "not confirmed", None: "not tested: no recording was held out"}
 
-DEVIATIONS = 1.96
-"""Standard errors to either side: 95 % of a normal distribution."""
+MOST_FINDINGS = 5
+"""Findings shown before a fold."""
+
+NOTHING_ELSE = "No competing explanation"
 
 
 def effect_title(effect: str) -> str:
@@ -73,18 +66,30 @@ def noise_ratios(document: DiagnosisDocument) -> tuple[list[float], list[float],
 
 
 def summary_sentences(document: DiagnosisDocument) -> Iterator[str]:
-    """What was compared, what it comes to, and how much better unseen motion is predicted."""
+    """What was compared, what it comes to, and how unseen motion is predicted, better or worse."""
     yield f"Compared with {AGAINST[document.against]}: {VERDICTS[document.verdict]}."
     before, after, held_out = noise_ratios(document)
     if document.findings and after != before:
         most = max(range(len(before)), key=lambda place: before[place] - after[place])
         motion = "On motion that neither model was made from" if held_out else "On the motion itself"
-        yield (
-            f"{motion}, the residual of {document.joints[most]} goes from {significant(before[most], 3)} to"
-            f" {significant(after[most], 3)} times the sensor noise."
-        )
+        yield f"{motion}, {_residual_change(document, most)}."
+        worse = [place for place in range(len(before)) if after[place] > (1.0 + SHOWN) * before[place]]
+        if held_out and worse:
+            yield f"It is predicted worse: {'; '.join(_residual_change(document, place) for place in worse)}."
     if not document.findings:
         yield "No effect is named. The last table says what size each would have needed to show in these recordings."
+
+
+def _residual_change(document: DiagnosisDocument, joint: int) -> str:
+    """How one joint's residual changes.
+
+    Parameters
+    ----------
+    joint : int
+        joint index, from 0
+    """
+    before, after = (significant(ratios[joint], 3) for ratios in noise_ratios(document)[:2])
+    return f"the residual of {document.joints[joint]} goes from {before} to {after} times the sensor noise"
 
 
 def refutations(document: DiagnosisDocument) -> Iterator[str]:
@@ -99,11 +104,9 @@ def cautions(document: DiagnosisDocument) -> Iterator[str]:
     if document.fit.held_out is None:
         yield "No recording was held out: nothing here was tested on motion that the model has not seen."
     for finding in document.findings:
-        where = f"{effect_title(finding.effect)} {place_title(finding.joint)}"
         if finding.equivalent:
+            where = f"{effect_title(finding.effect)} {place_title(finding.joint)}"
             yield f"{where}: these data cannot tell it from {', '.join(finding.equivalent)}."
-        if finding.confirmed is False:
-            yield f"{where} was not seen again on the held-out recordings."
     for move in document.constancy.moved:
         yield (
             f"{move.parameter} is not the same in {file_title(move.between[0])} and {file_title(move.between[1])}:"
@@ -135,7 +138,7 @@ def _share(share: float) -> str:
     return f"{100.0 * share:.0f} %"
 
 
-def finding_facts(finding: FindingEntry, total_gain: float) -> list[tuple[str, str]]:
+def finding_facts(finding: FindingEntry, joints: Sequence[str]) -> list[tuple[str, str]]:
     """What is known of a finding, in the order in which one asks."""
     facts = [
         (each.name, f"{value}{unit}" if reach == ABSENT else f"{value} ± {reach}{unit} (95 %)")
@@ -144,11 +147,24 @@ def finding_facts(finding: FindingEntry, total_gain: float) -> list[tuple[str, s
         for unit in ("" if each.unit == "1" else f" {each.unit}",)
     ]
     facts += [("Torque", finding.equation)] if finding.equation else []
-    if total_gain > 0.0:
-        facts.append(("Explains", f"{percent(finding.gain / total_gain)} of what all findings explain"))
-    facts.append(("Held out", CONFIRMED[finding.confirmed]))
-    others = ", ".join(finding.equivalent) if finding.equivalent else "nothing: it stands alone"
-    return [*facts, ("Could also be", others)]
+    if finding.share is not None:
+        facts.append(("Explains", f"{percent(finding.share)} of the explained energy {place_title(finding.joint)}"))
+    others = ", ".join(finding.equivalent) if finding.equivalent else NOTHING_ELSE
+    return [*facts, ("Held out", held_out_words(finding, joints)), ("Could also be", others)]
+
+
+def held_out_words(finding: FindingEntry, joints: Sequence[str]) -> str:
+    """Whether held-out motion confirms a finding, and the change at its joint, or where it is largest."""
+    change = finding.held_out_change
+    if change is None:
+        return CONFIRMED[finding.confirmed]
+    if finding.joint is None:
+        place = max(range(len(joints)), key=lambda joint: abs(change.relative[joint]))
+    else:
+        place = list(joints).index(finding.joint)
+    size = change_text(change.relative[place], change.std[place])
+    changes = f"the rms of {joints[place]} changes by {size}"
+    return changes if finding.confirmed is None else f"{CONFIRMED[finding.confirmed]}: {changes}"
 
 
 def constancy_sentence(document: DiagnosisDocument) -> str:

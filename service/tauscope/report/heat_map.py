@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from markupsafe import Markup, escape
 
 from tauscope.diagnosis.documents.plots import ResidualHistogram
-from tauscope.report.quantities import significant
+from tauscope.number_text import significant
 from tauscope.report.table import Table
 
 LEVELS = (1.1, 1.3, 1.6, 2.0, 3.0, 5.0, 10.0)

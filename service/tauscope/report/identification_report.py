@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from markupsafe import Markup
 
 from tauscope.identification import Identification, IdentificationDocument, document
+from tauscope.number_text import counted, percent, significant
 from tauscope.recording import Recording
 from tauscope.report.csv_text import csv_text
 from tauscope.report.friction_curve import friction_curve
@@ -13,7 +14,7 @@ from tauscope.report.friction_figure import friction_figure
 from tauscope.report.page import Drawing, KeyFigure, Numbers, Page, Part, Section, render
 from tauscope.report.parameter_figure import parameter_figure
 from tauscope.report.provenance import Provenance
-from tauscope.report.quantities import counted, percent, significant, torque_unit, velocity_unit
+from tauscope.report.quantities import torque_unit, velocity_unit
 from tauscope.report.residual_figure import residual_figure
 from tauscope.report.series import TorqueSeries, torque_series
 from tauscope.report.tables import (
@@ -103,7 +104,8 @@ def _fit_section(result: IdentificationDocument, identification: Identification)
     figure = Drawing(
         Markup(residual_figure("fit", result)),  # noqa: S704 - our own drawing; its text is escaped
         "Residual of every joint as a multiple of its sensor noise",
-        f"Residual rms at the recorded rate, unfiltered, as a multiple of the sensor noise σ ({noise_words(result)})."
+        "Residual rms at the recorded rate, unfiltered, as a multiple of the sensor noise σ"
+        f" ({noise_words(result.noise_method)})."
         " A joint at one has nothing but noise left.",
     )
     return Section("fit", "Fit", [Part(figure=figure, table=fit_table(result, identification.robot))])

@@ -31,12 +31,15 @@ class Numbers:
 class Card:
     """One thing of several that are ranked.
 
+    rank : int
+        from 1
     probability : float
         from 0 to 1
     facts : sequence of (str, str)
         what is known about it
     """
 
+    rank: int
     title: str
     place: str
     probability: float
@@ -46,11 +49,20 @@ class Card:
 
 
 @dataclass(frozen=True)
+class Fold:
+    """Cards that are folded away."""
+
+    title: str
+    cards: Sequence[Card]
+
+
+@dataclass(frozen=True)
 class Part:
     """A piece of a section; what is None is left out."""
 
     title: str | None = None
     card: Card | None = None
+    fold: Fold | None = None
     figure: Drawing | None = None
     table: Table | None = None
     numbers: Numbers | None = None

@@ -7,7 +7,7 @@ from matplotlib.ticker import NullFormatter
 
 from tauscope.diagnosis.documents.residual_spectrum import ResidualSpectrum
 from tauscope.diagnosis.documents.torque_overlay import TorqueOverlay
-from tauscope.report.quantities import power_of_ten
+from tauscope.number_text import power_of_ten
 from tauscope.report.svg import BAND, INK, MEASURED, MUTED, PREDICTED, RESIDUAL, draw_svg
 
 HEIGHT_INCHES = 3.5

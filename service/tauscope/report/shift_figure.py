@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
 from tauscope.diagnosis import DiagnosisDocument
-from tauscope.report.quantities import power_of_ten
+from tauscope.number_text import power_of_ten
 from tauscope.report.svg import BAND, MUTED, PREDICTED, draw_svg
 
 MOST = 14

@@ -1,8 +1,9 @@
 """The numbers behind the figures."""
 
 from tauscope.identification import IdentificationDocument
+from tauscope.number_text import ABSENT, percent, significant, with_uncertainty
 from tauscope.report.provenance import Provenance
-from tauscope.report.quantities import ABSENT, base_parameter_unit, percent, significant, torque_unit, with_uncertainty
+from tauscope.report.quantities import base_parameter_unit, torque_unit
 from tauscope.report.table import Table
 from tauscope.report.words import noise_ratio
 from tauscope.robot import Robot

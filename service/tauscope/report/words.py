@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 
 from tauscope.identification import IdentificationDocument
+from tauscope.number_text import percent, significant
 from tauscope.recording.words import listed
-from tauscope.report.quantities import percent, significant
 
 AT_NOISE = 1.1
 """A residual of at most this many times the noise holds nothing but noise."""
@@ -51,9 +51,9 @@ def cautions(document: IdentificationDocument) -> list[str]:
     return [f"{each.sentence}." for each in document.warnings]
 
 
-def noise_words(document: IdentificationDocument) -> str:
+def noise_words(method: str) -> str:
     """Where the noise figures come from."""
-    if document.noise_method == "periods":
+    if method == "periods":
         return "from differences between repeated periods, whatever the model"
     return "from the whitened residual"
 

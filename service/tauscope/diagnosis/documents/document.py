@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from tauscope.diagnosis.documents.impossible import impossible_places, impossible_warnings
 from tauscope.diagnosis.documents.result import (
     ConstancyEntry,
     DetectableEntry,
@@ -13,6 +14,7 @@ from tauscope.diagnosis.documents.result import (
     FitChangeEntry,
     FitChangesEntry,
     HeadroomEntry,
+    HeldOutChangeEntry,
     MismatchEntry,
     MovedEntry,
     NextExperimentEntry,
@@ -20,18 +22,16 @@ from tauscope.diagnosis.documents.result import (
     ShiftEntry,
     WhereEntry,
 )
+from tauscope.diagnosis.documents.statement import HEADLINES, state_finding, state_unknown
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
 from tauscope.diagnosis.findings.elsewhere import spread
 from tauscope.diagnosis.findings.finding import Finding
 from tauscope.diagnosis.findings.location import JointMismatch, Place
-from tauscope.diagnosis.findings.stand_in import DOUBTED
 from tauscope.diagnosis.findings.verdict import Verdict
 from tauscope.diagnosis.model.term import Term
 from tauscope.diagnosis.model.torque_scale import on_the_arm
 from tauscope.diagnosis.next_experiment import PlannedExperiment
-from tauscope.effects import Quantity, TimeLocalEffect, effect_class
-from tauscope.effects.load_dependent_friction import LoadDependentFriction
-from tauscope.effects.torque_gain_error import TorqueGainError
+from tauscope.effects import Effect, Quantity, effect_class
 from tauscope.identification.warnings import robot_warnings
 from tauscope.recording.recording import Array
 
@@ -49,20 +49,25 @@ def document(
 ) -> DiagnosisDocument:
     """The document of a diagnosis."""
     names = [joint.name for joint in diagnosis.robot.joints]
+    findings = [*(_finding(each, diagnosis, names) for each in diagnosis.findings), *_unknown(diagnosis, names)]
+    warnings = [*robot_warnings(diagnosis.robot), *diagnosis.identification.recording_warnings]
+    noise_method = diagnosis.identification.residuals.noise_method
     return DiagnosisDocument(
-        warnings=[*robot_warnings(diagnosis.robot), *diagnosis.identification.recording_warnings],
+        warnings=[*warnings, *impossible_warnings(diagnosis)],
         robot=diagnosis.robot.name,
         joints=names,
         against=diagnosis.against,
         verdict=diagnosis.verdict.value,
         noise_std=_floats(diagnosis.noise_std),
-        noise_method="periods" if diagnosis.pure_error else "residual",
+        noise_method="periods" if noise_method == "periods" else "residual",
         cutoff_hz=diagnosis.cutoff_hz,
         mismatch=[
             _mismatch(each, names, significant=significant)
             for each, significant in zip(diagnosis.mismatch, diagnosis.mismatched, strict=True)
         ],
-        findings=[*(_finding(each, diagnosis, names) for each in diagnosis.findings), *_unknown(diagnosis, names)],
+        headline=_headline(diagnosis),
+        findings=findings,
+        tentative=[_finding(each, diagnosis, names, tentative=True) for each in diagnosis.tentative],
         fit=_fit_changes(diagnosis),
         constancy=_constancy(diagnosis),
         detectable=_detectable(diagnosis, names),
@@ -151,7 +156,7 @@ def _mismatch(found: JointMismatch, names: Sequence[str], *, significant: bool) 
     )
 
 
-def _finding(finding: Finding, diagnosis: Diagnosis, names: Sequence[str]) -> FindingEntry:
+def _finding(finding: Finding, diagnosis: Diagnosis, names: Sequence[str], *, tentative: bool = False) -> FindingEntry:
     effect = finding.terms[0].effect
     quantities = _quantities(finding, diagnosis)
     others = list({option.candidate.effect.name(names): None for option in finding.alternatives})
@@ -163,14 +168,24 @@ def _finding(finding: Finding, diagnosis: Diagnosis, names: Sequence[str]) -> Fi
         equivalent=others,
         equation=effect.equation,
         parameters=[QuantityEntry(name=q.name, value=q.value, std=q.std, unit=q.unit) for q in quantities],
-        statement=_statement(finding, quantities, others, diagnosis),
+        statement=state_finding(finding, quantities, diagnosis, tentative=tentative).text,
         gain=finding.gain,
-        confirmed=finding.confirmed,
+        share=_share(finding, diagnosis, tentative=tentative),
+        confirmed=False if tentative else finding.confirmed,
+        held_out_change=_held_out_change(finding),
         rms_before=_floats(before.train),
         rms_after=_floats(after.train),
         held_out_rms_before=None if before.held_out is None else _floats(before.held_out),
         held_out_rms_after=None if after.held_out is None else _floats(after.held_out),
     )
+
+
+def _headline(diagnosis: Diagnosis) -> str:
+    """The finding that explains most; without findings what the verdict is."""
+    if not diagnosis.findings:
+        return HEADLINES[diagnosis.verdict.value]
+    first = diagnosis.findings[0]
+    return f"{state_finding(first, _quantities(first, diagnosis), diagnosis, tentative=False).headline}."
 
 
 def _quantities(finding: Finding, diagnosis: Diagnosis) -> list[Quantity]:
@@ -192,27 +207,21 @@ def _told(term: Term, diagnosis: Diagnosis, covariance: Array | None = None) -> 
     return term.effect.quantities(diagnosis.setting, term.coefficients, term.shape, covariance)
 
 
-def _why_behind(finding: Finding) -> str:
-    """Why a finding may be none beside the one that it is behind."""
-    if isinstance(finding.terms[0].effect, TorqueGainError) and isinstance(finding.behind, LoadDependentFriction):
-        return "it may be none: a gear's efficiency, and load friction of another formula, show as both"
-    return "it is so small that it may be an error of that effect's formula"
+def _share(finding: Finding, diagnosis: Diagnosis, *, tentative: bool) -> float | None:
+    """Part of the energy that is explained at its joints that it explains; None where nothing is."""
+    touched = finding.terms[0].effect.touched(len(diagnosis.mismatch))
+    explained = sum(max(diagnosis.mismatch[joint].explained, 0.0) for joint in touched)
+    if tentative or not finding.in_model:  # what the model's findings explain is without it
+        explained += finding.gain
+    return min(max(finding.gain / explained, 0.0), 1.0) if explained > 0.0 else None
 
 
-def _statement(finding: Finding, quantities: Sequence[Quantity], others: Sequence[str], diagnosis: Diagnosis) -> str:
-    term = finding.terms[0]
-    names = [joint.name for joint in diagnosis.robot.joints]
-    sizes = ", ".join(f"{q.name} = {q.value:.4g} ± {q.std:.2g} {q.unit}" for q in quantities[:4])
-    when = ""
-    if isinstance(term.effect, TimeLocalEffect):
-        names_of_recordings = diagnosis.fitter.observations.names
-        when = f", {term.effect.when(term.coefficients, term.shape, names_of_recordings, diagnosis.setting.durations)}"
-    doubt = f"; these data cannot tell it from {', '.join(others)}" if others else ""
-    if finding.behind is not None:
-        doubt += f"; beside {finding.behind.name(names)} {_why_behind(finding)}"
-    if finding.as_law < DOUBTED:
-        doubt += "; so much is left beside it that it may stand in for something that the catalogue does not have"
-    return f"{term.effect.where(names)}: {term.effect.meaning}{when} ({sizes}){doubt}; {term.effect.remedy}"
+def _held_out_change(finding: Finding) -> HeldOutChangeEntry | None:
+    change = finding.held_out_change
+    if change is None:
+        return None
+    std = [error if np.isfinite(error) else None for error in _floats(change.error)]
+    return HeldOutChangeEntry(relative=_floats(change.relative), std=std)
 
 
 def _unknown(diagnosis: Diagnosis, names: Sequence[str]) -> list[FindingEntry]:
@@ -229,8 +238,9 @@ def _unknown(diagnosis: Diagnosis, names: Sequence[str]) -> list[FindingEntry]:
             equivalent=[],
             equation="",
             parameters=[],
-            statement=f"{names[found.joint]}: a significant mismatch of {found.excess_rms:.3g} rms that nothing in the"
-            " catalogue explains: look at the residual where it concentrates",
+            statement=state_unknown(
+                names[found.joint], found.excess_rms, Effect.unit_at("{tau}", diagnosis.setting, found.joint)
+            ).text,
             gain=float(diagnosis.misfit_before.excess[found.joint]),
             confirmed=None,
             rms_before=_floats(before.train),
@@ -245,7 +255,7 @@ def _unknown(diagnosis: Diagnosis, names: Sequence[str]) -> list[FindingEntry]:
 
 
 def _shifts(diagnosis: Diagnosis) -> list[ShiftEntry]:
-    """Nominal parameters that moved when the findings were added."""
+    """Nominal parameters that moved when the findings were added, to values that they can have."""
     before, after = diagnosis.selection.nominal, diagnosis.selection.fit
     if not diagnosis.findings:
         return []
@@ -253,6 +263,7 @@ def _shifts(diagnosis: Diagnosis) -> list[ShiftEntry]:
     size = before.model.structure.size
     std = np.sqrt(np.maximum(np.diag(before.covariance)[:size] * inflation, 1e-300))
     shifts = (after.model.parameters - before.model.parameters) / std
+    hidden = impossible_places(before.model.structure, after.model.parameters)
     order = np.argsort(-np.abs(shifts))
     return [
         ShiftEntry(
@@ -262,7 +273,7 @@ def _shifts(diagnosis: Diagnosis) -> list[ShiftEntry]:
             shift_in_std=float(shifts[place]),
         )
         for place in order
-        if abs(shifts[place]) > SHIFTS_FROM
+        if abs(shifts[place]) > SHIFTS_FROM and place not in hidden
     ]
 
 
@@ -295,4 +306,8 @@ def _open_question(diagnosis: Diagnosis, names: Sequence[str]) -> tuple[list[str
     if diagnosis.verdict is Verdict.UNEXPLAINED:
         why = "repeat the same motion several times and slower: what repeats with time, angle or speed shows its kind"
         return [UNKNOWN], why
+    if diagnosis.tentative:
+        effects = [finding.terms[0].effect for finding in diagnosis.tentative]
+        motions = dict.fromkeys(effect.revealing_motion for effect in effects)
+        return [effect.name(names) for effect in effects], "record " + "; and ".join(motions)
     return [], ""

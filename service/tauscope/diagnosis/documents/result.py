@@ -36,6 +36,13 @@ class QuantityEntry(ResultModel):
     unit: str = Field(description="SI")
 
 
+class HeldOutChangeEntry(ResultModel):
+    """What a finding changes on held-out recordings, at every joint."""
+
+    relative: list[float] = Field(description="change of the residual's rms; below zero is better")
+    std: list[float | None] = Field(description="its standard error; null where the motion is too short to tell it")
+
+
 class FindingEntry(ResultModel):
     """An effect that the nominal model leaves out."""
 
@@ -48,9 +55,20 @@ class FindingEntry(ResultModel):
     equivalent: list[str] = Field(description="other effect@joint that these data cannot tell from it")
     equation: str = Field(description="its torque")
     parameters: list[QuantityEntry] = Field(description="estimates")
-    statement: str = Field(description="one plain sentence to act on")
+    statement: str = Field(
+        description="short sentences: the physics with its size and probability, numbers, doubts, and what to do"
+    )
     gain: float = Field(description="what it takes off the residual's energy, in noise variances")
-    confirmed: bool | None = Field(description="by held-out recordings; null without any")
+    share: float | None = Field(
+        default=None, description="part of its joint's explained residual energy that it explains; null for `unknown`"
+    )
+    confirmed: bool | None = Field(
+        description="whether a joint that it acts on is predicted better on held-out recordings and no joint worse;"
+        " null without any"
+    )
+    held_out_change: HeldOutChangeEntry | None = Field(
+        default=None, description="what it changes on held-out recordings; null without any"
+    )
     rms_before: list[float] = Field(description="per joint, residual of the model without it [Nm or N]")
     rms_after: list[float] = Field(description="per joint, residual of the model with all findings [Nm or N]")
     held_out_rms_before: list[float] | None = Field(description="the same on held-out recordings")
@@ -163,16 +181,24 @@ class DiagnosisDocument(ResultModel):
     )
     noise_std: list[float] = Field(description="per joint, torque noise a sample [Nm or N]")
     noise_method: Literal["periods", "residual"] = Field(
-        description="from differences between repeated periods, or from what a saturated fit leaves"
+        description="from differences between repeated periods, or from the whitened residual"
     )
     cutoff_hz: float = Field(description="band in which torque and effects were compared [Hz]")
     mismatch: list[MismatchEntry] = Field(description="one a joint")
-    findings: list[FindingEntry] = Field(description="most explained residual energy first")
+    headline: str = Field(default="", description="the most important result in one sentence")
+    findings: list[FindingEntry] = Field(
+        description="those that held-out recordings confirm, or all without any; most explained residual energy first"
+    )
+    tentative: list[FindingEntry] = Field(
+        default=[], description="those that held-out recordings do not confirm; the model does not have them"
+    )
     fit: FitChangesEntry = Field(description="without and with all findings")
     constancy: ConstancyEntry = Field(description="whether the parameters hold from one recording to the next")
     detectable: list[DetectableEntry] = Field(description="what would have been seen, and from which size")
     parameter_differences: list[DifferenceEntry] = Field(description="what the simulation has wrong")
-    parameter_shifts: list[ShiftEntry] = Field(description="what the left-out effects had been doing to the parameters")
+    parameter_shifts: list[ShiftEntry] = Field(
+        description="what the left-out effects had been doing to the parameters; without impossible values"
+    )
     next_experiment: NextExperimentEntry | None = Field(description="what would decide what is open")
     headroom: list[HeadroomEntry] | None = Field(
         default=None, description="one a joint: what a black box still predicts; null where it was not asked for"

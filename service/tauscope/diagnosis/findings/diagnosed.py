@@ -47,6 +47,8 @@ class ParameterDifference:
 class Diagnosis:
     """What was found.
 
+    tentative : tuple of Finding
+        what held-out motion refutes; no part of the model, and it turns no verdict
     noise_std : (n,) float64
         torque noise a sample at the recorded rate [Nm or N]
     cutoff_hz : float
@@ -73,6 +75,7 @@ class Diagnosis:
     held_out: HeldOut | None
     against: Literal["identified", "model", "simulation"] = "identified"
     differences: tuple[ParameterDifference, ...] = ()
+    tentative: tuple[Finding, ...] = ()
 
     @property
     def robot(self) -> Robot:
@@ -116,5 +119,11 @@ class Diagnosis:
         return 1.0 if self.pure_error else self.selection.fit.inflation()
 
     def with_findings(self, added: Sequence[Finding]) -> "Diagnosis":
-        """The same with more findings."""
-        return replace(self, findings=in_order([*self.findings, *added]))
+        """The same with more findings, those apart that held-out motion refutes."""
+        standing = [each for each in added if each.confirmed is not False]
+        refuted = [each for each in added if each.confirmed is False]
+        return replace(
+            self,
+            findings=in_order([*self.findings, *standing]),
+            tentative=in_order([*self.tentative, *refuted]),
+        )

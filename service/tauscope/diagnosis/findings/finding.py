@@ -12,10 +12,10 @@ from tauscope.diagnosis.findings.stand_in import certainty_as_law
 from tauscope.diagnosis.fitting.fit import Fit, Fitter
 from tauscope.diagnosis.fitting.lack_of_fit import LackOfFit
 from tauscope.diagnosis.model.extended import ExtendedModel
+from tauscope.diagnosis.model.held_out_change import HeldOutChange, sum_stretches
 from tauscope.diagnosis.model.residual import raw_squares
 from tauscope.diagnosis.model.term import Term
 from tauscope.diagnosis.model.torque_scale import covariance_on_the_arm, scaled_back
-from tauscope.diagnosis.observations.observations import Observations
 from tauscope.diagnosis.screening.screen import Screen
 from tauscope.diagnosis.selection.choice import Option, Selection
 from tauscope.diagnosis.selection.confirmation import HeldOut
@@ -34,10 +34,13 @@ class FitSizes:
         on the recordings that the model was made from [Nm or N]
     held_out : (n,) float64 or None
         on recordings that were not used
+    stretches : (n, S) float64 or None
+        squared errors there, summed over stretches of motion [Nm² or N²]
     """
 
     train: Array
     held_out: Array | None
+    stretches: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +52,7 @@ class Finding:
     gain : float
         what they take off the residual's energy beside all other findings [noise variances]
     confirmed : bool or None
-        by motion that was not used; None where there was none
+        by motion that was not used; None where there was none. What is refuted is tentative
     """
 
     terms: tuple[Term, ...]
@@ -71,16 +74,45 @@ class Finding:
         effect = self.terms[0].effect
         return effect.id, effect.joint
 
+    @property
+    def held_out_change(self) -> HeldOutChange | None:
+        """What it changes on motion that was not used; None where there was none."""
+        return change_between(self.before, self.after)
+
+
+def change_between(before: FitSizes, after: FitSizes) -> HeldOutChange | None:
+    """What a second model predicts better than a first; None without held-out recordings."""
+    if before.stretches is None or after.stretches is None:
+        return None
+    return HeldOutChange.between(before.stretches, after.stretches)
+
+
+def is_confirmed(term: Term, before: FitSizes, after: FitSizes, *, seen_again: bool | None) -> bool | None:
+    """Whether held-out motion confirms an effect; None without held-out recordings.
+
+    What belongs to instants of the training recordings acts on no held-out motion: there it only must do no harm.
+
+    Parameters
+    ----------
+    seen_again : bool or None
+        what a test of its own says
+    """
+    change = change_between(before, after)
+    if change is None or seen_again is False:
+        return seen_again
+    if not term.effect.recurs(term.shape):
+        return not change.losing
+    return change.confirms(term.effect.touched(len(change.relative)))
+
 
 def sizes(model: ExtendedModel, fitter: Fitter, held_out: HeldOut | None) -> FitSizes:
     """Raw residuals of a model on training and held-out recordings."""
-    train = _rms(model, fitter.observations)
-    return FitSizes(train, None if held_out is None else _rms(model, held_out.observations))
-
-
-def _rms(model: ExtendedModel, observations: Observations) -> Array:
-    squares, samples = raw_squares(model, observations)
-    return np.sqrt(squares / np.maximum(samples, 1.0))
+    squares, samples = raw_squares(model, fitter.observations)
+    train = np.sqrt(squares.sum(axis=1) / np.maximum(samples, 1.0))
+    if held_out is None:
+        return FitSizes(train, None)
+    squares, samples = raw_squares(model, held_out.observations)
+    return FitSizes(train, np.sqrt(squares.sum(axis=1) / np.maximum(samples, 1.0)), sum_stretches(squares))
 
 
 def selected_findings(
@@ -106,16 +138,18 @@ def selected_findings(
         alternatives = _likely(rivals, without, screen, held_out)
         as_law = certainty_as_law(terms[0].effect, selection.nominal, fit, without, left)
         covariances = tuple(_covariance_of(fit.model, place, covariance) for place in places)
+        before = sizes(without.model, fitter, held_out)
+        seen_again = any(choice.confirmation is not None for choice in choices) or None
         found.append(
             Finding(
                 terms=terms,
                 covariances=covariances,
                 gain=without.energy - fit.energy,
                 probability=standing.certainty * as_law * _share(chosen, alternatives, inflation),
-                before=sizes(without.model, fitter, held_out),
+                before=before,
                 after=after,
                 alternatives=alternatives,
-                confirmed=any(choice.confirmation is not None for choice in choices) or None,
+                confirmed=is_confirmed(terms[0], before, after, seen_again=seen_again),
                 behind=standing.behind,
                 as_law=as_law,
                 elsewhere=(

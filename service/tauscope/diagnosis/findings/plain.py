@@ -13,7 +13,7 @@ from scipy import stats
 
 from tauscope.diagnosis.findings.constant_torque import instead_of_a_constant
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
-from tauscope.diagnosis.findings.finding import Finding, sizes, without_nominal
+from tauscope.diagnosis.findings.finding import Finding, is_confirmed, sizes, without_nominal
 from tauscope.diagnosis.model.term import Term
 from tauscope.diagnosis.selection.admission import SMALLEST_SHARE
 from tauscope.diagnosis.selection.equivalence import probability_among
@@ -83,15 +83,17 @@ def _finding(effect: PlainTerm, diagnosis: Diagnosis) -> Finding | None:
     probability = probability_among(gain - 1.0, [option.score for option in others], [inflation] * len(others))
     if probability < HARDLY:  # something else explains it better, and has been refused elsewhere
         return None
+    term = Term(effect, shape, np.array([value]))
+    before = sizes(without.model, diagnosis.fitter, diagnosis.held_out)
     return Finding(
-        terms=(Term(effect, shape, np.array([value])),),
+        terms=(term,),
         covariances=(np.diag([variance, *np.zeros(len(shape))]),),
         gain=gain,
         probability=probability,
-        before=sizes(without.model, diagnosis.fitter, diagnosis.held_out),
+        before=before,
         after=diagnosis.after,
         alternatives=others,
-        confirmed=_seen_again(place, value, diagnosis),
+        confirmed=is_confirmed(term, before, diagnosis.after, seen_again=_seen_again(place, value, diagnosis)),
         in_model=False,
     )
 

@@ -42,9 +42,12 @@ def residual_rows(model: ExtendedModel, observations: Observations) -> list[list
 
 
 def raw_squares(model: ExtendedModel, observations: Observations) -> tuple[Array, Array]:
-    """Σ e² and number of samples of every joint at the recorded rate, (n,) each; nothing is filtered."""
+    """Squared errors at the recorded rate, (n, N), summed over repetitions, and samples of every joint, (n,).
+
+    Nothing is filtered; pieces follow each other, and what was not measured counts zero.
+    """
     count = observations.robot.joint_count
-    squares, samples = np.zeros(count), np.zeros(count)
+    squares, samples = [], np.zeros(count)
     for piece in observations.as_measured or observations:
         signals, motion = _quiet(model.signals(piece), piece, model), piece.prepared.motion
         predicted = np.repeat(signals.torque[:, None], piece.repetitions, axis=1)
@@ -55,9 +58,9 @@ def raw_squares(model: ExtendedModel, observations: Observations) -> tuple[Array
         measured = motion.torque[:, own].transpose(2, 0, 1)
         known = motion.measured[:, own].transpose(2, 0, 1)
         error = np.where(known, measured - predicted[..., own], 0.0)
-        squares += np.einsum("jpt,jpt->j", error, error)
+        squares.append(np.einsum("jpt,jpt->jt", error, error))
         samples += known.sum(axis=(1, 2))
-    return squares, samples
+    return np.concatenate(squares, axis=1), samples
 
 
 def _quiet(signals: Signals, piece: Piece, model: ExtendedModel) -> Signals:

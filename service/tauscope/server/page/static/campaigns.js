@@ -1,7 +1,7 @@
 // Campaigns: begun from a robot file, followed step by step, and read.
 
 import { follow, getJson, post } from "./api.js";
-import { cautions, chance, explained, h, moment, render, section, state, title } from "./dom.js";
+import { cautions, explained, h, moment, render, section, state, title } from "./dom.js";
 import { HEADLINES, appendRobot } from "./diagnoses.js";
 import { DRIVERS } from "./drivers.js";
 import { move } from "./leases.js";
@@ -73,7 +73,7 @@ function outcomeOf(campaign, { diagnosis }) {
   const id = (path) => path.split("/").pop();
   return [
     h("p", { class: "headline", text: diagnosis ? HEADLINES[diagnosis.verdict] : t`The arm is identified.` }),
-    diagnosis?.findings.map((each) => h("p", {}, h("strong", { text: each.joint ? t`${title(each.effect)} at ${each.joint}` : title(each.effect) }), t`, ${chance(each.probability)} probable. `, h("span", { lang: "en", text: `${each.statement}.` }))),
+    diagnosis?.findings.map((each) => h("p", {}, h("strong", { text: each.joint ? t`${title(each.effect)} at ${each.joint}` : title(each.effect) }), ". ", h("span", { lang: "en", text: each.statement }))),
     h("div", { class: "row" },
       campaign.links.diagnosis ? h("a", { class: "button primary", href: `#/diagnoses/${id(campaign.links.diagnosis)}`, text: t`Read the diagnosis` }) : null,
       h("a", { class: "button", href: `#/identifications/${id(campaign.links.identification)}`, text: t`Read the identification` }),

@@ -20,7 +20,10 @@ export const HEADLINES = {
   inconclusive: t`These recordings cannot decide it.`,
 };
 const AGAINST = { identified: t`compared with the best model that the data allow`, model: t`compared with the robot file's model`, simulation: t`compared with the simulator's recordings` };
-const CONFIRMED = new Map([[true, t`seen again on held-out motion`], [false, t`not seen on held-out motion`], [null, t`no recording was held out`]]);
+const CONFIRMED = new Map([[true, t`confirmed`], [false, t`not confirmed`], [null, t`no recording was held out`]]);
+
+/** Findings before a fold. */
+const MOST_FINDINGS = 5;
 
 export async function showDiagnosis(root, { id, signal, show }) {
   const job = await getJson(`diagnoses/${id}`, signal);
@@ -32,7 +35,8 @@ export async function showDiagnosis(root, { id, signal, show }) {
   const [before, after] = [ratio(fit.rms_before), ratio(fit.rms_after)];
   const most = before.indexOf(Math.max(...before));
   render(root, ...head,
-    h("p", { class: "headline", text: HEADLINES[result.verdict] }),
+    result.headline ? h("p", { class: "headline", lang: "en", text: result.headline }) : null,
+    h("p", { class: "lead", text: HEADLINES[result.verdict] }),
     figures([
       [t`Verdict`, named(result.verdict), AGAINST[result.against]],
       [t`Findings`, `${result.findings.length}`, [...new Set(result.findings.map((each) => title(each.effect)))].join(", ") || t`nothing is named`],
@@ -110,17 +114,34 @@ function placed(name) {
 }
 
 function whatSection(result) {
-  const total = result.findings.reduce((sum, each) => sum + each.gain, 0);
-  return section("what", t`What`, result.findings.length ? null : h("p", { text: t`No effect of the catalogue is named.` }),
-    result.findings.map((each, place) => h("article", { class: "card" },
-      h("p", { class: "rank", "aria-hidden": "true", text: `${place + 1}` }),
-      h("div", {}, h("h3", {}, title(each.effect), h("span", { text: each.joint ? t` at ${each.joint}` : t` of the whole arm` })), h("p", { lang: "en", text: `${each.statement}.` }),
-        h("dl", {}, each.parameters.flatMap((q) => [h("dt", { text: q.name }), h("dd", { text: `${withError(q.value, 1.96 * q.std)}${unit(q.unit)} (95 %)` })]),
-          each.equation ? [h("dt", { text: t`Torque` }), h("dd", { text: each.equation })] : null,
-          h("dt", { text: t`Explains` }), h("dd", { text: t`${percent(each.gain / total)} of what all findings explain` }),
-          h("dt", { text: t`Held out` }), h("dd", { text: CONFIRMED.get(each.confirmed) }),
-          h("dt", { text: t`Could also be` }), h("dd", { text: each.equivalent.map(placed).join(", ") || t`nothing: it stands alone` }))),
-      h("div", { class: "chance" }, h("strong", { text: chance(each.probability) }), t`probable`, h("div", { class: "meter", "aria-hidden": "true" }, h("span", { "width%": 100 * each.probability }))))));
+  const cards = result.findings.map((each, place) => findingCard(each, place, result.joints));
+  const tentative = (result.tentative ?? []).map((each, place) => findingCard(each, place, result.joints));
+  return section("what", t`What`, cards.length ? null : h("p", { text: t`No effect of the catalogue is named.` }),
+    cards.slice(0, MOST_FINDINGS),
+    cards.length > MOST_FINDINGS ? h("details", {}, h("summary", { text: t`${cards.length - MOST_FINDINGS} more` }), cards.slice(MOST_FINDINGS)) : null,
+    tentative.length ? h("details", {}, h("summary", { text: t`Tentative: held-out motion does not confirm these (${tentative.length})` }), tentative) : null);
+}
+
+function findingCard(each, place, joints) {
+  return h("article", { class: "card" },
+    h("p", { class: "rank", "aria-hidden": "true", text: `${place + 1}` }),
+    h("div", {}, h("h3", {}, title(each.effect), h("span", { text: each.joint ? t` at ${each.joint}` : t` of the whole arm` })), h("p", { lang: "en", text: each.statement }),
+      h("dl", {}, each.parameters.flatMap((q) => [h("dt", { text: q.name }), h("dd", { text: `${withError(q.value, 1.96 * q.std)}${unit(q.unit)} (95 %)` })]),
+        each.equation ? [h("dt", { text: t`Torque` }), h("dd", { text: each.equation })] : null,
+        Number.isFinite(each.share) ? [h("dt", { text: t`Explains` }), h("dd", { text: t`${percent(each.share)} of the explained energy there` })] : null,
+        h("dt", { text: t`Held out` }), h("dd", { text: heldOut(each, joints) }),
+        h("dt", { text: t`Could also be` }), h("dd", { text: each.equivalent.map(placed).join(", ") || t`No competing explanation` }))),
+    h("div", { class: "chance" }, h("strong", { text: chance(each.probability) }), t`probable`, h("div", { class: "meter", "aria-hidden": "true" }, h("span", { "width%": 100 * each.probability }))));
+}
+
+/** Whether held-out motion confirms a finding, and the change at its joint, or where it is largest. */
+function heldOut(each, joints) {
+  const change = each.held_out_change;
+  if (!change) return CONFIRMED.get(each.confirmed);
+  const sizes = change.relative.map(Math.abs);
+  const at = each.joint ? joints.indexOf(each.joint) : sizes.indexOf(Math.max(...sizes));
+  const changes = t`the rms of ${joints[at]} changes by ${withError(100 * change.relative[at], 196 * (change.std[at] ?? 0))} % (95 %)`;
+  return each.confirmed === null ? changes : `${CONFIRMED.get(each.confirmed)}: ${changes}`;
 }
 
 function howMuchSection(result) {

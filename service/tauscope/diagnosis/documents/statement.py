@@ -1,0 +1,164 @@
+"""A finding in words: the physics and its size first, then numbers, doubts, held-out motion, and what to do."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tauscope.diagnosis.findings.diagnosed import Diagnosis
+from tauscope.diagnosis.findings.finding import Finding
+from tauscope.diagnosis.findings.stand_in import DOUBTED
+from tauscope.effects import Effect, Quantity, TimeLocalEffect
+from tauscope.effects.load_dependent_friction import LoadDependentFriction
+from tauscope.effects.torque_gain_error import TorqueGainError
+from tauscope.number_text import ABSENT, chance, significant, with_uncertainty
+
+HEADLINES = {
+    "consistent": "Nothing but noise is left: the model explains the recordings.",
+    "unexplained": "Something is missing that no effect of the catalogue explains.",
+    "inconclusive": "These recordings cannot decide whether anything is missing.",
+    "wrong_values": "No physics is missing: the model states wrong values.",
+}
+"""By verdict, where no finding leads."""
+
+DEVIATIONS = 1.96
+"""Standard errors to either side: 95 % of a normal distribution."""
+
+MOST_NUMBERS = 4
+
+LIKELY = 0.5
+"""Probability from which a finding advises: below, something else is likelier."""
+
+UNLIKELY = "Something else is likelier: do not act on this alone"
+
+MOST_RIVALS = 2
+"""Equivalents named in a headline; a finding's entry has them all."""
+
+
+@dataclass(frozen=True)
+class Statement:
+    """A finding in sentences.
+
+    headline : str
+        the first of them, without its full stop
+    """
+
+    headline: str
+    sentences: tuple[str, ...]
+
+    @property
+    def text(self) -> str:
+        """All of them."""
+        return " ".join(f"{sentence}." for sentence in (self.headline, *self.sentences))
+
+
+def state_finding(
+    finding: Finding, quantities: Sequence[Quantity], diagnosis: Diagnosis, *, tentative: bool
+) -> Statement:
+    """The statement of a finding; a tentative one advises nothing.
+
+    Parameters
+    ----------
+    quantities : sequence of Quantity
+        its parameters, those of its first term first
+    """
+    names = [joint.name for joint in diagnosis.robot.joints]
+    found = {each.name: each for each in quantities}
+    effect = finding.terms[0].effect
+    of_first = quantities[: len(quantities) // len(finding.terms)]
+    sentences = [numbers_text(of_first), *_doubts(finding, names)]
+    sentences += [_sentence(_held_out(finding, names, tentative=tentative))]
+    if not tentative:
+        sentences.append(_sentence(effect.advice(found)) if finding.probability >= LIKELY else UNLIKELY)
+    claim = _claim(finding, found, diagnosis, names)
+    headline = f"{_sentence(claim)} ({chance(finding.probability)}{_rivals(finding, names)})"
+    return Statement(headline, tuple(filter(None, sentences)))
+
+
+def numbers_text(quantities: Sequence[Quantity]) -> str:
+    """The first parameters with 95 % intervals."""
+    parts, any_interval = [], False
+    for each in (quantity.in_usual_unit for quantity in quantities[:MOST_NUMBERS]):
+        value, reach = with_uncertainty(each.value, DEVIATIONS * each.std)
+        unit = "" if each.unit == "1" else f" {each.unit}"
+        parts.append(f"{each.name} = {value}{unit}" if reach == ABSENT else f"{each.name} = {value} ± {reach}{unit}")
+        any_interval |= reach != ABSENT
+    return ", ".join(parts) + (" (95 %)" if any_interval else "")
+
+
+def _claim(finding: Finding, found: dict[str, Quantity], diagnosis: Diagnosis, names: Sequence[str]) -> str:
+    """What the arm does and the model does not, where, and when."""
+    term, several = finding.terms[0], len(finding.terms) - 1
+    parts = [term.effect.claim(found, diagnosis.setting), term.effect.place(names)]
+    if isinstance(term.effect, TimeLocalEffect):
+        recordings = diagnosis.fitter.observations.names
+        parts.append(term.effect.when(term.coefficients, term.shape, recordings, diagnosis.setting.durations))
+    if several:
+        parts.append(f"with {several} more {'order' if several == 1 else 'orders'}")
+    return " ".join(filter(None, parts))
+
+
+def _rivals(finding: Finding, names: Sequence[str]) -> str:
+    """What it could also be."""
+    own = finding.terms[0].effect
+    rivals = list(dict.fromkeys(_noun(option.candidate.effect, own, names) for option in finding.alternatives))
+    if not rivals:
+        return ""
+    shown, more = rivals[:MOST_RIVALS], len(rivals) - MOST_RIVALS
+    return "; or " + " or ".join([*shown, f"{more} more"] if more > 0 else shown)
+
+
+def _noun(rival: Effect, own: Effect, names: Sequence[str]) -> str:
+    """A rival's name, with its place where that is another."""
+    words = rival.id.replace("_", " ")
+    return words if rival.joint == own.joint else f"{words} {rival.place(names) or 'of the whole arm'}"
+
+
+def _doubts(finding: Finding, names: Sequence[str]) -> Iterator[str]:
+    """Why it may be something else, beside its rivals."""
+    if isinstance(finding.terms[0].effect, TorqueGainError) and isinstance(finding.behind, LoadDependentFriction):
+        yield "A gear's efficiency, or load friction of another formula, may look the same"
+    elif finding.behind is not None:
+        law = finding.behind.id.replace("_", " ")
+        yield f"It is small: the formula of {' '.join(filter(None, (law, finding.behind.place(names))))} may cause it"
+    if finding.as_law < DOUBTED:
+        yield "Low confidence: unmodelled physics may be causing this"
+
+
+def _held_out(finding: Finding, names: Sequence[str], *, tentative: bool) -> str:
+    """What changes on held-out motion, at the joint that matters; empty without such motion."""
+    change = finding.held_out_change
+    doubt = "held-out motion does not confirm it" if tentative else ""
+    if change is None:
+        return doubt
+    touched = list(finding.terms[0].effect.touched(len(names)))
+    worst = max(change.losing, key=lambda joint: change.relative[joint], default=None)
+    joint = worst if worst is not None else touched[int(np.argmin(change.relative[touched]))]
+    size = f"the held-out rms of {names[joint]} changes by {change_text(change.relative[joint], change.error[joint])}"
+    return f"{doubt}: {size}" if doubt else size
+
+
+def change_text(relative: float, error: float | None) -> str:
+    """A relative change with its 95 % interval, as per cent."""
+    if error is None or not np.isfinite(error) or error <= 0.0:
+        return f"{100.0 * relative:+.1f} %"
+    value, reach = with_uncertainty(100.0 * relative, 100.0 * DEVIATIONS * error)
+    sign = "+" if relative > 0.0 else ""
+    return f"{sign}{value} ± {reach} % (95 %)"
+
+
+def state_unknown(joint: str, rms: float, unit: str) -> Statement:
+    """The statement of a mismatch without a name.
+
+    Parameters
+    ----------
+    rms : float
+        beyond the noise [Nm or N]
+    """
+    headline = f"A mismatch of {significant(rms, 2)} {unit} rms at {joint} has no known cause ({chance(1.0)})"
+    return Statement(headline, ("Look at the residual where it concentrates",))
+
+
+def _sentence(clause: str) -> str:
+    """A clause that begins with a capital."""
+    return clause[:1].upper() + clause[1:]

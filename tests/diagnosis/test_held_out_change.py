@@ -1,0 +1,66 @@
+"""The change on held-out motion against statistics of made-up errors, and what it confirms."""
+
+import numpy as np
+import pytest
+
+from tauscope.diagnosis.model.held_out_change import SHOWN, STRETCHES, HeldOutChange, sum_stretches
+
+SAMPLES = 4800
+
+
+def squares(rng: np.random.Generator, *sizes: float) -> np.ndarray:
+    return (np.array(sizes)[:, None] * rng.standard_normal((len(sizes), SAMPLES))) ** 2
+
+
+def test_the_change_is_that_of_the_rms() -> None:
+    before, after = (squares(np.random.default_rng(1), *sizes) for sizes in ((1.0, 2.0), (0.5, 2.0)))
+    change = HeldOutChange.between(sum_stretches(before), sum_stretches(after))
+    expected = np.sqrt(after.sum(axis=1) / before.sum(axis=1)) - 1.0
+    assert change.relative == pytest.approx(expected, rel=1e-12)
+
+
+def test_the_standard_error_is_the_spread_over_many_recordings() -> None:
+    rng = np.random.default_rng(2)
+    found = [
+        HeldOutChange.between(sum_stretches(squares(rng, 1.0)), sum_stretches(squares(rng, 0.7))) for _ in range(300)
+    ]
+    spread = np.std([each.relative[0] for each in found])
+    assert np.mean([each.error[0] for each in found]) == pytest.approx(spread, rel=0.1)
+
+
+def test_errors_of_neighbours_that_are_alike_count_as_few() -> None:
+    rng = np.random.default_rng(3)
+    pairs = [(squares(rng, 1.0), squares(rng, 1.0)) for _ in range(50)]
+    # a value held for 25 samples
+    held = [tuple(np.repeat(each[:, ::25], 25, axis=1) for each in pair) for pair in pairs]
+    free, tied = (
+        np.mean([HeldOutChange.between(*map(sum_stretches, pair)).error[0] for pair in kind]) for kind in (pairs, held)
+    )
+    assert tied == pytest.approx(5.0 * free, rel=0.2)
+
+
+def test_nothing_is_told_of_motion_that_is_too_short_or_of_no_error_at_all() -> None:
+    short = np.ones((1, 10))
+    assert sum_stretches(short).shape == (1, 1)
+    change = HeldOutChange.between(sum_stretches(short), sum_stretches(4.0 * short))
+    assert (change.relative[0], change.error[0], change.standard[0]) == (1.0, np.inf, 0.0)
+    still = HeldOutChange.between(np.zeros((1, STRETCHES)), np.zeros((1, STRETCHES)))
+    assert (still.relative[0], still.standard[0]) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("relative", "error", "touched", "expected"),
+    [
+        ([-0.2, 0.0], [0.01, 0.01], [0], True),
+        ([-0.2, 0.015], [0.01, 0.01], [0], True),  # within two standard errors
+        ([-0.2, 0.03], [0.01, 0.01], [0], False),
+        ([-0.2, 0.9 * SHOWN], [0.01, 1e-4], [0], True),  # no number that is shown changes
+        ([0.0, -0.2], [0.01, 0.01], [0], False),
+        ([0.1, -0.2], [0.2, 0.01], [0, 1], True),
+        ([0.1, -0.2], [0.01, 0.01], [0, 1], False),
+    ],
+)
+def test_a_joint_that_it_acts_on_gains_and_none_loses(
+    relative: list[float], error: list[float], touched: list[int], expected: bool
+) -> None:
+    assert HeldOutChange(np.array(relative), np.array(error)).confirms(touched) is expected
