@@ -18,7 +18,9 @@ def show_diagnosis(console: Console, document: DiagnosisDocument) -> None:
     console.print()
     for finding in document.findings:
         console.print(plain(f"* {finding.statement}"), soft_wrap=True)
-    if document.findings:
+    for sentence in document.wrong_values:
+        console.print(plain(f"* {sentence}"), soft_wrap=True)
+    if document.findings or document.wrong_values:
         console.print()
     console.print(table("Mismatch with the nominal model", _mismatch(document)))
     console.print(table("Residual at the recorded rate [Nm or N]", residual_table(document)))

@@ -14,7 +14,8 @@ VERDICTS = {
     "explained": "the findings bring the residual to the noise",
     "partly_explained": "the findings improve the fit, and a significant remainder stays",
     "unexplained": "a significant mismatch that nothing in the catalogue explains",
-    "inconclusive": "the parameters do not hold from one recording to the next, and nothing can be named",
+    "inconclusive": "parameters do not hold, or held-out motion is beyond training, and nothing can be named",
+    "wrong_values": "no physics is missing, but stated values are wrong",
 }
 
 HEADLINES = {
@@ -23,6 +24,7 @@ HEADLINES = {
     "partly_explained": "The findings explain part of what the model left; something remains.",
     "unexplained": "Something is missing that nothing in the catalogue explains.",
     "inconclusive": "These recordings cannot decide it.",
+    "wrong_values": "No physics is missing, but stated values are wrong.",
 }
 
 AGAINST = {
@@ -75,6 +77,7 @@ def noise_ratios(document: DiagnosisDocument) -> tuple[list[float], list[float],
 def summary_sentences(document: DiagnosisDocument) -> Iterator[str]:
     """What was compared, what it comes to, and how much better unseen motion is predicted."""
     yield f"Compared with {AGAINST[document.against]}: {VERDICTS[document.verdict]}."
+    yield from (f"{sentence}." for sentence in document.wrong_values)
     before, after, held_out = noise_ratios(document)
     if document.findings and after != before:
         most = max(range(len(before)), key=lambda place: before[place] - after[place])
