@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 
 @dataclass(frozen=True)
 class WrongQuantity:
@@ -24,7 +26,8 @@ class WrongQuantity:
     def words(self) -> str:
         """Value and stated value."""
         unit = f" {self.unit}"
-        size = f"{self.value:.3g} ± {self.std:.1g}{unit}"
+        digits = 1 - int(np.floor(np.log10(max(self.std, np.finfo(float).tiny))))
+        size = f"{round(self.value, digits):.6g} ± {self.std:.2g}{unit}"
         return f"is {size}" if self.simulation is None else f"is {size}, not {self.simulation:.3g}{unit}"
 
 
@@ -93,4 +96,4 @@ def _count(explains: int, among: int) -> str:
     """How many differences in words."""
     if explains < among:
         return f"{explains} of {among} differences"
-    return "the only difference" if among == 1 else f"all {among} differences"
+    return {1: "the only difference", 2: "both differences"}.get(among, f"all {among} differences")
