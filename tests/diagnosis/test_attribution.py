@@ -9,7 +9,7 @@ import pytest
 
 from arms import Array, panda_like, random_parameters
 from pinocchio_arm import pinocchio_model
-from tauscope.diagnosis.against.attribution import Explanation, explain_surplus
+from tauscope.diagnosis.against.attribution import Attribution, Explanation
 from tauscope.diagnosis.against.wrong_values import attribute
 from tauscope.diagnosis.findings.diagnosed import ParameterDifference
 from tauscope.dynamics import torque_regressor
@@ -22,28 +22,27 @@ STATED = random_parameters(np.random.default_rng(3), 7)
 SHIFT = np.array([0.05, 0.0, 0.02])
 SAMPLES, NOISE = 300, 0.3
 
-Body = pin.Inertia
-Change = Callable[[Body], Body]
+Change = Callable[[pin.Inertia], pin.Inertia]
 
 
-def heavier(body: Body) -> Body:
+def heavier(body: pin.Inertia) -> pin.Inertia:
     """A wrong <mass> of a URDF: centre of mass and inertia about it are right."""
     return pin.Inertia(body.mass + 0.7, body.lever, body.inertia)
 
 
-def denser(body: Body) -> Body:
+def denser(body: pin.Inertia) -> pin.Inertia:
     return pin.Inertia(1.4 * body.mass, body.lever, 1.4 * body.inertia)
 
 
-def off_centre(body: Body) -> Body:
+def off_centre(body: pin.Inertia) -> pin.Inertia:
     return pin.Inertia(body.mass, body.lever + SHIFT, body.inertia)
 
 
-def rounder(body: Body) -> Body:
+def rounder(body: pin.Inertia) -> pin.Inertia:
     return pin.Inertia(body.mass, body.lever, body.inertia + np.diag([0.1, 0.0, 0.0]))
 
 
-def loaded(body: Body) -> Body:
+def loaded(body: pin.Inertia) -> pin.Inertia:
     return body + pin.Inertia(0.7, np.array([0.1, 0.05, 0.1]), np.zeros((3, 3)))
 
 
@@ -58,16 +57,17 @@ def surplus(changes: dict[int, Change], seed: int) -> tuple[Array, Array]:
         [pin.rnea(model, data, *state) for state in zip(*states, strict=True)]
         for model, data in ((real, real.createData()), (stated, stated.createData()))
     ]
-    left = np.subtract(*torque) + NOISE * rng.standard_normal((SAMPLES, 7))
+    left = np.array(torque[0]) - np.array(torque[1]) + NOISE * rng.standard_normal((SAMPLES, 7))
     columns = torque_regressor(ARM, *states).reshape(-1, 70)[:, BASE.independent_columns]
     covariance = NOISE**2 * np.linalg.inv(columns.T @ columns)
-    return covariance @ (columns.T @ left.ravel()) / NOISE**2, covariance
+    return covariance @ (columns.T @ left.ravel()) / NOISE**2, np.asarray(covariance, dtype=np.float64)
 
 
 def explanations(changes: dict[int, Change], seed: int, links: Array | None = STATED) -> tuple[Explanation, ...]:
     model = Model(tuple(LinkInertia.from_vector(row) for row in STATED.reshape(7, 10)), None)
     prior = plausible_prior(replace(ARM, model=model), np.zeros((1, 70)), np.zeros(1)).widen(2.0)
-    return tuple(explain_surplus(BASE, *surplus(changes, seed), links, np.linalg.inv(prior.root.T @ prior.root)))
+    believed = np.asarray(np.linalg.inv(prior.root.T @ prior.root), dtype=np.float64)
+    return Attribution(BASE, *surplus(changes, seed), links, believed).explain()
 
 
 def titles(found: tuple[Explanation, ...]) -> list[set[str]]:
@@ -94,6 +94,11 @@ def test_a_right_arm_needs_none() -> None:
     assert [explanations({}, seed) for seed in range(20)] == [()] * 20
 
 
+def test_where_all_bodies_are_wrong_each_is_one_number() -> None:
+    found = explanations(dict.fromkeys(range(1, 8), denser), 1)
+    assert {each.change.title for each in found} == {f"mass of link {link}" for link in range(1, 8)}
+
+
 def test_two_wrong_bodies_are_two_explanations() -> None:
     found = explanations({3: denser, 6: off_centre}, 1)
     assert {each.change.title for each in found} == {"mass of link 3", "centre of mass of link 6"}
@@ -103,7 +108,7 @@ def differences(real: Array, covariance: Array) -> list[ParameterDifference]:
     stated = BASE.project(STATED)
     std = np.sqrt(np.diag(covariance))
     rows = zip(BASE.expressions, stated, stated + real, std, strict=True)
-    found = [ParameterDifference(name, *map(float, values)) for name, *values in rows]
+    found = [ParameterDifference(name, float(given), float(own), float(error)) for name, given, own, error in rows]
     return [each for each in found if abs(each.in_std) > 4.0]
 
 

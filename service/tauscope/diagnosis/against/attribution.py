@@ -2,22 +2,24 @@
 
 With d the surplus of the base parameters, C its covariance and x_g(β_g) the changes of some links' standard parameters,
 
-    d = B Σ_g x_g(β_g) + e,   e ~ N(0, C),   β_g ~ N(0, V_g),
+    d = B Σ_g x_g(β_g) + e,   e ~ N(0, s² C),   β_g ~ N(0, s² V_g),   s ≥ 1,
 
 B the base parameters of each standard one. A set of changes is as good as the probability of d under it, β integrated
 out: every number that may change costs what it could have been otherwise, so that one mass is preferred to ten moments
-(MacKay 1992). One is added, exchanged or left out until nothing helps.
+(MacKay 1992). The most probable s is what a model that is wrong elsewhere adds to the errors. A change is added,
+exchanged or left out until nothing helps.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import linalg, optimize
+from scipy import linalg, optimize, stats
 
 from tauscope.diagnosis.against.link_changes import MASS, MOMENTS, LinkChange, link_changes
 from tauscope.dynamics.base_parameters import BaseParameters
+from tauscope.effects.carried_body import FARTHEST_M
 from tauscope.recording.recording import Array
 
 AS_GOOD = 3.0
@@ -25,6 +27,12 @@ AS_GOOD = 3.0
 
 PROGRESS = 1e-3
 """Gain in log probability from which an exchange is one."""
+
+UNLIKELY = 1e-3
+"""Chance of what is left, below which more may be wrong than steps of one change find."""
+
+MOST_OF_IT = 0.7
+"""Part of what makes the surplus significant that a body at the tool takes at least."""
 
 MOST_MOVES = 100
 """Additions and exchanges, at most."""
@@ -97,13 +105,24 @@ class _Set:
         return linalg.solve_triangular(self.factor, left, lower=True)
 
     @cached_property
+    def inflation(self) -> float:
+        """s²: what is left over what C leads to expect, at least 1."""
+        return max(float(self.rest @ self.rest) / len(self.rest), 1.0)
+
+    @cached_property
     def evidence(self) -> float:
         """Log probability of the surplus, but for a constant."""
-        return -0.5 * float(self.rest @ self.rest) - float(np.log(np.diag(self.factor)).sum())
+        known = -float(np.log(np.diag(self.factor)).sum()) - 0.5 * len(self.rest) * np.log(self.inflation)
+        return known - 0.5 * float(self.rest @ self.rest) / self.inflation
 
     def without(self, place: int) -> "_Set":
         """The same less one change."""
         return _Set(self.problem, (*self.parts[:place], *self.parts[place + 1 :]))
+
+    @property
+    def is_possible(self) -> bool:
+        """Whether no link is told a mass that is not positive."""
+        return all(part.change.is_possible(part.values) for part in self.parts)
 
     def with_change(self, change: LinkChange) -> "_Set":
         """The same with one more change at its most probable values."""
@@ -112,16 +131,31 @@ class _Set:
     def _fit(self, change: LinkChange) -> _Part:
         """A change at its most probable values beside the others."""
         seen = linalg.solve_triangular(self.factor, self.problem.columns[change.link], lower=True)
-        values = _most_probable(change, seen, self.rest)
-        columns = self.problem.columns[change.link]
-        return _Part(change, values, columns @ change.change(values), columns @ change.slope(values))
+        return self.problem.part(change, _most_probable(change, seen, self.rest))
 
     def settle(self) -> "_Set":
-        """Every change fitted anew beside the others: values that are not linear move with them."""
-        found = self
-        for _ in range(len(self.parts) - 1):
-            found = found.without(0).with_change(found.parts[0].change)
-        return found
+        """The same at the most probable values of all changes together."""
+        changes = [part.change for part in self.parts]
+        if all(change.is_linear for change in changes) or len(changes) < 2:
+            return self
+        ends = np.cumsum([len(change.spread) for change in changes])[:-1]
+        spread = np.concatenate([change.spread for change in changes])
+        columns = [self.problem.columns[change.link] for change in changes]
+
+        def left(values: Array) -> Array:
+            pairs = zip(columns, changes, np.split(values, ends), strict=True)
+            explained = sum(own @ change.change(each) for own, change, each in pairs)
+            return np.concatenate([self.problem.target - explained, values / spread])
+
+        def slope(values: Array) -> Array:
+            pairs = zip(columns, changes, np.split(values, ends), strict=True)
+            slopes = np.concatenate([-own @ change.slope(each) for own, change, each in pairs], axis=1)
+            return np.concatenate([slopes, np.diag(1.0 / spread)])
+
+        start = np.concatenate([part.values for part in self.parts])
+        found = optimize.least_squares(left, start, slope, method="lm", x_scale=spread).x
+        pairs = zip(changes, np.split(found, ends), strict=True)
+        return _Set(self.problem, tuple(self.problem.part(change, values) for change, values in pairs))
 
 
 class Attribution:
@@ -133,8 +167,8 @@ class Attribution:
         of the arm
     surplus : (m,) float64
         real less stated base parameters
-    whitener : (r, m) float64
-        W with Wᵀ W the inverse covariance of the surplus where that says anything
+    covariance : (m, m) float64
+        C
     links : (10 n,) float64 or None
         stated standard parameters; None where only their base parameters are known
     believed : (10 n, 10 n) float64
@@ -142,9 +176,9 @@ class Attribution:
     """
 
     def __init__(
-        self, base: BaseParameters, surplus: Array, whitener: Array, links: Array | None, believed: Array
+        self, base: BaseParameters, surplus: Array, covariance: Array, links: Array | None, believed: Array
     ) -> None:
-        count = len(believed) // 10
+        count, whitener = len(believed) // 10, _whitener(covariance)
         self.target = whitener @ surplus
         self.base_columns = [_columns_of(base, link, count) for link in range(count)]
         self.columns = [whitener @ columns for columns in self.base_columns]
@@ -155,42 +189,106 @@ class Attribution:
             found = link_changes(link, stated, believed[own, own])
             self.changes += [each for each in found if np.any(columns @ each.slope(each.spread))]
 
-    def explain(self) -> tuple[Explanation, ...]:
-        """The most probable set of changes, the one that explains most first."""
-        found = _Set(self, ())
-        for _ in range(MOST_MOVES):
-            better = self._best(self._additions(found)) or self._best(self._exchanges(found))
-            if better is None:
-                break
-            found = better.settle()
+    def payload(self) -> LinkChange | None:
+        """A body at the tool that accounts for most of the surplus, where no change of few numbers is as probable."""
+        none, last = _Set(self, ()), len(self.columns) - 1
+        for change in self.changes:
+            if not change.is_point_mass or change.link != last:
+                continue
+            alone = none.with_change(change)
+            (mass, *place), energy = alone.parts[0].values, float(self.target @ self.target)
+            left = float(np.sum((self.target - alone.parts[0].effect) ** 2))
+            if mass <= 0.0 or np.linalg.norm(place) > FARTHEST_M or self._log_odds(alone) <= self._log_odds(none):
+                return None
+            simpler = (each for each in self.changes if len(each.quantities) < len(change.quantities))
+            most = energy - left >= MOST_OF_IT * (energy - len(self.target))
+            return (
+                change if most and all(none.with_change(each).evidence < alone.evidence for each in simpler) else None
+            )
+        return None
+
+    def explain(self, first: LinkChange | None = None) -> tuple[Explanation, ...]:
+        """The most probable set of changes, the one that explains most first.
+
+        Parameters
+        ----------
+        first : LinkChange or None
+            a change that is one of them in any case, and the first
+        """
+        start = _Set(self, ())
+        start = start if first is None else start.with_change(first)
+        kept = len(start.parts)
+        found = self._search(start, kept)
+        if stats.chi2.sf(float(found.rest @ found.rest), len(self.target)) < UNLIKELY:
+            for change in self.changes:
+                start = start.with_change(change) if change.is_whole else start
+            found = max(found, self._simplify(start.settle(), kept), key=self._log_odds)
         explained = [self._explanation(found, place) for place in range(len(found.parts))]
-        return tuple(sorted(explained, key=lambda each: -each.gain))
+        return (*explained[:kept], *sorted(explained[kept:], key=lambda each: -each.gain))
 
     @property
     def _cost(self) -> float:
         """Log odds before the data against any one change: one of them is there, whichever."""
         return float(np.log(max(len(self.changes), 1)))
 
-    def _additions(self, at: _Set) -> Iterator[tuple[float, _Set]]:
-        """One change more, with its gain in log posterior odds."""
-        for change in self.changes:
-            more = at.with_change(change)
-            yield more.evidence - at.evidence - self._cost, more
+    def _simplify(self, found: _Set, kept: int) -> _Set:
+        """The same with fewer numbers a link, from the tip inwards: an inner link takes what outer ones leave."""
+        for drop in (False, True):  # a link left out too early leaves its share to the others
+            before = -np.inf
+            while self._log_odds(found) > before:
+                before = self._log_odds(found)
+                for link in sorted({part.change.link for part in found.parts[kept:]}, reverse=True):
+                    found = self._better(found, self._simpler(found, link, kept, drop=drop)) or found
+        return found
 
-    def _exchanges(self, at: _Set) -> Iterator[tuple[float, _Set]]:
-        """One change less, or another in its place."""
-        for place in range(len(at.parts)):
+    def _simpler(self, found: _Set, link: int, kept: int, *, drop: bool) -> Iterator[_Set]:
+        """Another change of the same link, or none."""
+        place = next(place for place, part in enumerate(found.parts) if part.change.link == link and place >= kept)
+        fewer = found.without(place)
+        if drop:
+            yield fewer
+        yield from (fewer.with_change(change) for change in self.changes if change.link == link)
+
+    def _search(self, found: _Set, kept: int) -> _Set:
+        """The most probable set that steps of one change lead to; the first ones stay."""
+        for _ in range(MOST_MOVES):
+            better = self._better(found, self._additions(found)) or self._better(found, self._exchanges(found, kept))
+            if better is None:
+                break
+            found = better
+        return found
+
+    def part(self, change: LinkChange, values: Array) -> _Part:
+        """A change at its values.
+
+        Parameters
+        ----------
+        values : (k,) float64
+            β
+        """
+        columns = self.columns[change.link]
+        return _Part(change, values, columns @ change.change(values), columns @ change.slope(values))
+
+    def _log_odds(self, found: _Set) -> float:
+        return found.evidence - self._cost * len(found.parts)
+
+    def _additions(self, at: _Set) -> Iterator[_Set]:
+        """One change more."""
+        return (at.with_change(change) for change in self.changes)
+
+    def _exchanges(self, at: _Set, kept: int) -> Iterator[_Set]:
+        """One change less, or another in its place, but for the first ones."""
+        for place in range(kept, len(at.parts)):
             fewer = at.without(place)
-            yield fewer.evidence - at.evidence + self._cost, fewer
-            for change in self.changes:
-                other = fewer.with_change(change)
-                yield other.evidence - at.evidence, other
+            yield fewer
+            yield from self._additions(fewer)
 
-    @staticmethod
-    def _best(moves: Iterator[tuple[float, _Set]]) -> _Set | None:
-        """The best move, None where none makes the set more probable."""
-        gain, found = max(moves, key=lambda each: each[0], default=(0.0, None))
-        return found if gain > PROGRESS else None
+    def _better(self, at: _Set, moves: Iterator[_Set]) -> _Set | None:
+        """The first of the best moves that makes the set more probable also when all its values are fitted."""
+        least = self._log_odds(at) + PROGRESS
+        likely = sorted(moves, key=lambda each: -self._log_odds(each))
+        settled = (each.settle() for each in likely if self._log_odds(each) > least)
+        return next((each for each in settled if each.is_possible and self._log_odds(each) > least), None)
 
     def _explanation(self, found: _Set, place: int) -> Explanation:
         """One change of a set with its uncertainty beside the others and its equivalents."""
@@ -202,7 +300,7 @@ class Attribution:
         return Explanation(
             change=part.change,
             values=part.values,
-            covariance=np.asarray(np.linalg.inv(information), dtype=np.float64),
+            covariance=np.asarray(np.linalg.inv(information), dtype=np.float64) * found.inflation,
             effect=self.base_columns[part.change.link] @ part.change.change(part.values),
             gain=float(fewer.rest @ fewer.rest - np.sum((fewer.rest - own) ** 2)),
             log_odds=found.evidence - fewer.evidence - self._cost,
@@ -251,33 +349,8 @@ def _ridge(columns: Array, spread: Array, target: Array) -> Array:
     return spread * np.linalg.solve(scaled.T @ scaled + np.eye(len(spread)), scaled.T @ target)
 
 
-def explain_surplus(
-    base: BaseParameters, surplus: Array, covariance: Array, links: Array | None, believed: Array
-) -> Sequence[Explanation]:
-    """The fewest changes of links that explain a surplus of base parameters, the largest first.
-
-    Parameters
-    ----------
-    surplus : (m,) float64
-        real less stated
-    covariance : (m, m) float64
-        of that
-    links : (10 n,) float64 or None
-        stated standard parameters; None where only their base parameters are known
-    believed : (10 n, 10 n) float64
-        covariance believed of them
-    """
-    return Attribution(base, surplus, whitener(covariance), links, believed).explain()
-
-
-def whitener(covariance: Array) -> Array:
-    """W with Wᵀ W = C⁻¹ where C says anything, (r, m).
-
-    Parameters
-    ----------
-    covariance : (m, m) float64
-        C
-    """
+def _whitener(covariance: Array) -> Array:
+    """W with Wᵀ W = C⁻¹ where C says anything, (r, m)."""
     scale = np.sqrt(np.maximum(np.diag(covariance), np.finfo(float).tiny))
     values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
     known = values > 1e-12 * values[-1]

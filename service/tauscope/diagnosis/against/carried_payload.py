@@ -1,6 +1,5 @@
 """A point mass at the tool, found in the links' surplus over a given model, as a finding."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,23 +10,6 @@ from tauscope.diagnosis.findings.finding import Finding, sizes
 from tauscope.diagnosis.model.term import Term
 from tauscope.effects.carried_body import FARTHEST_M
 from tauscope.effects.payload import Payload
-
-
-def payload_among(explanations: Sequence[Explanation], last_link: int) -> Explanation | None:
-    """The explanation that is a body at the tool, where it explains most.
-
-    Parameters
-    ----------
-    explanations : sequence of Explanation
-        the largest first
-    last_link : int
-        index, from 0
-    """
-    first = next(iter(explanations), None)
-    if first is None or not first.change.is_point_mass or first.change.link != last_link:
-        return None
-    within = bool(np.linalg.norm(first.values[1:]) < FARTHEST_M)
-    return first if within and first.values[0] > 0.0 else None
 
 
 def payload_finding(diagnosis: Diagnosis, carried: Explanation) -> Finding:

@@ -11,9 +11,10 @@ from typing import Literal
 
 import numpy as np
 from scipy import stats
+from threadpoolctl import ThreadpoolController
 
-from tauscope.diagnosis.against.attribution import Explanation, explain_surplus
-from tauscope.diagnosis.against.carried_payload import payload_among, payload_finding
+from tauscope.diagnosis.against.attribution import Attribution, Explanation
+from tauscope.diagnosis.against.carried_payload import payload_finding
 from tauscope.diagnosis.against.link_changes import stated_links
 from tauscope.diagnosis.against.simulated import fit_to_simulation
 from tauscope.diagnosis.against.wrong_values import attribute
@@ -136,6 +137,7 @@ def _stated(diagnosis: Diagnosis) -> Given:
     return Given(values, tuple(lacking), links=standard)
 
 
+@ThreadpoolController().wrap(limits=1, user_api="blas")  # many small factors: threads cost more than they bring
 def compared(diagnosis: Diagnosis, given: Given, kind: Literal["model", "simulation"]) -> Diagnosis:
     """Findings that the given model makes, then what it has wrong beside them."""
     plain = replace(diagnosis, findings=tuple(finding for finding in diagnosis.findings if finding.in_model))
@@ -149,11 +151,12 @@ def compared(diagnosis: Diagnosis, given: Given, kind: Literal["model", "simulat
     count, several = structure.base_count, _several(len(given.values))
     explanations: list[Explanation] = []
     if all(name in given.values for name in names[:count]):
-        explanations = _explain_links(found, given, real[:count], covariance[:count, :count])
-        carried = payload_among(explanations, diagnosis.robot.joint_count - 1)
+        attribution = _attribution(found, given, real[:count], covariance[:count, :count])
+        carried = attribution.payload()
+        explanations = list(attribution.explain(carried))
         if carried is not None:
-            found, real[:count] = found.with_findings([payload_finding(found, carried)]), real[:count] - carried.effect
-            explanations.remove(carried)
+            payload = explanations.pop(0)
+            found, real[:count] = found.with_findings([payload_finding(found, payload)]), real[:count] - payload.effect
     missing = {f"{term} {diagnosis.robot.joints[joint].name}" for joint, term in given.lacking}
     differences = [
         ParameterDifference(name, given.values[name], float(value), float(error))
@@ -165,14 +168,14 @@ def compared(diagnosis: Diagnosis, given: Given, kind: Literal["model", "simulat
     return replace(found, against=kind, differences=wrong, before=_given_sizes(found, given))
 
 
-def _explain_links(diagnosis: Diagnosis, given: Given, real: Array, covariance: Array) -> list[Explanation]:
-    """The wrong numbers of links, the one that explains most first."""
+def _attribution(diagnosis: Diagnosis, given: Given, real: Array, covariance: Array) -> Attribution:
+    """The surplus of the base parameters, to be explained by links."""
     base, joints = diagnosis.selection.fit.model.structure.base, diagnosis.robot.joint_count
     stated = np.array([given.values[name] for name in base.expressions])
     same = np.diag((NEGLIGIBLE * np.maximum(np.abs(real), np.abs(stated))) ** 2)
     prior = diagnosis.identification.posterior.prior.root[: 10 * joints, : 10 * joints]
     believed = np.asarray(np.linalg.inv(prior.T @ prior), dtype=np.float64)
-    return list(explain_surplus(base, real - stated, covariance + same, given.links, believed))
+    return Attribution(base, real - stated, covariance + same, given.links, believed)
 
 
 def _several(count: int) -> float:

@@ -6,7 +6,7 @@ first moments, all moments of inertia; a point mass at any place of the link; or
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -48,6 +48,8 @@ class LinkChange:
         x, the change (10,) of the standard parameters, from β (k,)
     is_linear : bool
         whether x is linear in β
+    stated_mass : float or None
+        mass of the link before the change [kg]; None where it is not known
     """
 
     link: int
@@ -56,6 +58,22 @@ class LinkChange:
     change: Callable[[Array], Array]
     is_linear: bool = True
     is_point_mass: bool = False
+    stated_mass: float | None = None
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether all ten numbers may be wrong."""
+        return self.quantities == QUANTITIES
+
+    def is_possible(self, values: Array) -> bool:
+        """Whether the link keeps a positive mass; ten free numbers do not all mean what they say.
+
+        Parameters
+        ----------
+        values : (k,) float64
+            β
+        """
+        return self.is_whole or self.stated_mass is None or self.stated_mass + self.change(values)[MASS] >= 0.0
 
     def slope(self, values: Array) -> Array:
         """∂x/∂β, (10, k), exact for polynomials of second degree.
@@ -88,6 +106,12 @@ def link_changes(link: int, stated: Array | None, spread: Array) -> Iterator[Lin
     spread : (10, 10) float64
         covariance believed of the link's standard parameters
     """
+    mass = None if stated is None else float(stated[MASS])
+    return (replace(each, stated_mass=mass) for each in _changes(link, stated, spread))
+
+
+def _changes(link: int, stated: Array | None, spread: Array) -> Iterator[LinkChange]:
+    """The same without the stated mass."""
     std = np.sqrt(np.diag(spread))
     unit = np.eye(SIZE)
     for place, name in enumerate(QUANTITIES):
