@@ -1,8 +1,10 @@
 """A model without missing physics but with wrong numbers: which links and joints have them."""
 
+import tempfile
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,9 +12,10 @@ import pytest
 from diagnosis.diagnosed_arm import recordings
 from diagnosis.loaded_arm import carrying
 from identification.simulated import Array, paper_robot, simulate
+from robot.robot_texts import write_robot
 from tauscope.diagnosis import Diagnosis, DiagnosisDocument, against_model, against_simulation, diagnose, document
 from tauscope.identification import Options
-from tauscope.robot import FrictionCoefficients, LinkInertia, Robot
+from tauscope.robot import FrictionCoefficients, LinkInertia, Robot, read_robot
 
 SEEDS = (1, 2, 3)
 
@@ -158,3 +161,77 @@ def test_a_body_at_the_tool_is_a_payload_and_no_wrong_value() -> None:
     light = compared(carrying(paper_robot(), 0.3, place))
     assert light.verdict == "wrong_values"
     assert {where for where, _ in causes(light)} == {3}
+
+
+URDF = """\
+<robot name="three-joint-arm">
+  <link name="base"/>
+  <link name="shoulder"><inertial>
+    <origin xyz="0 0 0.05"/><mass value="4.0"/>
+    <inertia ixx="0.02" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.03"/>
+  </inertial></link>
+  <link name="upper"><inertial>
+    <origin xyz="0.2 0.02 0.01"/><mass value="3.0"/>
+    <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.06" iyz="0" izz="0.06"/>
+  </inertial></link>
+  <link name="lower"><inertial>
+    <origin xyz="0.15 0 0.03"/><mass value="1.9"/>
+    <inertia ixx="0.006" ixy="0" ixz="0" iyy="0.03" iyz="0" izz="0.03"/>
+  </inertial></link>
+  <joint name="pan" type="revolute">
+    <parent link="base"/><child link="shoulder"/><axis xyz="0 0 1"/>
+    <limit lower="-2.5" upper="2.5" velocity="2" effort="60"/><dynamics damping="0.6" friction="1.5"/>
+  </joint>
+  <joint name="lift" type="revolute">
+    <origin xyz="0 0 0.2"/><parent link="shoulder"/><child link="upper"/><axis xyz="0 1 0"/>
+    <limit lower="-2.5" upper="2.5" velocity="2" effort="60"/><dynamics damping="0.5" friction="1.2"/>
+  </joint>
+  <joint name="elbow" type="revolute">
+    <origin xyz="0.4 0 0"/><parent link="upper"/><child link="lower"/><axis xyz="0 1 0"/>
+    <limit lower="-2.5" upper="2.5" velocity="2" effort="30"/><dynamics damping="0.3" friction="0.8"/>
+  </joint>
+</robot>
+"""
+
+
+@cache
+def arm_of_urdf() -> Diagnosis:
+    """An arm that lacks nothing but what the robot file's URDF gets wrong."""
+    robot = robot_of(URDF)
+    rng = np.random.default_rng(4)
+    made = [simulate(robot, seed=seed, periods=2) for seed in SEEDS[:2]]
+    noise = np.array([0.2, 0.2, 0.1])
+    return diagnose(robot, [arm.recording(arm.white(noise, rng), arm.white(2e-5, rng)) for arm in made])
+
+
+def robot_of(urdf: str) -> Robot:
+    with tempfile.TemporaryDirectory() as folder:
+        text = "name: arm\nkinematics:\n  urdf: {file: arm.urdf, base: base, tip: lower}\njoints:\n"
+        limits = "limits: {acceleration: 5.0}, friction_shape: {k_v: 500}"
+        text += "".join(f"  - {{name: {name}, {limits}}}\n" for name in ("pan", "lift", "elbow"))
+        return read_robot(write_robot(Path(folder), text, urdf))
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "place", "quantities"),
+    [
+        ('<mass value="1.9"/>', '<mass value="1.2"/>', 3, {"mass"}),
+        ('<mass value="3.0"/>', '<mass value="3.6"/>', 2, {"mass"}),
+        ("0.15 0 0.03", "0.10 0 0.03", 3, {"centre_of_mass_x"}),
+        ('damping="0.5"', 'damping="0.1"', "lift", {"viscous"}),
+    ],
+)
+def test_a_wrong_number_of_a_urdf_is_named(right: str, wrong: str, place: int | str, quantities: set[str]) -> None:
+    found = arm_of_urdf()
+    robot = robot_of(URDF.replace(right, wrong))
+    told = document(against_model(replace(found, identification=replace(found.identification, robot=robot))))
+    assert told.verdict == "wrong_values"
+    assert causes(told) == {(place, quantity) for quantity in quantities}
+
+
+def test_a_zero_damping_of_a_urdf_is_a_finding() -> None:
+    found = arm_of_urdf()
+    robot = robot_of(URDF.replace('damping="0.5"', 'damping="0"'))
+    told = document(against_model(replace(found, identification=replace(found.identification, robot=robot))))
+    assert told.verdict == "explained"
+    assert {(each.effect, each.joint) for each in told.findings} == {("viscous_friction", "lift")}

@@ -59,7 +59,8 @@ def attribute(
         effects = [float(each.effect[place]) for each in explanations]
         whole = abs(size - sum(effects)) <= max(several * difference.std, NOTABLE * abs(size))
         pairs = zip(values, effects, strict=True)
-        causes.append([value for value, effect in pairs if whole and abs(effect) > NOTABLE * abs(size)])
+        notable = [value for value, effect in pairs if abs(effect) > NOTABLE * abs(size)]
+        causes.append([value for value in notable if whole and value.quantities])
     counts = {id(value): sum(value in own for own in causes) for value in values}
     told = {
         id(each): replace(each, explains=counts.get(id(each), 1), among=len(differences))
@@ -81,19 +82,20 @@ def _of_joint(difference: ParameterDifference, joints: Sequence[Joint]) -> list[
     kind = joints[own[0]].type
     unit = JOINT_UNITS[kind].get(term, "Nm" if kind is JointType.REVOLUTE else "N")
     quantity = WrongQuantity(term, difference.simulation, difference.real, difference.std, unit)
-    return [WrongValue(None, own[0], (quantity,))]
+    return [WrongValue(None, own[0], (quantity,))] if quantity.is_possible else []
 
 
 def _of_link(explained: Explanation, stated: Array | None) -> WrongValue:
-    """The quantities of one link that differ clearly, at least one."""
+    """The quantities of one link that differ clearly, or else the clearest; none where no body has it."""
     change = explained.change
     quantities = _quantities(explained, np.zeros(SIZE) if stated is None else stated)
     if stated is None:
         quantities = [replace(each, name=f"added_{each.name}", simulation=None) for each in quantities]
     clearness = [abs(each.value - (each.simulation or 0.0)) / each.std for each in quantities]
     clear = [each for each, size in zip(quantities, clearness, strict=True) if size > CLEAR]
+    clear = clear or [quantities[int(np.argmax(clearness))]]
     titles = tuple(each.title for each in explained.equivalent)
-    return WrongValue(change.link, None, tuple(clear or [quantities[int(np.argmax(clearness))]]), equivalent=titles)
+    return WrongValue(change.link, None, tuple(each for each in clear if each.is_possible), equivalent=titles)
 
 
 def _quantities(explained: Explanation, stated: Array) -> list[WrongQuantity]:

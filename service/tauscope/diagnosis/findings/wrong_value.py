@@ -5,6 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+NEVER_NEGATIVE = frozenset({"mass", "inertia_xx", "inertia_yy", "inertia_zz", "stiction", "viscous"})
+"""Quantities that no body and no friction has below zero; what is printed is possible."""
+
 
 @dataclass(frozen=True)
 class WrongQuantity:
@@ -21,6 +24,11 @@ class WrongQuantity:
     value: float
     std: float
     unit: str
+
+    @property
+    def is_possible(self) -> bool:
+        """Whether a body or a joint can have the value."""
+        return self.value >= 0.0 or self.name not in NEVER_NEGATIVE
 
     @property
     def words(self) -> str:
