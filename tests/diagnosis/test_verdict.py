@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from tauscope.diagnosis.findings.detectability import detectable, needed_strength
-from tauscope.diagnosis.findings.verdict import Evidence, Verdict, verdict
+from tauscope.diagnosis.findings.verdict import OPEN, Evidence, Verdict, verdict
 from tauscope.diagnosis.screening.screen import Candidate
 from tauscope.effects.joint_spring import JointSpring
 
@@ -59,3 +59,37 @@ def test_a_model_that_predicts_nothing_is_not_consistent() -> None:
     """However little it leaves of slow training motion, and however well its parameters hold there."""
     quiet = Evidence(0, misfit_before=False, misfit_after=False, parameters_hold=True, predicts=False)
     assert verdict(quiet) is Verdict.INCONCLUSIVE
+
+
+@pytest.mark.parametrize(
+    ("evidence", "expected"),
+    [
+        (Evidence(0, True, True, True, predicts=False, extrapolates=True), Verdict.INCONCLUSIVE),
+        (Evidence(0, True, True, True, predicts=True, extrapolates=True), Verdict.UNEXPLAINED),
+        (Evidence(0, True, True, True, predicts=False), Verdict.UNEXPLAINED),
+        (Evidence(0, False, False, True, predicts=True, extrapolates=True), Verdict.CONSISTENT),
+        (Evidence(1, True, False, True, predicts=False, extrapolates=True), Verdict.EXPLAINED),
+    ],
+)
+def test_motion_beyond_training_decides_only_what_is_badly_predicted_and_has_no_name(
+    evidence: Evidence, expected: Verdict
+) -> None:
+    assert verdict(evidence) is expected
+
+
+@pytest.mark.parametrize(
+    ("evidence", "expected"),
+    [
+        (Evidence(0, False, False, True, wrong_values=True), Verdict.WRONG_VALUES),
+        (Evidence(1, True, False, True, wrong_values=True), Verdict.EXPLAINED),
+        (Evidence(0, True, True, True, wrong_values=True), Verdict.UNEXPLAINED),
+        (Evidence(0, False, False, False, wrong_values=True), Verdict.INCONCLUSIVE),
+    ],
+)
+def test_wrong_values_are_the_verdict_where_no_physics_is_missing(evidence: Evidence, expected: Verdict) -> None:
+    assert verdict(evidence) is expected
+
+
+def test_a_verdict_that_leaves_something_open_asks_for_another_motion() -> None:
+    closed = {Verdict.CONSISTENT, Verdict.EXPLAINED, Verdict.WRONG_VALUES}
+    assert set(Verdict) - closed == OPEN

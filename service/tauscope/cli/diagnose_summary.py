@@ -26,6 +26,10 @@ def show_diagnosis(console: Console, document: DiagnosisDocument) -> None:
     if document.tentative:
         console.print(plain("Tentative: held-out motion does not confirm these"), soft_wrap=True)
         _show_findings(console, document.tentative)
+    for sentence in document.wrong_values:
+        console.print(plain(f"* {sentence}"), soft_wrap=True)
+    if document.wrong_values:
+        console.print()
     console.print(table("Mismatch with the nominal model", _mismatch(document)))
     console.print(table("Residual at the recorded rate [Nm or N]", residual_table(document)))
     if document.headroom is not None:

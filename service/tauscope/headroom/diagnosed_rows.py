@@ -18,7 +18,9 @@ def motion_rows(diagnosis: Diagnosis) -> tuple[list[MotionRows], list[MotionRows
 
 
 def leaves_open(diagnosis: Diagnosis) -> list[bool]:
-    """Per joint, whether the verdict says that more than noise is left there."""
+    """Per joint, whether the verdict says that more than noise is left there; all where it decides nothing."""
+    if diagnosis.verdict is Verdict.INCONCLUSIVE:
+        return [True] * diagnosis.robot.joint_count
     told = diagnosis.verdict in (Verdict.PARTLY_EXPLAINED, Verdict.UNEXPLAINED)
     left = diagnosis.mismatched if diagnosis.verdict is Verdict.UNEXPLAINED else diagnosis.misfit_after.significant
     return [told and own for own in left]

@@ -82,6 +82,8 @@ class Identification:
         residual at the recorded rate that noise and covariance lead to expect [Nm or N]
     extrapolation : (n,) float64 or None
         share of the held-out torque's rms that training leaves uncertain
+    uncertainty_growth : (n,) float64 or None
+        uncertain torque of held-out motion over that of training
     """
 
     robot: Robot
@@ -107,6 +109,7 @@ class Identification:
     excitation: Excitation
     held_out_excitation: Excitation | None
     extrapolation: Array | None
+    uncertainty_growth: Array | None
     cutoff_hz: float | None
     options: Options
     recording_warnings: tuple[ResultWarning, ...]
@@ -189,13 +192,15 @@ def identify(
 
     progress("evaluate held-out recordings")
     held_conditioners = [Conditioner.survey(recording, robot) for recording in held_out]
-    held = predicted = beyond = held_excitation = None
+    predicted_train, known = predict(motions)
+    held = predicted = beyond = growth = held_excitation = None
     if held_out:
         unseen = Dataset(held_conditioners, robot, base, cutoff, motions.rest_variance)
         held = evaluate(unseen, structure, [parameters])[0].fit
         predicted, uncertain = predict(unseen)
         held_excitation = measure_excitation(unseen)
         beyond = uncertain / np.maximum(held.torque_rms, np.finfo(float).tiny)
+        growth = uncertain / np.maximum(known, np.finfo(float).tiny)
     return Identification(
         robot=robot,
         structure=structure,
@@ -214,12 +219,13 @@ def identify(
         residuals=residuals,
         free_fit=found.free.fit,
         price_of_bodies=residuals.fit.band_rms / np.maximum(found.free.fit.band_rms, np.finfo(float).tiny),
-        predicted_train=predict(motions)[0],
+        predicted_train=predicted_train,
         held_out=held,
         predicted_held_out=predicted,
         excitation=measure_excitation(motions),
         held_out_excitation=held_excitation,
         extrapolation=beyond,
+        uncertainty_growth=growth,
         cutoff_hz=cutoff,
         options=options,
         recording_warnings=tuple(warning for each in (*recordings, *held_out) for warning in each.warnings),

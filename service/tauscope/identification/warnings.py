@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from tauscope.identification.consistency import far_reaching
+from tauscope.identification.excitation import Excitation
 from tauscope.identification.identification import Identification
 from tauscope.identification.posterior import DETERMINED
 from tauscope.recording.conditioning import ConditioningSummary
@@ -14,10 +15,10 @@ FEWEST_REVERSALS = 2
 """A joint turns round at least so often where friction is to be told from a constant torque."""
 
 UNSEEN = 0.1
-"""Share of a joint's held-out torque that training leaves uncertain, above which held-out motion extrapolates."""
+"""Share of a joint's held-out torque above which it matters that training leaves it uncertain."""
 
 BEYOND = 1.25
-"""Times the top speed of training at which held-out motion is another motion."""
+"""Times the top speed, the range or the uncertain torque of training at which held-out motion is another motion."""
 
 FAR_OFF = 3.0
 """Factor between recorded and stated weight beyond which a unit is wrong rather than a mass."""
@@ -37,8 +38,8 @@ def identification_warnings(result: Identification) -> list[ResultWarning]:
         *robot_warnings(result.robot),
         *result.recording_warnings,
         *_bodies(result),
-        *_excitation(result),
-        *_extrapolation(result),
+        *excitation_warnings(result),
+        *extrapolation_warnings(result),
         *_samples((*result.conditioning, *result.held_out_conditioning)),
     ]
 
@@ -122,7 +123,7 @@ def _bodies(result: Identification) -> Iterator[ResultWarning]:
         )
 
 
-def _excitation(result: Identification) -> Iterator[ResultWarning]:
+def excitation_warnings(result: Identification) -> Iterator[ResultWarning]:
     """Joints of which the recordings leave something open."""
     for joint, each in enumerate(result.robot.joints):
         weak = weak_points(result, joint)
@@ -135,23 +136,41 @@ def _excitation(result: Identification) -> Iterator[ResultWarning]:
             )
 
 
-def _extrapolation(result: Identification) -> Iterator[ResultWarning]:
-    """Held-out motion beyond what training excites."""
-    if result.held_out_excitation is None or result.extrapolation is None:
-        return
+def extrapolations(result: Identification) -> dict[int, str]:
+    """Joints whose held-out motion is beyond what training excites, and how, by joint index from 0."""
+    if result.held_out_excitation is None or result.extrapolation is None or result.uncertainty_growth is None:
+        return {}
     own, other = result.excitation, result.held_out_excitation
+    found = {}
     for joint, each in enumerate(result.robot.joints):
+        unit = "m" if each.type is JointType.PRISMATIC else "rad"
+        reasons = []
         if other.speed[joint] > BEYOND * own.speed[joint]:
-            unit = "m/s" if each.type is JointType.PRISMATIC else "rad/s"
-            reason = f"it moves at up to {other.speed[joint]:.3g} {unit}, in training at {own.speed[joint]:.3g}"
-        elif result.extrapolation[joint] > UNSEEN:
-            reason = f"training leaves {100 * result.extrapolation[joint]:.2g} % of its torque uncertain"
-        else:
-            continue
+            reasons.append(
+                f"it moves at up to {other.speed[joint]:.3g} {unit}/s, in training at {own.speed[joint]:.3g}"
+            )
+        if other.highest[joint] - other.lowest[joint] > BEYOND * (own.highest[joint] - own.lowest[joint]):
+            reasons.append(f"it moves from {_range(other, joint)} {unit}, in training from {_range(own, joint)}")
+        if result.extrapolation[joint] > UNSEEN and result.uncertainty_growth[joint] > BEYOND:
+            reasons.append(f"training leaves {100 * result.extrapolation[joint]:.2g} % of its torque uncertain")
+        if reasons:
+            found[joint] = "; ".join(reasons)
+    return found
+
+
+def _range(motion: Excitation, joint: int) -> str:
+    """Lowest and highest position of a joint in words."""
+    return f"{motion.lowest[joint]:.2g} to {motion.highest[joint]:.2g}"
+
+
+def extrapolation_warnings(result: Identification) -> Iterator[ResultWarning]:
+    """Held-out motion beyond what training excites."""
+    for joint, reason in extrapolations(result).items():
+        name = result.robot.joints[joint].name
         yield ResultWarning(
             code="extrapolation",
-            joint=each.name,
-            text=f"{each.name}: held-out motion is beyond what training excites: {reason}",
+            joint=name,
+            text=f"{name}: held-out motion is beyond what training excites: {reason}",
             remedy="train on motion as fast and as wide as the held-out motion",
         )
 

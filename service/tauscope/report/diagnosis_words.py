@@ -18,6 +18,7 @@ VERDICTS = {
     "partly_explained": "a significant remainder stays beside the findings",
     "unexplained": "a significant mismatch that no confirmed effect explains",
     "inconclusive": "these recordings cannot decide it",
+    "wrong_values": "no physics is missing, but stated values are wrong",
 }
 
 AGAINST = {
@@ -68,6 +69,7 @@ def noise_ratios(document: DiagnosisDocument) -> tuple[list[float], list[float],
 def summary_sentences(document: DiagnosisDocument) -> Iterator[str]:
     """What was compared, what it comes to, and how unseen motion is predicted, better or worse."""
     yield f"Compared with {AGAINST[document.against]}: {VERDICTS[document.verdict]}."
+    yield from (f"{sentence}." for sentence in document.wrong_values)
     before, after, held_out = noise_ratios(document)
     if document.findings and after != before:
         most = max(range(len(before)), key=lambda place: before[place] - after[place])

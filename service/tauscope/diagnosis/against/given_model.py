@@ -1,19 +1,23 @@
 """What a given model has wrong: the robot file's model, or what recordings made in the user's own simulator show.
 
 Values that are wrong (`Diagnosis.differences`) are told from structure that is missing (`Diagnosis.findings`). A term
-that the given model does not have at all is missing; one that it has is right or wrong. A surplus of the links that one
-body at the tool accounts for is a payload. An effect that the simulator shows too is not missing from it.
+that the given model does not have at all is missing; one that it has is right or wrong. Wrong values are attributed to
+links and joints; a body at the tool is a payload. An effect that the simulator shows too is not missing from it.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from scipy import stats
+from threadpoolctl import ThreadpoolController
 
-from tauscope.diagnosis.against.payload_search import payload_finding
+from tauscope.diagnosis.against.attribution import Attribution, Explanation
+from tauscope.diagnosis.against.carried_payload import payload_finding
+from tauscope.diagnosis.against.link_changes import stated_links
 from tauscope.diagnosis.against.simulated import fit_to_simulation
+from tauscope.diagnosis.against.wrong_values import attribute
 from tauscope.diagnosis.findings.diagnosed import Diagnosis, ParameterDifference
 from tauscope.diagnosis.findings.finding import Finding, FitSizes, sizes
 from tauscope.diagnosis.findings.plain import with_plain_terms
@@ -42,11 +46,16 @@ class Given:
 
     lacking : tuple of (int, str)
         joint indices and nominal terms that it does not have
+    covariance : (p, p) float64 or None
+        of the values, in the columns of the diagnosed model; None where they are exact
+    links : (10 n,) float64 or None
+        standard parameters of its links; None where only their base parameters are known
     """
 
     values: Mapping[str, float]
-    std: Mapping[str, float] = field(default_factory=dict)
     lacking: tuple[tuple[int, str], ...] = ()
+    covariance: Array | None = None
+    links: Array | None = None
 
 
 def against_model(diagnosis: Diagnosis) -> Diagnosis:
@@ -70,7 +79,7 @@ def against_simulation(diagnosis: Diagnosis, simulated: Sequence[Recording], opt
     fit = fit_to_simulation(diagnosis, simulated, options)
     names = diagnosis.selection.fit.model.structure.names
     values = dict(zip(names, (float(value) for value in fit.values), strict=True))
-    std = dict(zip(names, (float(value) for value in fit.std), strict=True))
+    std = dict(zip(names, np.sqrt(np.diag(fit.covariance)), strict=True))
     real = dict(zip(names, diagnosis.selection.fit.model.parameters, strict=True))
     terms = [(joint, term) for joint in range(diagnosis.robot.joint_count) for term in TERMS]
     lacking = []
@@ -79,7 +88,9 @@ def against_simulation(diagnosis: Diagnosis, simulated: Sequence[Recording], opt
         if name in values and abs(values[name]) < max(LACKED * abs(real[name]), 5.0 * std[name]):
             lacking.append((joint, term))
     missing = tuple(finding for finding in diagnosis.findings if finding.place not in fit.shared)
-    found = compared(beside(diagnosis, missing), Given(values, std, tuple(lacking)), "simulation")
+    given = Given(values, tuple(lacking), fit.covariance)
+    given = replace(given, links=_simulated_links(diagnosis, given))
+    found = compared(beside(diagnosis, missing), given, "simulation")
     of_effects = [each for differences in fit.shared.values() for each in differences if is_wrong(each, CLEAR)]
     return replace(found, differences=ordered([*found.differences, *of_effects]))
 
@@ -91,13 +102,28 @@ def beside(diagnosis: Diagnosis, missing: Sequence[Finding]) -> Diagnosis:
     return replace(diagnosis, findings=tuple(missing), misfit_before=before)
 
 
+def _simulated_links(diagnosis: Diagnosis, given: Given) -> Array | None:
+    """The robot file's links where the simulator has their base parameters: they are its own."""
+    links = diagnosis.robot.model.links
+    if links is None or given.covariance is None:
+        return None
+    base = diagnosis.selection.fit.model.structure.base
+    values, standard = base.project(stated_links(links)), stated_links(links)
+    pairs = zip(base.expressions, values, np.sqrt(np.diag(given.covariance)), strict=False)
+    differences = [
+        ParameterDifference(name, given.values[name], float(value), float(std)) for name, value, std in pairs
+    ]
+    return None if any(is_wrong(each, _several(len(values))) for each in differences) else standard
+
+
 def _stated(diagnosis: Diagnosis) -> Given:
     """What the robot file's model says, by parameter name."""
     robot, structure = diagnosis.robot, diagnosis.selection.fit.model.structure
     values: dict[str, float] = {}
+    standard = None
     lacking: list[tuple[int, str]] = []
     if robot.model.links is not None:
-        standard = np.concatenate([link.to_vector() for link in robot.model.links])
+        standard = stated_links(robot.model.links)
         values |= dict(zip(structure.base.expressions, map(float, structure.base.project(standard)), strict=True))
     for joint, described in enumerate(robot.joints):
         friction = None if robot.model.friction is None else robot.model.friction[joint]
@@ -108,9 +134,10 @@ def _stated(diagnosis: Diagnosis) -> Given:
         values |= {f"{name} {described.name}": value for name, value in stated.items()}
         lacking += [(joint, name) for name, value in stated.items() if value == 0.0]
         lacking.append((joint, "offset"))
-    return Given(values, {}, tuple(lacking))
+    return Given(values, tuple(lacking), links=standard)
 
 
+@ThreadpoolController().wrap(limits=1, user_api="blas")  # many small factors: threads cost more than they bring
 def compared(diagnosis: Diagnosis, given: Given, kind: Literal["model", "simulation"]) -> Diagnosis:
     """Findings that the given model makes, then what it has wrong beside them."""
     plain = replace(diagnosis, findings=tuple(finding for finding in diagnosis.findings if finding.in_model))
@@ -118,24 +145,42 @@ def compared(diagnosis: Diagnosis, given: Given, kind: Literal["model", "simulat
     fit = found.selection.fit
     size, structure = fit.model.structure.size, fit.model.structure
     covariance = fit.covariance[:size, :size] * found.inflation
+    covariance = covariance if given.covariance is None else covariance + given.covariance
     names, real = list(structure.names), fit.model.parameters.copy()
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    count = structure.base_count
+    count, several = structure.base_count, _several(len(given.values))
+    explanations: list[Explanation] = []
     if all(name in given.values for name in names[:count]):
-        surplus = real[:count] - np.array([given.values[name] for name in names[:count]])
-        spread = covariance[:count, :count] + np.diag([given.std.get(name, 0.0) ** 2 for name in names[:count]])
-        payload, share = payload_finding(found, surplus, spread)
-        if payload is not None:
-            found, real[:count] = found.with_findings([payload]), real[:count] - share
+        attribution = _attribution(found, given, real[:count], covariance[:count, :count])
+        carried = attribution.payload()
+        explanations = list(attribution.explain(carried))
+        if carried is not None:
+            payload = explanations.pop(0)
+            found, real[:count] = found.with_findings([payload_finding(found, payload)]), real[:count] - payload.effect
     missing = {f"{term} {diagnosis.robot.joints[joint].name}" for joint, term in given.lacking}
-    several = float(stats.norm.isf(0.5 * CHANCE / max(len(given.values), 1)))
     differences = [
-        ParameterDifference(name, given.values[name], float(value), float(np.hypot(error, given.std.get(name, 0.0))))
+        ParameterDifference(name, given.values[name], float(value), float(error))
         for name, value, error in zip(names, real, std, strict=True)
         if name in given.values and name not in missing
     ]
     wrong = ordered([each for each in differences if is_wrong(each, several)])
+    wrong = attribute(wrong, names[:count], explanations, given.links, diagnosis.robot.joints, several)
     return replace(found, against=kind, differences=wrong, before=_given_sizes(found, given))
+
+
+def _attribution(diagnosis: Diagnosis, given: Given, real: Array, covariance: Array) -> Attribution:
+    """The surplus of the base parameters, to be explained by links."""
+    base, joints = diagnosis.selection.fit.model.structure.base, diagnosis.robot.joint_count
+    stated = np.array([given.values[name] for name in base.expressions])
+    same = np.diag((NEGLIGIBLE * np.maximum(np.abs(real), np.abs(stated))) ** 2)
+    prior = diagnosis.identification.posterior.prior.root[: 10 * joints, : 10 * joints]
+    believed = np.asarray(np.linalg.inv(prior.T @ prior), dtype=np.float64)
+    return Attribution(base, real - stated, covariance + same, given.links, believed)
+
+
+def _several(count: int) -> float:
+    """Standard errors by which one of so many parameters differs by chance alone in `CHANCE` of all cases."""
+    return float(stats.norm.isf(0.5 * CHANCE / max(count, 1)))
 
 
 def _given_sizes(diagnosis: Diagnosis, given: Given) -> FitSizes:

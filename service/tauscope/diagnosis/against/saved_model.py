@@ -22,7 +22,7 @@ def against_saved(diagnosis: Diagnosis, saved: ExtendedModel) -> Diagnosis:
     )
     had = {(term.effect.id, term.effect.joint): term for term in saved.terms}
     missing = tuple(finding for finding in diagnosis.findings if finding.place not in had)
-    found = compared(beside(diagnosis, missing), Given(values, {}, lacking), "model")
+    found = compared(beside(diagnosis, missing), Given(values, lacking), "model")
     differences: list[ParameterDifference] = []
     for finding in diagnosis.findings:
         if finding.place not in had:

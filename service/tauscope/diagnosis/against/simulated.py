@@ -31,14 +31,16 @@ Place = tuple[str, int | None]
 class SimulatedFit:
     """What the simulator has.
 
-    values, std : (p,) float64
-        nominal parameters in the columns of the final model, and their standard errors
+    values : (p,) float64
+        nominal parameters in the columns of the final model
+    covariance : (p, p) float64
+        of these
     shared : mapping of (str, int or None) to tuple of ParameterDifference
         effects and places that the simulator shows too, with their coefficients in the simulator and on the arm
     """
 
     values: Array
-    std: Array
+    covariance: Array
     shared: dict[Place, tuple[ParameterDifference, ...]]
 
 
@@ -55,9 +57,9 @@ def fit_to_simulation(diagnosis: Diagnosis, simulated: Sequence[Recording], opti
     rows = rows.with_weightings(row_weightings(rows, start))
     fit = Fitter(rows).fit(start)
     inflation = 1.0 if pure_error else fit.inflation()
-    variance = np.maximum(np.diag(fit.covariance), 0.0) * inflation
-    std = np.sqrt(variance[: start.structure.size])
-    return SimulatedFit(fit.model.parameters, std, _shared(diagnosis, fit, inflation))
+    size = start.structure.size
+    covariance = fit.covariance[:size, :size] * inflation
+    return SimulatedFit(fit.model.parameters, covariance, _shared(diagnosis, fit, inflation))
 
 
 def _in_columns_of(final: ExtendedModel, simulated: ExtendedModel, terms: Sequence[Term]) -> ExtendedModel:

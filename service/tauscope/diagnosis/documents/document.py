@@ -6,6 +6,7 @@ import numpy as np
 
 from tauscope.diagnosis.documents.impossible import impossible_places, impossible_warnings
 from tauscope.diagnosis.documents.result import (
+    CauseEntry,
     ConstancyEntry,
     DetectableEntry,
     DiagnosisDocument,
@@ -27,18 +28,27 @@ from tauscope.diagnosis.findings.diagnosed import Diagnosis
 from tauscope.diagnosis.findings.elsewhere import spread
 from tauscope.diagnosis.findings.finding import Finding
 from tauscope.diagnosis.findings.location import JointMismatch, Place
-from tauscope.diagnosis.findings.verdict import Verdict
+from tauscope.diagnosis.findings.verdict import OPEN, Verdict
+from tauscope.diagnosis.findings.wrong_value import WrongValue
 from tauscope.diagnosis.model.term import Term
 from tauscope.diagnosis.model.torque_scale import on_the_arm
 from tauscope.diagnosis.next_experiment import PlannedExperiment
 from tauscope.effects import Effect, Quantity, effect_class
-from tauscope.identification.warnings import robot_warnings
+from tauscope.identification.warnings import (
+    excitation_warnings,
+    extrapolation_warnings,
+    extrapolations,
+    robot_warnings,
+)
 from tauscope.recording.recording import Array
+from tauscope.result_warning import ResultWarning
 
 SHIFTS_FROM = 3.0
 """Standard errors from which a parameter's shift is told."""
 
 UNKNOWN = "unknown"
+
+_WIDE = "record one motion through the whole range of positions and speeds, slow reversals included"
 
 
 def document(
@@ -50,10 +60,9 @@ def document(
     """The document of a diagnosis."""
     names = [joint.name for joint in diagnosis.robot.joints]
     findings = [*(_finding(each, diagnosis, names) for each in diagnosis.findings), *_unknown(diagnosis, names)]
-    warnings = [*robot_warnings(diagnosis.robot), *diagnosis.identification.recording_warnings]
     noise_method = diagnosis.identification.residuals.noise_method
     return DiagnosisDocument(
-        warnings=[*warnings, *impossible_warnings(diagnosis)],
+        warnings=[*_warnings(diagnosis), *impossible_warnings(diagnosis)],
         robot=diagnosis.robot.name,
         joints=names,
         against=diagnosis.against,
@@ -71,7 +80,8 @@ def document(
         fit=_fit_changes(diagnosis),
         constancy=_constancy(diagnosis),
         detectable=_detectable(diagnosis, names),
-        parameter_differences=_differences(diagnosis),
+        parameter_differences=_differences(diagnosis, names),
+        wrong_values=_wrong_values(diagnosis, names),
         parameter_shifts=_shifts(diagnosis),
         next_experiment=_next_experiment(diagnosis, names, planned, trajectory),
         headroom=headroom,
@@ -125,7 +135,19 @@ def _detectable(diagnosis: Diagnosis, names: Sequence[str]) -> list[DetectableEn
     ]
 
 
-def _differences(diagnosis: Diagnosis) -> list[DifferenceEntry]:
+def _warnings(diagnosis: Diagnosis) -> list[ResultWarning]:
+    """Warnings of the files and of the motion; what training hardly tells where that leaves the verdict open."""
+    found = diagnosis.identification
+    weak = excitation_warnings(found) if diagnosis.verdict is Verdict.INCONCLUSIVE else ()
+    return [
+        *robot_warnings(diagnosis.robot),
+        *found.recording_warnings,
+        *extrapolation_warnings(found),
+        *weak,
+    ]
+
+
+def _differences(diagnosis: Diagnosis, names: Sequence[str]) -> list[DifferenceEntry]:
     return [
         DifferenceEntry(
             parameter=each.parameter,
@@ -133,9 +155,31 @@ def _differences(diagnosis: Diagnosis) -> list[DifferenceEntry]:
             real=each.real,
             std=each.std,
             difference_in_std=each.in_std,
+            explained_by=[cause for value in each.explained_by for cause in _causes(value, names)],
         )
         for each in diagnosis.differences
     ]
+
+
+def _causes(wrong: WrongValue, names: Sequence[str]) -> list[CauseEntry]:
+    return [
+        CauseEntry(
+            link=None if wrong.link is None else wrong.link + 1,
+            joint=None if wrong.joint is None else names[wrong.joint],
+            quantity=each.name,
+            simulation=each.simulation,
+            value=each.value,
+            std=each.std,
+            unit=each.unit,
+        )
+        for each in wrong.quantities
+    ]
+
+
+def _wrong_values(diagnosis: Diagnosis, names: Sequence[str]) -> list[str]:
+    """One sentence a link or joint, the one that explains most first."""
+    found = dict.fromkeys(value for each in diagnosis.differences for value in each.explained_by)
+    return [value.statement(names) for value in sorted(found, key=lambda each: -each.explains)]
 
 
 def _where(place: Place | None) -> WhereEntry | None:
@@ -295,15 +339,8 @@ def _open_question(diagnosis: Diagnosis, names: Sequence[str]) -> tuple[list[str
             motions = dict.fromkeys(effect.revealing_motion for effect in effects)
             return [effect.name(names) for effect in effects], "record " + "; and ".join(motions)
     if diagnosis.verdict is Verdict.INCONCLUSIVE:
-        moved = sorted({parameter_names(diagnosis)[move.parameter] for move in diagnosis.constancy.moves})
-        if diagnosis.constancy.holds:
-            why = "the training motion does not say what held-out motion asks for"
-        else:
-            why = "the parameters do not hold from one recording to the next"
-        why += f" ({', '.join(moved[:4])})" if moved else ""
-        why += ": record one motion through the whole range of positions and speeds, slow reversals included"
-        return [], why
-    if diagnosis.verdict is Verdict.UNEXPLAINED:
+        return [], f"{_reason(diagnosis)}: {_WIDE}"
+    if diagnosis.verdict in OPEN:
         why = "repeat the same motion several times and slower: what repeats with time, angle or speed shows its kind"
         return [UNKNOWN], why
     if diagnosis.tentative:
@@ -311,3 +348,15 @@ def _open_question(diagnosis: Diagnosis, names: Sequence[str]) -> tuple[list[str
         motions = dict.fromkeys(effect.revealing_motion for effect in effects)
         return [effect.name(names) for effect in effects], "record " + "; and ".join(motions)
     return [], ""
+
+
+def _reason(diagnosis: Diagnosis) -> str:
+    """Why the recordings decide nothing."""
+    beyond = extrapolations(diagnosis.identification)
+    if beyond and not diagnosis.predicts:
+        joints = (f"{diagnosis.robot.joints[joint].name}: {reason}" for joint, reason in beyond.items())
+        return f"training lacks motion that held-out recordings have ({'. '.join(joints)})"
+    if diagnosis.constancy.holds:
+        return "the training motion does not say what held-out motion asks for"
+    moved = sorted({parameter_names(diagnosis)[move.parameter] for move in diagnosis.constancy.moves})
+    return f"the parameters do not hold from one recording to the next ({', '.join(moved[:4])})"

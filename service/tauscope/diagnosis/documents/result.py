@@ -114,6 +114,18 @@ class DetectableEntry(ResultModel):
     visible: bool = Field(description="false where no torque and position along this motion can show it")
 
 
+class CauseEntry(ResultModel):
+    """A quantity of a link or a joint that explains a difference."""
+
+    link: int | None = Field(default=None, description="number of the link, from 1; null where it is a joint's")
+    joint: str | None = Field(default=None, description="name of the joint; null where it is a link's")
+    quantity: str = Field(description="mass, first_moment_x, centre_of_mass_x, inertia_xx, stiction, viscous, …")
+    simulation: float | None = Field(description="stated value; null where only the difference is known")
+    value: float = Field(description="value on the arm; the difference where the quantity begins with added_")
+    std: float = Field(description="standard error of the value")
+    unit: str = Field(description="SI")
+
+
 class DifferenceEntry(ResultModel):
     """A parameter that the simulation has wrong."""
 
@@ -122,6 +134,11 @@ class DifferenceEntry(ResultModel):
     real: float = Field(description="value on the arm")
     std: float = Field(description="standard error of the difference")
     difference_in_std: float = Field(description="real less simulation, in standard errors")
+    explained_by: list[CauseEntry] = Field(
+        default=[],
+        description="the fewest quantities of links and joints that explain all differences, as far as this"
+        " one; empty where none do",
+    )
 
 
 class ShiftEntry(ResultModel):
@@ -176,8 +193,8 @@ class DiagnosisDocument(ResultModel):
     robot: str = Field(description="name of the robot")
     joints: list[str] = Field(description="names of its joints, in chain order")
     against: Literal["identified", "model", "simulation"] = Field(description="what the recordings were compared with")
-    verdict: Literal["consistent", "explained", "partly_explained", "unexplained", "inconclusive"] = Field(
-        description="as a whole"
+    verdict: Literal["consistent", "explained", "partly_explained", "unexplained", "inconclusive", "wrong_values"] = (
+        Field(description="as a whole; wrong_values: no physics is missing, but stated values are wrong")
     )
     noise_std: list[float] = Field(description="per joint, torque noise a sample [Nm or N]")
     noise_method: Literal["periods", "residual"] = Field(
@@ -196,6 +213,9 @@ class DiagnosisDocument(ResultModel):
     constancy: ConstancyEntry = Field(description="whether the parameters hold from one recording to the next")
     detectable: list[DetectableEntry] = Field(description="what would have been seen, and from which size")
     parameter_differences: list[DifferenceEntry] = Field(description="what the simulation has wrong")
+    wrong_values: list[str] = Field(
+        default=[], description="a sentence for each link or joint whose stated values are wrong"
+    )
     parameter_shifts: list[ShiftEntry] = Field(
         description="what the left-out effects had been doing to the parameters; without impossible values"
     )

@@ -10,6 +10,7 @@ from tauscope.diagnosis.findings.detectability import Detectable
 from tauscope.diagnosis.findings.finding import Finding, FitSizes, in_order
 from tauscope.diagnosis.findings.location import JointMismatch
 from tauscope.diagnosis.findings.verdict import Evidence, Verdict, verdict
+from tauscope.diagnosis.findings.wrong_value import WrongValue
 from tauscope.diagnosis.fitting.fit import Fitter
 from tauscope.diagnosis.fitting.lack_of_fit import LackOfFit
 from tauscope.diagnosis.screening.screen import Screen
@@ -17,6 +18,7 @@ from tauscope.diagnosis.selection.choice import Selection
 from tauscope.diagnosis.selection.confirmation import HeldOut
 from tauscope.effects import ArmContext
 from tauscope.identification import Identification
+from tauscope.identification.warnings import extrapolations
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
@@ -30,12 +32,15 @@ class ParameterDifference:
 
     simulation, real : float
         its values [SI]
+    explained_by : tuple of WrongValue
+        quantities of links or joints that explain the difference
     """
 
     parameter: str
     simulation: float
     real: float
     std: float
+    explained_by: tuple[WrongValue, ...] = ()
 
     @property
     def in_std(self) -> float:
@@ -92,6 +97,8 @@ class Diagnosis:
                 any(self.misfit_after.significant),
                 self.constancy.holds,
                 self.predicts,
+                bool(extrapolations(self.identification)),
+                bool(self.differences),
             )
         )
 

@@ -1,4 +1,4 @@
-"""The verdict, computed from tests: none of the five is a default."""
+"""The verdict, computed from tests: none is a default."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -12,23 +12,44 @@ class Verdict(StrEnum):
     PARTLY_EXPLAINED = "partly_explained"
     UNEXPLAINED = "unexplained"
     INCONCLUSIVE = "inconclusive"
+    WRONG_VALUES = "wrong_values"
+
+
+OPEN = frozenset({Verdict.PARTLY_EXPLAINED, Verdict.UNEXPLAINED, Verdict.INCONCLUSIVE})
+"""Verdicts that leave something to another recording."""
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """What the verdict rests on."""
+    """What the verdict rests on.
+
+    extrapolates : bool
+        whether held-out motion is beyond what training excites
+    wrong_values : bool
+        whether a model that the recordings are compared with states wrong values
+    """
 
     findings: int
     misfit_before: bool
     misfit_after: bool
     parameters_hold: bool
     predicts: bool = True
+    extrapolates: bool = False
+    wrong_values: bool = False
 
 
 def verdict(evidence: Evidence) -> Verdict:
-    """The verdict on some evidence."""
+    """The verdict on some evidence.
+
+    Where held-out motion is neither predicted nor like training, and nothing has a name, the error may be physics or
+    parameters that training leaves open: no misfit decides that.
+    """
     if evidence.findings:
         return Verdict.PARTLY_EXPLAINED if evidence.misfit_after else Verdict.EXPLAINED
+    if evidence.extrapolates and not evidence.predicts:
+        return Verdict.INCONCLUSIVE
     if evidence.misfit_before:
         return Verdict.UNEXPLAINED
-    return Verdict.CONSISTENT if evidence.parameters_hold and evidence.predicts else Verdict.INCONCLUSIVE
+    if not (evidence.parameters_hold and evidence.predicts):
+        return Verdict.INCONCLUSIVE
+    return Verdict.WRONG_VALUES if evidence.wrong_values else Verdict.CONSISTENT

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
-from tauscope.diagnosis.findings.verdict import Verdict
+from tauscope.diagnosis.findings.verdict import OPEN
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.next_experiment.bank import KINDS, Bank, Primitive
 from tauscope.diagnosis.next_experiment.separation import equations, log_variances, played, separations
@@ -56,8 +56,7 @@ class PlannedExperiment:
 
 def is_wanted(diagnosis: Diagnosis) -> bool:
     """Whether anything is open that a motion decides."""
-    open_verdicts = (Verdict.INCONCLUSIVE, Verdict.UNEXPLAINED)
-    return diagnosis.verdict in open_verdicts or any(finding.alternatives for finding in diagnosis.findings)
+    return diagnosis.verdict in OPEN or any(finding.alternatives for finding in diagnosis.findings)
 
 
 def plan_experiment(

@@ -18,6 +18,7 @@ export const HEADLINES = {
   partly_explained: t`The findings explain part of what the model left; something remains.`,
   unexplained: t`Something is missing that nothing in the catalogue explains.`,
   inconclusive: t`These recordings cannot decide it.`,
+  wrong_values: t`No physics is missing, but stated values are wrong.`,
 };
 const AGAINST = { identified: t`compared with the best model that the data allow`, model: t`compared with the robot file's model`, simulation: t`compared with the simulator's recordings` };
 const CONFIRMED = new Map([[true, t`confirmed`], [false, t`not confirmed`], [null, t`no recording was held out`]]);
@@ -151,7 +152,7 @@ function howMuchSection(result) {
   const p = result.constancy.p_value;
   return section("how-much", t`How much`,
     h("h3", { text: t`Residual rms at the recorded rate` }), table(t`Residual rms`, columns, rows),
-    result.parameter_differences.length ? [h("h3", { text: t`What the simulation has wrong` }), bars(result.parameter_differences.map((each) => [each.parameter, each.difference_in_std, `${number(each.simulation)} → ${number(each.real)}`]))] : null,
+    result.parameter_differences.length ? [h("h3", { text: t`What the simulation has wrong` }), h("ul", { class: "plain", lang: "en" }, result.wrong_values.map((each) => h("li", { text: `${each}.` }))), bars(result.parameter_differences.map((each) => [each.parameter, each.difference_in_std, `${number(each.simulation)} → ${number(each.real)}`]))] : null,
     result.parameter_shifts.length ? [h("h3", { text: t`What had been absorbed where` }), h("p", { class: "note", text: t`How far estimates moved when the findings were added, in standard errors; within the shaded part nothing has moved.` }),
       bars(result.parameter_shifts.slice(0, 14).map((each) => [each.parameter, each.shift_in_std, `${number(each.before)} → ${number(each.after)}`]))] : null,
     h("p", { class: "note", text: result.constancy.moved.length ? t`Parameters do not all hold from one recording to the next: ${result.constancy.moved.map((each) => each.parameter).join(", ")} (p = ${number(p, 2)}).` : t`The parameters hold from one recording to the next (p = ${number(p, 2)}).` }));
