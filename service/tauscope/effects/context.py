@@ -39,6 +39,8 @@ class ArmContext:
         highest frequency that torque and columns share [Hz]
     position_std : (n,) float64 or None
         noise of every joint's position, its encoder's steps included [rad or m]; None where it is negligible
+    link_encoders : frozenset of int
+        joints, from 0, whose transmission an encoder on the link has shown as it is
     """
 
     robot: Robot
@@ -54,6 +56,7 @@ class ArmContext:
     durations: tuple[float, ...]
     cutoff_hz: float
     position_std: Array | None = None
+    link_encoders: frozenset[int] = frozenset()
 
     @property
     def joints(self) -> range:

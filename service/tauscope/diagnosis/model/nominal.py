@@ -88,14 +88,14 @@ def setting_of(
         top_speed=speed.max(axis=0),
         load=np.sqrt((load**2).mean(axis=1)),
         top_torque=np.abs(torque).max(axis=1),
-        inertia=_mean_inertia(robot, signals[0].bodies, position),
+        inertia=mean_inertia(robot, signals[0].bodies, position),
         durations=_durations(observations),
         cutoff_hz=nyquist if cutoff_hz is None else cutoff_hz,
         position_std=np.max([conditioner.position_noise_std for conditioner in conditioners], axis=0),
     )
 
 
-def _mean_inertia(robot: Robot, bodies: Array, position: Array) -> Array:
+def mean_inertia(robot: Robot, bodies: Array, position: Array) -> Array:
     """Mean of the mass matrix's diagonal along a motion, not below zero, (n,) [kg m² or kg]."""
     poses = position[:: max(len(position) // POSES, 1)]
     diagonal = np.diagonal(mass_matrix(robot, bodies, poses), axis1=1, axis2=2)
