@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from diagnosis.linked_arm import linked_recordings
-from identification.simulated import paper_robot
+from identification.simulated import Array, paper_robot
 from tauscope.diagnosis import Diagnosis, diagnose, document
 from tauscope.diagnosis.deflection.measured import MeasuredDeflection, measure_deflection
 from tauscope.diagnosis.model.nominal import nominal_model
 from tauscope.identification import identify
-from tauscope.recording import Recording
+from tauscope.recording import Recording, examine_recording
 
 SEEDS, CUTOFF_HZ = (1, 2), 8.0
 FOURTEEN_BIT = 2.0 * np.pi / 2**14
@@ -41,23 +41,43 @@ def test_rigid_joints_show_neither_whatever_mounting_and_wiring_add(step: float)
 
 def test_a_load_that_keeps_its_sign_says_nothing_of_play() -> None:
     rng = np.random.default_rng(3)
-    (recording,) = linked_recordings((2,), rng, compliance=COMPLIANCE)
+    (recording,) = linked_recordings((3,), rng, compliance=COMPLIANCE)
     samples = recording.samples()
     assert samples.link_position is not None
     found = identify(paper_robot(), [recording])
     second = measure_deflection([recording], found, nominal_model(found), CUTOFF_HZ)[1]
-    if np.isinf(second.play_std):
-        assert second.play == pytest.approx(0.0, abs=1e-6)
+    assert np.isinf(second.play_std)
+    assert not second.has_play
     assert abs(second.compliance - COMPLIANCE[1]) < 2.0 * second.compliance_std
 
 
-def test_columns_that_repeat_the_motors_positions_are_no_encoders() -> None:
-    (recording,) = linked_recordings((1,), np.random.default_rng(3))
+def with_links(recording: Recording, link: Array) -> Recording:
+    """The recording with other columns qlink."""
     samples = recording.samples()
-    copied = Recording.from_arrays(
-        "copied", samples.time, samples.position, samples.effort, link_position=samples.position
-    )
-    assert measure([copied]) == ()
+    return Recording.from_arrays(recording.name, samples.time, samples.position, samples.effort, link_position=link)
+
+
+def test_columns_that_are_no_encoders_are_not_used_and_said() -> None:
+    (recording,) = linked_recordings((1,), np.random.default_rng(3), mounting=False)
+    position = recording.samples().position
+    claimed = examine_recording(with_links(recording, position * [1.0, -1.0, 57.3]), paper_robot())
+    assert measure([claimed]) == ()
+    assert [(each.code, each.joint) for each in claimed.notes] == [
+        ("link-encoder", joint) for joint in ("joint1", "joint2", "joint3")
+    ]
+    assert "repeats column q1" in claimed.notes[0].text
+
+
+def test_links_whose_angle_wraps_are_measured_as_any_other() -> None:
+    rng = np.random.default_rng(3)
+    recordings = linked_recordings(SEEDS, rng, compliance=COMPLIANCE)
+    wrapped = []
+    for each in recordings:
+        link = each.samples().link_position
+        assert link is not None
+        wrapped.append(with_links(each, np.mod(link + 2.0, 2.0 * np.pi)))
+    for one, other in zip(measure(recordings), measure(wrapped), strict=True):
+        assert other.compliance == pytest.approx(one.compliance, abs=0.01 * one.compliance_std)
 
 
 def diagnosed(**deflection: tuple[float, ...]) -> Diagnosis:

@@ -1,6 +1,6 @@
 """A recording as the encoders on the links see it, and by how much each link lags its motor."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,14 +13,11 @@ from tauscope.identification.dataset import prepared_motion
 from tauscope.recording import Recording
 from tauscope.recording.conditioning import Conditioner
 from tauscope.recording.conditioning.position_noise import encoder_step
-from tauscope.recording.samples import Array, Samples, Table
+from tauscope.recording.link_encoders import LinkEncoders, find_link_encoders
+from tauscope.recording.samples import Array, Table
 
 LIGHT = 0.2
 """Load, over its rms, below which teeth may be apart: errors of the load are of this size."""
-
-FOLLOWS = 0.1
-"""Deflection over the motion, rms, from which a column is in another unit or of another joint: no transmission that
-carries an arm gives way so far."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,17 +68,17 @@ class LinkRows:
         return (np.arange(len(self.load)) / (self.rate_hz * length_s)).astype(np.intp)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _LinkTable:
     """Rows of a recording's table with the links' positions in the place of the motors', without what derives from q.
 
-    swapped : tuple of (int, int, float)
-        column of q, column of qlink and zero of qlink, of every joint that has both
+    lag : (N, n) float64
+        by how much each link lags its motor; zero at joints without an encoder on the link [rad or m]
     """
 
     source: Table
+    lag: Array
     kept: NDArray[np.intp]
-    swapped: tuple[tuple[int, int, float], ...]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -94,37 +91,18 @@ class _LinkTable:
 
     def rows(self, start: int, stop: int) -> Array:
         """Rows start:stop."""
-        block = self.source.rows(start, stop).copy()
-        for motor, link, zero in self.swapped:
-            block[:, motor] = block[:, link] - zero
-        return block[:, self.kept]
+        block = self.source.rows(start, stop)[:, self.kept]
+        block[:, 1 : 1 + self.lag.shape[1]] -= self.lag[start:stop]
+        return block
 
 
-def link_joints(samples: Samples) -> list[int]:
-    """Joints, from 0, with an encoder on the link: its column neither repeats q nor moves without it."""
-    if samples.link_position is None:
-        return []
-    found = []
-    for joint, (motor, link) in enumerate(zip(samples.position.T, samples.link_position.T, strict=True)):
-        both = np.isfinite(motor) & np.isfinite(link)
-        apart = (motor - link)[both]
-        if np.any(apart != 0.0) and apart.std() < FOLLOWS * motor[both].std():
-            found.append(joint)
-    return found
-
-
-def link_recording(recording: Recording, joints: Sequence[int], zeros: Array) -> Recording:
-    """The recording with the positions of these joints as their links' encoders see them.
-
-    Parameters
-    ----------
-    zeros : (n,) float64
-        what every qlink shows where q is zero [rad or m]
-    """
+def link_recording(recording: Recording, encoders: LinkEncoders) -> Recording:
+    """The recording with positions as the links' encoders see them, each link's zero where its motor's is."""
     names = recording.table.names
     kept = [place for place, name in enumerate(names) if not name.startswith(("qd", "qlink", "qref"))]
-    swapped = tuple((names.index(f"q{j + 1}"), names.index(f"qlink{j + 1}"), float(zeros[j])) for j in joints)
-    table = _LinkTable(recording.table, np.array(kept), swapped)
+    lag = np.zeros_like(encoders.lag)
+    lag[:, encoders.joints] = encoders.lag[:, encoders.joints]
+    table = _LinkTable(recording.table, lag, np.array(kept))
     return Recording(recording.name, recording.joint_count, recording.effort_kind, table)
 
 
@@ -140,27 +118,25 @@ def link_rows(
     cutoff_hz : float or None
         of the common band [Hz]; None for no filter
     """
-    samples = recording.samples()
-    joints = link_joints(samples)
-    if not joints or samples.link_position is None:
-        return
     robot, structure = model.structure.robot, model.structure
+    samples = recording.samples()
+    encoders = find_link_encoders(samples, [joint.type for joint in robot.joints])
+    if encoders is None or samples.link_position is None or not encoders.joints:
+        return
     step = np.maximum(encoder_step([samples.position]), encoder_step([samples.link_position]))
-    apart = samples.position - samples.link_position
-    zeros = np.array([-np.nanmedian(own) if joint in joints else 0.0 for joint, own in enumerate(apart.T)])
-    conditioner = Conditioner.survey(link_recording(recording, joints, zeros), robot).as_one_motion(None)
+    conditioner = Conditioner.survey(link_recording(recording, encoders), robot).as_one_motion(None)
     for motion in conditioner.motions(cutoff_hz):
         prepared = prepared_motion(motion, robot, structure.base, number)
         inertia = mean_inertia(robot, model.standard_parameters(), motion.position)
-        for joint in joints:
-            known = np.isfinite(apart[:, joint])
+        for joint in encoders.joints:
+            known = np.isfinite(encoders.lag[:, joint])
             load = (
                 model.parameters[structure.joint_columns(joint)][: len(prepared.rigid[joint])] @ prepared.rigid[joint]
             )
             velocity = motion.velocity[:, joint]
             rms = max(float(np.sqrt(np.mean(load**2))), np.finfo(float).tiny)
             rows = [
-                np.interp(motion.time, samples.time[known], apart[known, joint]),
+                np.interp(motion.time, samples.time[known], encoders.lag[known, joint]),
                 load,
                 np.clip(load / (LIGHT * rms), -1.0, 1.0),
                 motion.position[:, joint],
