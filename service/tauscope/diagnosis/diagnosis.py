@@ -6,8 +6,9 @@ from dataclasses import replace
 from threadpoolctl import ThreadpoolController
 
 from tauscope.diagnosis.deflection.measured import measure_deflection
+from tauscope.diagnosis.deflection.terms import direct_terms
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
-from tauscope.diagnosis.findings.direct import direct_terms, with_direct_findings
+from tauscope.diagnosis.findings.direct import with_direct_findings
 from tauscope.diagnosis.findings.finding import Finding, FitSizes
 from tauscope.diagnosis.findings.plain import undeclared_offsets, with_plain_terms
 from tauscope.diagnosis.fitting.friction_slopes import (

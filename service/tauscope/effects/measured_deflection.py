@@ -81,6 +81,10 @@ class MeasuredPlay(Backlash):
         grid = mesh(np.array([play]), BANDS * context.cutoff_hz)
         return cls(joint, grid, grid.min(axis=0), grid.max(axis=0), play, std)
 
+    def is_free(self, place: int) -> bool:
+        """No shape: the encoder shows the gap."""
+        return False
+
     def quantities(
         self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
@@ -123,6 +127,10 @@ class MeasuredTeeth(SpringyTeeth):
         band = np.array([SPRINGY_BAND * context.cutoff_hz])
         grid = mesh(play[:1], band, compliance[:1], LOSSES)
         return cls(joint, grid, grid.min(axis=0), grid.max(axis=0), *play.tolist(), *compliance.tolist())
+
+    def is_free(self, place: int) -> bool:
+        """No shape: the encoder shows gap and compliance."""
+        return False
 
     def quantities(
         self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array

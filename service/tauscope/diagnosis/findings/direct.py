@@ -1,60 +1,23 @@
 """Findings that an encoder on the link shows directly, whether or not the torque shows them too."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy import stats
 
 from tauscope.diagnosis.deflection.measured import MeasuredDeflection
+from tauscope.diagnosis.deflection.terms import DirectTerm, direct_terms
 from tauscope.diagnosis.findings.detectability import Detectable
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
 from tauscope.diagnosis.findings.finding import Finding
-from tauscope.diagnosis.model.term import Term
-from tauscope.effects import ArmContext
-from tauscope.effects.measured_deflection import MeasuredElasticity, MeasuredPlay, MeasuredTeeth
+from tauscope.effects.measured_deflection import MeasuredElasticity, MeasuredPlay
 
 NO_SHAPE = np.zeros((0, 0))
 """Covariance of what no fit estimates."""
 
 AGREED = 3.0
 """Standard errors by which held-out motion may show another size."""
-
-
-@dataclass(frozen=True, eq=False)
-class DirectTerm:
-    """A deflection that is certain.
-
-    value, std : float
-        of its coefficient [rad/Nm, rad, m/N or m]
-    """
-
-    term: Term
-    value: float
-    std: float
-
-    @property
-    def joint(self) -> int:
-        """Index, from 0."""
-        return self.term.effect.joint or 0
-
-
-def direct_terms(measured: Sequence[MeasuredDeflection], setting: ArmContext) -> list[DirectTerm]:
-    """Terms of all deflections that are certain.
-
-    Teeth give way too: compliance is a finding of its own where it moves the link by more than play does.
-    """
-    found = []
-    for each in measured:
-        compliance, play = np.array([each.compliance, each.compliance_std]), np.array([each.play, each.play_std])
-        if each.has_play:
-            can_swing = each.is_compliant and setting.inertia[each.joint] > 0.0
-            teeth = MeasuredTeeth.of(setting, each.joint, play, compliance) if can_swing else None
-            effect = teeth or MeasuredPlay.of(setting, each.joint, *play.tolist())
-            found.append((effect, play))
-        if each.is_compliant and not (each.has_play and each.play > each.largest_wind_up):
-            found.append((MeasuredElasticity.of(setting, each.joint, *compliance.tolist()), compliance))
-    return [DirectTerm(Term(effect, effect.grid[0], size[:1]), *size.tolist()) for effect, size in found]
 
 
 def with_direct_findings(
