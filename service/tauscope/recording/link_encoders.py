@@ -10,9 +10,15 @@ from tauscope.recording.samples import Array, Samples
 from tauscope.result_warning import ResultWarning
 from tauscope.robot.robot import JointType
 
-FOLLOWS = 0.1
-"""Deflection over the motion, rms, from which a column is in another unit or of another joint: no transmission that
-carries an arm gives way so far."""
+FOLLOWS = 0.2
+"""Usual deflection over the motion's rms from which a column is in another unit or of another joint: no transmission
+that carries an arm gives way so far."""
+
+USUAL = 0.95
+"""Share of the samples whose deflection is usual: glitches of an encoder are rarer than the rest."""
+
+GLITCH = 10.0
+"""Deflection over the usual one from which a sample is a glitch: under a sudden load it is three or four times that."""
 
 LEAST_MOTION = 0.05
 """Motion, rms, below which a joint rests and its two encoders show their noise [rad or m]."""
@@ -25,7 +31,7 @@ class LinkEncoders:
     """What the columns qlink say.
 
     lag : (N, n) float64
-        q - qlink without whole turns and without its median [rad or m]; NaN where either is missing
+        q - qlink without whole turns and without its median [rad or m]; NaN where either is missing or a glitch
     joints : tuple of int
         joints, from 0, that have an encoder on the link
     copies, strangers : tuple of int
@@ -49,12 +55,16 @@ def find_link_encoders(samples: Samples, types: Sequence[JointType]) -> LinkEnco
         own = lag[known, joint]
         if not len(own):
             continue
+        is_copy = not own.any()
         if types[joint] is JointType.REVOLUTE:
             own = own - ONE_TURN * np.rint((own - own[0]) / ONE_TURN)
-        lag[known, joint] = own - np.median(own)
         motion = max(float(samples.position[known, joint].std()), LEAST_MOTION)
-        kind = "copies" if not own.any() else "joints" if own.std() <= FOLLOWS * motion else "strangers"
+        own = own - np.median(own)
+        usual = float(np.quantile(np.abs(own), USUAL))
+        kind = "copies" if is_copy else "joints" if usual <= FOLLOWS * motion else "strangers"
         found[kind].append(joint)
+        is_glitch = np.abs(own) > (GLITCH * usual if usual > 0.0 else FOLLOWS * motion)
+        lag[known, joint] = np.where(is_glitch, np.nan, own)
     return LinkEncoders(lag, **{name: tuple(joints) for name, joints in found.items()})
 
 

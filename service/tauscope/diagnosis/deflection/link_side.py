@@ -38,8 +38,8 @@ class LinkRows:
         columns of the base parameters that make the load
     inertia : float
         mean inertia of the link and all that it carries [kg m² or kg]
-    step : float
-        smallest change that both encoders resolve [rad or m]
+    resolution : float
+        step or noise of the encoders [rad or m]
     rate_hz : float
         of the rows [Hz]
     """
@@ -54,7 +54,7 @@ class LinkRows:
     direction: Array
     rigid: Array
     inertia: float
-    step: float
+    resolution: float
     rate_hz: float
 
     def stretches(self, length_s: float) -> NDArray[np.intp]:
@@ -125,6 +125,7 @@ def link_rows(
         return
     step = np.maximum(encoder_step([samples.position]), encoder_step([samples.link_position]))
     conditioner = Conditioner.survey(link_recording(recording, encoders), robot).as_one_motion(None)
+    resolution = np.maximum(step, conditioner.position_noise_std)
     for motion in conditioner.motions(cutoff_hz):
         prepared = prepared_motion(motion, robot, structure.base, number)
         inertia = mean_inertia(robot, model.standard_parameters(), motion.position)
@@ -151,7 +152,7 @@ def link_rows(
                     *motion.band.reduce(np.stack(rows)),
                     rigid=prepared.reduced_rigid[joint],
                     inertia=float(inertia[joint]),
-                    step=float(step[joint]),
+                    resolution=float(resolution[joint]),
                     rate_hz=motion.band.rate_hz,
                 ),
             )

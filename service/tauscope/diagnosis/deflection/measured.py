@@ -59,9 +59,6 @@ ROUNDS = 12
 CERTAIN = 5.0
 """Standard errors from which a deflection is there: one of a million joints shows so much by chance."""
 
-RESOLVED = 0.5
-"""Deflection over an encoder's step from which it is the transmission's and not the encoder's."""
-
 
 @dataclass(frozen=True)
 class MeasuredDeflection:
@@ -75,8 +72,8 @@ class MeasuredDeflection:
         b [rad or m]; the error is infinite where the load does not change its side often enough
     largest_load : float
         largest torque that was transmitted [Nm or N]
-    step : float
-        smallest change that both encoders resolve [rad or m]
+    resolution : float
+        step or noise of the encoders: less is theirs and not the transmission's [rad or m]
     """
 
     joint: int
@@ -85,17 +82,17 @@ class MeasuredDeflection:
     play: float
     play_std: float
     largest_load: float
-    step: float
+    resolution: float
 
     @property
     def least_compliance(self) -> float:
         """Compliance above which the transmission certainly gives way [rad/Nm or m/N]."""
-        return max(CERTAIN * self.compliance_std, RESOLVED * self.step / self.largest_load)
+        return max(CERTAIN * self.compliance_std, self.resolution / self.largest_load)
 
     @property
     def least_play(self) -> float:
         """Play above which there certainly is lost motion [rad or m]."""
-        return max(CERTAIN * self.play_std, RESOLVED * self.step)
+        return max(CERTAIN * self.play_std, self.resolution)
 
     @property
     def largest_wind_up(self) -> float:
@@ -152,7 +149,9 @@ def _measure_joint(
     if not reverses:  # then the teeth's side is part of the encoders' offset
         columns[:, 1], spreads[1] = 0.0, 1.0
     first = _regress(columns, deflection, spreads, stretch)
-    rotor = np.concatenate([piece.inertia * piece.acceleration for piece in pieces])[clear]
+    acceleration = np.concatenate([piece.acceleration for piece in pieces])[clear]
+    deflection -= 0.5 * float(first.values[2]) ** 2 * acceleration  # the delay's second order looks like a load
+    rotor = pieces[0].inertia * acceleration
     spread = ROTOR_SHARE * max(abs(float(first.values[0])), float(np.sqrt(first.covariance[0, 0])))
     found = _regress(np.column_stack([columns, rotor]), deflection, np.append(spreads, spread), stretch)
     rigid = np.concatenate([piece.rigid for piece in pieces], axis=1)[:, clear]
@@ -169,7 +168,7 @@ def _measure_joint(
         play=play,
         play_std=float(np.sqrt(variances[1] + LOAD_ERROR**2 * (play**2 + wind_up**2))) if reverses else np.inf,
         largest_load=float(np.abs(load).max()),
-        step=max(piece.step for piece in pieces),
+        resolution=max(piece.resolution for piece in pieces),
     )
 
 
@@ -194,15 +193,16 @@ def _reverses(pieces: Sequence[LinkRows]) -> bool:
 
 
 def _columns(pieces: Sequence[LinkRows], *, is_revolute: bool) -> tuple[Array, Array]:
-    """Columns of the regression (M, k), load and side first, and the spread that is believed of each, (k,)."""
+    """Columns of the regression (M, k), load, side and velocity first, and what is believed of their spread, (k,)."""
     recordings = sorted({piece.recording for piece in pieces})
     parts = []
     for piece in pieces:
         offsets = np.tile([float(piece.recording == each) for each in recordings], (len(piece.load), 1))
         turn = [np.sin(piece.position), np.cos(piece.position)] if is_revolute else [piece.position]
-        parts.append(np.column_stack([piece.load, 0.5 * piece.side, offsets, piece.direction, piece.velocity, *turn]))
-    free = np.full(3 + len(recordings), np.inf)
-    return np.concatenate(parts), np.concatenate([free, [DELAY_S], np.full(2 if is_revolute else 1, ECCENTRICITY)])
+        parts.append(np.column_stack([piece.load, 0.5 * piece.side, piece.velocity, piece.direction, offsets, *turn]))
+    free = np.full(1 + len(recordings), np.inf)
+    turns = np.full(2 if is_revolute else 1, ECCENTRICITY)
+    return np.concatenate(parts), np.concatenate([[np.inf, np.inf, DELAY_S], free, turns])
 
 
 @dataclass(frozen=True, eq=False)
