@@ -7,6 +7,7 @@ from diagnosis.linked_arm import linked_recordings
 from identification.simulated import Array, paper_robot
 from tauscope.diagnosis import Diagnosis, diagnose, document
 from tauscope.diagnosis.deflection.measured import MeasuredDeflection, measure_deflection
+from tauscope.diagnosis.extended_model.saved import model_document, restored
 from tauscope.diagnosis.model.nominal import nominal_model
 from tauscope.identification import identify
 from tauscope.recording import Recording, examine_recording
@@ -57,6 +58,17 @@ def with_links(recording: Recording, link: Array) -> Recording:
     return Recording.from_arrays(recording.name, samples.time, samples.position, samples.effort, link_position=link)
 
 
+def test_an_encoder_that_is_read_late_shows_no_deflection() -> None:
+    """Eight milliseconds at 2 rad/s are 16 mrad, far more than any play."""
+    recordings = linked_recordings(SEEDS, np.random.default_rng(3), mounting=False)
+    late = []
+    for each in recordings:
+        samples = each.samples()
+        link = [np.interp(samples.time - 8e-3, samples.time, own) for own in samples.position.T]
+        late.append(with_links(each, np.column_stack(link)))
+    assert not any(each.is_compliant or each.has_play for each in measure(late))
+
+
 def test_columns_that_are_no_encoders_are_not_used_and_said() -> None:
     (recording,) = linked_recordings((1,), np.random.default_rng(3), mounting=False)
     position = recording.samples().position
@@ -66,6 +78,13 @@ def test_columns_that_are_no_encoders_are_not_used_and_said() -> None:
         ("link-encoder", joint) for joint in ("joint1", "joint2", "joint3")
     ]
     assert "repeats column q1" in claimed.notes[0].text
+
+
+def test_an_encoder_that_misses_most_samples_says_nothing() -> None:
+    (recording,) = linked_recordings((1,), np.random.default_rng(3), compliance=COMPLIANCE)
+    link = recording.samples().link_position
+    assert link is not None
+    assert measure([with_links(recording, np.where(np.arange(len(link))[:, None] % 100 < 60, np.nan, link))]) == ()
 
 
 def test_links_whose_angle_wraps_are_measured_as_any_other() -> None:
@@ -87,7 +106,8 @@ def diagnosed(**deflection: tuple[float, ...]) -> Diagnosis:
 
 
 def test_a_diagnosis_names_what_the_encoders_show() -> None:
-    found = document(diagnosed(compliance=(0.0, 3e-4, 0.0), play=PLAY))
+    diagnosis = diagnosed(compliance=(0.0, 3e-4, 0.0), play=PLAY)
+    found = document(diagnosis)
     named = {(each.effect, each.joint): each for each in found.findings}
     assert {("backlash", "joint1"), ("joint_elasticity", "joint2")} <= set(named)
     (compliance,) = named["joint_elasticity", "joint2"].parameters
@@ -96,6 +116,9 @@ def test_a_diagnosis_names_what_the_encoders_show() -> None:
     assert named["joint_elasticity", "joint2"].confirmed
     limits = {(each.effect, each.joint): each.minimum for each in found.detectable}
     assert limits["joint_elasticity", "joint3"] is not None
+    terms = diagnosis.selection.fit.model.terms
+    again = restored(model_document(diagnosis), paper_robot()).terms
+    assert [type(term.effect) for term in again] == [type(term.effect) for term in terms]
 
 
 def test_a_rigid_joint_is_never_called_elastic() -> None:

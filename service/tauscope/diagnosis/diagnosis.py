@@ -58,7 +58,7 @@ def diagnose(
     rows = Observations.prepare(surveyed, robot, identification.structure.base, cutoff, model.steepness)
     confirming = confirming_rows(unseen, identification, cutoff, model.steepness)
     measured = measure_deflection(recordings, identification, model, cutoff)
-    seen = frozenset(each.joint for each in measured)
+    seen = frozenset(each.joint for each in measured if not each.is_open)
     setting = replace(setting_of(model, rows, surveyed, cutoff), link_encoders=seen)
     progress("estimate noise")
     selector = selector_on(rows, confirming, model, possible_effects(setting))

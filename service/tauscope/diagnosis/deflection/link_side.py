@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.model.nominal import mean_inertia
 from tauscope.dynamics import smooth_sign
+from tauscope.errors import RecordingError
 from tauscope.identification.dataset import prepared_motion
 from tauscope.recording import Recording
 from tauscope.recording.conditioning import Conditioner
@@ -124,9 +125,13 @@ def link_rows(
     if encoders is None or samples.link_position is None or not encoders.joints:
         return
     step = np.maximum(encoder_step([samples.position]), encoder_step([samples.link_position]))
-    conditioner = Conditioner.survey(link_recording(recording, encoders), robot).as_one_motion(None)
+    try:
+        conditioner = Conditioner.survey(link_recording(recording, encoders), robot).as_one_motion(None)
+        motions = list(conditioner.motions(cutoff_hz))
+    except RecordingError:  # an encoder that misses too much says nothing
+        return
     resolution = np.maximum(step, conditioner.position_noise_std)
-    for motion in conditioner.motions(cutoff_hz):
+    for motion in motions:
         prepared = prepared_motion(motion, robot, structure.base, number)
         inertia = mean_inertia(robot, model.standard_parameters(), motion.position)
         for joint in encoders.joints:

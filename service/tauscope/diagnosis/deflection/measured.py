@@ -59,6 +59,10 @@ ROUNDS = 12
 CERTAIN = 5.0
 """Standard errors from which a deflection is there: one of a million joints shows so much by chance."""
 
+RESOLVED = 0.3
+"""Deflection over the encoders' resolution from which it is no error of theirs: motion averages within a count, but
+not what repeats with the angle."""
+
 
 @dataclass(frozen=True)
 class MeasuredDeflection:
@@ -87,12 +91,18 @@ class MeasuredDeflection:
     @property
     def least_compliance(self) -> float:
         """Compliance above which the transmission certainly gives way [rad/Nm or m/N]."""
-        return max(CERTAIN * self.compliance_std, self.resolution / self.largest_load)
+        return max(CERTAIN * self.compliance_std, RESOLVED * self.resolution / self.largest_load)
 
     @property
     def least_play(self) -> float:
         """Play above which there certainly is lost motion [rad or m]."""
-        return max(CERTAIN * self.play_std, self.resolution)
+        return max(CERTAIN * self.play_std, RESOLVED * self.resolution)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the encoders show a deflection that may be their own error."""
+        by_load = self.compliance > CERTAIN * self.compliance_std and not self.is_compliant
+        return by_load or (self.play > CERTAIN * self.play_std and not self.has_play)
 
     @property
     def largest_wind_up(self) -> float:
@@ -135,14 +145,15 @@ def measure_deflection(
 def _measure_joint(
     joint: int, pieces: Sequence[LinkRows], model: ExtendedModel, covariance: Array
 ) -> MeasuredDeflection | None:
-    """What the rows of one joint say; None where they are too few."""
+    """What the rows of one joint say; None where they are too few, or where nothing loads the joint."""
     structure = model.structure
     is_revolute = structure.robot.joints[joint].type is JointType.REVOLUTE
     columns, spreads = _columns(pieces, is_revolute=is_revolute)
     stretch = _number_stretches(pieces)
     clear = np.abs(np.concatenate([piece.side for piece in pieces])) > SETTLED
     _, stretch = np.unique(stretch[clear], return_inverse=True)
-    if not stretch.size or stretch.max() + 1 < FEWEST_STRETCHES:
+    load = np.concatenate([piece.load for piece in pieces])
+    if not stretch.size or stretch.max() + 1 < FEWEST_STRETCHES or not load.any():
         return None
     columns, deflection = columns[clear], np.concatenate([piece.deflection for piece in pieces])[clear]
     reverses = _reverses(pieces)
@@ -159,7 +170,6 @@ def _measure_joint(
     compliance, play = found.values[:2].tolist()
     by_load = compliance * (found.solver[:2] @ rigid.T)
     variances = np.diag(found.covariance[:2, :2] + by_load @ covariance[np.ix_(places, places)] @ by_load.T)
-    load = np.concatenate([piece.load for piece in pieces])
     wind_up = compliance * float(np.sqrt(np.mean(load**2)))
     return MeasuredDeflection(
         joint=joint,

@@ -46,7 +46,7 @@ def with_direct_findings(
             as_law=1.0,
             elsewhere=(),
         )
-    seen = tuple(limit for each in measured for limit in _limits(each))
+    seen = tuple(limit for each in measured if not each.is_open for limit in _limits(each))
     found = replace(diagnosis, findings=(), detectable=(*diagnosis.detectable, *seen))
     return found.with_findings(list(findings.values()))
 
