@@ -1,10 +1,14 @@
 """From a robot and recordings to what its model leaves out: the whole way, in the order of the steps."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from threadpoolctl import ThreadpoolController
 
+from tauscope.diagnosis.deflection.measured import measure_deflection
+from tauscope.diagnosis.deflection.terms import direct_terms
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
+from tauscope.diagnosis.findings.direct import with_direct_findings
 from tauscope.diagnosis.findings.finding import Finding, FitSizes
 from tauscope.diagnosis.findings.plain import undeclared_offsets, with_plain_terms
 from tauscope.diagnosis.fitting.friction_slopes import (
@@ -53,14 +57,18 @@ def diagnose(
     cutoff = diagnosis_cutoff(surveyed, identification, model.steepness)
     rows = Observations.prepare(surveyed, robot, identification.structure.base, cutoff, model.steepness)
     confirming = confirming_rows(unseen, identification, cutoff, model.steepness)
-    setting = setting_of(model, rows, surveyed, cutoff)
+    measured = measure_deflection(recordings, identification, model, cutoff)
+    seen = frozenset(each.joint for each in measured if not each.is_open)
+    setting = replace(setting_of(model, rows, surveyed, cutoff), link_encoders=seen)
     progress("estimate noise")
     selector = selector_on(rows, confirming, model, possible_effects(setting))
     progress("compare effects")
     model = with_fitting_slopes(model, selector.fitter, open_slopes(identification), setting.speed)
     model = with_fitting_stribeck(model, selector.fitter, open_stribeck(identification), setting.speed)
-    selection, selector = selected(selector, model, identification, setting, progress)
+    direct = [each.term for each in direct_terms(measured, setting)]
+    selection, selector = selected(selector, model, identification, setting, progress, direct)
     progress("weigh the evidence")
     found = concluded(identification, setting, selector, selection, cutoff)
     found = looked_again(found, surveyed, unseen, progress)
+    found = with_direct_findings(found, measured, measure_deflection(held_out, identification, model, cutoff))
     return with_plain_terms(found, undeclared_offsets(found))

@@ -23,7 +23,7 @@ from tauscope.diagnosis.model.term import Term
 from tauscope.diagnosis.noise.events import beside_events
 from tauscope.diagnosis.noise.floor import with_noise
 from tauscope.diagnosis.observations.observations import Observations
-from tauscope.diagnosis.screening.screen import Screen
+from tauscope.diagnosis.screening.screen import Screen, model_signals
 from tauscope.diagnosis.selection.choice import Selection
 from tauscope.diagnosis.selection.confirmation import CLEARLY_WORSE, HeldOut
 from tauscope.diagnosis.selection.farther import looked_farther
@@ -86,13 +86,19 @@ def confirming_rows(
 
 
 def selected(
-    selector: Selector, model: ExtendedModel, identification: Identification, setting: ArmContext, progress: Progress
+    selector: Selector,
+    model: ExtendedModel,
+    identification: Identification,
+    setting: ArmContext,
+    progress: Progress,
+    known: Sequence[Term] = (),
 ) -> tuple[Selection, Selector]:
     """All that is missing, and the selector whose rows count as much as they should beside it."""
     rotors = [
         Term(RotorInertia(j), np.zeros(0), np.array([value])) for j, value in identified_rotors(identification).items()
     ]
-    selection = selector.select(model, rotors, progress)
+    shaped = _with_best_shapes(known, model, selector) if known else []
+    selection = selector.select(model, [*rotors, *shaped], progress)
     guided = guided_by(selection.fit.model, selector)
     if guided is not None:
         selector = guided
@@ -105,6 +111,19 @@ def selected(
     if identification.constrained:
         selection = _unless_plainer_is_better(selection, delivered_model(identification), selector)
     return selection, selector
+
+
+def _with_best_shapes(known: Sequence[Term], model: ExtendedModel, selector: Selector) -> list[Term]:
+    """Terms of known size in the shapes of their grids that the torque fits best: 2 c u - c² B is largest."""
+    fit = selector.fitter.fit(model)
+    signals = model_signals(fit.model, selector.screen.observations)
+    found = []
+    for term in known:
+        seen = selector.screen.at_shapes(term.effect, term.effect.grid, fit, signals)
+        size = float(term.coefficients[0])
+        gains = 2.0 * size * seen.target[:, 0] - size**2 * seen.gram[:, 0, 0]
+        found.append(replace(term, shape=term.effect.grid[int(np.argmax(gains))]))
+    return found
 
 
 def _unless_plainer_is_better(selection: Selection, delivered: ExtendedModel, selector: Selector) -> Selection:

@@ -50,7 +50,7 @@ def looked_again(
     rows = _likely(rows, model, cutoff, first.fitter.observations)
     if unseen is not None and first.held_out is not None:
         unseen = _likely(unseen, model, cutoff, first.held_out.observations)
-    setting = setting_of(model, rows, recordings, cutoff)
+    setting = replace(setting_of(model, rows, recordings, cutoff), link_encoders=first.setting.link_encoders)
     spoken_for = _spoken_for(first)
     effects = [each for each in possible_effects(setting) if (each.id, each.joint) in spoken_for]
     selector = selector_on(rows, unseen, model, effects, looked_at_before=len(first.screen.effects))

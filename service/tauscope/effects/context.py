@@ -39,6 +39,10 @@ class ArmContext:
         highest frequency that torque and columns share [Hz]
     position_std : (n,) float64 or None
         noise of every joint's position, its encoder's steps included [rad or m]; None where it is negligible
+    coldest, hottest : (n,) float64
+        range of every joint's recorded temperature [°C]; NaN where there is none
+    link_encoders : frozenset of int
+        joints, from 0, whose transmission an encoder on the link has shown as it is
     """
 
     robot: Robot
@@ -54,6 +58,9 @@ class ArmContext:
     durations: tuple[float, ...]
     cutoff_hz: float
     position_std: Array | None = None
+    coldest: Array = field(default_factory=lambda: np.zeros(0))
+    hottest: Array = field(default_factory=lambda: np.zeros(0))
+    link_encoders: frozenset[int] = frozenset()
 
     @property
     def joints(self) -> range:
@@ -81,6 +88,16 @@ class ArmContext:
         return bool(
             self.slowest[joint] < -ONE_WAY * self.speed[joint] and self.fastest[joint] > ONE_WAY * self.speed[joint]
         )
+
+    def warming(self, joint: int) -> float:
+        """Range of a joint's recorded temperature [K]; zero where there is none.
+
+        Parameters
+        ----------
+        joint : int
+            joint index, from 0
+        """
+        return float(np.nan_to_num(self.hottest[joint] - self.coldest[joint])) if self.hottest.size else 0.0
 
     def is_loaded(self, joint: int) -> bool:
         """Whether the rigid body loads a joint's transmission at all.
@@ -117,6 +134,8 @@ class Signals:
         standard parameters that stand for the fitted base parameters: all that torque along this chain needs
     links : (10 n,) float64
         standard parameters of the nearest physically consistent links, for another chain or another gravity
+    temperature : (n, P, N) float64 or None
+        recorded temperature [°C]; NaN at joints without, None where none was recorded
     """
 
     robot: Robot
@@ -133,6 +152,7 @@ class Signals:
     bodies: Array
     links: Array
     periodic: bool
+    temperature: Array | None = None
     of_motion: dict[str, Any] = field(default_factory=dict, repr=False)
     _memory: dict[str, Any] = field(default_factory=dict, repr=False)
 

@@ -54,8 +54,9 @@ class Deflection(Effect):
 
     @staticmethod
     def deflected_joints(context: ArmContext) -> list[int]:
-        """Joints that move, and whose transmission carries anything."""
-        return [joint for joint in context.joints if context.moves(joint) and context.is_loaded(joint)]
+        """Joints that move, whose transmission carries anything, and whose deflection was not measured."""
+        hidden = [joint for joint in context.joints if joint not in context.link_encoders]
+        return [joint for joint in hidden if context.moves(joint) and context.is_loaded(joint)]
 
     def touched(self, joint_count: int) -> tuple[int, ...]:
         """All joints."""

@@ -1,4 +1,4 @@
-"""Friction that changes over time: grease that warms up, by the clock or by the heat that friction itself makes."""
+"""Friction that changes over time: with a temperature that was recorded, by the clock, or by friction's own heat."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -7,11 +7,27 @@ import numpy as np
 from scipy import signal
 
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Shape, Sizes, size_text
+from tauscope.effects.effect import Coefficient, Effect, Quantity, Shape, Sizes, size_text
 from tauscope.recording.recording import Array
 
 TIMES = np.array([0.08, 0.2, 0.5, 1.2, 3.0])
 """Time constants looked at, relative to the longest recording."""
+
+
+LEAST_WARMING = 2.0
+"""Range of a recorded temperature from which friction may follow it [K]: motors report whole degrees."""
+
+RATES = np.array([0.0, 0.03])
+"""Relative changes of viscosity looked at [1/K]: greases and oils lose 2 to 5 % a kelvin."""
+
+FASTEST = 0.06
+"""…and the largest [1/K]."""
+
+NO_RATE = 1e-9
+"""Rate below which friction is a straight line in temperature [1/K]."""
+
+BESIDE_SENSOR = 10.0
+"""What the clock has to explain more than a temperature that was recorded [noise variances]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +40,8 @@ class FrictionDrift(Effect):
 
     duration_s : float
         D, of the longest recording [s]
+    beside_sensor : bool
+        whether the temperature was recorded, too
     """
 
     repeats_with_motion = False
@@ -43,15 +61,25 @@ class FrictionDrift(Effect):
 
     duration_s: float = 1.0
     by_heat: bool = False
+    beside_sensor: bool = False
 
     @classmethod
     def forms(cls, context: ArmContext) -> Sequence[Effect]:
-        """Both ways, a joint that moves."""
+        """With temperature and by the clock where that was recorded, else by the clock and by heat."""
         longest = max(context.durations)
         times = TIMES * longest
         grid = times[:, None], 0.5 * times[:1], 1.5 * times[-1:]
-        moving = [joint for joint in context.joints if context.moves(joint)]
-        return [cls(joint, *grid, longest, by_heat) for joint in moving for by_heat in (False, True)]
+        found: list[Effect] = []
+        for joint in (joint for joint in context.joints if context.moves(joint)):
+            if context.warming(joint) >= LEAST_WARMING:
+                found += [ThermalDrift.of(context, joint), cls(joint, *grid, longest, beside_sensor=True)]
+            else:
+                found += [cls(joint, *grid, longest, by_heat) for by_heat in (False, True)]
+        return found
+
+    def reluctance(self, shapes: Array) -> Array:
+        """Beside a temperature that was recorded the clock must explain clearly more."""
+        return np.full(len(shapes), BESIDE_SENSOR if self.beside_sensor else 0.0)
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
         """Whether friction rises or falls, at the joint's usual speed."""
@@ -82,3 +110,58 @@ class FrictionDrift(Effect):
             start = kept * power.mean() * (1.0 - np.exp(-before / constant))
             found.append(signal.lfilter([1.0 - kept], [1.0, -kept], power, zi=[start])[0].reshape(signals.time.shape))
         return np.stack(found)
+
+
+@dataclass(frozen=True, eq=False)
+class ThermalDrift(FrictionDrift):
+    """τ = (f A(q̇) + w q̇) h(ϑ), h = (1 - e^{-r (ϑ - ϑ_0)}) / r, ϑ the temperature that was recorded.
+
+    f and w are what friction changes by a kelvin at ϑ_0. Where no temperature is known h is zero.
+
+    reference_c : float
+        ϑ_0, middle of the temperatures of training [°C]
+    """
+
+    is_variant = True
+    arguments = frozenset({"velocity", "temperature"})
+    equation = "tau = (f sgn(qd) + w qd) (1 - exp(-r (T - T_0))) / r, T the recorded temperature"
+    meaning = "friction changes with the joint's temperature"
+    remedy = "let friction depend on temperature, or warm the joint up before recording"
+    revealing_motion = "the same motion cold and warm"
+    coefficients = (Coefficient("f", "{tau}/K"), Coefficient("w", "{tau} s/{q}/K"))
+    shapes = (Shape("r", "1/K"),)
+
+    reference_c: float = 0.0
+
+    @classmethod
+    def of(cls, context: ArmContext, joint: int) -> "ThermalDrift":
+        """The form of a joint whose temperature was recorded.
+
+        Parameters
+        ----------
+        joint : int
+            index, from 0
+        """
+        bounds = np.zeros(1), np.array([FASTEST])
+        reference = 0.5 * float(context.coldest[joint] + context.hottest[joint])
+        return cls(joint, RATES[:, None], *bounds, max(context.durations), reference_c=reference)
+
+    def columns(self, signals: Signals, shapes: Array) -> Array:
+        """A(q̇) h, q̇ h, repetition by repetition."""
+        joint = self.joint or 0
+        warmer = np.zeros(signals.time.shape)
+        if signals.temperature is not None:
+            warmer = np.nan_to_num(signals.temperature[joint] - self.reference_c)
+        rate = np.where(np.abs(shapes[:, 0]) < NO_RATE, NO_RATE, shapes[:, 0])[:, None, None]
+        course = -np.expm1(-rate * warmer) / rate
+        own = np.stack([signals.step[joint], signals.velocity[joint]])
+        return (own[None, :, None, :] * course[:, None])[:, :, None]
+
+    def quantities(
+        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
+    ) -> tuple[Quantity, ...]:
+        """f, w, r and ϑ_0."""
+        return (
+            *super().quantities(context, coefficients, shape, covariance),
+            Quantity("T_0", self.reference_c, 0.0, "°C"),
+        )

@@ -4,7 +4,7 @@ Without findings it is what the residual's power exceeds the noise's by. Where f
 be known: it is in the residual without them and in that with them, and their difference is free of it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,7 @@ from tauscope.diagnosis.fitting.fit import Fit
 from tauscope.diagnosis.model.residual import residual_rows
 from tauscope.diagnosis.observations.observations import BoolArray, Observations
 from tauscope.diagnosis.selection.choice import Selection
+from tauscope.effects import Signals
 from tauscope.recording.recording import Array
 
 BINS = 12
@@ -21,6 +22,9 @@ WINDOW = 3
 
 CONCENTRATED = 0.45
 """Share of the excess within `WINDOW` of `BINS` equally full bins from which it has a place."""
+
+THERMAL = "temperature"
+"""The variable of effects that follow a recorded temperature: they show at both ends of its range."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +67,7 @@ def locate(selection: Selection, observations: Observations, left: Sequence[bool
     before = residual_rows(nominal.model, observations)
     after = residual_rows(fit.model, observations) if selection.choices else None
     signals = [nominal.model.signals(piece) for piece in observations]
+    terms = fit.model.terms
     found = []
     for joint, pieces in enumerate(before):
         used = np.concatenate([piece.used[joint].ravel() for piece in observations])
@@ -70,23 +75,40 @@ def locate(selection: Selection, observations: Observations, left: Sequence[bool
         if after is not None and not left[joint]:
             noise = np.concatenate([rows[0] for rows in after[joint]])[used] ** 2
         power = np.concatenate([rows[0] for rows in pieces])[used] ** 2 - noise
-        places = []
-        kinds = {"velocity": "velocity", "position": "position", "load": "load", "acceleration": "acceleration"}
-        for variable, name in kinds.items():
-            own = [p.reduced(getattr(s, name)[joint][None])[0] for p, s in zip(observations, signals, strict=True)]
-            places.append(_concentration(variable, np.concatenate(own)[used], power))
-        ratio = observations.robot.joints[joint].gear_ratio
-        if ratio is not None and abs(ratio) > 1.0:
-            angle = [
-                p.reduced(np.mod(s.position[joint] * ratio, 2.0 * np.pi)[None])[0]
-                for p, s in zip(observations, signals, strict=True)
-            ]
-            places.append(_concentration("motor_position", np.concatenate(angle)[used], power))
+        thermal = any(term.effect.joint == joint and THERMAL in (term.effect.arguments or ()) for term in terms)
+        places = _places(joint, observations, signals, used, power, thermal=thermal)
         best = max((each for each in places if each is not None), key=lambda each: each.share, default=None)
         excess = float(np.sqrt(max(float(power.mean()), 0.0)))
         explained = _energy(nominal, joint) - _energy(fit, joint)
         found.append(JointMismatch(joint, excess, explained, best, _in_time(observations, used, power)))
     return tuple(found)
+
+
+def _places(
+    joint: int,
+    observations: Observations,
+    signals: Sequence[Signals],
+    used: BoolArray,
+    power: Array,
+    *,
+    thermal: bool,
+) -> Iterator[Place | None]:
+    """Places of the excess of one joint, variable by variable."""
+
+    def place(variable: str, values: Callable[[Signals], Array], least: float = CONCENTRATED) -> Place | None:
+        rows = [piece.reduced(values(each)[None])[0] for piece, each in zip(observations, signals, strict=True)]
+        return _concentration(variable, np.concatenate(rows)[used], power, least)
+
+    known = [each.temperature[joint] for each in signals if each.temperature is not None]
+    if thermal and len(known) == len(signals) and all(np.isfinite(each).all() for each in known):
+        rows = [piece.reduced(each[None])[0] for piece, each in zip(observations, known, strict=True)]
+        yield _concentration(THERMAL, np.concatenate(rows)[used], power, 0.0)
+        return
+    ratio = observations.robot.joints[joint].gear_ratio
+    for variable in ("velocity", "position", "load", "acceleration"):
+        yield place(variable, lambda each, name=variable: getattr(each, name)[joint])
+    if ratio is not None and abs(ratio) > 1.0:
+        yield place("motor_position", lambda each: np.mod(each.position[joint] * ratio, 2.0 * np.pi))
 
 
 def _energy(fit: Fit, joint: int) -> float:
@@ -95,8 +117,14 @@ def _energy(fit: Fit, joint: int) -> float:
     return float(residual @ residual)
 
 
-def _concentration(variable: str, values: Array, power: Array) -> Place | None:
-    """The window of neighbouring bins that holds most of the excess."""
+def _concentration(variable: str, values: Array, power: Array, least: float = CONCENTRATED) -> Place | None:
+    """The window of neighbouring bins that holds most of the excess.
+
+    Parameters
+    ----------
+    least : float
+        share of the excess from which it is one
+    """
     total = float(power.sum())
     edges = np.quantile(values, np.linspace(0.0, 1.0, BINS + 1))
     if total <= 0.0 or edges[0] == edges[-1]:
@@ -106,7 +134,7 @@ def _concentration(variable: str, values: Array, power: Array) -> Place | None:
     windows = np.convolve(sums, np.ones(WINDOW), mode="valid")
     best = int(np.argmax(windows))
     share = float(windows[best] / total)
-    if share < CONCENTRATED:
+    if share < least:
         return None
     return Place(variable, float(edges[best]), float(edges[best + WINDOW]), min(share, 1.0))
 

@@ -188,6 +188,7 @@ class ExtendedModel:
             bodies=self.standard_parameters(),
             links=self.links,
             periodic=motion.repetitions > 1,
+            temperature=piece.temperature,
             of_motion=piece.memory.setdefault("of_motion", {}),
         )
 

@@ -8,7 +8,7 @@ import numpy as np
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.observations.observations import Observations
 from tauscope.dynamics import mass_matrix
-from tauscope.effects import ArmContext
+from tauscope.effects import ArmContext, Signals
 from tauscope.identification import Identification
 from tauscope.identification.shape_sensitivity import ShapeParameter
 from tauscope.recording.conditioning import Conditioner
@@ -77,6 +77,7 @@ def setting_of(
     signals = [model.signals(piece) for piece in observations]
     load = np.concatenate([each.load for each in signals], axis=1)
     torque = np.concatenate([each.torque for each in signals], axis=1)
+    coldest, hottest = _temperatures(signals, robot.joint_count)
     nyquist = min(conditioner.timing.rate_hz for conditioner in conditioners) / 2.0
     return ArmContext(
         robot=robot,
@@ -88,18 +89,38 @@ def setting_of(
         top_speed=speed.max(axis=0),
         load=np.sqrt((load**2).mean(axis=1)),
         top_torque=np.abs(torque).max(axis=1),
-        inertia=_mean_inertia(robot, signals[0].bodies, position),
+        inertia=mean_inertia(robot, signals[0].bodies, position),
         durations=_durations(observations),
         cutoff_hz=nyquist if cutoff_hz is None else cutoff_hz,
         position_std=np.max([conditioner.position_noise_std for conditioner in conditioners], axis=0),
+        coldest=coldest,
+        hottest=hottest,
     )
 
 
-def _mean_inertia(robot: Robot, bodies: Array, position: Array) -> Array:
-    """Mean of the mass matrix's diagonal along a motion, not below zero, (n,) [kg m² or kg]."""
+def mean_inertia(robot: Robot, bodies: Array, position: Array) -> Array:
+    """Mean of the mass matrix's diagonal along a motion, not below zero, (n,) [kg m² or kg].
+
+    Parameters
+    ----------
+    bodies : (10 n,) float64
+        standard parameters
+    position : (N, n) float64
+        of the motion [rad or m]
+    """
     poses = position[:: max(len(position) // POSES, 1)]
     diagonal = np.diagonal(mass_matrix(robot, bodies, poses), axis1=1, axis2=2)
     return np.asarray(np.maximum(diagonal.mean(axis=0), 0.0))
+
+
+def _temperatures(signals: Sequence[Signals], joint_count: int) -> tuple[Array, Array]:
+    """Lowest and highest temperature of every joint, (n,) each [°C]; NaN where none was recorded."""
+    lowest, highest = np.full(joint_count, np.nan), np.full(joint_count, np.nan)
+    for each in signals:
+        if each.temperature is not None:
+            lowest = np.fmin(lowest, np.fmin.reduce(each.temperature, axis=(1, 2)))
+            highest = np.fmax(highest, np.fmax.reduce(each.temperature, axis=(1, 2)))
+    return lowest, highest
 
 
 def _durations(observations: Observations) -> tuple[float, ...]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tauscope.diagnosis.observations.band import STATE_BANDS, quiet_cutoffs, state_cutoffs
 from tauscope.diagnosis.observations.row_weighting import RowWeighting
 from tauscope.diagnosis.observations.spikes import without_spikes
+from tauscope.diagnosis.observations.temperature import read_temperature
 from tauscope.diagnosis.observations.whitening import JointNoise
 from tauscope.dynamics.base_parameters import BaseParameters
 from tauscope.identification.dataset import Dataset, PreparedMotion
@@ -63,6 +64,8 @@ class Piece:
         bands in which the velocities say most of single samples [Hz]; None for no filter
     rigid_hz : float or None
         band in which the accelerations do [Hz]; None for no filter
+    temperature : (n, P, N) float64 or None
+        at these instants [°C]; NaN at joints without a sensor, None where there is none
     """
 
     prepared: PreparedMotion
@@ -74,6 +77,7 @@ class Piece:
     by_position: BoolArray
     quiet_hz: Array | None = None
     rigid_hz: float | None = None
+    temperature: Array | None = None
     memory: dict[str, Any] = field(default_factory=dict, repr=False)
 
     @property
@@ -302,4 +306,6 @@ def _piece(
     widest = np.full(motion.position.shape[1], motion.rate_hz / 2.0)
     width = widest if state_hz is None else np.minimum(state_hz, widest)
     source = conditioner.source.in_band(cutoff_hz)
-    return Piece(prepared, torque, used, time, width, conditioner.noise, ~(source.velocity | source.acceleration))
+    by_position = ~(source.velocity | source.acceleration)
+    temperature = read_temperature(conditioner, time + start_s)
+    return Piece(prepared, torque, used, time, width, conditioner.noise, by_position, temperature=temperature)

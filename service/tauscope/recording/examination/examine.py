@@ -8,6 +8,8 @@ import numpy as np
 from tauscope.errors import RecordingError
 from tauscope.recording.examination.mending import mend_recording
 from tauscope.recording.examination.plausibility import find_implausible
+from tauscope.recording.examination.sketch import joint_types
+from tauscope.recording.link_encoders import link_warnings
 from tauscope.recording.reading import read_recording
 from tauscope.recording.recording import Recording
 from tauscope.recording.units import SI, Reading
@@ -52,7 +54,10 @@ def examine_recording(recording: Recording, robot: Robot | None = None, *, trust
         text, _, remedy = doubt.rpartition("; ")
         note = ResultWarning(code="doubtful-units", text=text, remedy=remedy)
         recording = replace(recording, notes=(*recording.notes, note))
-    return replace(mend_recording(recording, robot), is_examined=True)
+    mended = mend_recording(recording, robot)
+    names = [None] * recording.joint_count if robot is None else [joint.name for joint in robot.joints]
+    links = link_warnings(mended, joint_types(mended, robot), names)
+    return replace(mended, notes=(*mended.notes, *links), is_examined=True)
 
 
 def find_missing_effort(recording: Recording) -> str | None:

@@ -1,0 +1,142 @@
+"""Compliance and play whose size an encoder on the link has shown.
+
+A fit of the torque may give the first-order laws another size; reported is the size that the encoder shows.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tauscope.effects.backlash import BANDS, LOSSES, SPRINGY_BAND, Backlash, SpringyTeeth
+from tauscope.effects.context import ArmContext
+from tauscope.effects.effect import Quantity, mesh
+from tauscope.effects.joint_elasticity import BANDS as LOAD_BANDS
+from tauscope.effects.joint_elasticity import JointElasticity
+from tauscope.recording.recording import Array
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredElasticity(JointElasticity):
+    """Compliance from q - q_link over the load.
+
+    compliance, compliance_std : float
+        c and its standard error [rad/Nm or m/N]
+    """
+
+    is_variant = True
+    equation = "q - q_link = c tau_rb, c = 1/stiffness"
+    meaning = "the transmission gives way under load: the encoder on the link shows it"
+
+    compliance: float = 0.0
+    compliance_std: float = 0.0
+
+    @classmethod
+    def of(cls, context: ArmContext, joint: int, compliance: float, std: float) -> "MeasuredElasticity":
+        """The form of a joint.
+
+        Parameters
+        ----------
+        joint : int
+            index, from 0
+        compliance, std : float
+            c and its standard error [rad/Nm or m/N]
+        """
+        swings = (0.0, compliance) if context.inertia[joint] > 0.0 else (0.0,)
+        grid = mesh(LOAD_BANDS * context.cutoff_hz, np.array(swings))
+        return cls(joint, grid, grid.min(axis=0), grid.max(axis=0), compliance, std)
+
+    def quantities(
+        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
+    ) -> tuple[Quantity, ...]:
+        """Compliance as the encoder shows it."""
+        return (Quantity("c", self.compliance, self.compliance_std, self.unit("{q}/{tau}", context)),)
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredPlay(Backlash):
+    """Play from the jump of q - q_link where the load changes its sign.
+
+    play, play_std : float
+        b and its standard error [rad or m]
+    """
+
+    is_variant = True
+    equation = "q - q_link = b/2 sgn(tau_rb)"
+    meaning = "the transmission has play when the load changes sign: the encoder on the link shows it"
+
+    play: float = 0.0
+    play_std: float = 0.0
+
+    @classmethod
+    def of(cls, context: ArmContext, joint: int, play: float, std: float) -> "MeasuredPlay":
+        """The form of a joint.
+
+        Parameters
+        ----------
+        joint : int
+            index, from 0
+        play, std : float
+            b and its standard error [rad or m]
+        """
+        grid = mesh(np.array([play]), BANDS * context.cutoff_hz)
+        return cls(joint, grid, grid.min(axis=0), grid.max(axis=0), play, std)
+
+    def is_free(self, place: int) -> bool:
+        """No shape: the encoder shows the gap."""
+        return False
+
+    def quantities(
+        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
+    ) -> tuple[Quantity, ...]:
+        """Play as the encoder shows it."""
+        return (Quantity("b", self.play, self.play_std, self.unit("{q}", context)),)
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredTeeth(SpringyTeeth):
+    """The same where the encoder also shows that the teeth give way.
+
+    play, play_std : float
+        b and its standard error [rad or m]
+    compliance, compliance_std : float
+        c and its standard error [rad/Nm or m/N]
+    """
+
+    is_variant = True
+    equation = "q - q_link = b/2 sgn(tau_rb) + c tau_rb"
+    meaning = MeasuredPlay.meaning
+
+    play: float = 0.0
+    play_std: float = 0.0
+    compliance: float = 0.0
+    compliance_std: float = 0.0
+
+    @classmethod
+    def of(cls, context: ArmContext, joint: int, play: Array, compliance: Array) -> "MeasuredTeeth":
+        """The form of a joint.
+
+        Parameters
+        ----------
+        joint : int
+            index, from 0
+        play : (2,) float64
+            b and its standard error [rad or m]
+        compliance : (2,) float64
+            c and its standard error [rad/Nm or m/N]
+        """
+        band = np.array([SPRINGY_BAND * context.cutoff_hz])
+        grid = mesh(play[:1], band, compliance[:1], LOSSES)
+        return cls(joint, grid, grid.min(axis=0), grid.max(axis=0), *play.tolist(), *compliance.tolist())
+
+    def is_free(self, place: int) -> bool:
+        """No shape: the encoder shows gap and compliance."""
+        return False
+
+    def quantities(
+        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
+    ) -> tuple[Quantity, ...]:
+        """Play and compliance as the encoder shows them."""
+        return (
+            Quantity("b", self.play, self.play_std, self.unit("{q}", context)),
+            Quantity("c", self.compliance, self.compliance_std, self.unit("{q}/{tau}", context)),
+        )
