@@ -47,13 +47,7 @@ class JointMoments:
 
     @staticmethod
     def of(
-        index: Index,
-        target: Array,
-        columns: Array,
-        features: Array,
-        bounds: Index,
-        share: float,
-        groups: Index,
+        index: Index, target: Array, columns: Array, features: Array, bounds: Index, share: float, groups: Index
     ) -> "JointMoments":
         """From rows that are ordered by class."""
         rows = np.vstack([target[None], columns, features])
@@ -110,11 +104,6 @@ class JointMoments:
             products=whole[:, order][:, :, order],
         )
 
-    def counting(self, share: float) -> "JointMoments":
-        """The same rows, each counting as a share of one."""
-        root = np.sqrt(share)
-        return replace(self, rows=root * self.rows, products=share * self.products, share=share * self.share)
-
     def without(self, places: Index, values: Array) -> "JointMoments":
         """The same with some parameters held at a value.
 
@@ -146,20 +135,6 @@ class JointMoments:
         products = whole[:visible, :visible] - half.T @ half
         determinant = 2.0 * float(np.log(np.diag(root)).sum()) - float(self.counts @ np.log(weights))
         return Weighted(products, determinant)
-
-    def discrepancy(self, scales: Scales, direction: Array) -> Array:
-        """Most probable torque without a name, (R,).
-
-        Parameters
-        ----------
-        direction : (1 + k,) float64
-            1, then minus the columns' parameters
-        """
-        visible, amplitudes = self.visible, scales.amplitudes(self.groups)
-        whole = np.tensordot(scales.weights(), self.products, axes=1)
-        inner = np.eye(len(amplitudes)) + amplitudes[:, None] * whole[visible:, visible:] * amplitudes
-        seen = amplitudes * (whole[visible:, :visible] @ direction)
-        return (amplitudes * np.linalg.solve(inner, seen)) @ self.rows[visible:]
 
     def _half(self, whole: Array, scales: Scales) -> tuple[Array, Array]:
         """K^(-1/2) A Bᵀ W Z of target and columns, and K^(1/2) with K = 1 + A Bᵀ W B A."""
@@ -214,9 +189,11 @@ class JointMoments:
             trace = counts[place] - weight * float(np.sum(own[visible:, visible:] * kernel))
             by_class[place] = trace * weight - weight**2 * float(np.sum(seen * spread))
         inside = whole[visible:, :visible] - whole[visible:, visible:] @ taken
-        energy = np.sum((inside @ spread) * inside, axis=1)
-        mutual = whole[visible:, visible:]
-        of_feature = 2.0 * amplitudes**2 * (np.diag(mutual) - energy - np.sum((mutual @ kernel) * mutual, axis=1))
+        energy = np.einsum("bi,ij,bj->b", inside, spread, inside)
+        of_feature = 2.0 * amplitudes**2 * (np.diag(whole)[visible:] - energy)
+        of_feature -= (
+            2.0 * amplitudes**2 * np.einsum("bc,cd,db->b", whole[visible:, visible:], kernel, whole[visible:, visible:])
+        )
         return scales.collect(by_class, of_feature, self.groups)
 
 

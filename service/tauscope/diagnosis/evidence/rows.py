@@ -4,13 +4,11 @@ Near rest friction takes any value up to breakaway, which no curve of the veloci
 their own (`Scales`), and those of a stop, where friction holds with whatever torque there is, say nothing.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tauscope.diagnosis.evidence.dependence import Succession
 from tauscope.diagnosis.evidence.discrepancy import GROUP, Reach, beyond, smooth_features
 from tauscope.diagnosis.evidence.moments import JointMoments
 from tauscope.diagnosis.evidence.scales import REST_BOUNDS, REST_SHARES
@@ -18,9 +16,7 @@ from tauscope.diagnosis.fitting.projection import JointColumns
 from tauscope.diagnosis.fitting.regressor_noise import certainty, shared_errors
 from tauscope.diagnosis.fitting.white_columns import WhiteColumns
 from tauscope.diagnosis.model.extended import ExtendedModel
-from tauscope.diagnosis.observations.observations import Observations, Piece
-from tauscope.diagnosis.screening.screen import white_columns
-from tauscope.effects import Effect, Signals
+from tauscope.diagnosis.observations.observations import BoolArray, Observations, Piece
 from tauscope.recording.recording import Array
 
 REVERSAL = 2.0
@@ -46,8 +42,8 @@ class EvidenceRows:
         weight of each of them beside friction's step, whose place the velocity's noise leaves open
     bounds : tuple of (K + 1,) int
         where each class begins
-    features : tuple of (b, R) float64
-        discrepancy, then errors that all reversals share, in order of time
+    features : tuple of (b, R_j) float64
+        discrepancy, then errors that all reversals share
     """
 
     observations: Observations
@@ -57,41 +53,29 @@ class EvidenceRows:
     bounds: tuple[NDArray[np.intp], ...]
     features: tuple[Array, ...]
     groups: NDArray[np.intp]
-    successions: tuple[Succession, ...]
 
     @staticmethod
     def prepare(observations: Observations, model: ExtendedModel) -> "EvidenceRows":
         """Rows of training recordings beside a nominal model."""
         reach, white = Reach.of(observations), WhiteColumns(observations)
-        order, certain, bounds, features, successions = [], [], [], [], []
+        order, certain, bounds, features = [], [], [], []
         shared = 0
         for joint in range(observations.robot.joint_count):
-            near, stops = find_rest(observations, model, joint)
+            near, stopped = find_rest(observations, model, joint)
             kinds = np.digitize(near, REST_BOUNDS)
-            places = [np.flatnonzero(kinds == kind) for kind in range(len(REST_SHARES))]
+            places = [np.flatnonzero((kinds == kind) & ~stopped) for kind in range(len(REST_SHARES))]
             order.append(np.concatenate(places))
-            known = certainty(observations, model, joint, OPEN) * _weigh_stops(observations, model, joint, stops)
-            certain.append(known[order[-1]])
+            certain.append(certainty(observations, model, joint, OPEN)[order[-1]])
             bounds.append(np.cumsum([0, *map(len, places)]))
             smooth = smooth_features(observations, model, joint, reach)
             errors = shared_errors(observations, model, joint, np.ones(smooth.shape[1]))
             shared = len(errors)
-            features.append(np.vstack([smooth, errors]))
-            successions.append(Succession.of(*observations.row_labels(joint)))
+            features.append(np.vstack([smooth, errors])[:, order[-1]] * certain[-1])
         groups = np.concatenate([GROUP, np.full(shared, -1)])
-        return EvidenceRows(
-            observations,
-            white,
-            tuple(order),
-            tuple(certain),
-            tuple(bounds),
-            tuple(features),
-            groups,
-            tuple(successions),
-        )
+        return EvidenceRows(observations, white, tuple(order), tuple(certain), tuple(bounds), tuple(features), groups)
 
-    def take(self, joint: int, rows: Array, dependence: float) -> Array:
-        """The rows of a joint that count, as much as they tell, in order of their class, (…, R_j).
+    def take(self, joint: int, rows: Array) -> Array:
+        """The rows of a joint that count, in order of their class, (…, R_j).
 
         Parameters
         ----------
@@ -99,77 +83,35 @@ class EvidenceRows:
             joint index, from 0
         rows : (…, R) float64
             white rows
-        dependence : float
-            κ
         """
-        return rows[..., self.order[joint]] * (self.certain[joint] / np.sqrt(dependence))
+        return rows[..., self.order[joint]] * self.certain[joint]
 
-    def moments(
-        self, model: ExtendedModel, dependence: Sequence[float], *, owned: bool = False
-    ) -> tuple[JointMoments, ...]:
-        """Residual of a model and its slopes in all parameters, one entry a joint.
+    def moments(self, model: ExtendedModel, *, owned: bool = False) -> tuple[JointMoments, ...]:
+        """What a model leaves, and the slopes of that in all its parameters, one entry a joint.
 
         The discrepancy is beyond what the nominal model can make; where terms are `owned`, beyond what they can, too.
         """
+        linear = zip(self.white.residual(model), self.white.all(model), strict=True)
         plain = model.size if owned else model.structure.size + len(model.constants)
-        given = zip(self.white.residual(model), self.white.all(model), dependence, strict=True)
-        return tuple(self.joint_moments(joint, *own, plain) for joint, own in enumerate(given))
+        return tuple(self._joint_moments(joint, *own, plain) for joint, own in enumerate(linear))
 
-    def joint_moments(
-        self, joint: int, residual: Array, linear: JointColumns, dependence: float, plain: int
-    ) -> JointMoments:
-        """Those of one joint, with a discrepancy beyond the columns of the first parameters.
-
-        Parameters
-        ----------
-        joint : int
-            joint index, from 0
-        residual : (R,) float64
-            white rows
-        dependence : float
-            κ
-        plain : int
-            number of parameters that the discrepancy leaves alone
-        """
-        columns, smooth = self.take(joint, linear.rows, dependence), self.groups >= 0
-        features = self.take(joint, self.features[joint], dependence)
+    def _joint_moments(self, joint: int, residual: Array, linear: JointColumns, plain: int) -> JointMoments:
+        """Those of one joint, with a discrepancy beyond the columns of the first parameters."""
+        columns, smooth = self.take(joint, linear.rows), self.groups >= 0
+        features = self.features[joint].copy()
         features[smooth] = beyond(columns[linear.index < plain], features[smooth])
-        share = self.observations.noise[joint].share / dependence
-        target = self.take(joint, residual, dependence)
+        share = self.observations.noise[joint].share
+        target = self.take(joint, residual)
         return JointMoments.of(linear.index, target, columns, features, self.bounds[joint], share, self.groups)
 
-    def dependence(self, joint: int, left: Array) -> float:
-        """κ of what a model leaves beside its discrepancy.
-
-        Parameters
-        ----------
-        joint : int
-            joint index, from 0
-        left : (R_j,) float64
-            in order of class
-        """
-        rows, moving = np.zeros(self.features[joint].shape[1]), self.bounds[joint][1]
-        rows[self.order[joint][:moving]] = left[:moving]
-        return self.successions[joint].dependence(rows)
-
-    def columns(self, effect: Effect, shapes: Array, signals: Sequence[Signals]) -> dict[int, Array]:
-        """White rows of an effect at every joint that it touches, in order of time, (s, c, R).
-
-        Parameters
-        ----------
-        shapes : (s, k) float64
-            values of its shape parameters
-        """
-        return white_columns(self.observations, effect, shapes, signals)
-
-    def measured_rms(self, joint: int, dependence: float) -> float:
+    def measured_rms(self, joint: int) -> float:
         """Rms of a joint's white torque."""
-        torque = self.take(joint, self.white.measured(joint), dependence)
+        torque = self.take(joint, self.white.measured(joint))
         return float(np.sqrt(np.mean(torque**2))) if torque.size else 0.0
 
 
-def find_rest(observations: Observations, model: ExtendedModel, joint: int) -> tuple[Array, NDArray[np.intp]]:
-    """Share of every white row's samples near rest, (R,), and which stop it is of, from 1, or 0 for none, (R,).
+def find_rest(observations: Observations, model: ExtendedModel, joint: int) -> tuple[Array, BoolArray]:
+    """Share of every white row's samples near rest, (R,), and which rows are of a stop, (R,).
 
     Parameters
     ----------
@@ -179,21 +121,8 @@ def find_rest(observations: Observations, model: ExtendedModel, joint: int) -> t
     order = observations.noise[joint].order if observations.noise else 0
     kept = observations.kept(joint)
     near = np.concatenate([_measure_rest(piece, model, joint)[order:] for piece in observations])
-    stops, count = [], 0
-    for piece in observations:
-        own = _find_stops(piece, joint)
-        stops.append(np.where(own > 0, own + count, 0)[order:])
-        count += int(own.max(initial=0))
-    return near[kept], np.concatenate(stops)[kept]
-
-
-def _weigh_stops(observations: Observations, model: ExtendedModel, joint: int, stops: NDArray[np.intp]) -> Array:
-    """Weight of each row, (R,): all rows of a stop count as one, whose friction is anything up to breakaway."""
-    column = model.structure.coefficient(joint, "stiction")
-    breakaway = 0.0 if column is None else float(model.parameters[column])
-    power = 1.0 + breakaway**2 / observations.noise[joint].model.variance
-    rows = np.bincount(stops)[stops]
-    return np.where(stops > 0, 1.0 / np.sqrt(rows * power), 1.0)
+    stopped = np.concatenate([_find_stops(piece, joint)[order:] for piece in observations])
+    return near[kept], stopped[kept]
 
 
 def _measure_rest(piece: Piece, model: ExtendedModel, joint: int) -> Array:
@@ -207,9 +136,9 @@ def _measure_rest(piece: Piece, model: ExtendedModel, joint: int) -> Array:
     return np.clip(piece.repeated(motion.band.reduce(slow[None]))[0], 0.0, 1.0)
 
 
-def _find_stops(piece: Piece, joint: int) -> NDArray[np.intp]:
-    """Number of the stop that each row is of, from 1, or 0 for none, (P M,)."""
-    stopped = np.zeros(piece.rows, dtype=np.intp)
-    for number, stop in enumerate(piece.prepared.stops(joint), start=1):
-        stopped[max(stop.start - AROUND_STOP, 0) : stop.stop + AROUND_STOP] = number
+def _find_stops(piece: Piece, joint: int) -> BoolArray:
+    """Rows of a stop of a joint, (P M,)."""
+    stopped = np.zeros(piece.rows, dtype=bool)
+    for stop in piece.prepared.stops(joint):
+        stopped[max(stop.start - AROUND_STOP, 0) : stop.stop + AROUND_STOP] = True
     return np.tile(stopped, piece.repetitions)

@@ -44,9 +44,9 @@ def search(
     nominal = _with_rotors(laboratory.start(model), laboratory, identification, effects)
     confirming = None
     if unseen:
-        prepared = Observations.prepare(unseen, robot, base, cutoff, model.steepness).apart()
+        prepared = Observations.prepare(unseen, robot, base, cutoff, model.steepness)
         confirming = HeldOut(prepared.with_noise(white_noise(prepared, model)))
-    return Search(laboratory, Proposer(laboratory, effects), confirming).run(nominal)
+    return Search(laboratory, Proposer(rows, effects), confirming).run(nominal)
 
 
 def _with_rotors(

@@ -19,13 +19,6 @@ SHORTEST = 8
 """Rows of a stretch, at least: errors of neighbouring rows are alike."""
 
 
-WORSE = 2.0
-"""Standard errors by which a joint is clearly predicted worse."""
-
-SPILLED = 1.0 / 3.0
-"""Part of the gain of all joints that others may lose."""
-
-
 @dataclass(frozen=True, eq=False)
 class Change:
     """How much better one hypothesis predicts than another.
@@ -46,25 +39,6 @@ class Change:
     def standard(self) -> Array:
         """Change in standard errors, (n,); zero where nothing changed."""
         return np.divide(self.relative, self.error, out=np.zeros_like(self.relative), where=self.error > 0.0)
-
-    @property
-    def harm(self) -> float:
-        """What joints lose that are clearly predicted worse, beyond a small part of what all others gain [log rms].
-
-        All joints share the links. What is believed of these moves with an effect, and other joints with it.
-        """
-        gain = np.log1p(self.relative)
-        lost = float(gain[(self.standard > WORSE) & (gain > 0.0)].sum())
-        return lost + SPILLED * float(np.minimum(gain, 0.0).sum()) if lost > 0.0 else 0.0
-
-    @property
-    def log_odds(self) -> float:
-        """Log odds that held-out motion adds to the second hypothesis, 2 z² of each joint.
-
-        Where a torque f is there, leaving it out costs Σ f² ± 2σ √(κ Σ f²) in white noise σ whose rows count as 1/κ:
-        z = √(Σ f²/κ) / 2σ, and Σ f² / 2κσ² is the log odds. So the noise need not be known.
-        """
-        return -2.0 * float(np.sum(self.standard * np.abs(self.standard)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,9 +64,9 @@ class HeldOut:
     def _compare_joint(
         self, joint: int, before: Array, after: Array, model: ExtendedModel, scales: Scales
     ) -> tuple[float, float, float]:
-        near, stops = find_rest(self.observations, model, joint)
+        near, stopped = find_rest(self.observations, model, joint)
         kept = self.observations.kept(joint)
-        counted = np.where(stops > 0, 0.0, scales.weights()[np.digitize(near, REST_BOUNDS)])
+        counted = np.where(stopped, 0.0, scales.weights()[np.digitize(near, REST_BOUNDS)])
         first, second = counted * before[kept] ** 2, counted * after[kept] ** 2
         whole = float(first.sum())
         if whole <= 0.0:

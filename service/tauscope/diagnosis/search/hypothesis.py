@@ -10,7 +10,6 @@ from tauscope.diagnosis.evidence.bodies import BodyPrior, NormalBodies
 from tauscope.diagnosis.evidence.linear_model import LinearModel, Posterior
 from tauscope.diagnosis.evidence.rows import EvidenceRows
 from tauscope.diagnosis.evidence.scales import Scales
-from tauscope.diagnosis.fitting.bounded_step import bounded_step
 from tauscope.diagnosis.fitting.fit import stepped
 from tauscope.diagnosis.model.extended import STATED_ERROR, ExtendedModel, with_terms
 from tauscope.diagnosis.model.term import Term
@@ -35,12 +34,6 @@ LARGEST_SHAPE_STEP = 0.15
 HALVINGS = (1.0, 0.5, 0.25, 0.1)
 """Parts of a step that are tried until the data are more probable."""
 
-STEPS = 8
-"""Most steps to the most probable parameters."""
-
-ROUNDING = 1e-3
-"""Part of its standard error by which rounding may leave a coefficient below zero."""
-
 PROGRESS = 0.1
 """Gain in log probability below which a step is the last."""
 
@@ -53,8 +46,6 @@ class Hypothesis:
         standard deviation believed of every term's coefficients
     scales : tuple of Scales
         one entry a joint
-    dependence : tuple of float
-        κ of every joint
     """
 
     model: ExtendedModel
@@ -62,7 +53,6 @@ class Hypothesis:
     linear: LinearModel
     bodies: NormalBodies
     scales: tuple[Scales, ...]
-    dependence: tuple[float, ...]
 
     @cached_property
     def posterior(self) -> Posterior:
@@ -124,20 +114,12 @@ class Laboratory:
         count = len(self.prior.bodies.base)
         parameters[:count] = self.prior.bodies.base @ links
         nominal = replace(model, parameters=parameters, links=links)
-        dependence = [1.0] * model.structure.robot.joint_count
-        moments = self.rows.moments(nominal, dependence)
+        moments = self.rows.moments(nominal)
         levels = [float(np.sqrt(np.mean(own.rows[0] ** 2))) if own.rows.size else 1.0 for own in moments]
-        at = self.at(nominal, (), tuple(map(Scales.start, levels)), dependence)
-        return self.settle(self.settle(at, range(len(levels))), range(len(levels)))
+        return self.settle(self.at(nominal, (), tuple(map(Scales.start, levels))), range(len(levels)), rounds=2)
 
     def at(
-        self,
-        model: ExtendedModel,
-        sizes: Sequence[Array],
-        scales: Sequence[Scales],
-        dependence: Sequence[float],
-        *,
-        owned: bool = False,
+        self, model: ExtendedModel, sizes: Sequence[Array], scales: Sequence[Scales], *, owned: bool = False
     ) -> Hypothesis:
         """A model as it is.
 
@@ -160,67 +142,38 @@ class Laboratory:
             spread[place] = np.concatenate([size, _shape_spreads(term)])
         diagonal = np.arange(plain, model.size)
         precision[diagonal, diagonal] = 1.0 / spread[plain:] ** 2
-        linear = LinearModel(self.rows.moments(model, dependence, owned=owned), mean, precision)
-        linear = _hold_impossible(linear, model, scales)
-        return Hypothesis(model, tuple(sizes), linear, bodies, tuple(scales), tuple(dependence))
+        linear = LinearModel(self.rows.moments(model, owned=owned), mean, precision)
+        return Hypothesis(model, tuple(sizes), linear, bodies, tuple(scales))
 
-    def settle(self, start: Hypothesis, joints: Collection[int]) -> Hypothesis:
+    def settle(self, start: Hypothesis, joints: Collection[int], *, rounds: int = 1, steps: int = 4) -> Hypothesis:
         """The most probable parameters, and scales of highest evidence at some joints."""
-        at = self.weigh(self.tune(start, joints), joints)
-        estimate = self._own(at)
-        for _ in range(STEPS):
-            nearer = self._nearer(estimate)
-            if nearer is None:
-                break
-            gained, estimate = estimate.misfit - nearer.misfit, nearer
-            if gained < 2.0 * PROGRESS:
-                break
-        return self.weigh(self.at(estimate.model, at.sizes, at.scales, at.dependence), joints)
-
-    def approach(self, at: Hypothesis) -> Hypothesis:
-        """The hypothesis after one step towards its most probable parameters."""
-        estimate = self._own(at)
-        return self._nearer(estimate) or estimate
-
-    def _own(self, at: Hypothesis) -> Hypothesis:
-        """The same with all effects believed, so that the discrepancy takes no part of them, and independent rows."""
-        return self.at(at.model, at.sizes, at.scales, [1.0] * len(at.scales), owned=True)
+        at = start
+        for _ in range(rounds):
+            at = self.tune(at, joints)
+            estimate = self.at(at.model, at.sizes, at.scales, owned=True)
+            for _ in range(steps):
+                nearer = self._nearer(estimate)
+                if nearer is None:
+                    break
+                gained, estimate = estimate.misfit - nearer.misfit, nearer
+                if gained < 2.0 * PROGRESS:
+                    break
+            at = self.at(estimate.model, at.sizes, at.scales)
+        return self.tune(at, joints)
 
     def tune(self, at: Hypothesis, joints: Collection[int]) -> Hypothesis:
         """The same model under scales of highest evidence."""
         return replace(at, scales=at.linear.most_probable(at.scales, joints))
 
-    def weigh(self, at: Hypothesis, joints: Collection[int]) -> Hypothesis:
-        """The same model under scales of highest evidence, rows counting as much as its own residual lets them."""
-        dependence, mean = list(at.dependence), at.posterior.mean
-        for joint in joints:
-            own = at.linear.joints[joint]
-            direction = np.concatenate([[1.0], -mean[own.index]])
-            left = direction @ own.rows[: own.visible] - own.discrepancy(at.scales[joint], direction)
-            dependence[joint] = self.rows.dependence(joint, left)
-        return self.tune(self.under(at, dependence, joints), joints)
-
-    def under(self, at: Hypothesis, dependence: Sequence[float], joints: Collection[int]) -> Hypothesis:
-        """The same with another dependence of some joints' rows."""
-        moments, counted = list(at.linear.joints), list(at.dependence)
-        for joint in joints:
-            moments[joint] = moments[joint].counting(at.dependence[joint] / dependence[joint])
-            counted[joint] = dependence[joint]
-        return replace(at, linear=replace(at.linear, joints=tuple(moments)), dependence=tuple(counted))
-
-    def paint(self, at: Hypothesis, like: Hypothesis) -> Hypothesis:
-        """The same model under another hypothesis' scales."""
-        return self.at(at.model, at.sizes, like.scales, like.dependence)
-
     def _nearer(self, at: Hypothesis) -> Hypothesis | None:
         """The model after a step under which data and parameters are more probable; None where there is none."""
-        step = _limit(at)
+        step = _limit(at.model, at.posterior.mean)
         base = len(at.bodies.mean)
         links = at.bodies.links(at.model.parameters[:base] + step[:base]) - at.model.links
         whole = self.prior.bodies.share(at.model.links, links)
         for part in HALVINGS:
             moved = replace(stepped(at.model, part * whole * step), links=at.model.links + part * whole * links)
-            found = self.at(moved, at.sizes, at.scales, at.dependence, owned=True)
+            found = self.at(moved, at.sizes, at.scales, owned=True)
             if found.misfit < at.misfit:
                 return found
         return None
@@ -233,7 +186,7 @@ class Laboratory:
         size : (c,) float64
             standard deviation believed of its coefficients
         """
-        return self.at(with_terms(at.model, [*at.model.terms, term]), [*at.sizes, size], at.scales, at.dependence)
+        return self.at(with_terms(at.model, [*at.model.terms, term]), [*at.sizes, size], at.scales)
 
     def without_term(self, at: Hypothesis, place: int) -> Hypothesis:
         """A model with one effect less, as it is.
@@ -245,41 +198,7 @@ class Laboratory:
         """
         terms = [term for at_place, term in enumerate(at.model.terms) if at_place != place]
         sizes = [size for at_place, size in enumerate(at.sizes) if at_place != place]
-        return self.at(with_terms(at.model, terms), sizes, at.scales, at.dependence)
-
-
-def _hold_impossible(linear: LinearModel, model: ExtendedModel, scales: Sequence[Scales]) -> LinearModel:
-    """The same with coefficients held at zero that would else be negative and cannot be: friction takes power."""
-    values = _one_sided(model)
-    places = np.flatnonzero(np.isfinite(values))
-    held, found = np.zeros(len(places), dtype=bool), linear
-    for _ in range(2 * len(places)):
-        posterior = found.posterior(scales)
-        wanted = (values + posterior.mean)[places] / np.linalg.norm(posterior.spread[places], axis=1)
-        freed = held & (wanted > 0.0)
-        if freed.any():
-            held &= ~freed
-        elif held.all() or wanted[~held].min() >= -ROUNDING:
-            break
-        else:
-            held[np.flatnonzero(~held)[np.argmin(wanted[~held])]] = True
-        found = linear.hold(places[held], -values[places[held]])
-    return found
-
-
-def _one_sided(model: ExtendedModel) -> Array:
-    """Values of the parameters that cannot be negative, (p,); NaN for all others."""
-    values = np.full(model.size, np.nan)
-    for joint in range(model.structure.robot.joint_count):
-        for name in ("stiction", "viscous"):
-            place = model.structure.coefficient(joint, name)
-            if place is not None:
-                values[place] = model.parameters[place]
-    for term, place in zip(model.terms, model.term_places(), strict=True):
-        for number, (coefficient, value) in enumerate(zip(term.effect.coefficients, term.coefficients, strict=True)):
-            if coefficient.positive:
-                values[place.start + number] = value
-    return values
+        return self.at(with_terms(at.model, terms), sizes, at.scales)
 
 
 def _slopes(model: ExtendedModel) -> Array:
@@ -300,24 +219,21 @@ def _shape_spreads(term: Term) -> Array:
     )
 
 
-def _limit(at: Hypothesis) -> Array:
-    """The most probable step within which the columns of curved parameters are straight, and these in their bounds."""
-    rows, first = [], at.model.structure.size
-    rows += [(first + place, -np.inf, np.inf, LARGEST_LOG_STEP) for place in range(len(at.model.constants))]
-    for term, place in zip(at.model.terms, at.model.term_places(), strict=True):
+def _limit(model: ExtendedModel, step: Array) -> Array:
+    """A step whose curved parameters stay where their columns are straight."""
+    limited, first = step.copy(), model.structure.size
+    slopes = slice(first, first + len(model.constants))
+    limited[slopes] = np.clip(step[slopes], -LARGEST_LOG_STEP, LARGEST_LOG_STEP)
+    for term, place in zip(model.terms, model.term_places(), strict=True):
         effect = term.effect
-        for number, free in enumerate(term.free_shapes, start=place.start + len(term.coefficients)):
-            value, low, high = float(term.shape[free]), float(effect.lower[free]), float(effect.upper[free])
-            reach = (
-                LARGEST_LOG_STEP * abs(value) if effect.shapes[free].logarithmic else LARGEST_SHAPE_STEP * (high - low)
-            )
-            rows.append((number, min(low - value, 0.0), max(high - value, 0.0), max(reach, np.finfo(float).tiny)))
-    places, lower, upper, reach = np.array(rows, dtype=np.float64).reshape(-1, 4).T
-    return bounded_step(
-        at.posterior.mean,
-        at.posterior.spread,
-        places.astype(np.intp),
-        np.maximum(lower, -reach),
-        np.minimum(upper, reach),
-        reach,
-    )
+        reach = np.array(
+            [
+                LARGEST_LOG_STEP * abs(float(term.shape[free]))
+                if effect.shapes[free].logarithmic
+                else LARGEST_SHAPE_STEP * float(effect.upper[free] - effect.lower[free])
+                for free in term.free_shapes
+            ]
+        )
+        shapes = slice(place.start + len(term.coefficients), place.stop)
+        limited[shapes] = np.clip(step[shapes], -reach, reach)
+    return limited

@@ -5,10 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tauscope.diagnosis.evidence.linear_model import LinearModel
+from tauscope.diagnosis.evidence.rows import EvidenceRows
+from tauscope.diagnosis.evidence.scales import Scales
 from tauscope.diagnosis.model.term import Term
 from tauscope.diagnosis.screening.refinement import POINTS, neighbours, spread
-from tauscope.diagnosis.screening.screen import SHAPES_AT_ONCE
-from tauscope.diagnosis.search.hypothesis import Hypothesis, Laboratory
+from tauscope.diagnosis.screening.screen import SHAPES_AT_ONCE, white_columns
+from tauscope.diagnosis.search.hypothesis import Hypothesis
 from tauscope.diagnosis.search.scoring import SIZES, Scored, Scorer
 from tauscope.diagnosis.selection.choice import Place, has_possible_values
 from tauscope.effects import Effect, Signals
@@ -39,15 +42,15 @@ class Proposal:
         the same on the grid if nothing without a name were left out
     size : (c,) float64
         standard deviation believed of its coefficients
-    found : Hypothesis
-        with it, its coefficients at zero
+    scales : tuple of Scales
+        of highest evidence with it
     """
 
     term: Term
     size: Array
     log_factor: float
     log_factor_alone: float
-    found: Hypothesis
+    scales: tuple[Scales, ...]
 
     @property
     def place(self) -> Place:
@@ -58,40 +61,27 @@ class Proposal:
 class Proposer:
     """Proposes effects for the same rows."""
 
-    def __init__(self, laboratory: Laboratory, effects: Sequence[Effect]) -> None:
-        self.laboratory, self.rows, self.effects = laboratory, laboratory.rows, tuple(effects)
+    def __init__(self, rows: EvidenceRows, effects: Sequence[Effect]) -> None:
+        self.rows, self.effects = rows, tuple(effects)
 
     def propose(self, at: Hypothesis, is_wanted: Callable[[Effect], bool]) -> list[Proposal]:
         """Effects that make the data more probable, the most probable first."""
-        independent = self.laboratory.under(at, [1.0] * len(at.scales), range(len(at.scales)))
-        scorer = Scorer(self.rows, independent)
+        scorer = Scorer(self.rows, at)
         signals = [at.model.signals(piece) for piece in self.rows.observations]
         wanted = [effect for effect in self.effects if is_wanted(effect) and len(effect.grid)]
-        scored = side_by_side(lambda effect: self._on_grid(effect, scorer, signals, independent), wanted)
-        looked: dict[int, Proposal | None] = {}
-        for kind in (0, 1):
-            seen = set[Place]()
-            for place in sorted(range(len(scored)), key=lambda place: -scored[place][kind].log_evidence):
-                if len(seen) == LOOKED_AT or scored[place][kind].log_evidence < WORTH_A_LOOK:
-                    break
-                if _place(scored[place]) not in seen:
-                    if place not in looked:
-                        looked[place] = self._look_at(scored[place], scorer, at, signals)
-                    if looked[place] is not None:
-                        seen.add(_place(scored[place]))
+        scored = side_by_side(lambda effect: self._on_grid(effect, scorer, signals), wanted)
+        chosen = _shortlist([pair[0] for pair in scored]) | _shortlist([pair[1] for pair in scored])
+        pairs = [scored[place] for place in sorted(chosen)]
+        found = [self._look_at(pair, scorer, at, signals) for pair in pairs]
         best: dict[Place, Proposal] = {}
-        for proposal in sorted(
-            (each for each in looked.values() if each is not None), key=lambda each: -each.log_factor
-        ):
+        for proposal in sorted((each for each in found if each is not None), key=lambda each: -each.log_factor):
             best.setdefault(proposal.place, proposal)
         return list(best.values())
 
-    def _on_grid(
-        self, effect: Effect, scorer: Scorer, signals: Sequence[Signals], at: Hypothesis
-    ) -> tuple[Scored, Scored]:
+    def _on_grid(self, effect: Effect, scorer: Scorer, signals: Sequence[Signals]) -> tuple[Scored, Scored]:
         """Every shape of an effect's grid."""
         parts = [
-            scorer.score(effect, shapes, self.columns(effect, shapes, signals, at.dependence))
+            scorer.score(effect, shapes, self.columns(effect, shapes, signals))
             for shapes in _parts(thin(effect.grid, MOST_SHAPES))
         ]
         beside, alone = ([part[kind] for part in parts] for kind in (0, 1))
@@ -108,28 +98,41 @@ class Proposer:
         effect, place = on_grid.effect, on_grid.best
         joints = effect.touched(len(at.scales))
         shape, size = self._zoom(effect, on_grid.shapes[place], on_grid.sizes[place], at, signals)
-        found = self._extend(effect, shape, size, at)
+        scales, gained = self._tune(effect, shape, size, at, joints, signals)
         if any(effect.is_free(each) for each in range(len(effect.shapes))):
-            beside = self.laboratory.paint(at, found)
-            shape, size = self._zoom(effect, shape, size, beside, signals)
-            found = self._extend(effect, shape, size, beside)
-        term = replace(found.model.terms[-1], coefficients=found.posterior.mean[-len(size) :])
+            shape, size = self._zoom(effect, shape, size, replace(at, scales=scales), signals)
+            scales, gained = self._tune(effect, shape, size, replace(at, scales=scales), joints, signals)
+        linear = self._extend(effect, shape, size, at.linear, signals)
+        coefficients = linear.posterior(scales).mean[at.linear.size :]
         k_v = None if effect.joint is None else at.model.structure.terms[effect.joint].k_v
-        if not (has_possible_values(term, k_v) and effect.is_consistent(term.coefficients, shape)):
+        term = Term(effect, shape, coefficients)
+        if not (has_possible_values(term, k_v) and effect.is_consistent(coefficients, shape)):
             return None
         one_sided = sum(each.positive for each in effect.coefficients)
-        # Where the effect is there, only the model that has it tells the noise.
         averaged = on_grid.log_evidence - float(on_grid.log_factors.max())
         sized = float(np.log(2.0)) * one_sided - float(np.log(len(SIZES)))
-        before = self.laboratory.tune(self.laboratory.under(at, found.dependence, joints), joints)
-        factor = found.log_evidence - before.log_evidence + averaged + sized
-        return Proposal(term, size, factor, alone.log_evidence, found)
+        factor = gained - at.log_evidence + averaged + sized
+        return Proposal(term, size, factor, alone.log_evidence, scales)
 
-    def _extend(self, effect: Effect, shape: Array, size: Array, at: Hypothesis) -> Hypothesis:
-        """A hypothesis with an effect of a given shape, under scales of highest evidence."""
-        joints = effect.touched(len(at.scales))
-        added = self.laboratory.with_term(at, Term(effect, shape, np.zeros(len(size))), size)
-        return self.laboratory.weigh(self.laboratory.tune(added, joints), joints)
+    def _tune(
+        self,
+        effect: Effect,
+        shape: Array,
+        size: Array,
+        at: Hypothesis,
+        joints: Sequence[int],
+        signals: Sequence[Signals],
+    ) -> tuple[tuple[Scales, ...], float]:
+        """Scales of highest evidence with an effect, and that log evidence."""
+        linear = self._extend(effect, shape, size, at.linear, signals)
+        scales = linear.most_probable(at.scales, joints)
+        return scales, linear.evidence(scales)
+
+    def _extend(
+        self, effect: Effect, shape: Array, size: Array, linear: LinearModel, signals: Sequence[Signals]
+    ) -> LinearModel:
+        columns = self.columns(effect, shape[None], signals)
+        return linear.extend({joint: own[0] for joint, own in columns.items()}, np.zeros(len(size)), size)
 
     def _zoom(
         self, effect: Effect, shape: Array, size: Array, at: Hypothesis, signals: Sequence[Signals]
@@ -145,7 +148,7 @@ class Proposer:
                 values = spread(low, high, effect.shapes[place].logarithmic)
                 shapes = np.tile(shape, (POINTS + 1, 1))
                 shapes[:POINTS, place] = values
-                found, _ = scorer.score(effect, shapes, self.columns(effect, shapes, signals, at.dependence))
+                found, _ = scorer.score(effect, shapes, self.columns(effect, shapes, signals))
                 if not np.isfinite(found.log_factors.max()):
                     break
                 best = found.best
@@ -154,9 +157,7 @@ class Proposer:
                     low, high = float(values[max(best - 1, 0)]), float(values[min(best + 1, POINTS - 1)])
         return shape, size
 
-    def columns(
-        self, effect: Effect, shapes: Array, signals: Sequence[Signals], dependence: Sequence[float]
-    ) -> dict[int, Array]:
+    def columns(self, effect: Effect, shapes: Array, signals: Sequence[Signals]) -> dict[int, Array]:
         """White rows of an effect at every joint that it touches, (s, c, R_j).
 
         Parameters
@@ -164,8 +165,8 @@ class Proposer:
         shapes : (s, k) float64
             values of its shape parameters
         """
-        white = self.rows.columns(effect, shapes, signals)
-        return {joint: self.rows.take(joint, rows, dependence[joint]) for joint, rows in white.items()}
+        white = white_columns(self.rows.observations, effect, shapes, signals)
+        return {joint: self.rows.take(joint, rows) for joint, rows in white.items()}
 
 
 def _parts(shapes: Array) -> Iterator[Array]:
@@ -180,7 +181,13 @@ def _join(parts: Sequence[Scored]) -> Scored:
     return Scored(parts[0].effect, *(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
-def _place(scored: tuple[Scored, Scored]) -> Place:
-    """Which effect where."""
-    effect = scored[0].effect
-    return effect.id, effect.joint
+def _shortlist(scored: Sequence[Scored]) -> set[int]:
+    """Places of the best forms of the effects that explain most, one form an effect and joint."""
+    ranked = sorted(range(len(scored)), key=lambda place: -scored[place].log_evidence)
+    chosen: dict[Place, int] = {}
+    for place in ranked:
+        if len(chosen) == LOOKED_AT or scored[place].log_evidence < WORTH_A_LOOK:
+            break
+        effect = scored[place].effect
+        chosen.setdefault((effect.id, effect.joint), place)
+    return set(chosen.values())

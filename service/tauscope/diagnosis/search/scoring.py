@@ -83,7 +83,7 @@ class Scorer:
         """Rms of each column over that of the measured torque, at the joint where that is largest, (s, c)."""
         found = []
         for joint, own in columns.items():
-            measured = self._rows.measured_rms(joint, self._at.dependence[joint])
+            measured = self._rows.measured_rms(joint)
             if measured > 0.0 and own.shape[-1]:
                 found.append(np.sqrt(np.mean(own**2, axis=-1)) / measured)
         return np.max(found, axis=0) if found else np.zeros(next(iter(columns.values())).shape[:2])

@@ -1,22 +1,27 @@
 """From the nominal model to the most probable set of effects: one more, one less, until nothing helps."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tauscope.diagnosis.search.held_out import Change, HeldOut
 from tauscope.diagnosis.search.hypothesis import Hypothesis, Laboratory
 from tauscope.diagnosis.search.proposals import Proposal, Proposer
-from tauscope.diagnosis.search.window import window_log_odds
 from tauscope.diagnosis.selection.choice import Place
-from tauscope.effects import Effect, TimeLocalEffect
+from tauscope.effects import Effect
 from tauscope.effects.computation import side_by_side
 
 MOST_EFFECTS = 12
 """Effects that are added at most."""
 
-CONTRADICTED = 1.64
-"""…and by which a joint on which an effect acts is: one in twenty is so by chance."""
+WORSE = 2.7
+"""Standard errors by which no joint may be predicted worse: of seven joints one is so by chance in thirty findings…"""
+
+SPILLED = 0.25
+"""…unless what it loses is less than this part of what all joints gain [log rms]."""
+
+BETTER = 1.64
+"""…and by which a joint on which an effect acts is predicted better, at least: one in twenty is so by chance."""
 
 CATALOGUED = 3.0
 """Log odds before the data that torque which is left out has a name: one in twenty laws is in no catalogue."""
@@ -70,66 +75,45 @@ class Search:
                 break
             at = self._without_superfluous(found, len(nominal.model.terms))
             refused |= _places(found) - _places(at)
-        return Found(nominal, self._without_harm(at, nominal), tuple(steps))
-
-    def _without_harm(self, at: Hypothesis, nominal: Hypothesis) -> Hypothesis:
-        """The same without the effects at whose cost joints are predicted worse than by the nominal model."""
-        first = len(nominal.model.terms)
-        while self.held_out is not None and len(at.model.terms) > first:
-            if self.held_out.change(nominal, at).harm <= 0.0:
-                break
-            others = [self._settle_without(at, place) for place in range(first, len(at.model.terms))]
-            harms = [self.held_out.change(nominal, each).harm for each in others]
-            at = others[int(np.argmin(harms))]
-        return at
-
-    def _settle_without(self, at: Hypothesis, place: int) -> Hypothesis:
-        touched = at.model.terms[place].effect.touched(len(at.scales))
-        return self.laboratory.settle(self.laboratory.without_term(at, place), touched)
+        return Found(nominal, at, tuple(steps))
 
     def _best(self, at: Hypothesis, proposals: list[Proposal]) -> tuple[list[Step], Hypothesis | None]:
-        """The most probable proposal that held-out motion does not contradict, after those that it does."""
+        """The most probable proposal that held-out motion does not contradict, after those that it does.
+
+        Where none is more probable than torque without a name, one that is as probable, and with which held-out motion
+        is predicted clearly better, is preferred to it.
+        """
         refusals: list[Step] = []
-        worth = [each for each in proposals if self._is_worth_a_try(each)]
-        for proposal in sorted(worth, key=lambda each: -self._foresee(at, each)) if len(worth) > 1 else worth:
+        likely = [each for each in proposals if self._log_odds(each) > 0.0]
+        for proposal in likely:
             step, found = self._try(at, proposal, proposals)
             if step.is_confirmed:
                 return [*refusals, step], found
             refusals.append(step)
+        others = [each for each in proposals if each not in likely and self._names(each)]
+        for proposal in sorted(others, key=lambda each: -each.log_factor_alone):
+            step, found = self._try(at, proposal, proposals)
+            if step.is_confirmed and step.change is not None and bool((step.change.standard < -WORSE).any()):
+                return [*refusals, step], found
         return refusals, None
-
-    def _foresee(self, at: Hypothesis, proposal: Proposal) -> float:
-        """Log odds of a proposal after all motion, at parameters one step from those at hand."""
-        if self.held_out is None:
-            return self._log_odds(proposal)
-        nearer = self.laboratory.approach(self._add(at, proposal))
-        return self._log_odds(proposal) + self.held_out.change(at, nearer).log_odds
-
-    def _add(self, at: Hypothesis, proposal: Proposal) -> Hypothesis:
-        return self.laboratory.with_term(self.laboratory.paint(at, proposal.found), proposal.term, proposal.size)
 
     def _try(self, at: Hypothesis, proposal: Proposal, proposals: list[Proposal]) -> tuple[Step, Hypothesis]:
         """A proposal in the model, and what held-out motion says of it."""
         touched = proposal.term.effect.touched(len(at.scales))
-        found = self.laboratory.settle(self._add(at, proposal), touched)
+        added = self.laboratory.with_term(at, proposal.term, proposal.size)
+        found = self.laboratory.settle(replace(added, scales=proposal.scales), touched)
         change = None if self.held_out is None else self.held_out.change(at, found)
         rivals = tuple(each for each in proposals if each is not proposal)
-        log_odds = self._log_odds(proposal)
-        if isinstance(proposal.term.effect, TimeLocalEffect):
-            log_odds = min(log_odds, window_log_odds(at, found, found.model.terms[-1], self.laboratory))
-        log_odds += 0.0 if change is None else change.log_odds
-        contradicted = change is not None and (
-            change.harm > 0.0 or bool((change.standard[list(touched)] > CONTRADICTED).any())
-        )
-        return Step(proposal, log_odds, rivals, change, log_odds > 0.0 and not contradicted), found
+        confirmed = change is None or _is_better(change, touched)
+        return Step(proposal, self._log_odds(proposal), rivals, change, confirmed), found
 
     def _log_odds(self, proposal: Proposal) -> float:
         return proposal.log_factor + self._prior_odds(proposal.term.effect)
 
-    def _is_worth_a_try(self, proposal: Proposal) -> bool:
-        """Whether an effect is about as probable as torque without a name, and far more than none."""
+    def _names(self, proposal: Proposal) -> bool:
+        """Whether an effect is as probable as torque without a name, and far more than none."""
         alone = proposal.log_factor_alone + self._prior_odds(proposal.term.effect)
-        return self._log_odds(proposal) > (-CATALOGUED if alone > CATALOGUED else 0.0)
+        return proposal.log_factor > -CATALOGUED and alone > CATALOGUED
 
     def _prior_odds(self, effect: Effect) -> float:
         """Log odds before the data: one effect at one place is missing, whichever."""
@@ -179,3 +163,14 @@ class _Wanted:
 def _places(at: Hypothesis) -> set[Place]:
     """Effects of a hypothesis, and where."""
     return {(term.effect.id, term.effect.joint) for term in at.model.terms}
+
+
+def _is_better(change: Change, touched: tuple[int, ...]) -> bool:
+    """Whether held-out motion is predicted better where an effect acts, and hardly worse anywhere.
+
+    All joints share the links. What is believed of these moves with an effect, and other joints with it.
+    """
+    gain = np.log1p(change.relative)
+    lost = float(gain[change.standard > WORSE].sum())
+    gained = -float(np.minimum(gain, 0.0).sum())
+    return bool(change.standard[list(touched)].min() < -BETTER) and lost < SPILLED * gained and gain.sum() < 0.0
