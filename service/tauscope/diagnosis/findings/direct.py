@@ -37,11 +37,12 @@ def with_direct_findings(
         known = findings.get(place)
         if known is None:
             known = Finding((direct.term,), (NO_SHAPE,), 0.0, 1.0, diagnosis.after, diagnosis.after)
+        agrees = _agree(direct, unseen.get(direct.joint))
         findings[place] = replace(
             known,
             probability=float(stats.norm.cdf(CERTAIN)),
             alternatives=(),
-            confirmed=_agree(direct, unseen.get(direct.joint)),
+            confirmed=known.confirmed if agrees is None else agrees,
             behind=None,
             as_law=1.0,
             elsewhere=(),
