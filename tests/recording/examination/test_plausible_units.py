@@ -113,10 +113,25 @@ def test_registers_and_magnitudes_are_refused() -> None:
     assert "this is a magnitude" in str(find_implausible(changed(samples, effort=np.abs(samples.effort))))
 
 
+def test_a_fast_drive_in_milliseconds_is_refused() -> None:
+    samples = swing(rate_hz=4000.0)  # 4 Hz in ms: a rate that slow loggers have
+    doubt = find_implausible(changed(samples, time=samples.time * 1e3, velocity=None))
+    assert doubt is not None
+    assert "t=ms" in doubt
+
+
+def test_a_slow_friction_sweep_is_not_refused() -> None:
+    samples = swing(rate_hz=2000.0)
+    slow = changed(samples, time=samples.time * 200.0, velocity=None)  # 10 Hz, and 240 s for a sweep
+    assert find_implausible(slow) is None
+
+
 def test_encoder_counts_are_no_angles() -> None:
     samples = swing()
     counts = np.rint(2048 + samples.position * 4096 / (2 * np.pi))
     assert "counts of an encoder" in str(find_implausible(changed(samples, position=counts, velocity=None)))
+    whole_degrees = np.rint(100.0 * samples.position)
+    assert "--units q=deg" in str(find_implausible(changed(samples, position=whole_degrees, velocity=None)))
 
 
 def test_torque_limits_tell_milliamperes() -> None:

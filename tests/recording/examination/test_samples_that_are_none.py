@@ -14,6 +14,7 @@ from identification.simulated import PAPER_NOISE, paper_robot, simulate
 from recording.examination.damages import (
     DAMAGES,
     Channels,
+    drop_long,
     hold_all,
     hold_efforts,
     reset_encoder,
@@ -157,6 +158,52 @@ def test_an_arm_that_swings_freely_keeps_its_zeros() -> None:
     channels.position[1500:] = channels.position[1500]
     codes = {warning.code for warning in read_text(channels.csv()).warnings}
     assert "effort-dropouts" in codes  # it stands on its brakes
+
+
+def test_zeros_on_the_way_from_one_sign_to_the_other_are_measured() -> None:
+    channels = Channels.of(BASE)
+    channels.effort[:, 0] = 0.01 * np.rint(100.0 * channels.effort[:, 0])
+    for start in range(200, 2800, 400):  # forth, rest without load, back
+        channels.effort[start - 50 : start, 0] = 20.0 + channels.effort[start - 50 : start, 0] / 100.0
+        channels.effort[start : start + 50, 0] = 0.0
+        channels.effort[start + 50 : start + 100, 0] = channels.effort[start + 50 : start + 100, 0] / 100.0 - 20.0
+    assert "effort-dropouts" not in {warning.code for warning in read_text(channels.csv()).warnings}
+
+
+def test_motion_during_a_pause_of_the_logger_is_no_jump() -> None:
+    channels = Channels.of(BASE)
+    channels.keep(np.r_[0:1000, 1400 : len(channels.time)])
+    assert np.abs(channels.position[1000] - channels.position[999]).max() > 0.5
+    assert read_text(channels.csv()).warnings == ()
+
+
+def test_steps_of_torque_are_no_held_samples() -> None:
+    channels = Channels.of(BASE)
+    levels = np.random.default_rng(6).uniform(-20.0, 20.0, channels.effort.shape)
+    channels.effort = levels[np.arange(len(levels)) // 80]
+    assert read_text(channels.csv()).warnings == ()
+
+
+def test_a_held_position_is_masked_and_a_rest_is_not() -> None:
+    channels, rng = Channels.of(BASE), np.random.default_rng(0)
+    channels.position = np.rint(channels.position / 1e-3) * 1e-3
+    channels.position[1000:1300] = channels.position[1000]
+    number = np.arange(len(channels.time))
+    updates = np.cumsum([0, *rng.integers(2, 5, len(number))])  # every third row, give or take one
+    rows = updates[np.searchsorted(updates, number, side="right") - 1]
+    channels.position = channels.position[rows]
+    kept = np.isfinite(read_text(channels.csv()).samples().position).all(axis=1)
+    moving = kept & ((number < 1000) | (number >= 1300))
+    assert np.mean(rows[moving] == number[moving]) > 0.99
+    assert kept[1000:1300].mean() > 0.2
+
+
+@pytest.mark.parametrize(("damage", "arm", "seed"), [(spike_positions, 10_600, 18), (drop_long, 10_400, 12)])
+def test_a_damage_is_named_where_it_is_hard(damage: Damage, arm: int, seed: int) -> None:
+    channels = Channels.of(sound_recording(arm).recording)  # a coarse encoder rests; torque near zero is all noise
+    damage(channels, np.random.default_rng(seed))
+    recording = Recording.from_arrays("hard", channels.time, channels.position, channels.effort)
+    assert {warning.code for warning in examine_recording(recording).warnings} == {DAMAGES[damage]}
 
 
 def test_check_finds_the_same(tmp_path: Path) -> None:

@@ -19,12 +19,9 @@ SLOWEST_RATE_HZ = 2.0
 FASTEST_RATE_HZ = 2e5
 """No drive is sampled this fast [Hz]."""
 
-LONGEST_SWEEP_S = 1000.0
-"""A joint that would need longer than this to cross its range at its own top speed is not moving [s]: slow friction
-sweeps take a few hundred."""
-
-SLOW_RATE_HZ, LONG_SWEEP_S = 10.0, 300.0
-"""Neither alone is strange, a rate below the one [Hz] or a sweep beyond the other [s]; both at once are."""
+SLOWEST = 30.0
+"""Time from row to row times the time to cross a joint's range at its own top speed [s²]: a slow friction sweep of
+300 s is sampled at 10 Hz or more. A clock in ms makes this product a million times larger."""
 
 LEAST_SWEEP = 0.05
 """A range below this is rest, whatever its speed [rad or m]."""
@@ -158,8 +155,7 @@ def _doubt_time(sketch: Sketch) -> str | None:
     moving &= sketch.top_speed > 0.0
     sweep = float(np.min(sketch.span[moving] / sketch.top_speed[moving])) if moving.any() else 0.0
     whole = "" if not moving.any() else f" and the fastest joint takes {sweep:.3g} s to cross its range"
-    is_slow = interval > 1.0 / SLOW_RATE_HZ and sweep > LONG_SWEEP_S
-    if interval >= 1.0 / SLOWEST_RATE_HZ or sweep > LONGEST_SWEEP_S or is_slow:
+    if interval >= 1.0 / SLOWEST_RATE_HZ or interval * sweep > SLOWEST:
         text = f"rows are {interval:.4g} s apart{whole}: this is hardly in seconds"
         if abs(interval - 1.0) < 1e-9:
             return _doubt("t", text, "t=ms where it counts ms, or --units t=index --rate HZ where it counts samples")

@@ -24,8 +24,7 @@ HELD_SHARE = 0.5
 """Share of such moves followed by a rest above which the source holds its values."""
 
 FEWEST_MOVES = 30
-MOVING_SHARE = 0.2
-"""Least number of such moves, and their least share of all changes: noise makes some now and then."""
+"""Least number of such moves: noise makes some now and then."""
 
 LONGEST_HOLD = 64
 """Rows of the longest hold: a source of 30 Hz on a topic of 2 kHz."""
@@ -206,8 +205,7 @@ def _measure_holds(pieces: list[Array]) -> tuple[float, int, int]:
     bold = [sizes >= STEPS_OF_A_MOVE * step for sizes in steps]
     moves = np.concatenate([runs[large[:-1] & large[1:]] for runs, large in zip(lengths, bold, strict=True)])
     usual = int(np.percentile(np.concatenate(lengths), 99.0))
-    enough = len(moves) >= max(FEWEST_MOVES, MOVING_SHARE * sum(map(len, lengths)))
-    if not enough or np.mean(moves > 1) < HELD_SHARE:
+    if len(moves) < FEWEST_MOVES or np.mean(moves > 1) < HELD_SHARE:
         return step, usual, 1
     hold = int(np.median(moves))
     return step, usual, hold if hold <= LONGEST_HOLD else 1
