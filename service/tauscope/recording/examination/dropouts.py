@@ -61,7 +61,7 @@ class ZeroRuns:
         """Whether noise lets no effort stay at one value."""
         return any(0 < scale.run <= USUAL_RUN * scale.hold and scale.change > 0.0 for scale in self._scales)
 
-    def dropouts(self, recording: Recording) -> list[Rows]:
+    def find_dropouts(self, recording: Recording) -> list[Rows]:
         """Ranges of rows that are dropouts, of every joint, (k, 2)."""
         change = np.array([scale.change for scale in self._scales])
         *own, common = ([] if len(runs) > MOST_RUNS else runs for runs in self._runs)
@@ -69,13 +69,13 @@ class ZeroRuns:
             run
             for run in (common if len(own) > 1 else ())
             if (self._is_noisy and run[1] - run[0] >= COMMON_ROWS and _is_gap(recording, run))
-            or (_drops(recording, run) > COMMON_DROP * change).any()
+            or (_measure_drops(recording, run) > COMMON_DROP * change).any()
         ]
         lost = [set(shared) for _ in own]
         for joint, runs in enumerate(own):
             for run in runs:
                 overlaps = any(run[0] < stop and start < run[1] for start, stop in shared)
-                if not overlaps and _drops(recording, run)[joint] > DROP * change[joint]:
+                if not overlaps and _measure_drops(recording, run)[joint] > DROP * change[joint]:
                     lost[joint].add(run)
         return [np.array(sorted(ranges), dtype=np.int64).reshape(-1, 2) for ranges in lost]
 
@@ -98,7 +98,7 @@ def _moves(recording: Recording, run: tuple[int, int]) -> bool:
     return any(is_moving(block.position) for block in blocks)
 
 
-def _drops(recording: Recording, run: tuple[int, int]) -> Array:
+def _measure_drops(recording: Recording, run: tuple[int, int]) -> Array:
     """Distance of zero beyond the range of every joint's efforts before and after a run, (n,); at most 0 within it."""
     if not _is_gap(recording, run):
         return np.zeros(recording.joint_count)

@@ -21,14 +21,14 @@ def mend_recording(recording: Recording, robot: Robot | None = None) -> Recordin
     """Mask or repair the samples of a recording that were never measured, and say so in its notes."""
     names = [None] * recording.joint_count if robot is None else [joint.name for joint in robot.joints]
     defects = find_defects(recording, joint_types(recording, robot))
-    edits = _edits(recording, defects)
+    edits = _build_edits(recording, defects)
     if not edits:
         return recording
-    notes = (*recording.notes, *_warnings(recording, defects, names))
+    notes = (*recording.notes, *_describe_defects(recording, defects, names))
     return replace(recording, table=EditedTable(recording.table, edits), notes=notes)
 
 
-def _edits(recording: Recording, defects: Defects) -> dict[int, ColumnEdit]:
+def _build_edits(recording: Recording, defects: Defects) -> dict[int, ColumnEdit]:
     """Edits by column."""
     edits: dict[int, ColumnEdit] = {}
     n = recording.joint_count
@@ -44,7 +44,7 @@ def _edits(recording: Recording, defects: Defects) -> dict[int, ColumnEdit]:
     return edits
 
 
-def _warnings(recording: Recording, defects: Defects, joints: Sequence[str | None]) -> Iterator[ResultWarning]:
+def _describe_defects(recording: Recording, defects: Defects, joints: Sequence[str | None]) -> Iterator[ResultWarning]:
     """A warning about each kind of defect of each joint."""
 
     def begin(row: int) -> str:
@@ -62,7 +62,7 @@ def _warnings(recording: Recording, defects: Defects, joints: Sequence[str | Non
     kind = recording.effort_kind.value
     alike: dict[tuple[str, str, str | None], list[int]] = {}
     for number, joint in enumerate(defects.joints, 1):
-        for column, code, text, remedy in _joint_texts(joint, begin):
+        for column, code, text, remedy in _describe_joint(joint, begin):
             alike.setdefault((code, f"{column}: {text}", remedy), []).append(number)
     for (code, text, remedy), numbers in alike.items():
         group, _, words = text.partition(": ")
@@ -72,7 +72,7 @@ def _warnings(recording: Recording, defects: Defects, joints: Sequence[str | Non
         yield ResultWarning(code=code, joint=joint, text=f"{many} {', '.join(columns)}: {words}", remedy=remedy)
 
 
-def _joint_texts(
+def _describe_joint(
     joint: JointDefects, begin: Callable[[int], str]
 ) -> Iterator[tuple[Literal["q", "effort"], str, str, str | None]]:
     """Column, code, text and remedy of each kind of defect of one joint."""

@@ -100,7 +100,9 @@ def _doubt_velocity(sketch: Sketch, types: list[JointType]) -> str | None:
         for v in speeds
     ]
     # Of equal ratios the one with fewest units other than SI: that of q and qd both in degrees is 1.
-    deviation, time, position, speed = min(fits, key=lambda f: (f[0] > SAME_RATIO, len(_foreign(*f[1:])), f[0]))
+    deviation, time, position, speed = min(
+        fits, key=lambda f: (f[0] > SAME_RATIO, len(_name_foreign_units(*f[1:])), f[0])
+    )
     evidence = f"Δq/Δt is {typical:.3g} times column qd{joint + 1}"
     if deviation <= SAME_RATIO:
         column = "t" if time != "s" else f"q{joint + 1}" if position not in SI_LENGTHS else f"qd{joint + 1}"
@@ -109,7 +111,9 @@ def _doubt_velocity(sketch: Sketch, types: list[JointType]) -> str | None:
         if position in ("deg", "mm") and speed in SI_LENGTHS:
             units.append(f"qd={speed}")
         return _doubt(
-            column, f"{evidence}, the ratio of {' and '.join(_foreign(time, position, speed))}", ",".join(units)
+            column,
+            f"{evidence}, the ratio of {' and '.join(_name_foreign_units(time, position, speed))}",
+            ",".join(units),
         )
     if abs(sketch.interval - 1.0) < 1e-9:
         text = f"rises by 1 from row to row, and {evidence}: it counts samples of about {1.0 / typical:.4g} Hz"
@@ -135,7 +139,7 @@ def _velocity_ratios(sketch: Sketch) -> np.ndarray:
     return ratios
 
 
-def _foreign(time: str, position: str, speed: str) -> list[str]:
+def _name_foreign_units(time: str, position: str, speed: str) -> list[str]:
     """The units that are not SI, in words."""
     words = (
         "" if time == "s" else f"{time} to s",

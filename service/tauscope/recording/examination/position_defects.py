@@ -80,7 +80,7 @@ def scan_position(
     index = 0
     while index < len(large):
         a = int(large[index])
-        frozen = _frozen_rows(steps, a)
+        frozen = _count_frozen(steps, a)
         is_jump = abs(surprise[a]) > least_jump[a]
         reach = a + (LONGEST_GLITCH if is_jump else LONGEST_SPIKE)
         later = [int(b) for b in large[index + 1 : index + 4] if b <= reach and not frozen]
@@ -102,7 +102,7 @@ def _returns(surprise: Array, a: int, b: int) -> bool:
     return abs(out + back) < RETURN * max(abs(out), abs(back))
 
 
-def _frozen_rows(steps: Array, k: int) -> int:
+def _count_frozen(steps: Array, k: int) -> int:
     """Repeated rows before a step that makes up for them; 0 where it does not."""
     before, after = np.flatnonzero(steps[:k])[-CHANGES:], k + 1 + np.flatnonzero(steps[k + 1 :])[:CHANGES]
     if not len(before) or not len(after) or before[-1] == k - 1:

@@ -86,7 +86,9 @@ def measure_positions(sketch: Sketch, types: list[JointType]) -> list[PositionSc
     """Scales of every joint's position."""
     scales = []
     for joint, kind in enumerate(types):
-        pieces = [_steady(window.time, window.position[:, joint], sketch.interval) for window in sketch.windows]
+        pieces = [
+            _leave_stops_out(window.time, window.position[:, joint], sketch.interval) for window in sketch.windows
+        ]
         values = sketch.position[:, joint]
         values = values[np.isfinite(values)]
         low, high = np.percentile(values, [0.1, 99.9]) if len(values) else (0.0, 0.0)
@@ -184,7 +186,7 @@ def distance_beyond(windows: Array) -> Array:
     return np.maximum(np.maximum(values - others[:, -2], others[:, 1] - values), 0.0)
 
 
-def _steady(time: Array, values: Array, interval: float) -> Array:
+def _leave_stops_out(time: Array, values: Array, interval: float) -> Array:
     """A joint's known values without the rows before which the clock stands."""
     known = np.isfinite(values)
     time, values = time[known], values[known]

@@ -66,7 +66,7 @@ class JointDefects:
         if self.jumps or self.wraps:
             where = np.unique([0, *(row for row, _ in (*self.jumps, *self.wraps))])
             # Whole turns matter to nobody: the longest piece is that between jumps.
-            offsets = _offsets(self.jumps, where, count) + _offsets(self.wraps, where, count)
+            offsets = _sum_jumps(self.jumps, where, count) + _sum_jumps(self.wraps, where, count)
         return ColumnEdit(self._ranges("spikes", "frozen", "repeated", lost=lost), jumps=where, offsets=offsets)
 
     @property
@@ -169,7 +169,7 @@ class _Scan:
                 defects.joints[joint].rows[name] = rows
         if len(defects.bunched) > MOST_BUNCHED * len(recording):
             defects.bunched = NO_NUMBERS
-        for joint, ranges in zip(defects.joints, self.zeros.dropouts(recording), strict=True):
+        for joint, ranges in zip(defects.joints, self.zeros.find_dropouts(recording), strict=True):
             joint.rows["zeros"] = row_numbers(ranges)
         return defects
 
@@ -180,7 +180,7 @@ class _Scan:
             self.found.setdefault((joint, name), []).append(own)
 
 
-def _offsets(jumps: list[tuple[int, float]], where: Numbers, count: int) -> Array:
+def _sum_jumps(jumps: list[tuple[int, float]], where: Numbers, count: int) -> Array:
     """Offset from each of some rows on, (m,): the sum of the jumps up to there, 0 in the longest piece between them.
 
     Parameters
