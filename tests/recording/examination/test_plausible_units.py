@@ -27,7 +27,7 @@ def change(samples: Samples, **changes) -> Recording:
 @settings(max_examples=200, deadline=None)
 @given(seed=st.integers(0, 2**31), limited=st.booleans())
 def test_sound_recordings_are_not_refused(seed: int, limited: bool) -> None:
-    sound = record_sound_arm(seed)
+    sound = record_sound_arm(seed, rows=1500)
     robot = with_limits(sound.robot, sound.recording, np.random.default_rng(seed)) if limited else sound.robot
     assert find_implausible(sound.recording, robot) is None
     assert find_implausible(sound.recording) is None
