@@ -15,6 +15,7 @@ from recording.examination.damages import (
     DAMAGES,
     Channels,
     drop_long,
+    freeze_positions,
     hold_all,
     hold_efforts,
     reset_encoder,
@@ -93,6 +94,7 @@ def test_a_damage_is_named_wherever_it_is(damage: Damage, seed: int) -> None:
 @pytest.mark.timeout(1800)
 @settings(max_examples=1000, deadline=None)
 @given(damages=st.lists(st.sampled_from(list(DAMAGES)), min_size=1, max_size=2), seed=st.integers(0, 2**31))
+@example(damages=[reset_encoder, freeze_positions], seed=247598171)  # the reset follows the frozen rows at once
 def test_damages_end_in_a_line_or_in_a_result_as_good(damages: list[Damage], seed: int) -> None:
     assume(len(set(damages) & set(SLOW)) < 2)
     channels, rng = Channels.of(BASE), np.random.default_rng(seed)

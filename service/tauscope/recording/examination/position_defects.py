@@ -77,10 +77,11 @@ def scan_position(
     large = np.flatnonzero((np.abs(surprise) > least) & (steps != 0.0))  # a rest is judged by the step that ends it
     # Across a gap in time a joint may go as far as its speed allows.
     least_jump = np.maximum(JUMP * scale.move * np.maximum(np.diff(time) / interval, 1.0), LEAST_JUMP)
+    calm = np.where(np.abs(steps) > least_jump, 0.0, steps)
     index = 0
     while index < len(large):
         a = int(large[index])
-        frozen = _count_frozen(steps, a)
+        frozen = _count_frozen(steps, calm, a)
         is_jump = abs(surprise[a]) > least_jump[a]
         reach = a + (LONGEST_GLITCH if is_jump else LONGEST_SPIKE)
         later = [int(b) for b in large[index + 1 : index + 4] if b <= reach and not frozen]
@@ -102,13 +103,19 @@ def _returns(surprise: Array, a: int, b: int) -> bool:
     return abs(out + back) < RETURN * max(abs(out), abs(back))
 
 
-def _count_frozen(steps: Array, k: int) -> int:
-    """Repeated rows before a step that makes up for them; 0 where it does not."""
+def _count_frozen(steps: Array, calm: Array, k: int) -> int:
+    """Repeated rows before a step that makes up for them; 0 where it does not.
+
+    Parameters
+    ----------
+    calm : (N,) float64
+        the steps without jumps, from which speeds are taken [rad or m]
+    """
     before, after = np.flatnonzero(steps[:k])[-CHANGES:], k + 1 + np.flatnonzero(steps[k + 1 :])[:CHANGES]
     if not len(before) or not len(after) or before[-1] == k - 1:
         return 0
     rest = k - 1 - int(before[-1])
     # A coarse encoder's position changes in few rows: a speed is that of several changes.
-    speeds = steps[before[0] : before[-1] + 1].mean(), steps[k + 1 : after[-1] + 1].mean()
+    speeds = calm[before[0] : before[-1] + 1].mean(), calm[k + 1 : after[-1] + 1].mean()
     hidden = (rest + 1) * np.array(speeds)
     return rest if abs(steps[k] - hidden.mean()) <= MAKES_UP * np.abs(hidden).min() else 0
