@@ -97,7 +97,7 @@ def selected(
     rotors = [
         Term(RotorInertia(j), np.zeros(0), np.array([value])) for j, value in identified_rotors(identification).items()
     ]
-    shaped = _with_best_shapes(known, model, selector) if known else []
+    shaped = _choose_shapes(known, model, selector) if known else []
     selection = selector.select(model, [*rotors, *shaped], progress)
     guided = guided_by(selection.fit.model, selector)
     if guided is not None:
@@ -113,7 +113,7 @@ def selected(
     return selection, selector
 
 
-def _with_best_shapes(known: Sequence[Term], model: ExtendedModel, selector: Selector) -> list[Term]:
+def _choose_shapes(known: Sequence[Term], model: ExtendedModel, selector: Selector) -> list[Term]:
     """Terms of known size in the shapes of their grids that the torque fits best: 2 c u - c² B is largest."""
     fit = selector.fitter.fit(model)
     signals = model_signals(fit.model, selector.screen.observations)
