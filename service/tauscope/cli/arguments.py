@@ -6,7 +6,14 @@ from typing import Annotated
 import typer
 
 RobotFile = Annotated[
-    Path, typer.Argument(metavar="ROBOT", exists=True, dir_okay=False, help="Robot file (YAML).", show_default=False)
+    Path,
+    typer.Argument(
+        metavar="ROBOT",
+        exists=True,
+        dir_okay=False,
+        help="Robot file (YAML), or a URDF or MJCF by itself.",
+        show_default=False,
+    ),
 ]
 
 Units = Annotated[

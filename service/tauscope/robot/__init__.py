@@ -1,5 +1,6 @@
 """What the arm is: joints, chain, limits, and what the user's simulation believes; the robot file."""
 
+from tauscope.robot.chain import Chain
 from tauscope.robot.check import JointSummary, RobotReport, check_robot
 from tauscope.robot.denavit_hartenberg import DenavitHartenbergRow, modified_segments, standard_segments
 from tauscope.robot.finding import Finding, Severity
@@ -8,6 +9,7 @@ from tauscope.robot.physical import find_defect, nearest_body, pseudo_inertia
 from tauscope.robot.recording_layout import RecordingLayout, find_fault
 from tauscope.robot.robot import (
     STANDARD_PARAMETERS,
+    Coupling,
     FrictionCoefficients,
     FrictionShape,
     Joint,
@@ -22,10 +24,12 @@ from tauscope.robot.robot import (
 )
 from tauscope.robot.robot_data import robot_from_dict, robot_from_yaml, robot_to_dict
 from tauscope.robot.robot_file import read_robot
-from tauscope.robot.urdf import UrdfChain, read_urdf_chain
+from tauscope.robot.urdf import read_urdf_chain
 
 __all__ = [
     "STANDARD_PARAMETERS",
+    "Chain",
+    "Coupling",
     "DenavitHartenbergRow",
     "Finding",
     "FrictionCoefficients",
@@ -43,7 +47,6 @@ __all__ = [
     "RobotReport",
     "Segment",
     "Severity",
-    "UrdfChain",
     "check_robot",
     "find_defect",
     "find_fault",

@@ -1,6 +1,6 @@
 """The robot file as CONTRACT.md defines it, one class a mapping; what the fields mean stands there."""
 
-from typing import Self
+from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
@@ -9,6 +9,7 @@ from tauscope.robot.document_fields import (
     Motion,
     Name,
     Nonzero,
+    NotNegative,
     Number,
     PlainMapping,
     Positive,
@@ -45,12 +46,26 @@ class DenavitHartenbergRowDocument(Document):
     type: Motion = JointType.REVOLUTE
 
 
-class UrdfDocument(Document):
-    """Where the URDF is, and between which of its links the chain runs."""
+class CouplingDocument(Document):
+    """What moves a segment that follows a joint.
+
+    joint : int
+        index of the joint, from 0
+    offset : float
+        position of the segment where the joint is at zero [rad or m]
+    """
+
+    joint: Annotated[int, Field(ge=0, lt=MOST_JOINTS, strict=True)]
+    multiplier: Number
+    offset: Number
+
+
+class ChainDocument(Document):
+    """Where the URDF or MJCF is, and between which of its links or bodies the chain runs."""
 
     file: Name
-    base: Name
-    tip: Name
+    base: Name | None = None
+    tip: Name | None = None
 
 
 Rows = list[DenavitHartenbergRowDocument]
@@ -61,7 +76,8 @@ class KinematicsDocument(Document):
 
     dh: Rows | None = Field(default=None, min_length=1, max_length=MOST_JOINTS)
     mdh: Rows | None = Field(default=None, min_length=1, max_length=MOST_JOINTS)
-    urdf: UrdfDocument | None = None
+    urdf: ChainDocument | None = None
+    mjcf: ChainDocument | None = None
 
     @model_validator(mode="after")
     def _check_one(self) -> Self:
@@ -166,10 +182,15 @@ class FrictionDocument(Document):
 
 
 class ModelDocument(Document):
-    """What the user's simulation believes."""
+    """What the user's simulation believes.
+
+    rotor_inertia : list of float, or None
+        reflected to the joint, one a joint [kg m² or kg]
+    """
 
     links: list[LinkDocument] | None = Field(default=None, min_length=1, max_length=MOST_JOINTS)
     friction: list[FrictionDocument] | None = Field(default=None, min_length=1, max_length=MOST_JOINTS)
+    rotor_inertia: list[NotNegative] | None = Field(default=None, min_length=1, max_length=MOST_JOINTS)
 
 
 class RecordingDocument(Document):
@@ -194,13 +215,16 @@ class RecordingDocument(Document):
 class RobotDocument(Document):
     """The whole robot file.
 
-    gravity : list of three float
-        in the base frame [m/s²]
+    gravity : list of three float, or None
+        in the base frame [m/s²]; None takes that of the MJCF, else [0, 0, -9.81]
+    locked : dict of str to float
+        position of joints that do not move [rad or m]
     """
 
     name: Name
     kinematics: KinematicsDocument
-    gravity: Vector = Field(default=[0.0, 0.0, -9.81])
+    gravity: Vector | None = None
+    locked: dict[Name, Number] = Field(default_factory=dict)
     joints: list[JointDocument] | None = Field(default=None, min_length=1, max_length=MOST_JOINTS)
     model: ModelDocument | None = None
     recording: RecordingDocument | None = None
@@ -213,6 +237,13 @@ class RobotDocument(Document):
             if name in names[:index]:
                 first, second = names.index(name) + 1, index + 1
                 raise refusal(f"joints {first} and {second} are both named {shown(name)}; rename one", "joints")
+        return self
+
+    @model_validator(mode="after")
+    def _check_locked(self) -> Self:
+        """Rows of dh or mdh hold moving joints only."""
+        if self.locked and self.kinematics.urdf is None and self.kinematics.mjcf is None:
+            raise refusal("needs kinematics from a URDF or MJCF; put the fixed joint into the rows instead", "locked")
         return self
 
 
@@ -233,6 +264,7 @@ class SegmentDocument(Document):
     type: Motion
     before: PlacementDocument
     after: PlacementDocument
+    coupling: CouplingDocument | None = None
 
 
 class PlainKinematicsDocument(KinematicsDocument):

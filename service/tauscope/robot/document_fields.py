@@ -57,6 +57,13 @@ def _positive(value: float) -> float:
     return value
 
 
+def _not_negative(value: float) -> float:
+    """A number of zero or more."""
+    if value < 0.0:
+        raise refusal(f"must not be below zero, but is {value:g}; write its size")
+    return value
+
+
 def _nonzero(value: float) -> float:
     """A number other than zero."""
     if value == 0.0:
@@ -145,6 +152,7 @@ def _plain_mapping(value: Any) -> dict[str, Any]:
 
 Number = Annotated[float, BeforeValidator(_number)]
 Positive = Annotated[Number, AfterValidator(_positive)]
+NotNegative = Annotated[Number, AfterValidator(_not_negative)]
 Nonzero = Annotated[Number, AfterValidator(_nonzero)]
 Name = Annotated[str, BeforeValidator(_name)]
 Motion = Annotated[JointType, BeforeValidator(_motion)]

@@ -1,6 +1,6 @@
 """What the arm is: an open chain of joints, and what the user's simulation believes about its links."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
@@ -93,18 +93,48 @@ class Placement:
     translation: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
 
 
+@dataclass(frozen=True)
+class Coupling:
+    """A segment that follows a joint: its own position is multiplier · q_joint + offset.
+
+    joint : int
+        index of the joint, from 0
+    multiplier : float
+        turn or slide of the segment per turn or slide of the joint
+    offset : float
+        position of the segment at q_joint = 0 [rad or m]
+    """
+
+    joint: int
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+
 @dataclass(frozen=True, eq=False)
 class Segment:
-    """One joint of the chain: link frame j seen from link frame j-1 is ``before · motion_z(q_j) · after``.
+    """One motion of the chain: link frame j seen from link frame j-1 is ``before · motion_z(q_j) · after``.
 
     The joint turns about, or slides along, the z axis between the two placements. Standard DH puts a and α into
     `after`, modified DH into `before`; a URDF puts the axis' orientation into both, so that the link frame stays the
     URDF's own.
+
+    coupling : Coupling or None
+        None where the segment is the next joint's own
     """
 
     type: JointType
     before: Placement
     after: Placement
+    coupling: Coupling | None = None
+
+
+def segment_couplings(segments: Iterable[Segment]) -> tuple[Coupling, ...]:
+    """What moves each of a chain's segments: its own joint, which is the next one, or the joint that it follows."""
+    found: list[Coupling] = []
+    for segment in segments:
+        following = max((each.joint for each in found), default=-1) + 1
+        found.append(segment.coupling or Coupling(following))
+    return tuple(found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,10 +209,19 @@ class FrictionCoefficients:
 
 @dataclass(frozen=True)
 class Model:
-    """What the user's simulation believes; None where the robot file says nothing."""
+    """What the user's simulation believes; None where the robot file says nothing.
+
+    links : tuple of LinkInertia, or None
+        one a segment
+    friction : tuple of FrictionCoefficients, or None
+        one a joint
+    rotor_inertia : tuple of float, or None
+        reflected to the joint, one a joint [kg m² or kg]
+    """
 
     links: tuple[LinkInertia, ...] | None = None
     friction: tuple[FrictionCoefficients, ...] | None = None
+    rotor_inertia: tuple[float, ...] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,6 +230,8 @@ class Robot:
 
     joints : tuple of Joint
         base first
+    segments : tuple of Segment
+        base first; one a joint, and one for each joint that follows another
     gravity : (3,) float64
         acceleration of gravity in the base frame [m/s²]
     """
@@ -202,8 +243,10 @@ class Robot:
     model: Model = Model()
     source: Path | None = None
     urdf: Path | None = None
-    urdf_links: tuple[tuple[str, ...], ...] = ()
+    mjcf: Path | None = None
+    link_names: tuple[tuple[str, ...], ...] = ()
     findings: tuple[Finding, ...] = ()
+    notes: tuple[ResultWarning, ...] = ()
     repairs: tuple[Repair, ...] = ()
     recording: RecordingLayout = field(default_factory=RecordingLayout)
 
@@ -213,14 +256,49 @@ class Robot:
         return len(self.joints)
 
     @property
+    def link_count(self) -> int:
+        """Number of moving links, one a segment."""
+        return len(self.segments)
+
+    @property
+    def couplings(self) -> tuple[Coupling, ...]:
+        """What moves each segment."""
+        return segment_couplings(self.segments)
+
+    @property
+    def ratios(self) -> NDArray[np.float64]:
+        """What each segment moves per unit of each joint, (links, joints)."""
+        matrix = np.zeros((self.link_count, self.joint_count))
+        for link, coupling in enumerate(self.couplings):
+            matrix[link, coupling.joint] = coupling.multiplier
+        return matrix
+
+    def joint_of_link(self, link: int) -> Joint:
+        """The joint that moves a link.
+
+        Parameters
+        ----------
+        link : int
+            index of the link, from 0
+        """
+        return self.joints[self.couplings[link].joint]
+
+    @property
+    def first_links(self) -> tuple[int, ...]:
+        """Index of the first link that each joint moves."""
+        moved = [each.joint for each in self.couplings]
+        return tuple(moved.index(joint) for joint in range(self.joint_count))
+
+    @property
     def warnings(self) -> tuple[ResultWarning, ...]:
-        """One for each inertial that no body has, with the numbers before and after."""
-        return tuple(
+        """Notes on the description, and one for each inertial that no body has, with the numbers before and after."""
+        repaired = (
             ResultWarning(
                 code="repaired-inertial",
-                joint=self.joints[repair.link].name,
+                joint=self.joint_of_link(repair.link).name,
                 text=f"{repair.place}: {repair.text}",
                 remedy=repair.remedy,
             )
             for repair in self.repairs
         )
+        return (*self.notes, *repaired)

@@ -9,7 +9,8 @@ from tauscope.robot.messages import one_line, shown
 from tauscope.robot.physical import nearest_body, repair_text
 from tauscope.robot.placement import compose
 from tauscope.robot.robot import LinkInertia, Placement, Repair
-from tauscope.robot.urdf_element import Element, bounded_number, only_child, origin, urdf_error, where
+from tauscope.robot.urdf_element import Element, bounded_number, number, only_child, origin, urdf_error, where
+from tauscope.robot.urdf_xml import UrdfTree
 
 ENTRIES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
@@ -64,6 +65,18 @@ def lumped_inertia(
             _remark(place, stated, findings)
         vectors.append(after.to_vector())
     return LinkInertia.from_vector(np.sum(vectors, axis=0)) if vectors else None, repairs
+
+
+def stated_mass(tree: UrdfTree, link: str) -> float:
+    """Mass of a link and of everything that hangs on it [kg], as the file states it."""
+    total, waiting = 0.0, [link]
+    while waiting:
+        name = waiting.pop()
+        element = only_child(tree.label, tree.links[name], "inertial", [])
+        mass = None if element is None else only_child(tree.label, element, "mass", [])
+        total += 0.0 if mass is None else number(tree.label, mass, "value", 0.0)
+        waiting += [joint.child for joint in tree.child_joints.get(name, ())]
+    return total
 
 
 def _stated_inertia(label: str, body: Element, element: Element, findings: list[Finding]) -> LinkInertia:

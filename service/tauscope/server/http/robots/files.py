@@ -10,7 +10,8 @@ from tauscope.robot import Robot, RobotReport, check_robot, read_robot
 from tauscope.robot.bounded_file import decode_utf8, read_bounded
 from tauscope.robot.messages import one_line, shown
 from tauscope.robot.robot_file import LARGEST_ROBOT_FILE
-from tauscope.robot.urdf_xml import LARGEST_URDF
+from tauscope.robot.urdf_element import local_name
+from tauscope.robot.xml_text import LARGEST_XML, is_xml, parse_xml
 from tauscope.robot.yaml_text import read_yaml
 from tauscope.server.http.documents import to_json_text
 from tauscope.server.http.form import PartRule
@@ -24,7 +25,7 @@ def robot_part_rules(folder: Path) -> dict[str, PartRule]:
     """Parts of a form that bring a robot."""
     return {
         "robot": PartRule(LARGEST_ROBOT_FILE, folder, default_name="robot.yaml"),
-        "urdf": PartRule(LARGEST_URDF, folder),
+        "urdf": PartRule(LARGEST_XML, folder),
     }
 
 
@@ -52,7 +53,7 @@ def read_received_robot(folder: Path, file_name: str) -> Robot:
         if it is not valid, or names a file that was not sent with it
     """
     try:
-        _confine_urdf(folder, file_name)
+        _confine_files(folder, file_name)
         return read_robot(folder / file_name)
     except RobotFileError as error:
         raise type(error)(_in_user_terms(str(error), folder)) from None
@@ -67,7 +68,7 @@ def check_received_robot(folder: Path, file_name: str) -> RobotReport:
         if it cannot be read at all, or names a file that was not sent with it
     """
     try:
-        _confine_urdf(folder, file_name)
+        _confine_files(folder, file_name)
         report = check_robot(folder / file_name)
     except RobotFileError as error:
         raise type(error)(_in_user_terms(str(error), folder)) from None
@@ -75,15 +76,39 @@ def check_received_robot(folder: Path, file_name: str) -> RobotReport:
     return replace(report, source=file_name, findings=tuple(findings))
 
 
-def _confine_urdf(folder: Path, file_name: str) -> None:
+def _confine_files(folder: Path, file_name: str) -> None:
     """Refuse a robot file that names a file that did not come with it: no path of the server is opened for a client."""
-    path = folder / file_name
-    data = read_yaml(decode_utf8(read_bounded(path, LARGEST_ROBOT_FILE), file_name), file_name).data
-    for key in ("kinematics", "urdf", "file"):
-        data = data.get(key) if isinstance(data, dict) else None
-    if isinstance(data, str) and data not in {entry.name for entry in folder.iterdir()} - {file_name}:
-        hint = "send that file as part urdf, and write its bare name into the robot file"
-        raise RobotFileError(one_line(f"{file_name}: kinematics.urdf.file: {shown(data)} was not sent; {hint}"))
+    data = read_bounded(folder / file_name, LARGEST_ROBOT_FILE)
+    sent = {entry.name for entry in folder.iterdir()}
+    if is_xml(data):
+        _confine_xml(data, file_name, sent)
+        return
+    content = read_yaml(decode_utf8(data, file_name), file_name).data
+    kinematics = content.get("kinematics") if isinstance(content, dict) else None
+    for kind in ("urdf", "mjcf"):
+        named = kinematics.get(kind) if isinstance(kinematics, dict) else None
+        file = named.get("file") if isinstance(named, dict) else None
+        if not isinstance(file, str):
+            continue
+        if file not in sent - {file_name}:
+            hint = "send that file as part urdf, and write its bare name into the robot file"
+            raise RobotFileError(one_line(f"{file_name}: kinematics.{kind}.file: {shown(file)} was not sent; {hint}"))
+        _confine_xml(read_bounded(folder / file, LARGEST_XML), file, sent)
+
+
+def _confine_xml(data: bytes, label: str, sent: set[str]) -> None:
+    """Refuse an MJCF that names a file that did not come with it, a folder, or a plugin: MuJoCo would open it."""
+    root = parse_xml(data, label, [])
+    if local_name(root) != "mujoco":
+        return
+    for element in root.iter():
+        kind = local_name(element)
+        folders = [name for name in ("assetdir", "meshdir", "texturedir") if element.get(name)]
+        file = element.get("file")
+        if kind in ("extension", "plugin", "model") or folders or (file is not None and file not in sent):
+            text = f"<{kind}> {'names' if folders or file else 'is'} a file that was not sent"
+            hint = "send one MJCF without included files: save it from MuJoCo (mj_saveLastXML), without its meshes"
+            raise RobotFileError(one_line(f"{label}:{element.sourceline}: {text}; {hint}"))
 
 
 def _in_user_terms(text: str, folder: Path) -> str:
