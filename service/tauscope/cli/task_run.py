@@ -62,8 +62,7 @@ def run_task(
     require_distinct(recordings)
     require_free(paths, (robot_file, *recordings))
     robot = read_robot(robot_file)
-    if robot.urdf is not None:
-        require_free(paths, [robot.urdf])
+    require_free(paths, [path for _, path in robot.files])
     with shown_progress() as progress:
         result, written = write_outputs(task, request, dict(outputs), progress)
     if show is not None:

@@ -9,6 +9,7 @@ from tauscope.robot.physical import find_defect, nearest_body, pseudo_inertia
 from tauscope.robot.recording_layout import RecordingLayout, find_fault
 from tauscope.robot.robot import (
     STANDARD_PARAMETERS,
+    Actuator,
     Coupling,
     FrictionCoefficients,
     FrictionShape,
@@ -28,6 +29,7 @@ from tauscope.robot.urdf import read_urdf_chain
 
 __all__ = [
     "STANDARD_PARAMETERS",
+    "Actuator",
     "Chain",
     "Coupling",
     "DenavitHartenbergRow",

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tauscope.result_warning import ResultWarning
 from tauscope.robot.finding import Finding
 from tauscope.robot.messages import one_line, shown
-from tauscope.robot.robot import FrictionCoefficients, JointLimits, JointType, LinkInertia, Repair, Segment
+from tauscope.robot.robot import Actuator, FrictionCoefficients, JointLimits, JointType, LinkInertia, Repair, Segment
 
 MOST_NAMES = 4
 """Names that a note lists."""
@@ -20,6 +20,8 @@ MOST_NAMES = 4
 class Chain:
     """Joints, segments and bodies from the base to the tip.
 
+    segment_names : tuple of str
+        the file's joint of each segment
     segments : tuple of Segment
         one a joint, and one for each joint that follows another
     links : tuple of LinkInertia, or None
@@ -30,6 +32,10 @@ class Chain:
         one a joint [kg m² or kg]; None where no joint states it
     link_names : tuple of tuple of str
         links of the file that make up each link
+    branches : tuple of LinkInertia
+        the part of each link that hangs on joints beside the chain
+    actuators : tuple of Actuator or None
+        what drives each joint; None where the file says nothing
     gravity : (3,) float64, or None
         in the base frame [m/s²]; None where the file states none
     """
@@ -38,12 +44,15 @@ class Chain:
     tip: str
     joint_names: tuple[str, ...]
     joint_types: tuple[JointType, ...]
+    segment_names: tuple[str, ...]
     segments: tuple[Segment, ...]
     limits: tuple[JointLimits, ...]
     links: tuple[LinkInertia, ...] | None
     friction: tuple[FrictionCoefficients, ...] | None
     rotor_inertia: tuple[float, ...] | None
     link_names: tuple[tuple[str, ...], ...]
+    branches: tuple[LinkInertia, ...]
+    actuators: tuple[Actuator | None, ...]
     findings: tuple[Finding, ...]
     repairs: tuple[Repair, ...]
     notes: tuple[ResultWarning, ...] = ()

@@ -108,7 +108,8 @@ def _summary(number: int, joint: Joint, segment: Segment, mass: float | None) ->
 def _remarks(robot: Robot, source: str) -> Iterator[Finding]:
     """What other commands repair, will miss or stumble over."""
     for note in robot.notes:
-        yield Finding(Severity.INFO, source, f"{note.text}; {note.remedy}")
+        place, _, text = note.text.partition(": ")
+        yield Finding(Severity.INFO, place, f"{text}; {note.remedy}")
     for repair in robot.repairs:
         yield Finding(Severity.WARNING, repair.place, f"{repair.text}; {repair.remedy}")
     size = float(np.linalg.norm(robot.gravity))

@@ -59,6 +59,23 @@ class FrictionShape:
 
 
 @dataclass(frozen=True)
+class Actuator:
+    """What drives a joint in a simulator's file.
+
+    kind : str
+        ``motor``, ``position`` or ``velocity``
+    kp : float
+        torque per position error [Nm/rad or N/m]
+    kv : float
+        torque per velocity [Nm s/rad or N s/m]
+    """
+
+    kind: str
+    kp: float
+    kv: float
+
+
+@dataclass(frozen=True)
 class Joint:
     """One joint: its name, its limits and what turns a recorded drive signal into joint torque.
 
@@ -66,6 +83,8 @@ class Joint:
         motor turns per joint turn; None where not stated
     has_torque_constant : bool
         whether the robot file states the constant; 1 stands where it does not
+    actuator : Actuator or None
+        what drives the joint in the user's MJCF
     """
 
     name: str
@@ -77,6 +96,7 @@ class Joint:
     friction_shape: FrictionShape = FrictionShape()
     drive: Mapping[str, Any] | None = None
     has_torque_constant: bool = False
+    actuator: Actuator | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,6 +254,12 @@ class Robot:
         base first; one a joint, and one for each joint that follows another
     gravity : (3,) float64
         acceleration of gravity in the base frame [m/s²]
+    segment_names : tuple of str
+        joint of the URDF or MJCF that each segment is; empty without such a file, as are the next two
+    link_names : tuple of tuple of str
+        links of that file that make up each link
+    branches : tuple of LinkInertia
+        the part of each link that hangs on joints beside the chain
     """
 
     name: str
@@ -244,7 +270,9 @@ class Robot:
     source: Path | None = None
     urdf: Path | None = None
     mjcf: Path | None = None
+    segment_names: tuple[str, ...] = ()
     link_names: tuple[tuple[str, ...], ...] = ()
+    branches: tuple[LinkInertia, ...] = ()
     findings: tuple[Finding, ...] = ()
     notes: tuple[ResultWarning, ...] = ()
     repairs: tuple[Repair, ...] = ()
@@ -254,6 +282,13 @@ class Robot:
     def joint_count(self) -> int:
         """Number of joints n."""
         return len(self.joints)
+
+    @property
+    def files(self) -> tuple[tuple[str, Path], ...]:
+        """Role and path of the files that describe the robot, each once."""
+        roles = (("robot", self.source), ("urdf", self.urdf), ("mjcf", self.mjcf))
+        paths = {path: role for role, path in reversed(roles) if path is not None}
+        return tuple((role, path) for path, role in reversed(paths.items()))
 
     @property
     def link_count(self) -> int:

@@ -1,7 +1,7 @@
 """A validated document to a Robot."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -100,7 +100,9 @@ def build_robot(document: RobotDocument, origin: DocumentOrigin, file_source: Fi
         model=model,
         urdf=kinematics.path if kinematics.key == "urdf" else None,
         mjcf=kinematics.path if kinematics.key == "mjcf" else None,
+        segment_names=chain.segment_names if chain else (),
         link_names=chain.link_names if chain else (),
+        branches=chain.branches if chain else (),
         findings=tuple(findings),
         notes=chain.notes if chain else (),
         repairs=repairs,
@@ -166,8 +168,11 @@ def _joints(documents: list[JointDocument] | None, chain: _Kinematics, origin: D
             text = f"{shown(document.name)} is no moving joint of the chain; its joints are {known}: use one of these"
             raise origin.error(("joints", index, "name"), text)
     stated = {document.name: document for document in documents or ()}
-    rows = zip(names, chain.chain.joint_types, chain.chain.limits, strict=True)
-    return tuple(_joint(stated.get(name, JointDocument(name=name)), kind, limits) for name, kind, limits in rows)
+    rows = zip(names, chain.chain.joint_types, chain.chain.limits, chain.chain.actuators, strict=True)
+    return tuple(
+        replace(_joint(stated.get(name, JointDocument(name=name)), kind, limits), actuator=actuator)
+        for name, kind, limits, actuator in rows
+    )
 
 
 def _joint(document: JointDocument, kind: JointType, own: JointLimits) -> Joint:

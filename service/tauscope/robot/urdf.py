@@ -8,6 +8,7 @@ exporters write for "not known" (zero, negative, reversed, or beyond 1e9) count 
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,6 +25,15 @@ from tauscope.robot.urdf_branches import MOVING, JointMotions, Master, joint_axi
 from tauscope.robot.urdf_element import Element, number, only_child, origin, urdf_error, where
 from tauscope.robot.urdf_inertia import lumped_inertia, stated_mass
 from tauscope.robot.urdf_xml import UrdfJoint, UrdfTree, parse_urdf
+
+
+@dataclass(frozen=True, eq=False)
+class _Body:
+    """A link element, where it sits in the frame of the link that it belongs to, and whether a joint carries it."""
+
+    element: Element
+    placement: Placement
+    on_branch: bool
 
 
 def read_urdf_chain(
@@ -51,6 +61,7 @@ def read_urdf_chain(
     base, tip = _ends(tree, base, tip, locked or {})
     path = _path(tree, base, tip)
     motions = JointMotions(tree, locked or {}, path)
+    motions.remark_on_masters(findings)
     for joint in path:
         if joint.type not in MOVING and joint.type != "fixed" and joint.name not in (locked or {}):
             text = f"type {joint.type} is not supported in the chain; name the link beyond it as base"
@@ -61,7 +72,10 @@ def read_urdf_chain(
     moving = [joint for joint in path if joint.name in motions.moving]
     branches: list[UrdfJoint] = []
     bodies = [_bodies(tree, joint, path, motions, branches, findings) for joint in moving]
-    lumped = [lumped_inertia(label, link, members, findings) for link, members in enumerate(bodies)]
+    lumped = [
+        lumped_inertia(label, link, [(body.element, body.placement) for body in members], findings)
+        for link, members in enumerate(bodies)
+    ]
     links = [link for link, _ in lumped]
     _remark_on_base(tree, base, findings)
     for joint, link in zip(moving, links, strict=True):
@@ -76,12 +90,15 @@ def read_urdf_chain(
         tip=tip,
         joint_names=tuple(names),
         joint_types=tuple(_joint_type(joint) for joint in motions.independent),
+        segment_names=tuple(joint.name for joint in moving),
         segments=_segments(tree, path, motions, findings),
         limits=tuple(_limits(tree, joint, findings) for joint in motions.independent),
         links=tuple(link or LinkInertia.from_vector(np.zeros(10)) for link in links) if any(links) else None,
         friction=_friction(tree, moving, motions, findings),
         rotor_inertia=None,
-        link_names=tuple(tuple(element.get("name") for element, _ in members) for members in bodies),
+        link_names=tuple(tuple(body.element.get("name") for body in members) for members in bodies),
+        branches=tuple(_branch(label, members) for members in bodies),
+        actuators=(None,) * len(names),
         findings=tuple(findings),
         repairs=tuple(repair for _, repairs in lumped for repair in repairs),
         notes=(*notes, *_branch_notes(tree, branches, motions)),
@@ -190,23 +207,29 @@ def _bodies(
     motions: JointMotions,
     branches: list[UrdfJoint],
     findings: list[Finding],
-) -> list[tuple[Element, Placement]]:
-    """Link elements that move with a joint's child link, and where they sit in its frame; notes moving branches."""
-    bodies: list[tuple[Element, Placement]] = []
-    waiting = [(joint.child, Placement())]
+) -> list[_Body]:
+    """Bodies that move with a joint's child link; notes moving branches."""
+    bodies: list[_Body] = []
+    waiting = [(joint.child, Placement(), False)]
     while waiting:
-        link, placement = waiting.pop()
-        bodies.append((tree.links[link], placement))
+        link, placement, on_branch = waiting.pop()
+        bodies.append(_Body(tree.links[link], placement, on_branch))
         for below in tree.child_joints.get(link, ()):
             if below.name in motions.moving:
                 continue
             # The chain's own joints are read again for the segments: remarks on them are made there.
             remarks = [] if below in path else findings
             rest = compose(origin(tree.label, below.element, remarks), motions.rigid_motion(below, remarks))
-            waiting.append((below.child, compose(placement, rest)))
+            waiting.append((below.child, compose(placement, rest), on_branch or below.type != "fixed"))
             if below.type != "fixed":
                 branches.append(below)
     return bodies
+
+
+def _branch(label: str, members: list[_Body]) -> LinkInertia:
+    """What a link carries on joints beside the chain."""
+    carried = [(body.element, body.placement) for body in members if body.on_branch]
+    return lumped_inertia(label, 0, carried, [])[0] or LinkInertia.from_vector(np.zeros(10))
 
 
 def _branch_notes(tree: UrdfTree, branches: list[UrdfJoint], motions: JointMotions) -> list[ResultWarning]:

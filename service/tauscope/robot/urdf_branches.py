@@ -73,8 +73,7 @@ class JointMotions:
         while (mimic := only_child(self._tree.label, joint.element, "mimic", [])) is not None:
             name = mimic.get("joint") or ""
             if name not in self._joints:
-                text = f"mimics joint {shown(name)}, which is not in the file; {nearest(name, self._joints)}"
-                raise urdf_error(self._tree.label, joint.element, text)
+                return None  # said by `remark_on_masters`
             if name in met:
                 raise urdf_error(self._tree.label, joint.element, "mimics itself; name another joint in <mimic>")
             met.append(name)
@@ -84,6 +83,15 @@ class JointMotions:
             if joint.name in self._locked:
                 break
         return None if len(met) == 1 else Master(joint, multiplier, offset)
+
+    def remark_on_masters(self, findings: list[Finding]) -> None:
+        """Say which mimic joints follow a joint that is not in the file; as in ROS, they move by themselves."""
+        for joint in self._joints.values():
+            mimic = only_child(self._tree.label, joint.element, "mimic", findings)
+            if mimic is not None and (name := mimic.get("joint") or "") not in self._joints:
+                text = f"mimics joint {shown(name)}, which is not in the file, and counts as free; "
+                place = one_line(where(self._tree.label, joint.element))
+                findings.append(Finding(Severity.WARNING, place, text + nearest(name, self._joints)))
 
     def rigid_position(self, joint: UrdfJoint) -> float:
         """Position of a joint that does not move with the chain [rad or m]."""

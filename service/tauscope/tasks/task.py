@@ -168,8 +168,7 @@ def record_provenance(
     RecordingError
         where a file cannot be read any more
     """
-    paths = [("robot", Path(robot.source))] if robot.source else []
-    paths += [("urdf", robot.urdf)] if robot.urdf else []
+    paths = list(robot.files)
     paths += [(ROLES[role], files.find(role, name)) for role, names in inputs.items() for name in names]
     hashed = [
         InputFile(role, files.show(Path(file.path)), file.size_bytes, file.sha256)
