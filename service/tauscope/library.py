@@ -129,14 +129,14 @@ def diagnose(
         the data or the robot cannot answer
     """
     from tauscope import diagnosis
-    from tauscope.diagnosis.extended_model.saved import read_model
     from tauscope.diagnosis.next_experiment import planned_experiment
+    from tauscope.export.model_file import read_extended_model
     from tauscope.identification import Options
     from tauscope.results import DiagnosisResult
 
     arm, options = _robot(robot), Options(cutoff_hz=cutoff_hz)
     is_saved = isinstance(against, str | Path) and Path(against).suffix.lower() == ".json"
-    saved = read_model(Path(str(against)), arm) if is_saved else None
+    saved = read_extended_model(Path(str(against)), arm) if is_saved else None
     simulated = () if is_saved or against in ("identified", "model") else _recordings(against, arm)
     train, judge = _recordings(recordings, arm), _recordings(held_out, arm)
     if headroom:

@@ -58,13 +58,9 @@ def build_spec(robot: Robot) -> mujoco.MjSpec:
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
     spec.option.timestep = 1e-3
     body = spec.worldbody
-    first = set(robot.first_links)
-    names = [
-        robot.joint_of_link(link).name if link in first else f"{robot.joint_of_link(link).name} at link {link + 1}"
-        for link in range(robot.link_count)
-    ]
     with _mujoco_refusals(robot):
-        for number, (name, segment, link) in enumerate(zip(names, robot.segments, links, strict=True), 1):
+        rows = zip(robot.segment_labels, robot.segments, links, strict=True)
+        for number, (name, segment, link) in enumerate(rows, 1):
             body = body.add_body(name=f"link{number}")
             _place(body, name, segment)
             _weigh(body, link)

@@ -101,7 +101,7 @@ def test_urdf_by_itself_is_a_robot_file(tmp_path: Path) -> None:
     (note,) = robot.warnings
     assert note.code == "default-chain"
     assert "from 'base' to the deepest leaf 'tool'; its joints are 'shoulder', 'elbow'" in note.text
-    assert "kinematics: {urdf: {file: arm.urdf, base: …, tip: …}}" in note.remedy
+    assert "kinematics: {urdf: {file: arm.urdf, base: …, tip: …}}" in str(note.remedy)
 
 
 def test_base_and_tip_may_be_left_out(tmp_path: Path) -> None:

@@ -191,7 +191,7 @@ def test_what_moves_beside_the_chain_counts_as_rigid_and_is_noted() -> None:
     (note,) = chain.notes
     assert note.code == "rigid-branch"
     assert "joint 'grip' moves beside the chain and counts as rigid, with 7 kg" in note.text
-    assert "locked: {grip: 0.02}" in note.remedy
+    assert "locked: {grip: 0.02}" in str(note.remedy)
 
 
 def test_locked_joint_stands_where_it_is_stated() -> None:

@@ -174,10 +174,10 @@ def test_gradient_of_a_coupled_regressor_is_that_of_differences(seed: int) -> No
 
     def value(parts: list[np.ndarray]) -> np.ndarray:
         out = np.empty((robot.joint_count, columns, 2))
-        TorqueRegressor(robot, chunk=2).write(*parts, out)
+        TorqueRegressor(robot, chunk=2).write(parts[0], parts[1], parts[2], out)
         return np.einsum("jcn,jcn->n", weight, out)
 
-    gradients = RegressorGradient(robot, capacity=2).contract(*states, weight)
+    gradients = RegressorGradient(robot, capacity=2).contract(states[0], states[1], states[2], weight)
     step = 1e-6
     for part, gradient in enumerate(gradients):
         for joint in range(robot.joint_count):

@@ -55,9 +55,11 @@ def diagnose(
     next_trajectory: Annotated[
         Path | None, _output("Write the motion to record next: what best separates, or shows, what is open.")
     ] = None,
-    model: Annotated[Path | None, _output("Write the model with all findings, for --against.", "OUT.json")] = None,
+    model: Annotated[
+        Path | None, _output("Write the model with all findings, for export and --against.", "OUT.json")
+    ] = None,
     export: Annotated[
-        list[Path] | None, _output("Write compensation code of the model with all findings.", "OUT.py|OUT.h")
+        list[Path] | None, _output("Write the model with all findings, by suffix as in tauscope export.", "FILE")
     ] = None,
     scenario: Annotated[Path | None, _output("Write the findings for the simulated arm.", "OUT.yaml")] = None,
     improved_robot: Annotated[
@@ -83,7 +85,7 @@ def diagnose(
     from tauscope.cli.diagnose_summary import show_diagnosis
     from tauscope.cli.task_run import export_outputs, make_request, run_task
     from tauscope.cli.terminal import output
-    from tauscope.export.formats import CODE_FILES
+    from tauscope.export.formats import CODE_FILES, EXPORT_FILES
     from tauscope.tasks import diagnose as task
 
     what, simulated, saved = parse_against(against)
@@ -108,7 +110,7 @@ def diagnose(
     )
     outputs = [
         (model, "model.json"),
-        *export_outputs(export or (), CODE_FILES),
+        *export_outputs(export or (), {**EXPORT_FILES, **CODE_FILES}),
         (scenario, "scenario.yaml"),
         (improved_robot, "improved-robot.yaml"),
         (next_trajectory, f"trajectory{next_trajectory.suffix.lower()}" if next_trajectory else ""),

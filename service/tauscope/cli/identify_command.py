@@ -73,6 +73,10 @@ def identify(
         Path | None, typer.Option(metavar="OUT.html", dir_okay=False, help="Write a page to read, figures included.")
     ] = None,
     export: Export = None,
+    model: Annotated[
+        Path | None,
+        typer.Option(metavar="OUT.json", dir_okay=False, help="Write the model for tauscope export and --against."),
+    ] = None,
 ) -> None:
     """Find an arm's parameters from recordings.
 
@@ -110,7 +114,12 @@ def identify(
         held_out=tuple(map(str, held)),
         options=options,
     )
-    outputs = [(json, "result.json"), (report, "report.html"), *export_outputs(export or (), EXPORT_FILES)]
+    outputs = [
+        (json, "result.json"),
+        (report, "report.html"),
+        (model, "model.json"),
+        *export_outputs(export or (), EXPORT_FILES),
+    ]
     run_task(
         task,
         request,

@@ -28,6 +28,7 @@ from tauscope.cli.diagnose_command import diagnose
 from tauscope.cli.doctor_command import doctor
 from tauscope.cli.driver_choice import DriverCommand
 from tauscope.cli.excite_command import excite
+from tauscope.cli.export_command import export
 from tauscope.cli.fleet_command import fleet
 from tauscope.cli.identify_command import identify
 from tauscope.cli.job_command import job
@@ -69,6 +70,7 @@ app = typer.Typer(
 add_verb(app, identify, SeveralValuesCommand)
 add_verb(app, diagnose, SeveralValuesCommand)
 add_verb(app, excite)
+add_verb(app, export)
 app.add_typer(robot, name="robot")
 app.add_typer(recording, name="recording")
 add_verb(app, run, DriverCommand)

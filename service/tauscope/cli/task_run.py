@@ -109,15 +109,22 @@ def export_outputs(paths: Sequence[Path], files: Mapping[ExportFormat, ExportFil
     typer.BadParameter
         where a suffix names no format
     """
-    made = []
-    for path in paths:
-        kind = SUFFIXES.get(path.suffix.lower())
-        file = None if kind is None else files.get(kind)
-        if file is None:
-            known = ", ".join(suffix for suffix, kind in SUFFIXES.items() if kind in files)
-            raise typer.BadParameter(f"{str(path)!r}: the suffix names no format; use {known}", param_hint="'--export'")
-        made.append((path, file.output))
-    return made
+    return [(path, files[parse_export_format(path, files, "'--export'")].output) for path in paths]
+
+
+def parse_export_format(path: Path, files: Mapping[ExportFormat, ExportFile], option: str) -> ExportFormat:
+    """The format that the suffix of a file names.
+
+    Raises
+    ------
+    typer.BadParameter
+        where it names none
+    """
+    kind = SUFFIXES.get(path.suffix.lower())
+    if kind is None or kind not in files:
+        known = ", ".join(suffix for suffix, kind in SUFFIXES.items() if kind in files)
+        raise typer.BadParameter(f"{str(path)!r}: the suffix names no format; use {known}", param_hint=option)
+    return kind
 
 
 def _show_warnings(robot: Robot, result: Any, *, summarised: bool) -> None:

@@ -22,11 +22,14 @@ class JointModel:
 
     rotor_inertia : float or None
         the motor's inertia reflected to the joint [kg m² or kg]
+    branch : LinkInertia or None
+        the part of the link that the file has on moving joints beside the chain
     """
 
     link: LinkInertia | None = None
     friction: JointFriction | None = None
     rotor_inertia: float | None = None
+    branch: LinkInertia | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,16 +55,26 @@ def joint_models(
     friction: Sequence[JointFriction],
     rotor_inertia: Sequence[float | None] | None = None,
 ) -> dict[str, JointModel]:
-    """The whole robot's model by joint name, as the exports take it.
+    """The whole robot's model by the labels of its segments, as the exports take it.
 
     Parameters
     ----------
+    links : sequence of LinkInertia
+        one a segment
+    friction : sequence of JointFriction
+        one a joint
     rotor_inertia : sequence of float or None, length n, optional
         identified rotor inertias [kg m² or kg]
     """
     rotors = [None] * robot.joint_count if rotor_inertia is None else rotor_inertia
-    rows = zip(robot.joints, links, friction, rotors, strict=True)
-    return {joint.name: JointModel(link, coefficients, rotor) for joint, link, coefficients, rotor in rows}
+    own = {link: joint for joint, link in enumerate(robot.first_links)}
+    made: dict[str, JointModel] = {}
+    for index, (label, link) in enumerate(zip(robot.segment_labels, links, strict=True)):
+        branch = robot.branches[index] if robot.branches else None
+        joint = own.get(index)
+        mine = (None, None) if joint is None else (friction[joint], rotors[joint])
+        made[label] = JointModel(link, *mine, branch)
+    return made
 
 
 def centred(joint: str, link: LinkInertia) -> CentredInertia:

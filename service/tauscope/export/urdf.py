@@ -1,6 +1,6 @@
 """The identified model written into the user's own URDF: inertials and joint dynamics, nothing else."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +11,7 @@ from tauscope.export.compensation.identifiers import comment_text
 from tauscope.export.compensation.model import JointFriction
 from tauscope.export.joint_model import CentredInertia, JointModel, centred, dry_friction_and_damping, friction_notes
 from tauscope.export.xml_spans import Element, XmlText
+from tauscope.robot import LinkInertia, find_defect, nearest_body
 from tauscope.robot.messages import nearest, one_line, shown
 
 _MARKER = "Model identified by Tauscope."
@@ -25,13 +26,19 @@ class PatchedUrdf:
     notes: tuple[str, ...]
 
 
-def patch_urdf(source: bytes | Path, models: Mapping[str, JointModel]) -> PatchedUrdf:
+def patch_urdf(source: bytes | Path, models: Mapping[str, JointModel], remarks: Sequence[str] = ()) -> PatchedUrdf:
     """Write links and friction into a URDF in place; comments, meshes, order and white space stay byte for byte.
 
     A link's ``<inertial>`` gets the centre of mass, rpy 0, and the inertia about the centre of mass along the link
     frame's axes. ``<dynamics>`` gets damping = τ_v and friction = τ_s + τ_sc, the Coulomb level at speed. Links on
     fixed joints below are part of the identified link: their own inertials are set to zero, not removed, because
-    simulators make up a mass from the shapes of a link that has none.
+    simulators make up a mass from the shapes of a link that has none. What moves beside the chain stays as it is, and
+    its mass is taken off the link that carries it.
+
+    Parameters
+    ----------
+    remarks : sequence of str
+        what the comment says besides
 
     Raises
     ------
@@ -47,13 +54,15 @@ def patch_urdf(source: bytes | Path, models: Mapping[str, JointModel]) -> Patche
     for name, model in models.items():
         joint = tree.moving_joint(name)
         if model.link is not None:
-            inertia = centred(name, model.link)
-            _write_inertial(text, tree.link(joint.child), inertia)
+            own, moved = _without_branch(name, model)
+            notes += moved
+            _write_inertial(text, tree.link(joint.child), centred(name, own))
             notes += _zero_fixed_children(text, tree, joint.child, frozenset(models))
         if model.friction is not None:
             notes += _write_dynamics(text, joint.element, name, model.friction)
         if model.rotor_inertia:
             notes.append(f"{name}: URDF has no rotor inertia; the identified value is {model.rotor_inertia:.6g}.")
+    notes += remarks
     lines = [comment_text(note) for note in notes]
     text.set_comment(text.root, _MARKER, "".join(f"\n       {line}" for line in lines))
     return PatchedUrdf(text.edited(), tuple(notes))
@@ -115,6 +124,23 @@ def _joint(element: Element) -> _Joint:
     return _Joint(element, element.attributes.get("type", ""), ends[0], ends[1])
 
 
+def _without_branch(name: str, model: JointModel) -> tuple[LinkInertia, list[str]]:
+    """A joint's own link, without what the file has on moving joints beside the chain."""
+    link = model.link or LinkInertia.from_vector(np.zeros(10))
+    if model.branch is None or not np.any(model.branch.to_vector()):
+        return link, []
+    own = LinkInertia.from_vector(link.to_vector() - model.branch.to_vector())
+    if own.mass > 0.0 and find_defect(own) is None:
+        return own, []
+    text = f"{name}: the identified link less what moves beside it is no body; the nearest body is written."
+    body = nearest_body(own)
+    if not body.mass > 0.0:
+        raise ExportError(
+            one_line(f"joint {shown(name)}: what moves beside its link weighs more than the link; export .xml instead")
+        )
+    return body, [text]
+
+
 def _write_inertial(text: XmlText, link: Element, inertia: CentredInertia) -> None:
     """Set a link's inertial, adding what is missing of it."""
     values = {
@@ -147,8 +173,8 @@ def _zero_fixed_children(text: XmlText, tree: _Tree, link: str, identified: froz
             if below.type != "fixed":
                 if name not in identified:
                     notes.append(
-                        f"{below.child} moves on joint {name}, which was not identified: it is left as it was. If that "
-                        f"joint stood still in the recordings, its mass is part of link {link} too."
+                        f"{below.child} moves on joint {name} beside the chain: it is left as it was. Link {link} has "
+                        "the identified mass less what moves beside it."
                     )
             elif below.child not in seen:
                 seen.add(below.child)

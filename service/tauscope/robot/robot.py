@@ -308,6 +308,15 @@ class Robot:
             matrix[link, coupling.joint] = coupling.multiplier
         return matrix
 
+    @property
+    def segment_labels(self) -> tuple[str, ...]:
+        """A name for each segment: that of its joint, or of the joint in the file that follows."""
+        if self.segment_names:
+            return self.segment_names
+        first = self.first_links
+        names = (self.joint_of_link(link).name for link in range(self.link_count))
+        return tuple(name if link in first else f"{name} at link {link + 1}" for link, name in enumerate(names))
+
     def joint_of_link(self, link: int) -> Joint:
         """The joint that moves a link.
 

@@ -10,6 +10,7 @@ from pydantic import BaseModel, Field, field_validator
 from pydantic_core import PydanticCustomError
 
 from tauscope.export.compensation import RecordingSource
+from tauscope.export.model import Origin
 from tauscope.recording import EffortKind, Reading, Recording, open_recording
 from tauscope.report.provenance import InputFile, Provenance, input_files, versions
 from tauscope.robot import RecordingLayout, Robot, find_fault
@@ -178,15 +179,16 @@ def record_provenance(
     return Provenance(tuple(command), tuple(hashed), versions(), datetime.now(UTC))
 
 
-def recording_sources(provenance: Provenance) -> list[RecordingSource]:
-    """The recordings that a model is made from, for its exports."""
-    return [RecordingSource(entry.path, entry.sha256) for entry in provenance.inputs if entry.role == "recording"]
-
-
-def effort_kind(recordings: Sequence[Recording]) -> EffortKind:
-    """Current where any recording holds current."""
+def model_origin(robot: Robot, recordings: Sequence[Recording], provenance: Provenance) -> Origin:
+    """Where a model comes from, for its exports; its effort is current where any recording holds current."""
     holds_current = any(recording.effort_kind is EffortKind.CURRENT for recording in recordings)
-    return EffortKind.CURRENT if holds_current else EffortKind.TORQUE
+    sources = (RecordingSource(entry.path, entry.sha256) for entry in provenance.inputs if entry.role == "recording")
+    return Origin(
+        sources=tuple(sources),
+        effort_kind=EffortKind.CURRENT if holds_current else EffortKind.TORQUE,
+        created=provenance.created,
+        urdf=None if robot.urdf is None else robot.urdf.read_bytes(),
+    )
 
 
 def command_words(verb: str, robot: str, **options: Any) -> tuple[str, ...]:

@@ -1,0 +1,160 @@
+"""``tauscope export``: a model file to every format, and back through other readers to 1e-9."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cli.conftest import Ended, run  # noqa: F401
+from tauscope.dynamics import inverse_dynamics
+from tauscope.export.model_file import read_export_model
+from tauscope.robot import Robot, read_robot
+from tauscope_sim.motion import random_fourier_motion
+from tauscope_sim.recording import simulate_recording
+from tauscope_sim.recording_csv import write_recording_csv
+
+Run = Callable[..., Ended]
+
+
+def link(name: str, mass: float, x: float) -> str:
+    inertia = '<inertia ixx="0.05" ixy="0" ixz="0" iyy="0.06" iyz="0" izz="0.05"/>'
+    return f'<link name="{name}"><inertial><mass value="{mass}"/><origin xyz="{x} 0 0.05"/>{inertia}</inertial></link>'
+
+
+def joint(name: str, kind: str, parent: str, child: str, x: float, rest: str) -> str:
+    limit = '<limit lower="-2" upper="2" effort="60" velocity="3"/>'
+    ends = f'<parent link="{parent}"/><child link="{child}"/><origin xyz="{x} 0 0.1"/>'
+    return f'<joint name="{name}" type="{kind}">{ends}{limit}{rest}</joint>'
+
+
+URDF = "".join(
+    [
+        '<robot name="palletiser"><link name="base"/>',
+        link("column", 4, 0.1) + link("arm", 3, 0.2) + link("hand", 1, 0.05) + link("finger", 0.2, 0.01),
+        joint("turn", "revolute", "base", "column", 0, '<axis xyz="0 0 1"/>'),
+        joint("lift", "revolute", "column", "arm", 0.1, '<axis xyz="0 1 0"/>'),
+        joint("level", "revolute", "arm", "hand", 0.4, '<axis xyz="0 1 0"/><mimic joint="lift" multiplier="-1"/>'),
+        joint("grip", "prismatic", "hand", "finger", 0.1, '<axis xyz="0 1 0"/>'),
+        "</robot>",
+    ]
+)
+ROBOT = """
+name: palletiser
+kinematics: {urdf: {file: arm.urdf, base: base, tip: hand}}
+locked: {grip: 0.03}
+joints:
+  - {name: lift, friction_shape: {k_v: 200, delta: 10}}
+  - {name: turn, friction_shape: {k_v: 200, delta: 10}}
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A robot file with its URDF, a recording of it, and the model that identify made."""
+    path = tmp_path_factory.mktemp("export")
+    (path / "arm.urdf").write_text(URDF, encoding="utf-8")
+    (path / "arm.yaml").write_text(ROBOT, encoding="utf-8")
+    arm = read_robot(path / "arm.yaml")
+    motion = random_fourier_motion(arm.joints, np.random.default_rng(1), period_s=5.0)
+    rng = np.random.default_rng(2)
+    recording = simulate_recording(arm, motion, rate_hz=100.0, periods=2, noise_std=0.01, rng=rng)
+    write_recording_csv(path / "run.csv", recording, arm.joints)
+    return path
+
+
+@pytest.fixture
+def model(folder: Path, run: Run) -> Path:  # noqa: F811
+    path = folder / "model.json"
+    if not path.exists():
+        ended = run("identify", folder / "arm.yaml", folder / "run.csv", "--model", path)
+        assert ended.status == 0, ended.err
+    return path
+
+
+def torque(robot: Robot, links: np.ndarray) -> np.ndarray:
+    rng = np.random.default_rng(3)
+    q, qd, qdd = (rng.normal(size=(5, robot.joint_count)) for _ in range(3))
+    return inverse_dynamics(robot, links, q, qd, qdd)
+
+
+def links_of(robot: Robot) -> np.ndarray:
+    assert robot.model.links is not None
+    return np.concatenate([each.to_vector() for each in robot.model.links])
+
+
+@pytest.mark.parametrize("name", ["out.urdf", "out.xml"])
+def test_simulators_file_read_again_has_the_identified_torque(folder: Path, model: Path, run: Run, name: str) -> None:  # noqa: F811
+    out = folder / name
+    ended = run("export", model, out)
+    assert (ended.status, ended.err) == (0, "")
+    given = read_export_model(model)
+    expected = torque(given.robot, np.concatenate([each.to_vector() for each in given.links]))
+    if name == "out.urdf":
+        (folder / "again.yaml").write_text(ROBOT.replace("arm.urdf", name), encoding="utf-8")
+        again = read_robot(folder / "again.yaml")
+    else:
+        again = read_robot(out)
+    assert [each.name for each in again.joints] == ["turn", "lift"]
+    assert again.link_count == 3
+    np.testing.assert_allclose(torque(again, links_of(again)), expected, rtol=1e-9, atol=1e-9)
+    assert again.model.friction is not None
+    for found, friction in zip(again.model.friction, given.friction, strict=True):
+        assert found.viscous == pytest.approx(friction.viscous, rel=1e-12)
+        assert found.stiction == pytest.approx(friction.stiction + friction.stribeck, rel=1e-12)
+
+
+def test_mass_of_a_gripper_stays_where_it_was(folder: Path, model: Path, run: Run) -> None:  # noqa: F811
+    assert run("export", model, folder / "out.urdf").status == 0
+    text = (folder / "out.urdf").read_text(encoding="utf-8")
+    assert '<mass value="0.2"/>' in text
+    assert "finger moves on joint grip beside the chain: it is left as it was" in text
+
+
+@pytest.mark.parametrize("name", ["out.yaml", "out.json", "out.h", "out.py"])
+def test_controllers_files_are_written(folder: Path, model: Path, run: Run, name: str) -> None:  # noqa: F811
+    assert run("export", model, folder / name).status == 0
+    assert "lift" in (folder / name).read_text(encoding="utf-8")
+
+
+def test_actuators_have_gains(folder: Path, model: Path, run: Run) -> None:  # noqa: F811
+    out = folder / "servo.xml"
+    assert run("export", model, out, "--actuator", "position", "--kp", "400,300", "--kv", "20").status == 0
+    robot = read_robot(out)
+    gains = [(each.actuator.kp, each.actuator.kv) for each in robot.joints if each.actuator]
+    assert gains == [(400.0, 20.0), (300.0, 20.0)]
+    assert [each.limits.torque for each in robot.joints] == [60.0, 60.0]
+
+
+def test_model_can_be_compared_with(folder: Path, model: Path, run: Run) -> None:  # noqa: F811
+    document = json.loads(model.read_text(encoding="utf-8"))
+    assert document["schema"] == "tauscope.model/1"
+    assert document["arm"]["segments"] == ["turn", "lift", "level"]
+    assert [each["name"].endswith("run.csv") if isinstance(each, dict) else each[0].endswith("run.csv")
+            for each in document["arm"]["recordings"]] == [True]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("out.txt",), "the suffix names no format; use .json"),
+        (("out.urdf", "--actuator", "position"), "only an MJCF"),
+        (("out.xml", "--kp", "much"), "must be numbers"),
+        (("model.json",), "is an input of this command"),
+    ],
+)
+def test_wrong_usage_is_refused(folder: Path, model: Path, run: Run, words: tuple[str, ...], message: str) -> None:  # noqa: F811
+    ended = run("export", model, folder / words[0], *words[1:])
+    assert ended.status == 2
+    assert message in " ".join(ended.err.split())
+
+
+def test_file_without_its_arm_is_refused_with_a_remedy(folder: Path, model: Path, run: Run) -> None:  # noqa: F811
+    document = json.loads(model.read_text(encoding="utf-8"))
+    del document["arm"]
+    old = folder / "old.json"
+    old.write_text(json.dumps(document), encoding="utf-8")
+    ended = run("export", old, folder / "out.xml")
+    assert (ended.status, ended.out) == (1, "")
+    assert "write it again with --model" in ended.err
