@@ -169,9 +169,9 @@ class _Reader:
         if base is None or tip is None:
             ends = self._body_names[first], self._body_names[last]
             notes.insert(0, default_ends_note(self._label, "mjcf", *ends, names))
+        self._remark_on_the_rest()
         dofs = [int(model.jnt_dofadr[joint.index]) for joint in independent]
         rotors = np.array([model.dof_armature[dof] for dof in dofs]) + self._motor_armature(own)
-        rotation = self._data.xmat[first].reshape(3, 3)
         return Chain(
             base=self._body_names[first],
             tip=self._body_names[last],
@@ -189,7 +189,7 @@ class _Reader:
             findings=tuple(self._findings),
             repairs=(),
             notes=tuple(note for note in notes if note is not None),
-            gravity=rotation.T @ model.opt.gravity,
+            gravity=self._gravity(first),
         )
 
     def _error(self, text: str) -> RobotFileError:
@@ -197,6 +197,23 @@ class _Reader:
 
     def _remark(self, severity: Severity, joint: _Joint, text: str) -> None:
         self._findings.append(Finding(severity, one_line(f"{self._label}: joint {shown(joint.name)}"), text))
+
+    def _gravity(self, base: int) -> Array:
+        """Gravity in the base's frame, (3,) [m/s²]."""
+        if self._model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY):
+            return np.zeros(3)
+        return self._data.xmat[base].reshape(3, 3).T @ self._model.opt.gravity
+
+    def _remark_on_the_rest(self) -> None:
+        """Say which forces of the file the model leaves out."""
+        model, left = self._model, []
+        if model.opt.density or model.opt.viscosity:
+            left.append("drag of the medium (option density, viscosity)")
+        if any(model.tendon_stiffness) or np.any(model.tendon_damping) or any(model.tendon_frictionloss):
+            left.append("stiffness, damping and friction of tendons")
+        if np.any(model.body_gravcomp):
+            left.append("gravity compensation (gravcomp)")
+        self._findings += [Finding(Severity.WARNING, self._label, f"the model leaves out {each}") for each in left]
 
     def _masters(self) -> Iterable[tuple[int, tuple[int, float, float]]]:
         """Joints tied to another by an equality that is linear: q₁ - q₁⁰ = c₀ + c₁ (q₂ - q₂⁰)."""

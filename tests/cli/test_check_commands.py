@@ -8,6 +8,7 @@ import pytest
 
 from cli.conftest import Ended
 from cli.simulated_files import SimulatedFiles, record
+from robot.robot_texts import URDF
 from tauscope.recording import read_recording
 from tauscope.robot import read_robot
 from tauscope_sim.examples import example_robot
@@ -84,3 +85,11 @@ def test_a_truncated_log_is_recovered_on_demand(run: Run, tmp_path: Path) -> Non
     assert (ended.status, ended.err) == (0, "")
     assert "damage passed over: " in ended.out
     assert 0 < len(read_recording(target)) < 10_000
+
+
+def test_recording_of_another_chain_than_the_default_one_is_refused_with_the_chain(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "arm.urdf").write_text(URDF, encoding="utf-8")
+    (tmp_path / "run.csv").write_text("t,q1,tau1\n0,0,0\n0.1,0,0\n", encoding="utf-8")
+    ended = run("identify", tmp_path / "arm.urdf", tmp_path / "run.csv")
+    assert ended.status == 1
+    assert "its joints are 'shoulder', 'elbow'; where another is meant, write a robot file" in ended.err

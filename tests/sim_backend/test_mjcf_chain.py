@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from tauscope.dynamics import inverse_dynamics
 from tauscope.errors import RobotFileError
-from tauscope.robot import Actuator, Robot, read_robot
+from tauscope.robot import Actuator, Robot, Severity, read_robot
 
 # pyright: reportAttributeAccessIssue=false
 
@@ -191,6 +191,26 @@ def test_joint_that_follows_by_equality_has_no_coordinate_of_its_own(tmp_path: P
         mujoco.mj_inverse(model, data)
         expected.append(data.qfrc_inverse[0] - data.qfrc_inverse[1])
     np.testing.assert_allclose(tauscope_torque(robot, q, qd, qdd)[:, 0], expected, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('<option gravity="0.3 0 -9.7"/>', '<option density="1000"/>', "leaves out drag of the medium"),
+        ('<body name="lower"', '<body name="lower" gravcomp="1"', "leaves out gravity compensation"),
+        ('<joint name="elbow"', '<joint name="elbow" stiffness="3"', "has stiffness 3, which the model leaves out"),
+        ('<joint name="elbow"', '<joint name="elbow" damping="1 2 3"', "has polynomial damping"),
+    ],
+)
+def test_forces_that_the_model_leaves_out_are_named(tmp_path: Path, old: str, new: str, words: str) -> None:
+    robot = read_robot(write_robot(tmp_path, ARM.replace(old, new)))
+    assert [words in finding.text for finding in robot.findings if finding.severity is Severity.WARNING] == [True]
+
+
+def test_gravity_that_is_switched_off_is_none(tmp_path: Path) -> None:
+    option = '<option gravity="0.3 0 -9.7"><flag gravity="disable"/></option>'
+    robot = read_robot(write_robot(tmp_path, ARM.replace('<option gravity="0.3 0 -9.7"/>', option)))
+    np.testing.assert_array_equal(robot.gravity, np.zeros(3))
 
 
 @pytest.mark.parametrize(

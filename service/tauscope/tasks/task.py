@@ -9,11 +9,13 @@ from typing import Any, Protocol
 from pydantic import BaseModel, Field, field_validator
 from pydantic_core import PydanticCustomError
 
+from tauscope.errors import RecordingMismatchError
 from tauscope.export.compensation import RecordingSource
 from tauscope.export.model import Origin
 from tauscope.recording import EffortKind, Reading, Recording, open_recording
 from tauscope.report.provenance import InputFile, Provenance, input_files, versions
 from tauscope.robot import RecordingLayout, Robot, find_fault
+from tauscope.robot.messages import one_line
 from tauscope.strict_model import StrictModel
 
 ROLES = {"recordings": "recording", "held_out": "held out", "simulated": "compared with", "model": "compared with"}
@@ -147,11 +149,20 @@ def read_recordings(
     if role == "simulated":
         robot, reading = replace(robot, recording=RecordingLayout()), Reading(trust_units=options.trust_units)
     paths = [files.find(role, name) for name in names]
-    read = [open_recording(path, robot, reading) for path in paths]
+    read = [_open(path, robot, reading) for path in paths]
     return tuple(
         recording if str(path) == name else replace(recording, name=name)
         for recording, path, name in zip(read, paths, names, strict=True)
     )
+
+
+def _open(path: Path, robot: Robot, reading: Reading) -> Recording:
+    """A recording of a robot; where it has other joints than a chain that nobody chose, the reason names the chain."""
+    try:
+        return open_recording(path, robot, reading)
+    except RecordingMismatchError as error:
+        chosen = [f"{note.text}; {note.remedy}" for note in robot.notes if note.code == "default-chain"]
+        raise RecordingMismatchError(one_line("; ".join([str(error), *chosen]))) from error
 
 
 def record_provenance(
