@@ -1,13 +1,16 @@
 """``tauscope export``: a model file to every format, and back through other readers to 1e-9."""
 
 import json
+import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
 
-from cli.conftest import Ended, run  # noqa: F401
+from cli.conftest import Ended
 from tauscope.dynamics import inverse_dynamics
 from tauscope.export.model_file import read_export_model
 from tauscope.robot import Robot, read_robot
@@ -65,7 +68,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def model(folder: Path, run: Run) -> Path:  # noqa: F811
+def model(folder: Path, run: Run) -> Path:
     path = folder / "model.json"
     if not path.exists():
         ended = run("identify", folder / "arm.yaml", folder / "run.csv", "--model", path)
@@ -85,7 +88,7 @@ def links_of(robot: Robot) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", ["out.urdf", "out.xml"])
-def test_simulators_file_read_again_has_the_identified_torque(folder: Path, model: Path, run: Run, name: str) -> None:  # noqa: F811
+def test_simulators_file_read_again_has_the_identified_torque(folder: Path, model: Path, run: Run, name: str) -> None:
     out = folder / name
     ended = run("export", model, out)
     assert (ended.status, ended.err) == (0, "")
@@ -105,7 +108,7 @@ def test_simulators_file_read_again_has_the_identified_torque(folder: Path, mode
         assert found.stiction == pytest.approx(friction.stiction + friction.stribeck, rel=1e-12)
 
 
-def test_mass_of_a_gripper_stays_where_it_was(folder: Path, model: Path, run: Run) -> None:  # noqa: F811
+def test_mass_of_a_gripper_stays_where_it_was(folder: Path, model: Path, run: Run) -> None:
     assert run("export", model, folder / "out.urdf").status == 0
     text = (folder / "out.urdf").read_text(encoding="utf-8")
     assert '<mass value="0.2"/>' in text
@@ -113,12 +116,12 @@ def test_mass_of_a_gripper_stays_where_it_was(folder: Path, model: Path, run: Ru
 
 
 @pytest.mark.parametrize("name", ["out.yaml", "out.json", "out.h", "out.py"])
-def test_controllers_files_are_written(folder: Path, model: Path, run: Run, name: str) -> None:  # noqa: F811
+def test_controllers_files_are_written(folder: Path, model: Path, run: Run, name: str) -> None:
     assert run("export", model, folder / name).status == 0
     assert "lift" in (folder / name).read_text(encoding="utf-8")
 
 
-def test_actuators_have_gains(folder: Path, model: Path, run: Run) -> None:  # noqa: F811
+def test_actuators_have_gains(folder: Path, model: Path, run: Run) -> None:
     out = folder / "servo.xml"
     assert run("export", model, out, "--actuator", "position", "--kp", "400,300", "--kv", "20").status == 0
     robot = read_robot(out)
@@ -127,7 +130,30 @@ def test_actuators_have_gains(folder: Path, model: Path, run: Run) -> None:  # n
     assert [each.limits.torque for each in robot.joints] == [60.0, 60.0]
 
 
-def test_model_can_be_compared_with(folder: Path, model: Path, run: Run) -> None:  # noqa: F811
+def test_isaac_lab_gets_friction_as_torque(
+    folder: Path,
+    model: Path,
+    run: Run,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    out = folder / "actuators.py"
+    assert run("export", model, out, "--isaac-lab", "--kp", "400").status == 0
+    module = ModuleType("isaaclab.actuators")
+    module.ImplicitActuatorCfg = dict  # pyright: ignore[reportAttributeAccessIssue]
+    monkeypatch.setitem(sys.modules, "isaaclab", ModuleType("isaaclab"))
+    monkeypatch.setitem(sys.modules, "isaaclab.actuators", module)
+    space: dict[str, Any] = {}
+    exec(out.read_text(encoding="utf-8"), space)
+    arm, given = space["PALLETISER_ACTUATORS"]["arm"], read_export_model(model)
+    assert arm["joint_names_expr"] == ["turn", "lift"]
+    assert arm["stiffness"] == {"turn": 400.0, "lift": 400.0}
+    assert arm["effort_limit"] == {"turn": 60.0, "lift": 60.0}
+    for name, friction in zip(("turn", "lift"), given.friction, strict=True):
+        assert arm["viscous_friction"][name] == friction.viscous
+        assert arm["friction"][name] >= arm["dynamic_friction"][name]
+
+
+def test_model_can_be_compared_with(folder: Path, model: Path, run: Run) -> None:
     document = json.loads(model.read_text(encoding="utf-8"))
     assert document["schema"] == "tauscope.model/1"
     assert document["arm"]["segments"] == ["turn", "lift", "level"]
@@ -141,16 +167,17 @@ def test_model_can_be_compared_with(folder: Path, model: Path, run: Run) -> None
         (("out.txt",), "the suffix names no format; use .json"),
         (("out.urdf", "--actuator", "position"), "only an MJCF"),
         (("out.xml", "--kp", "much"), "must be numbers"),
+        (("out.xml", "--isaac-lab"), "Isaac Lab reads Python"),
         (("model.json",), "is an input of this command"),
     ],
 )
-def test_wrong_usage_is_refused(folder: Path, model: Path, run: Run, words: tuple[str, ...], message: str) -> None:  # noqa: F811
+def test_wrong_usage_is_refused(folder: Path, model: Path, run: Run, words: tuple[str, ...], message: str) -> None:
     ended = run("export", model, folder / words[0], *words[1:])
     assert ended.status == 2
     assert message in " ".join(ended.err.split())
 
 
-def test_file_without_its_arm_is_refused_with_a_remedy(folder: Path, model: Path, run: Run) -> None:  # noqa: F811
+def test_file_without_its_arm_is_refused_with_a_remedy(folder: Path, model: Path, run: Run) -> None:
     document = json.loads(model.read_text(encoding="utf-8"))
     del document["arm"]
     old = folder / "old.json"

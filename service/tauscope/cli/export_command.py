@@ -39,6 +39,9 @@ def export(
     ] = "motor",
     kp: Gains = None,
     kv: Gains = None,
+    isaac_lab: Annotated[
+        bool, typer.Option("--isaac-lab", help="Write an actuator configuration of Isaac Lab (.py).")
+    ] = False,
 ) -> None:
     """Write a model for a controller or a simulator.
 
@@ -49,14 +52,18 @@ def export(
     from tauscope.cli.terminal import output, plain
     from tauscope.export.actuators import ActuatorChoice, ActuatorKind
     from tauscope.export.formats import EXPORT_FILES, ExportFormat, make_export
+    from tauscope.export.isaac_lab import to_isaac_lab
     from tauscope.export.model_file import read_export_model
 
     kind = parse_export_format(out, EXPORT_FILES, "'OUT'")
-    if kind is not ExportFormat.MJCF and (actuator != "motor" or kp or kv):
+    if isaac_lab and kind is not ExportFormat.PYTHON:
+        raise typer.BadParameter(f"{str(out)!r}: Isaac Lab reads Python (.py)", param_hint="'--isaac-lab'")
+    if not isaac_lab and kind is not ExportFormat.MJCF and (actuator != "motor" or kp or kv):
         raise typer.BadParameter(f"{str(out)!r}: only an MJCF (.xml) has actuators", param_hint="'--actuator'")
     choice = ActuatorChoice(ActuatorKind(actuator), _numbers(kp, "--kp"), _numbers(kv, "--kv"))
     require_free([out], [model])
-    write_file(out, make_export(kind, read_export_model(model), choice))
+    read = read_export_model(model)
+    write_file(out, to_isaac_lab(read, choice).encode() if isaac_lab else make_export(kind, read, choice))
     if str(out) != "-":
         output().print(plain(f"wrote {out}"), soft_wrap=True)
 

@@ -61,7 +61,7 @@ def actuator_elements(
     """
     if choice.kind is ActuatorKind.MOTOR:
         return [_motor(joint, name) for joint, name in zip(robot.joints, names, strict=True)], []
-    gains, notes = _gains(robot, links, rotors, choice)
+    gains, notes = joint_gains(robot, links, rotors, choice)
     write = _position if choice.kind is ActuatorKind.POSITION else _dc_motor
     elements = [write(joint, name, *pair) for joint, name, pair in zip(robot.joints, names, gains, strict=True)]
     if choice.kind is ActuatorKind.DCMOTOR:
@@ -72,10 +72,21 @@ def actuator_elements(
     return elements, notes
 
 
-def _gains(
+def joint_gains(
     robot: Robot, links: Sequence[LinkInertia], rotors: Sequence[float], choice: ActuatorChoice
 ) -> tuple[list[tuple[float, float]], list[str]]:
-    """Kp and kv of each joint: as given, as in the user's MJCF, or for a bandwidth."""
+    """Gains kp and kv of each joint: as given, as in the user's MJCF, or for a bandwidth; and notes on the last.
+
+    Parameters
+    ----------
+    rotors : sequence of float
+        reflected rotor inertias, one a joint [kg m² or kg]
+
+    Raises
+    ------
+    ExportError
+        if the number of gains is not one, nor that of the joints
+    """
     count, notes = robot.joint_count, []
     for option, values in (("kp", choice.kp), ("kv", choice.kv)):
         if len(values) not in (0, 1, count):
