@@ -17,6 +17,9 @@ from tauscope.server.http.documents import to_json_text
 from tauscope.server.http.form import PartRule
 from tauscope.server.queue.record import without_folders
 
+FOLDERS = frozenset({"assetdir", "meshdir", "texturedir"})
+"""Attributes of an MJCF that name a folder."""
+
 INLINE_NAME = "robot.json"
 """File name of a robot that came as JSON; YAML readers read JSON."""
 
@@ -79,10 +82,10 @@ def check_received_robot(folder: Path, file_name: str) -> RobotReport:
 def _confine_files(folder: Path, file_name: str) -> None:
     """Refuse a robot file that names a file that did not come with it: no path of the server is opened for a client."""
     data = read_bounded(folder / file_name, LARGEST_ROBOT_FILE)
-    sent = {entry.name for entry in folder.iterdir()}
     if is_xml(data):
-        _confine_xml(data, file_name, sent)
+        _confine_xml(data, file_name)
         return
+    sent = {entry.name for entry in folder.iterdir()} - {file_name}
     content = read_yaml(decode_utf8(data, file_name), file_name).data
     kinematics = content.get("kinematics") if isinstance(content, dict) else None
     for kind in ("urdf", "mjcf"):
@@ -90,25 +93,24 @@ def _confine_files(folder: Path, file_name: str) -> None:
         file = named.get("file") if isinstance(named, dict) else None
         if not isinstance(file, str):
             continue
-        if file not in sent - {file_name}:
+        if file not in sent:
             hint = "send that file as part urdf, and write its bare name into the robot file"
             raise RobotFileError(one_line(f"{file_name}: kinematics.{kind}.file: {shown(file)} was not sent; {hint}"))
-        _confine_xml(read_bounded(folder / file, LARGEST_XML), file, sent)
+        _confine_xml(read_bounded(folder / file, LARGEST_XML), file)
 
 
-def _confine_xml(data: bytes, label: str, sent: set[str]) -> None:
-    """Refuse an MJCF that names a file that did not come with it, a folder, or a plugin: MuJoCo would open it."""
+def _confine_xml(data: bytes, label: str) -> None:
+    """Refuse an MJCF that names other files, folders or plugins: MuJoCo would open them."""
     root = parse_xml(data, label, [])
     if local_name(root) != "mujoco":
         return
     for element in root.iter():
         kind = local_name(element)
-        folders = [name for name in ("assetdir", "meshdir", "texturedir") if element.get(name)]
-        file = element.get("file")
-        if kind in ("extension", "plugin", "model") or folders or (file is not None and file not in sent):
-            text = f"<{kind}> {'names' if folders or file else 'is'} a file that was not sent"
-            hint = "send one MJCF without included files: save it from MuJoCo (mj_saveLastXML), without its meshes"
-            raise RobotFileError(one_line(f"{label}:{element.sourceline}: {text}; {hint}"))
+        names = [name for name in element.attrib if name.startswith("file") or name in FOLDERS]
+        if names or kind in ("extension", "plugin"):
+            hint = "send one MJCF without included files and meshes: MuJoCo saves it so (mj_saveLastXML)"
+            text = f"<{kind}> names a file that was not sent; {hint}"
+            raise RobotFileError(one_line(f"{label}:{element.sourceline}: {text}"))
 
 
 def _in_user_terms(text: str, folder: Path) -> str:
