@@ -185,3 +185,29 @@ def test_file_without_its_arm_is_refused_with_a_remedy(folder: Path, model: Path
     ended = run("export", old, folder / "out.xml")
     assert (ended.status, ended.out) == (1, "")
     assert "write it again with --model" in ended.err
+
+
+def test_joint_that_follows_before_its_master_keeps_its_place(folder: Path, run: Run) -> None:
+    """The first segment follows; friction, limits and the actuator belong to the master behind it."""
+    text = URDF.replace('<axis xyz="0 0 1"/>', '<axis xyz="0 0 1"/><mimic joint="lift" multiplier="0.5" offset="0.1"/>')
+    (folder / "early.urdf").write_text(text, encoding="utf-8")
+    (folder / "early.yaml").write_text(
+        ROBOT.replace("arm.urdf", "early.urdf").replace(
+            "  - {name: turn, friction_shape: {k_v: 200, delta: 10}}\n", ""
+        ),
+        encoding="utf-8",
+    )
+    arm = read_robot(folder / "early.yaml")
+    assert ([joint.name for joint in arm.joints], arm.own_links, arm.first_links) == (["lift"], (1,), (0,))
+    motion = random_fourier_motion(arm.joints, np.random.default_rng(1), period_s=5.0)
+    rng = np.random.default_rng(2)
+    recording = simulate_recording(arm, motion, rate_hz=100.0, periods=2, noise_std=0.01, rng=rng)
+    write_recording_csv(folder / "early.csv", recording, arm.joints)
+    model, out = folder / "early.json", folder / "early.xml"
+    assert run("identify", folder / "early.yaml", folder / "early.csv", "--model", model).status == 0
+    assert run("export", model, out).status == 0
+    given, again = read_export_model(model), read_robot(out)
+    assert [joint.name for joint in again.joints] == ["lift"]
+    assert again.joints[0].limits.position == (-2.0, 2.0)
+    expected = torque(given.robot, np.concatenate([each.to_vector() for each in given.links]))
+    np.testing.assert_allclose(torque(again, links_of(again)), expected, rtol=1e-9, atol=1e-9)

@@ -67,7 +67,7 @@ def joint_models(
         identified rotor inertias [kg m² or kg]
     """
     rotors = [None] * robot.joint_count if rotor_inertia is None else rotor_inertia
-    own = {link: joint for joint, link in enumerate(robot.first_links)}
+    own = {link: joint for joint, link in enumerate(robot.own_links)}
     made: dict[str, JointModel] = {}
     for index, (label, link) in enumerate(zip(robot.segment_labels, links, strict=True)):
         branch = robot.branches[index] if robot.branches else None

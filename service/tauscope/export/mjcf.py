@@ -45,12 +45,12 @@ def to_mjcf(model: ExportModel, choice: ActuatorChoice = MOTORS) -> MjcfModel:
     added = add_findings(model)
     robot, labels = added.robot, model.robot.segment_labels
     models = joint_models(robot, added.links, model.friction, model.rotor_inertia)
-    names = [_quoted(labels[link]) for link in robot.first_links]
+    names = [_quoted(labels[link]) for link in robot.own_links]
     notes: list[str] = []
     lines: list[str] = []
-    first = {link: joint for joint, link in enumerate(robot.first_links)}
+    own_joints = {link: joint for joint, link in enumerate(robot.own_links)}
     for index, label in enumerate(labels):
-        own = first.get(index)
+        own = own_joints.get(index)
         extras = JointExtras() if own is None else added.joints[own]
         limits = JointLimits() if own is None else robot.joints[own].limits
         lines += [f"{'  ' * (index + 2)}{line}" for line in _body(robot, index, label, models[label], extras, limits)]
@@ -101,9 +101,9 @@ def _passive(joint: int, extras: JointExtras, names: list[str]) -> list[str]:
 def _followers(robot: Robot, names: list[str]) -> list[str]:
     """Joints that follow another, as equalities."""
     lines: list[str] = []
-    first = robot.first_links
+    own = robot.own_links
     for link, coupling in enumerate(robot.couplings):
-        master = first[coupling.joint]
+        master = own[coupling.joint]
         if link != master:
             terms = numbers(coupling.offset, coupling.multiplier, 0.0, 0.0, 0.0)
             lines.append(f'    <joint joint1={names[link]} joint2={names[master]} polycoef="{terms}"/>')

@@ -78,7 +78,7 @@ def check_robot(path: Path | str) -> RobotReport:
         source=str(path),
         joints=tuple(
             _summary(number, joint, robot.segments[link], None if links is None else links[link].mass)
-            for number, (joint, link) in enumerate(zip(robot.joints, robot.first_links, strict=True), start=1)
+            for number, (joint, link) in enumerate(zip(robot.joints, robot.own_links, strict=True), start=1)
         ),
         gravity=_triple(robot.gravity),
         total_mass=None if links is None else float(sum(link.mass for link in links)),

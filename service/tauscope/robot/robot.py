@@ -301,6 +301,15 @@ class Robot:
         return segment_couplings(self.segments)
 
     @property
+    def own_links(self) -> tuple[int, ...]:
+        """Index of the link that moves as each joint does, or of the first one that follows it."""
+        links = {coupling.joint: link for link, coupling in reversed([*enumerate(self.couplings)])}
+        for link, coupling in reversed([*enumerate(self.couplings)]):
+            if (coupling.multiplier, coupling.offset) == (1.0, 0.0):
+                links[coupling.joint] = link
+        return tuple(links[joint] for joint in range(self.joint_count))
+
+    @property
     def ratios(self) -> NDArray[np.float64]:
         """What each segment moves per unit of each joint, (links, joints)."""
         matrix = np.zeros((self.link_count, self.joint_count))
@@ -313,9 +322,9 @@ class Robot:
         """A name for each segment: that of its joint, or of the joint in the file that follows."""
         if self.segment_names:
             return self.segment_names
-        first = self.first_links
+        own = self.own_links
         names = (self.joint_of_link(link).name for link in range(self.link_count))
-        return tuple(name if link in first else f"{name} at link {link + 1}" for link, name in enumerate(names))
+        return tuple(name if link in own else f"{name} at link {link + 1}" for link, name in enumerate(names))
 
     def joint_of_link(self, link: int) -> Joint:
         """The joint that moves a link.
