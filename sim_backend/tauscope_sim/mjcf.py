@@ -10,7 +10,6 @@ Bodies without a joint, and bodies on joints that rest, belong to the link that 
 # (MuJoCo's extension modules come without type stubs)
 
 from collections.abc import Iterable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -36,6 +35,7 @@ from tauscope.robot.robot import (
     Segment,
 )
 from tauscope.robot.urdf_inertia import inertia_about_frame
+from tauscope_sim.mjcf_compiler import compile_model
 
 Array = NDArray[np.float64]
 
@@ -61,50 +61,6 @@ def read_chain(
         if MuJoCo refuses the file, or no chain of hinges and slides runs from base to tip
     """
     return _Reader(compile_model(data, label, path), label, locked).chain(base, tip)
-
-
-def compile_model(data: bytes, label: str, path: Path | None) -> mujoco.MjModel:
-    """The compiled model; where files of shapes or textures are missing, without the shapes that state no inertia.
-
-    Raises
-    ------
-    RobotFileError
-        if MuJoCo refuses the file
-    """
-    try:
-        spec = _parse(data, path)
-        with suppress(ValueError):
-            return spec.compile()
-        spec = _parse(data, path)
-        _drop_shapes(spec)
-        return spec.compile()
-    except ValueError as error:
-        reason = " ".join(str(error).split()).removeprefix("Error: ")
-        raise RobotFileError(one_line(f"{label}: MuJoCo refuses the file ({reason}); correct it")) from None
-
-
-def _parse(data: bytes, path: Path | None) -> mujoco.MjSpec:
-    """The editable model; of a file, so that what it names is found beside it."""
-    return mujoco.MjSpec.from_string(data.decode()) if path is None else mujoco.MjSpec.from_file(str(path))
-
-
-def _drop_shapes(spec: mujoco.MjSpec) -> None:
-    """Delete meshes, height fields and textures, and the shapes that need them, where every body states its inertia."""
-    if spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
-        return
-    for body in spec.bodies:
-        if not body.explicitinertial and any(geom.meshname for geom in body.geoms) and body.joints:
-            return
-    for geom in list(spec.geoms):
-        if geom.meshname or geom.hfieldname:
-            spec.delete(geom)
-    for geom in spec.geoms:
-        geom.material = ""
-    for site in spec.sites:
-        site.material = ""
-    for kind in (spec.skins, spec.meshes, spec.hfields, spec.materials, spec.textures):
-        for element in list(kind):
-            spec.delete(element)
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """Chains of MJCF against MuJoCo's own inverse dynamics of the whole file, to 1e-9."""
 
+from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import mujoco
@@ -9,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tauscope.dynamics import inverse_dynamics
-from tauscope.errors import RobotFileError
+from tauscope.errors import MissingExtraError, RobotFileError
 from tauscope.robot import Actuator, Robot, Severity, read_robot
 
 # pyright: reportAttributeAccessIssue=false
@@ -227,6 +228,22 @@ def test_what_is_no_arm_is_refused_in_one_line(tmp_path: Path, old: str, new: st
     with pytest.raises(RobotFileError, match=message) as caught:
         read_robot(write_robot(tmp_path, text.replace(old, new)))
     assert "\n" not in str(caught.value)
+
+
+def test_mesh_that_gives_a_mass_must_be_there(tmp_path: Path) -> None:
+    text = ARM.replace('<inertial pos="0 0 .01" mass=".1" diaginertia="1e-4 1e-4 1e-4"/>', "")
+    with pytest.raises(RobotFileError, match=r"missing\.stl.*; put that file there, or state <inertial> of every body"):
+        read_robot(write_robot(tmp_path, text))
+
+
+def test_extra_that_is_missing_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def load(self: EntryPoint) -> None:
+        raise ModuleNotFoundError("No module named 'mujoco'", name="mujoco")
+
+    path = write_robot(tmp_path, ARM)
+    monkeypatch.setattr(EntryPoint, "load", load)
+    with pytest.raises(MissingExtraError, match=r"arm\.xml: reading an MJCF needs the sim extra: pip install"):
+        read_robot(path)
 
 
 def test_body_that_is_not_there_is_refused_with_the_nearest(tmp_path: Path) -> None:
