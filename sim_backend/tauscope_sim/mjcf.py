@@ -322,7 +322,7 @@ class _Reader:
     def _branches(
         self, members: list[tuple[int, list[tuple[int, Placement, bool]]]], moving: list[_Joint]
     ) -> ResultWarning | None:
-        """What is taken as rigid though the file lets it move."""
+        """The note on joints beside the chain, which count as rigid."""
         names, following, mass = [], [], 0.0
         chain = {joint.index for joint in moving}
         for _, placed in members:

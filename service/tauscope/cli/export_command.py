@@ -35,7 +35,7 @@ def export(
     out: Output,
     *,
     actuator: Annotated[
-        Literal["motor", "position", "dcmotor"], typer.Option(help="What drives the joints of an MJCF.")
+        Literal["motor", "position", "dcmotor"], typer.Option(help="Actuator of each joint in an MJCF.")
     ] = "motor",
     kp: Gains = None,
     kv: Gains = None,
@@ -75,5 +75,5 @@ def _numbers(text: str | None, option: str) -> tuple[float, ...]:
     except ValueError:
         values = (-1.0,)
     if any(not 0.0 <= value < 1e12 for value in values):
-        raise typer.BadParameter(f"{text!r} must be numbers of zero or more, such as 400 or 400,200", param_hint=option)
+        raise typer.BadParameter(f"{text!r} must be numbers of zero or more: 400, or 400,200", param_hint=option)
     return values

@@ -12,11 +12,11 @@ from tauscope.export.mjcf_findings import numbers
 from tauscope.robot import Joint, LinkInertia, Robot
 
 BANDWIDTH_RAD_S = 2.0 * np.pi * 5.0
-"""Bandwidth of gains that nothing states [rad/s]: 5 Hz, what a small servo's position loop reaches."""
+"""Bandwidth of gains that nothing states [rad/s]: 5 Hz, the reach of a small servo's position loop."""
 
 
 class ActuatorKind(StrEnum):
-    """What drives the joints of an exported arm."""
+    """Actuators of an exported arm."""
 
     MOTOR = "motor"
     POSITION = "position"

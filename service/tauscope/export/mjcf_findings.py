@@ -1,6 +1,6 @@
 """Findings of a diagnosis in the terms of MuJoCo, and the reason where it has none.
 
-τ of a finding is what the drive gives for it; what acts on the joint in MuJoCo is -τ. Cogging and bristles are passive
+τ of a finding is torque of the drive; the joint in MuJoCo feels -τ. Cogging and bristles are passive
 ``dcmotor`` elements, which MuJoCo has from version 3.8 on; all else loads in any version.
 """
 
@@ -26,7 +26,7 @@ NEWER = "needs MuJoCo 3.8 or later"
 
 @dataclass
 class JointExtras:
-    """What findings add to one joint, as attributes of its elements.
+    """Attributes that findings add to the elements of one joint.
 
     dry_friction : float
         taken off frictionloss, since bristles have it [Nm or N]
@@ -43,7 +43,7 @@ class JointExtras:
 
 @dataclass
 class Additions:
-    """What findings change of a whole file."""
+    """Changes that findings make to a file."""
 
     robot: Robot
     links: list[LinkInertia]
@@ -171,7 +171,7 @@ WRITERS: Mapping[str, Callable[[Additions, FoundEffect], str | None]] = {
     "kinematic_error": _displacement,
     "friction_coupling": _coupling,
 }
-"""What writes an effect into a file; it gives the reason where it cannot."""
+"""Functions that write an effect into a file, or return the reason against it."""
 
 
 def effects_in(model: ExportModel, included: Sequence[str], why: str) -> list[str]:

@@ -1,4 +1,4 @@
-"""What every export is made from: an identified model, with the findings of a diagnosis where there was one."""
+"""The input of every export: an identified model, and the findings of a diagnosis if there was one."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -54,7 +54,7 @@ class Origin:
 
 @dataclass(frozen=True, eq=False)
 class ExportModel:
-    """Bodies that can exist, friction for simulators and for controllers, and what was found beside them.
+    """Bodies that can exist, friction for simulators and for controllers, and findings.
 
     links : tuple of LinkInertia
         one a segment

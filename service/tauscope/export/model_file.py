@@ -34,7 +34,7 @@ class ArmEntry(ResultModel):
 
     robot: dict[str, Any] = Field(description="as robot_to_dict writes it")
     segments: list[str] = Field(description="joints of the URDF or MJCF, one a segment")
-    branches: list[list[float]] = Field(description="what moves beside the chain: ten standard parameters a link")
+    branches: list[list[float]] = Field(description="bodies on joints beside the chain: ten standard parameters a link")
     actuators: list[list[Any] | None] = Field(description="kind, kp and kv of each joint's actuator in the user's MJCF")
     urdf: str | None = Field(description="the URDF, one character a byte; null where there is none")
     effort: str = Field(description="torque or current")
@@ -69,7 +69,7 @@ def model_file(document: ModelDocument, robot: Robot, origin: Origin) -> ModelFi
 
 
 def identified_document(result: Identification) -> ModelDocument:
-    """What an identification delivers as a model without findings."""
+    """The delivered model of an identification, without findings."""
     structure, names = result.structure, [joint.name for joint in result.robot.joints]
     values = dict(zip(structure.names, map(float, result.consistent_parameters), strict=True))
     nominal = [place for place, name in enumerate(structure.names) if not name.startswith("rotor_inertia ")]

@@ -32,13 +32,13 @@ def patch_urdf(source: bytes | Path, models: Mapping[str, JointModel], remarks: 
     A link's ``<inertial>`` gets the centre of mass, rpy 0, and the inertia about the centre of mass along the link
     frame's axes. ``<dynamics>`` gets damping = τ_v and friction = τ_s + τ_sc, the Coulomb level at speed. Links on
     fixed joints below are part of the identified link: their own inertials are set to zero, not removed, because
-    simulators make up a mass from the shapes of a link that has none. What moves beside the chain stays as it is, and
-    its mass is taken off the link that carries it.
+    simulators make up a mass from the shapes of a link that has none. Bodies on joints beside the chain stay, and
+    their mass is taken off the link that carries them.
 
     Parameters
     ----------
     remarks : sequence of str
-        what the comment says besides
+        further lines of the comment
 
     Raises
     ------
@@ -125,18 +125,18 @@ def _joint(element: Element) -> _Joint:
 
 
 def _without_branch(name: str, model: JointModel) -> tuple[LinkInertia, list[str]]:
-    """A joint's own link, without what the file has on moving joints beside the chain."""
+    """A joint's own link, without the bodies on joints beside the chain."""
     link = model.link or LinkInertia.from_vector(np.zeros(10))
     if model.branch is None or not np.any(model.branch.to_vector()):
         return link, []
     own = LinkInertia.from_vector(link.to_vector() - model.branch.to_vector())
     if own.mass > 0.0 and find_defect(own) is None:
         return own, []
-    text = f"{name}: the identified link less what moves beside it is no body; the nearest body is written."
+    text = f"{name}: the identified link less the bodies beside the chain is no body; the nearest body is written."
     body = nearest_body(own)
     if not body.mass > 0.0:
         raise ExportError(
-            one_line(f"joint {shown(name)}: what moves beside its link weighs more than the link; export .xml instead")
+            one_line(f"joint {shown(name)}: the bodies beside the chain weigh more than its link; export .xml instead")
         )
     return body, [text]
 
@@ -174,7 +174,7 @@ def _zero_fixed_children(text: XmlText, tree: _Tree, link: str, identified: froz
                 if name not in identified:
                     notes.append(
                         f"{below.child} moves on joint {name} beside the chain: it is left as it was. Link {link} has "
-                        "the identified mass less what moves beside it."
+                        "the identified mass less that of the branch."
                     )
             elif below.child not in seen:
                 seen.add(below.child)

@@ -1,4 +1,4 @@
-"""The chain between two links of a URDF or MJCF: what a file in a simulator's format says of an arm."""
+"""The chain between two links of a URDF or MJCF, and notes on how it was chosen."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ class Chain:
     branches : tuple of LinkInertia
         the part of each link that hangs on joints beside the chain
     actuators : tuple of Actuator or None
-        what drives each joint; None where the file says nothing
+        one a joint; None where the file has none
     gravity : (3,) float64, or None
         in the base frame [m/s²]; None where the file states none
     """

@@ -47,7 +47,7 @@ class DenavitHartenbergRowDocument(Document):
 
 
 class CouplingDocument(Document):
-    """What moves a segment that follows a joint.
+    """The joint that a segment follows.
 
     joint : int
         index of the joint, from 0
@@ -216,7 +216,7 @@ class RobotDocument(Document):
     """The whole robot file.
 
     gravity : list of three float, or None
-        in the base frame [m/s²]; None takes that of the MJCF, else [0, 0, -9.81]
+        in the base frame [m/s²]; None: the gravity of the MJCF, else [0, 0, -9.81]
     locked : dict of str to float
         position of joints that do not move [rad or m]
     """

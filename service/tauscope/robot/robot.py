@@ -60,7 +60,7 @@ class FrictionShape:
 
 @dataclass(frozen=True)
 class Actuator:
-    """What drives a joint in a simulator's file.
+    """The drive of a joint in a simulator's file.
 
     kind : str
         ``motor``, ``position`` or ``velocity``
@@ -84,7 +84,7 @@ class Joint:
     has_torque_constant : bool
         whether the robot file states the constant; 1 stands where it does not
     actuator : Actuator or None
-        what drives the joint in the user's MJCF
+        of the joint in the user's MJCF
     """
 
     name: str
@@ -149,7 +149,7 @@ class Segment:
 
 
 def segment_couplings(segments: Iterable[Segment]) -> tuple[Coupling, ...]:
-    """What moves each of a chain's segments: its own joint, which is the next one, or the joint that it follows."""
+    """The joint that moves each segment: its own, which is the next one, or the one that it follows."""
     found: list[Coupling] = []
     for segment in segments:
         following = max((each.joint for each in found), default=-1) + 1
@@ -297,7 +297,7 @@ class Robot:
 
     @property
     def couplings(self) -> tuple[Coupling, ...]:
-        """What moves each segment."""
+        """The joint that moves each segment, and how."""
         return segment_couplings(self.segments)
 
     @property
@@ -311,7 +311,7 @@ class Robot:
 
     @property
     def ratios(self) -> NDArray[np.float64]:
-        """What each segment moves per unit of each joint, (links, joints)."""
+        """Motion of each segment per unit of each joint, (links, joints)."""
         matrix = np.zeros((self.link_count, self.joint_count))
         for link, coupling in enumerate(self.couplings):
             matrix[link, coupling.joint] = coupling.multiplier
@@ -319,7 +319,7 @@ class Robot:
 
     @property
     def segment_labels(self) -> tuple[str, ...]:
-        """A name for each segment: that of its joint, or of the joint in the file that follows."""
+        """A name for each segment: its joint, or the joint of the file that follows."""
         if self.segment_names:
             return self.segment_names
         own = self.own_links

@@ -155,7 +155,7 @@ def _placement(document: PlacementDocument) -> Placement:
 
 
 def _joints(documents: list[JointDocument] | None, chain: _Kinematics, origin: DocumentOrigin) -> tuple[Joint, ...]:
-    """Joints in chain order, what the document leaves open filled from the URDF or MJCF."""
+    """Joints in chain order; the URDF or MJCF fills gaps of the document."""
     if chain.chain is None:
         types = chain.joint_types
         documents = documents or [JointDocument(name=f"joint{number}") for number in range(1, len(types) + 1)]
@@ -176,7 +176,7 @@ def _joints(documents: list[JointDocument] | None, chain: _Kinematics, origin: D
 
 
 def _joint(document: JointDocument, kind: JointType, own: JointLimits) -> Joint:
-    """One joint; a limit of the robot file goes before that of the URDF or MJCF."""
+    """One joint; a limit of the robot file goes before one of the URDF or MJCF."""
     limits, shape = document.limits, document.friction_shape
     position = tuple(limits.position) if limits and limits.position else own.position
     return Joint(
@@ -200,7 +200,7 @@ def _joint(document: JointDocument, kind: JointType, own: JointLimits) -> Joint:
 def _model(
     document: ModelDocument | None, kinematics: _Kinematics, origin: DocumentOrigin, findings: list[Finding]
 ) -> tuple[Model, tuple[Repair, ...]]:
-    """The model block, or where it is absent what the URDF or MJCF says; and which of its links were repaired."""
+    """The model block, or if absent the model of the URDF or MJCF; and its repaired links."""
     chain, count = kinematics.chain, len(kinematics.joint_types)
     if document is None or document == ModelDocument():
         return (Model(chain.links, chain.friction, chain.rotor_inertia), chain.repairs) if chain else (Model(), ())

@@ -227,13 +227,13 @@ def _bodies(
 
 
 def _branch(label: str, members: list[_Body]) -> LinkInertia:
-    """What a link carries on joints beside the chain."""
+    """Bodies of a link on joints beside the chain."""
     carried = [(body.element, body.placement) for body in members if body.on_branch]
     return lumped_inertia(label, 0, carried, [])[0] or LinkInertia.from_vector(np.zeros(10))
 
 
 def _branch_notes(tree: UrdfTree, branches: list[UrdfJoint], motions: JointMotions) -> list[ResultWarning]:
-    """What is taken as rigid though the file lets it move, and what it weighs."""
+    """The note on joints beside the chain, which count as rigid."""
     assumed = [joint for joint in branches if not motions.is_locked(joint)]
     mass = sum(stated_mass(tree, joint.child) for joint in _outermost(tree, assumed))
     if not mass > 0.0:
@@ -249,7 +249,7 @@ def _outermost(tree: UrdfTree, joints: list[UrdfJoint]) -> list[UrdfJoint]:
 
 
 def _limits(tree: UrdfTree, joint: UrdfJoint, findings: list[Finding]) -> JointLimits:
-    """Limits of ``<limit>``; what no joint can have, which exporters write for "not known", counts as not stated."""
+    """Limits of ``<limit>``; values that exporters write for "not known" count as not stated."""
     element = only_child(tree.label, joint.element, "limit", findings)
     if element is None:
         return JointLimits()

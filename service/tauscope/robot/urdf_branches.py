@@ -64,7 +64,7 @@ class JointMotions:
             met.add(master.joint.name)
 
     def coupling(self, joint: UrdfJoint) -> Coupling | None:
-        """What moves a joint of the chain; None where it is the next one's own."""
+        """The joint that a joint of the chain follows; None where it is the next one itself."""
         return self._couplings[joint.name]
 
     def master(self, joint: UrdfJoint) -> Master | None:
@@ -73,7 +73,7 @@ class JointMotions:
         while (mimic := only_child(self._tree.label, joint.element, "mimic", [])) is not None:
             name = mimic.get("joint") or ""
             if name not in self._joints:
-                return None  # said by `remark_on_masters`
+                return None  # `remark_on_masters` warns
             if name in met:
                 raise urdf_error(self._tree.label, joint.element, "mimics itself; name another joint in <mimic>")
             met.append(name)
