@@ -140,7 +140,7 @@ class _Reader:
             friction=self._friction(moving, own),
             rotor_inertia=tuple(float(value) for value in rotors) if rotors.any() else None,
             link_names=tuple(tuple(self._body_names[each] for each, _, _ in placed) for _, placed in members),
-            branches=tuple(self._link(body, [each for each in placed if each[2]]) for body, placed in members),
+            branches=tuple(self._link(body, [each for each in placed if each[0] != body]) for body, placed in members),
             actuators=tuple(self._actuator(joint) for joint in independent),
             findings=tuple(self._findings),
             repairs=(),

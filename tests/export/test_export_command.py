@@ -211,3 +211,18 @@ def test_joint_that_follows_before_its_master_keeps_its_place(folder: Path, run:
     assert again.joints[0].limits.position == (-2.0, 2.0)
     expected = torque(given.robot, np.concatenate([each.to_vector() for each in given.links]))
     np.testing.assert_allclose(torque(again, links_of(again)), expected, rtol=1e-9, atol=1e-9)
+
+
+def test_own_mjcf_takes_the_values(folder: Path, model: Path, run: Run) -> None:
+    """Only a model of that MJCF is written onto it."""
+    own = folder / "own.xml"
+    assert run("export", model, own).status == 0
+    ended = run("export", model, folder / "new.xml", "--onto", own)
+    assert ended.status == 1
+    assert "the model comes from another file than an MJCF" in ended.err
+    made = folder / "own.json"
+    assert run("identify", own, folder / "run.csv", "--model", made).status == 0
+    assert run("export", made, folder / "new.xml", "--onto", own).status == 0
+    given, again = read_export_model(made), read_robot(folder / "new.xml")
+    expected = torque(given.robot, np.concatenate([each.to_vector() for each in given.links]))
+    np.testing.assert_allclose(torque(again, links_of(again)), expected, rtol=1e-9, atol=1e-9)

@@ -39,6 +39,15 @@ def export(
     ] = "motor",
     kp: Gains = None,
     kv: Gains = None,
+    onto: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="ARM.xml",
+            exists=True,
+            dir_okay=False,
+            help="Your own MJCF: its inertials and joints take the model's values, all else stays (.xml).",
+        ),
+    ] = None,
     isaac_lab: Annotated[
         bool, typer.Option("--isaac-lab", help="Write an actuator configuration of Isaac Lab (.py).")
     ] = False,
@@ -53,6 +62,7 @@ def export(
     from tauscope.export.actuators import ActuatorChoice, ActuatorKind
     from tauscope.export.formats import EXPORT_FILES, ExportFormat, make_export
     from tauscope.export.isaac_lab import to_isaac_lab
+    from tauscope.export.mjcf_patch import patch_mjcf
     from tauscope.export.model_file import read_export_model
 
     kind = parse_export_format(out, EXPORT_FILES, "'OUT'")
@@ -60,10 +70,16 @@ def export(
         raise typer.BadParameter(f"{str(out)!r}: Isaac Lab reads Python (.py)", param_hint="'--isaac-lab'")
     if not isaac_lab and kind is not ExportFormat.MJCF and (actuator != "motor" or kp or kv):
         raise typer.BadParameter(f"{str(out)!r}: only an MJCF (.xml) has actuators", param_hint="'--actuator'")
+    if onto is not None and (kind is not ExportFormat.MJCF or actuator != "motor" or kp or kv):
+        text = f"{str(out)!r}: only an MJCF (.xml) is written onto another, which keeps its actuators"
+        raise typer.BadParameter(text, param_hint="'--onto'")
     choice = ActuatorChoice(ActuatorKind(actuator), _numbers(kp, "--kp"), _numbers(kv, "--kv"))
-    require_free([out], [model])
+    require_free([out], [model] if onto is None else [model, onto])
     read = read_export_model(model)
-    write_file(out, to_isaac_lab(read, choice).encode() if isaac_lab else make_export(kind, read, choice))
+    if onto is not None:
+        write_file(out, patch_mjcf(onto, read))
+    else:
+        write_file(out, to_isaac_lab(read, choice).encode() if isaac_lab else make_export(kind, read, choice))
     if str(out) != "-":
         output().print(plain(f"wrote {out}"), soft_wrap=True)
 

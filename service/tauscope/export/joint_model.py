@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tauscope.errors import ExportError
 from tauscope.export.compensation.model import JointFriction, check_friction
-from tauscope.robot import LinkInertia, Robot, find_defect
+from tauscope.robot import LinkInertia, Robot, find_defect, nearest_body
 from tauscope.robot.messages import one_line, shown
 
 
@@ -132,3 +132,26 @@ def friction_notes(joint: str, friction: JointFriction, format_name: str) -> lis
         if value < 0.0:
             notes.append(f"{joint}: the identified {label} = {value:.6g} would drive the joint; 0 is written.")
     return notes
+
+
+def without_branch(name: str, model: JointModel) -> tuple[LinkInertia, list[str]]:
+    """A joint's own link, without the bodies that the file has elsewhere; and notes.
+
+    Raises
+    ------
+    ExportError
+        if these bodies weigh more than the link
+    """
+    link = model.link or LinkInertia.from_vector(np.zeros(10))
+    if model.branch is None or not np.any(model.branch.to_vector()):
+        return link, []
+    own = LinkInertia.from_vector(link.to_vector() - model.branch.to_vector())
+    if own.mass > 0.0 and find_defect(own) is None:
+        return own, []
+    text = f"{name}: the identified link less the bodies beside the chain is no body; the nearest body is written."
+    body = nearest_body(own)
+    if not body.mass > 0.0:
+        raise ExportError(
+            one_line(f"joint {shown(name)}: the bodies beside the chain weigh more than its link; export .xml instead")
+        )
+    return body, [text]

@@ -61,7 +61,8 @@ def to_mjcf(model: ExportModel, choice: ActuatorChoice = MOTORS) -> MjcfModel:
     lines += [f"{'  ' * (index + 2)}</body>" for index in reversed(range(robot.link_count))]
     rotors = [value or 0.0 for value in model.rotor_inertia]
     actuators, chosen = actuator_elements(robot, added.links, rotors, names, choice)
-    passive = [_passive(joint, extras, names) for joint, extras in enumerate(added.joints)]
+    tendons = tendon_elements(added, names)
+    passive = [passive_elements(joint, extras, names) for joint, extras in enumerate(added.joints)]
     notes += [*added.notes, *chosen]
     if any(passive):
         notes.append(f"Cogging and bristles are passive dcmotor elements: this file {NEWER}.")
@@ -79,7 +80,7 @@ def to_mjcf(model: ExportModel, choice: ActuatorChoice = MOTORS) -> MjcfModel:
             *lines,
             "  </worldbody>",
             *_followers(robot, [_quoted(label) for label in labels]),
-            *_tendons(added, names),
+            *(["  <tendon>", *(f"    {line}" for line in tendons), "  </tendon>"] if tendons else []),
             "  <actuator>",
             *(f"    {line}" for line in actuators),
             *(f"    {line}" for elements in passive for line in elements),
@@ -90,8 +91,14 @@ def to_mjcf(model: ExportModel, choice: ActuatorChoice = MOTORS) -> MjcfModel:
     return MjcfModel(text + "\n", tuple(notes))
 
 
-def _passive(joint: int, extras: JointExtras, names: list[str]) -> list[str]:
-    """Passive torques of a joint, which have no control input and whose motor is switched off."""
+def passive_elements(joint: int, extras: JointExtras, names: list[str]) -> list[str]:
+    """Passive torques of a joint, which have no control input and whose motor is switched off.
+
+    Parameters
+    ----------
+    names : list of str
+        of the joints, as quoted attribute values
+    """
     return [
         f'<dcmotor joint={names[joint]} resistance="1.0" motorconst="0.0 0.0" input="none" {each}/>'
         for each in extras.passive
@@ -110,14 +117,20 @@ def _followers(robot: Robot, names: list[str]) -> list[str]:
     return ["  <equality>", *lines, "  </equality>"] if lines else []
 
 
-def _tendons(added: Additions, names: list[str]) -> list[str]:
-    """Friction on the sum or difference of two joints' motion."""
+def tendon_elements(added: Additions, names: list[str]) -> list[str]:
+    """Friction on the sum or difference of two joints' motion.
+
+    Parameters
+    ----------
+    names : list of str
+        of the joints, as quoted attribute values
+    """
     lines: list[str] = []
     for dry, damping, factors in added.tendons:
-        lines.append(f'    <fixed damping="{numbers(damping)}" frictionloss="{numbers(dry)}">')
-        lines += [f'      <joint joint={names[joint]} coef="{numbers(by)}"/>' for joint, by in factors.items()]
-        lines.append("    </fixed>")
-    return ["  <tendon>", *lines, "  </tendon>"] if lines else []
+        lines.append(f'<fixed damping="{numbers(damping)}" frictionloss="{numbers(dry)}">')
+        lines += [f'  <joint joint={names[joint]} coef="{numbers(by)}"/>' for joint, by in factors.items()]
+        lines.append("</fixed>")
+    return lines
 
 
 def _body(

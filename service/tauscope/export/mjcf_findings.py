@@ -4,7 +4,7 @@
 ``dcmotor`` elements, which MuJoCo has from version 3.8 on; all else loads in any version.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import atan2, hypot
 
@@ -58,8 +58,14 @@ def numbers(*values: float | np.float64) -> str:
     return " ".join(repr(float(value) + 0.0) for value in values)
 
 
-def add_findings(model: ExportModel) -> Additions:
-    """Everything that MuJoCo can hold of a model's findings, and a note on each of the others."""
+def add_findings(model: ExportModel, *, without: Collection[str] = ()) -> Additions:
+    """Everything that MuJoCo can hold of a model's findings, and a note on each of the others.
+
+    Parameters
+    ----------
+    without : collection of str
+        ids of effects that are left out, since they change more than joints and bodies
+    """
     extras = [JointExtras() for _ in model.robot.joints]
     added = Additions(model.robot, list(model.links), model.friction, extras)
     names = [joint.name for joint in model.robot.joints]
@@ -67,7 +73,10 @@ def add_findings(model: ExportModel) -> Additions:
         if found.effect.id in IN_THE_MODEL:
             continue
         write = WRITERS.get(found.effect.id)
-        reason = "MJCF has no such element" if write is None else write(added, found)
+        if found.effect.id in without:
+            reason = "it changes the frame of a body, which stays as it was"
+        else:
+            reason = "MJCF has no such element" if write is None else write(added, found)
         label = found.effect.name(names)
         if reason is None:
             added.notes.append(f"{label} ({found.effect.equation}) is included.")

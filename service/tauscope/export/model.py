@@ -43,12 +43,17 @@ class FoundEffect:
 
 @dataclass(frozen=True)
 class Origin:
-    """Where a model came from."""
+    """Where a model came from.
+
+    is_mjcf : bool
+        whether the links' frames are bodies of an MJCF
+    """
 
     sources: tuple[RecordingSource, ...]
     effort_kind: EffortKind
     created: datetime
     urdf: bytes | None = None
+    is_mjcf: bool = False
     version: str = field(default_factory=tauscope_version)
 
 

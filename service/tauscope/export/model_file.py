@@ -37,6 +37,7 @@ class ArmEntry(ResultModel):
     branches: list[list[float]] = Field(description="bodies on joints beside the chain: ten standard parameters a link")
     actuators: list[list[Any] | None] = Field(description="kind, kp and kv of each joint's actuator in the user's MJCF")
     urdf: str | None = Field(description="the URDF, one character a byte; null where there is none")
+    is_mjcf: bool = Field(description="whether the links' frames are bodies of an MJCF")
     effort: str = Field(description="torque or current")
     recordings: list[list[str]] = Field(description="name and sha256 of the recordings that the model is made from")
     created: str = Field(description="when, ISO 8601")
@@ -60,6 +61,7 @@ def model_file(document: ModelDocument, robot: Robot, origin: Origin) -> ModelFi
             for each in robot.joints
         ],
         urdf=None if origin.urdf is None else origin.urdf.decode("latin-1"),
+        is_mjcf=origin.is_mjcf,
         effort=origin.effort_kind.value,
         recordings=[[source.name, source.sha256] for source in origin.sources],
         created=origin.created.isoformat(),
@@ -166,7 +168,7 @@ def read_export_model(path: Path) -> ExportModel:
         raise IdentificationError(one_line(f"{path}: {error}")) from None
     urdf = None if arm.urdf is None else arm.urdf.encode("latin-1", errors="replace")
     links = [LinkInertia.from_vector(np.array(link)) for link in document.links]
-    return of_extended_model(model, links, Origin(sources, effort, created, urdf, arm.version))
+    return of_extended_model(model, links, Origin(sources, effort, created, urdf, arm.is_mjcf, arm.version))
 
 
 def _robot(arm: ArmEntry) -> Robot:

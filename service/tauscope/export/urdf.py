@@ -9,9 +9,15 @@ import numpy as np
 from tauscope.errors import ExportError
 from tauscope.export.compensation.identifiers import comment_text
 from tauscope.export.compensation.model import JointFriction
-from tauscope.export.joint_model import CentredInertia, JointModel, centred, dry_friction_and_damping, friction_notes
+from tauscope.export.joint_model import (
+    CentredInertia,
+    JointModel,
+    centred,
+    dry_friction_and_damping,
+    friction_notes,
+    without_branch,
+)
 from tauscope.export.xml_spans import Element, XmlText
-from tauscope.robot import LinkInertia, find_defect, nearest_body
 from tauscope.robot.messages import nearest, one_line, shown
 
 _MARKER = "Model identified by Tauscope."
@@ -54,7 +60,7 @@ def patch_urdf(source: bytes | Path, models: Mapping[str, JointModel], remarks: 
     for name, model in models.items():
         joint = tree.moving_joint(name)
         if model.link is not None:
-            own, moved = _without_branch(name, model)
+            own, moved = without_branch(name, model)
             notes += moved
             _write_inertial(text, tree.link(joint.child), centred(name, own))
             notes += _zero_fixed_children(text, tree, joint.child, frozenset(models))
@@ -122,23 +128,6 @@ def _joint(element: Element) -> _Joint:
     """Type and ends of a joint element."""
     ends = [next((e.attributes.get("link", "") for e in element.named(end)), "") for end in ("parent", "child")]
     return _Joint(element, element.attributes.get("type", ""), ends[0], ends[1])
-
-
-def _without_branch(name: str, model: JointModel) -> tuple[LinkInertia, list[str]]:
-    """A joint's own link, without the bodies on joints beside the chain."""
-    link = model.link or LinkInertia.from_vector(np.zeros(10))
-    if model.branch is None or not np.any(model.branch.to_vector()):
-        return link, []
-    own = LinkInertia.from_vector(link.to_vector() - model.branch.to_vector())
-    if own.mass > 0.0 and find_defect(own) is None:
-        return own, []
-    text = f"{name}: the identified link less the bodies beside the chain is no body; the nearest body is written."
-    body = nearest_body(own)
-    if not body.mass > 0.0:
-        raise ExportError(
-            one_line(f"joint {shown(name)}: the bodies beside the chain weigh more than its link; export .xml instead")
-        )
-    return body, [text]
 
 
 def _write_inertial(text: XmlText, link: Element, inertia: CentredInertia) -> None:

@@ -33,7 +33,7 @@ class Chain:
     link_names : tuple of tuple of str
         links of the file that make up each link
     branches : tuple of LinkInertia
-        the part of each link that hangs on joints beside the chain
+        the part of each link that an export leaves where the file has it
     actuators : tuple of Actuator or None
         one a joint; None where the file has none
     gravity : (3,) float64, or None

@@ -259,7 +259,8 @@ class Robot:
     link_names : tuple of tuple of str
         links of that file that make up each link
     branches : tuple of LinkInertia
-        the part of each link that hangs on joints beside the chain
+        the part of each link that an export leaves where the file has it: of a URDF the bodies on joints beside the
+        chain, of an MJCF all but the body of the joint
     """
 
     name: str

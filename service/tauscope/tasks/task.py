@@ -199,6 +199,7 @@ def model_origin(robot: Robot, recordings: Sequence[Recording], provenance: Prov
         effort_kind=EffortKind.CURRENT if holds_current else EffortKind.TORQUE,
         created=provenance.created,
         urdf=None if robot.urdf is None else robot.urdf.read_bytes(),
+        is_mjcf=robot.mjcf is not None,
     )
 
 
