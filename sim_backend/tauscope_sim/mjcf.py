@@ -399,7 +399,8 @@ class _Reader:
                 found = found or Actuator("motor", 0.0, 0.0)
                 continue
             kp, kv = -float(model.actuator_biasprm[index, 1]), -float(model.actuator_biasprm[index, 2])
-            actuator = Actuator("position" if kp else "velocity", kp * gear * gear, kv * gear * gear)
+            kp, kv = kp * gear * gear + 0.0, kv * gear * gear + 0.0  # no negative zero
+            actuator = Actuator("position" if kp else "velocity", kp, kv)
             if found is None or found.kind != "position":
                 found = actuator
         if found is not None and found.kind != "motor":
