@@ -64,3 +64,12 @@ def test_a_joint_that_it_acts_on_gains_and_none_loses(
     relative: list[float], error: list[float], touched: list[int], expected: bool
 ) -> None:
     assert HeldOutChange(np.array(relative), np.array(error)).confirms(touched) is expected
+
+
+@pytest.mark.parametrize(
+    ("gain", "loss", "expected"), [(-0.13, 0.0051, False), (-0.13, 0.03, True), (0.0, 0.0051, True)]
+)
+def test_a_small_loss_beside_a_large_gain_spills_over_through_the_links(
+    gain: float, loss: float, expected: bool
+) -> None:
+    assert HeldOutChange(np.array([gain, loss]), np.array([0.02, 0.0015])).harms is expected

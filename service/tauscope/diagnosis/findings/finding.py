@@ -101,7 +101,7 @@ def is_confirmed(term: Term, before: FitSizes, after: FitSizes, *, seen_again: b
     if change is None or seen_again is False:
         return seen_again
     if not term.effect.recurs(term.shape):
-        return not change.losing
+        return not change.harms
     return change.confirms(term.effect.touched(len(change.relative)))
 
 

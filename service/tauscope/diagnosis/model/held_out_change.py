@@ -25,6 +25,9 @@ LOST = 2.0
 SHOWN = 0.005
 """…by a part of its rms that three digits show: a smaller loss changes no number that anybody reads."""
 
+SPILLED = 0.1
+"""Part of what other joints gain that joints may lose: all share the links, which move with an effect."""
+
 
 def sum_stretches(squares: Array) -> Array:
     """Sums over stretches of motion, (n, S).
@@ -80,12 +83,18 @@ class HeldOutChange:
         """Joints that are predicted worse."""
         return np.flatnonzero((self.standard > LOST) & (self.relative > SHOWN)).tolist()
 
+    @property
+    def harms(self) -> bool:
+        """Whether joints lose more than spills over from what others gain."""
+        gain = -np.log1p(self.relative)
+        return bool(-gain[self.losing].sum() > SPILLED * np.maximum(gain, 0.0).sum())
+
     def confirms(self, touched: Collection[int]) -> bool:
-        """Whether a joint on which an effect acts is predicted better and no joint worse.
+        """Whether a joint on which an effect acts is predicted better, and none is harmed.
 
         Parameters
         ----------
         touched : collection of int
             joints on which it acts, from 0
         """
-        return bool((self.relative[list(touched)] < 0.0).any()) and not self.losing
+        return bool((self.relative[list(touched)] < 0.0).any()) and not self.harms
