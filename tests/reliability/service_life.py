@@ -24,7 +24,7 @@ from server.conftest import connected
 from tauscope.server.http import Settings, create_app
 from tauscope.server.http import services as http_services
 from tauscope.server.http.services import Services
-from tauscope.server.queue.executors import WorkerPool
+from tauscope.server.queue.worker_pool import WorkerPool
 from tauscope.server.store.database import database as database_engine
 from tauscope.server.store.database.database import FILE_NAME
 

@@ -21,7 +21,7 @@ from mcap.records import Channel, Chunk, Schema
 from mcap.stream_reader import get_chunk_data_stream
 
 from tauscope.errors import RecordingError
-from tauscope.recording.inflation import require_plausible_inflation
+from tauscope.recording.inflation import LARGEST_RATIO, count_plausible_records, require_plausible_inflation
 from tauscope.recording.joint_state_log import JointStateLog, MessageHandler
 from tauscope.recording.joint_state_topic import Choice
 from tauscope.recording.recording import Recording
@@ -34,6 +34,8 @@ _RECORD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
 _MESSAGE_INDEX = struct.Struct("<HI")
 _LARGEST_CHUNK_BYTES = 2**28
+_PLAIN_CHUNK_BYTES = 2**26
+"""Unpacked size of a chunk up to which it may pack by any ratio: a chunk holds one large message, or some megabytes."""
 _COPY_BYTES = 2**20
 _UNREADABLE = (
     McapError,
@@ -141,7 +143,7 @@ class _Scan:
 
     def __init__(self, file: BinaryIO, size: int, sink: MessageSink) -> None:
         self._file, self._size, self._sink = file, size, sink
-        self._checksum = self._unpacked_bytes = self._messages = 0
+        self._checksum = self._unpacked_bytes = self._messages = self._records = 0
         self._schemas: dict[int, str] = {}
         self._handlers: dict[int, MessageHandler | None] = {}
 
@@ -191,18 +193,21 @@ class _Scan:
         if chunk.compression == "zstd":
             # The frame states its own size and the decompressor believes it: look before it allocates.
             declared.append(max(zstandard.frame_content_size(chunk.data), 0))
-        if max(declared) > _LARGEST_CHUNK_BYTES:
+        if max(declared) > min(_LARGEST_CHUNK_BYTES, max(_PLAIN_CHUNK_BYTES, LARGEST_RATIO * len(body))):
             raise ValueError("implausible chunk size")
         self._unpacked_bytes += max(declared)
         require_plausible_inflation(self._file.tell(), self._unpacked_bytes, "what was read so far")
         stream, size = get_chunk_data_stream(chunk, validate_crc=True)
         data = stream.read(size)
-        at = 0
+        at, most_records = 0, count_plausible_records(self._file.tell())
         while at < len(data):
             opcode, length = _RECORD.unpack_from(data, at)
             at += _RECORD.size
-            if length > len(data) - at:
-                raise ValueError("a record leaves its chunk")
+            if not 0 < length <= len(data) - at:
+                raise ValueError("a record is empty" if length == 0 else "a record leaves its chunk")
+            self._records += 1
+            if self._records > most_records:
+                raise ValueError(f"more than {most_records} records in so few bytes")
             self._take(opcode, data, at, at + length)
             at += length
 

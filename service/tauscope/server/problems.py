@@ -62,7 +62,7 @@ _KINDS = (
     ProblemKind("interrupted", HTTPStatus.CONFLICT, "The service ended before the job did"),
     ProblemKind("damaged", HTTPStatus.CONFLICT, "Files of this item are missing or damaged"),
     ProblemKind("not-ready", HTTPStatus.SERVICE_UNAVAILABLE, "The service cannot work now"),
-    ProblemKind("queue-full", HTTPStatus.SERVICE_UNAVAILABLE, "Too many jobs are waiting"),
+    ProblemKind("queue-full", HTTPStatus.TOO_MANY_REQUESTS, "Too much is waiting already"),
     ProblemKind("storage-full", HTTPStatus.INSUFFICIENT_STORAGE, "The disk is full"),
     ProblemKind("worker-lost", HTTPStatus.INTERNAL_SERVER_ERROR, "The worker process ended unexpectedly"),
     ProblemKind("internal", HTTPStatus.INTERNAL_SERVER_ERROR, "A fault of Tauscope's own"),

@@ -119,7 +119,7 @@ def test_a_waiting_identification_has_no_result_and_can_be_cancelled(
             assert_problem(answer, "not-finished", 409)
             assert answer.headers["retry-after"] == "2"
     full = waiting_client.post(IDENTIFICATIONS, files=files)
-    assert_problem(full, "queue-full", 503)
+    assert_problem(full, "queue-full", 429)
     assert full.headers["retry-after"] == "10"
 
     for job in (waiting, running):

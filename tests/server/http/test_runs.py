@@ -158,7 +158,7 @@ def test_stop_works_while_everything_else_is_stuck(
 
     app = create_app(settings, executor, controls)
     with connected(app) as client:
-        answer = begin_with(client, executor)
+        answer = begin(client)
         control = controls.next()
         control.go(RunState.RUNNING)
         services = app.state.services
@@ -179,17 +179,6 @@ def test_stop_works_while_everything_else_is_stuck(
         for thread in threads:
             thread.join(60.0)
         control.finish(RunState.STOPPED)
-
-
-def begin_with(client: TestClient, executor: ManualExecutor) -> dict[str, Any]:
-    """Begin a run whose trajectory is checked when the executor is run by hand."""
-    answers: list[dict[str, Any]] = []
-    thread = threading.Thread(target=lambda: answers.append(begin(client)))
-    thread.start()
-    wait_until(lambda: bool(executor.tasks))
-    executor.run()
-    thread.join(60.0)
-    return answers[0]
 
 
 def test_an_arm_has_one_run_at_a_time(arm: TestClient, controls: HandControls) -> None:

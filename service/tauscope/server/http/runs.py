@@ -1,6 +1,5 @@
 """Runs: requests, answers and what is special about this resource."""
 
-import asyncio
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -297,13 +296,14 @@ async def submit_run(request: Request, services: Services) -> str:
         most = min(LARGEST_TRAJECTORY, services.settings.max_upload_bytes)
         parts = {"trajectory": PartRule(most, workspace.trajectories, default_name="trajectory.json")}
         received = await receive_request(request, RunRequest, services.settings, workspace.robot, parts)
-        wanted = await run_in_threadpool(_prepare, received, services, workspace)
+        robot_file = await run_in_threadpool(_put_robot, received, services, workspace)
+        robot = await services.reading.call(request, read_received_robot, workspace.robot, robot_file)
+        wanted = await run_in_threadpool(_prepare, received, services, workspace, robot_file, robot)
         permit = permit_of(request, services, wanted.backend.device(wanted.robot.name))
         if wanted.uploaded:
-            checked = services.checks.submit(
-                check_trajectory, workspace.trajectories, workspace.robot / wanted.robot_file
+            await services.reading.call(
+                request, check_trajectory, workspace.trajectories, workspace.robot / wanted.robot_file
             )
-            await asyncio.wrap_future(checked)
         return await run_in_threadpool(_hand_in, wanted, services, workspace, permit)
     finally:
         await run_in_threadpool(items.discard, staged)
@@ -320,17 +320,22 @@ class _Wanted:
     uploaded: bool
 
 
-def _prepare(received: Received[RunRequest], services: Services, workspace: RunWorkspace) -> _Wanted:
-    """Put robot and trajectory into their places, and check the robot."""
+def _put_robot(received: Received[RunRequest], services: Services, workspace: RunWorkspace) -> str:
+    """Put the robot into its place; returns its file's name."""
     document, has_robot = received.document, received.form.file("robot") or received.document.robot
-    if document.excitation is not None and not has_robot:
-        excitation = EXCITATIONS.finished(services, document.excitation)
-        order = excitation.read_order()
-        shutil.copytree(excitation.robot, workspace.robot, dirs_exist_ok=True)
-        robot_file = "robot.yaml" if order is None else order.robot_file
-    else:
-        robot_file = keep_robot(received, workspace.robot)
-    robot = read_received_robot(workspace.robot, robot_file)
+    if document.excitation is None or has_robot:
+        return keep_robot(received, workspace.robot)
+    excitation = EXCITATIONS.finished(services, document.excitation)
+    order = excitation.read_order()
+    shutil.copytree(excitation.robot, workspace.robot, dirs_exist_ok=True)
+    return "robot.yaml" if order is None else order.robot_file
+
+
+def _prepare(
+    received: Received[RunRequest], services: Services, workspace: RunWorkspace, robot_file: str, robot: Robot
+) -> _Wanted:
+    """Put the trajectory into its place."""
+    document = received.document
     uploaded = received.form.file("trajectory") is not None
     if document.trajectory is not None:
         if uploaded:

@@ -30,15 +30,17 @@ from tauscope.server.history.model_registry import DriftMonitor, ModelRegistry
 from tauscope.server.history.retention import RetentionRule, RetentionSweeper
 from tauscope.server.http.heartbeat import Heartbeat
 from tauscope.server.http.metrics import Metrics, TimedExecutor
+from tauscope.server.http.reading import WIDTH, ReadingQueue
 from tauscope.server.http.repeated_answers import Answers, MemoryAnswers, StoredAnswers
 from tauscope.server.http.settings import Settings
 from tauscope.server.queue.cluster_executor import ClusterExecutor
 from tauscope.server.queue.diagnosis import run_diagnosis
 from tauscope.server.queue.excitation import run_excitation
-from tauscope.server.queue.executors import WorkerPool, open_executor
+from tauscope.server.queue.executors import open_executor
 from tauscope.server.queue.housekeeping import Housekeeping
 from tauscope.server.queue.identification import run_identification
 from tauscope.server.queue.queue import JobKind, JobQueue
+from tauscope.server.queue.worker_pool import WorkerPool
 from tauscope.server.schedules.repeater import Repeater
 from tauscope.server.schedules.repository import ScheduleRepository
 from tauscope.server.schedules.scheduler import Scheduler, new_boot
@@ -61,7 +63,7 @@ class Services:
     jobs: JobQueue
     runs: RunManager
     campaigns: CampaignManager
-    checks: Executor
+    reading: ReadingQueue
     access: Access
     leases: Leases
     audit: AuditTrail
@@ -117,7 +119,8 @@ def open_services(
     except BaseException:
         lock.release()
         raise
-    services = _assemble(_Ground(settings, access, database, site), executor, start)
+    readers = open_readers(settings)
+    services = _assemble(_Ground(settings, access, database, site), executor, readers, start)
     drift = DriftMonitor(services.models.history, site)
     _watch(services, drift)
     housekeeping = Housekeeping(
@@ -144,7 +147,7 @@ def open_services(
                 services.audit.note("service", "ended")
     finally:
         services.jobs.close()
-        services.checks.shutdown(wait=True, cancel_futures=True)
+        readers.shutdown(wait=True, cancel_futures=True)
         housekeeping.close()
         database.close()
         lock.release()
@@ -160,19 +163,22 @@ class _Ground:
     site: str
 
 
-def _assemble(ground: _Ground, executor: Executor | None, start: StartControl | None) -> Services:
+def _assemble(ground: _Ground, executor: Executor | None, readers: Executor, start: StartControl | None) -> Services:
     """Everything that the routes work with; nothing of it moves yet, and unfinished analysis goes on."""
     settings, database, site = ground.settings, ground.database, ground.site
     items, metrics, heartbeat = item_stores(settings.data_folder), Metrics(), Heartbeat()
     recordings = RecordingStore(settings.recordings_folder)
     recordings.tidy()
     identifications, diagnoses, excitations = kinds = _kinds(settings, items)
-    pool = executor or open_executor(settings.workers)
-    timed, most = TimedExecutor(pool, metrics.job_seconds), settings.max_waiting
+    pool = executor or open_executor(settings.workers, deadline_s=settings.job_timeout_s)
+    timed = TimedExecutor(pool, metrics.job_seconds)
+    new_queue = partial(
+        JobQueue, kinds, timed, most_waiting=settings.max_waiting, most_each=settings.max_jobs_per_caller
+    )
     if isinstance(pool, ClusterExecutor):  # it comes and goes, and so do its workers
-        jobs = JobQueue(kinds, timed, slots=lambda: pool.width, most_waiting=most, is_there=pool.is_there)
+        jobs = new_queue(slots=lambda: pool.width, is_there=pool.is_there)
     else:
-        jobs = JobQueue(kinds, timed, slots=settings.workers, most_waiting=most)
+        jobs = new_queue(slots=settings.workers)
     audit = AuditTrail(AuditLog(settings.data_folder))
     claims = DeviceClaims(settings.max_arms)
     leases = Leases(claims, settings.data_folder / "lease-number", on_end=partial(_note_end, audit))
@@ -194,7 +200,7 @@ def _assemble(ground: _Ground, executor: Executor | None, start: StartControl | 
         jobs=jobs,
         runs=runs,
         campaigns=campaigns,
-        checks=executor or WorkerPool(1),
+        reading=ReadingQueue(readers),
         access=ground.access,
         leases=leases,
         audit=audit,
@@ -206,6 +212,12 @@ def _assemble(ground: _Ground, executor: Executor | None, start: StartControl | 
         models=models,
         schedules=Scheduler(ScheduleRepository(database, site, new_boot()), repeater, settings.data_folder),
     )
+
+
+def open_readers(settings: Settings) -> Executor:
+    """Processes that read files of strangers; none is started before it is needed."""
+    bounds = {"deadline_s": settings.reading_timeout_s, "memory_bytes": settings.reading_memory_bytes}
+    return WorkerPool(WIDTH, **bounds)
 
 
 def _kinds(settings: Settings, items: Mapping[str, ItemStore]) -> tuple[JobKind, JobKind, JobKind]:

@@ -31,6 +31,14 @@ class Settings(BaseModel):
     max_recordings: int = Field(default=100, gt=0, description="most recordings of one request")
     max_waiting: int = Field(default=100, gt=0, description="most jobs that wait")
     workers: int = Field(default=1, gt=0, description="jobs that are worked on at a time, a process each")
+    reading_timeout_s: float = Field(
+        default=60.0, gt=0, description="how long a file may take to read: about 3 times the largest upload's time [s]"
+    )
+    reading_memory_bytes: int = Field(
+        default=2048 * MEBIBYTE, gt=0, description="memory of a process that reads: 8 times the largest upload [bytes]"
+    )
+    job_timeout_s: float = Field(default=4 * 3600.0, gt=0, description="how long the work of a job may take [s]")
+    max_jobs_per_caller: int = Field(default=50, gt=0, description="jobs of one caller that have not ended")
     max_arms: int = Field(default=4, gt=0, description="arms that may move at a time, a control process each")
     fires_schedules: bool = Field(default=True, description="whether what schedules repeat is started when it is due")
     backend: BackendName = Field(

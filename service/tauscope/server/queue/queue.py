@@ -8,7 +8,7 @@ from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from dataclasses import dataclass
 from pathlib import Path
 
-from tauscope.errors import LimitExceededError, NotFoundError
+from tauscope.errors import LimitExceededError, NotFoundError, TauscopeError
 from tauscope.server.queue.cluster_executor import ClusterUnavailableError
 from tauscope.server.queue.record import JobProblem, JobRecord, JobState
 from tauscope.server.queue.workspace import Workspace
@@ -143,6 +143,7 @@ class JobQueue:
         *,
         slots: int | Callable[[], int],
         most_waiting: int,
+        most_each: int | None = None,
         is_there: Callable[[], bool] = lambda: True,
     ) -> None:
         """Make the queue; jobs that an earlier service left unfinished are done again, in their order."""
@@ -150,6 +151,8 @@ class JobQueue:
         self._slots = slots if callable(slots) else lambda: slots
         self._is_there = is_there
         self._most_waiting = most_waiting
+        self._most_each = most_each
+        self._callers: dict[QueuedJob, str] = {}
         self._lock = threading.RLock()
         self._waiting: deque[QueuedJob] = deque()
         self._running: dict[QueuedJob, Future[JobProblem | None]] = {}
@@ -164,22 +167,31 @@ class JobQueue:
             self._waiting.extend(job for _, job in sorted(unfinished, key=lambda pair: pair[0]))
             self._go_on()
 
-    def submit(self, kind: JobKind, staged: Path) -> str:
-        """Take a job.
+    def submit(self, kind: JobKind, staged: Path, caller: str = "") -> str:
+        """Take a job; what campaigns and schedules hand in has no caller.
 
         Raises
         ------
         QueueFullError
-            if too many jobs are waiting; the folder stays staged
+            if too many jobs are waiting, or too many of the caller's; the folder stays staged
         """
         with self._lock:
             if self._is_closed or len(self._waiting) >= self._most_waiting:
                 raise QueueFullError(f"{len(self._waiting)} jobs are waiting already; try again when one has ended")
+            self._require_quota(caller)
             Workspace(staged).write_record(JobRecord(state=JobState.QUEUED, created=kind.items.clock()))
             job = QueuedJob(kind, kind.items.publish(staged))
             self._waiting.append(job)
+            self._callers[job] = caller
             self._go_on()
             return job.identifier
+
+    def _require_quota(self, caller: str) -> None:
+        """Refuse one more job of a caller who has enough of them."""
+        self._callers = {job: who for job, who in self._callers.items() if job in self._running or job in self._waiting}
+        open_jobs = sum(who == caller for who in self._callers.values())
+        if caller and self._most_each is not None and open_jobs >= self._most_each:
+            raise QueueFullError(f"{open_jobs} jobs of {caller} have not ended; try again when one has")
 
     def cancel_or_remove(self, kind: JobKind, identifier: str) -> bool:
         """Cancel a job that has not ended; remove one that has, or whose record is damaged.
@@ -341,6 +353,8 @@ class JobQueue:
             raise
         except CancelledError:
             return INTERRUPTED
+        except TauscopeError as error:  # a bound of the worker's
+            return JobProblem(code=error.code, detail=f"the job {error}")
         except BrokenExecutor:
             if self._is_closed:  # its process was ended with the service
                 return INTERRUPTED

@@ -1,7 +1,5 @@
 """Routes about recordings."""
 
-import asyncio
-from concurrent.futures import BrokenExecutor
 from typing import Annotated
 from urllib.parse import quote
 
@@ -12,6 +10,7 @@ from starlette.concurrency import run_in_threadpool
 from tauscope.server.http.documents import file_answer, media_type, refuse_media_type
 from tauscope.server.http.form import FORM, PartRule, receive_form
 from tauscope.server.http.openapi import binary_part, form_body
+from tauscope.server.http.reading import READING
 from tauscope.server.http.recordings.models import RecordingAnswer, RecordingListAnswer, RecordingReportAnswer
 from tauscope.server.http.services import ServicesDep
 from tauscope.server.problems import ProblemError, problem_responses
@@ -71,18 +70,14 @@ def get_recording(name: Name, services: ServicesDep) -> RecordingAnswer:
 @router.get(
     "/{name}/report",
     summary="Check a recording",
-    responses=problem_responses("not-found", "recording", "recording-mismatch", "worker-lost"),
+    responses=problem_responses("not-found", "recording", "recording-mismatch", *READING),
 )
 async def report_on_recording(
-    name: Name, services: ServicesDep, joint_count: JointCount = None
+    request: Request, name: Name, services: ServicesDep, joint_count: JointCount = None
 ) -> RecordingReportAnswer:
     """What it holds, and what to look at before trusting it."""
     path = await run_in_threadpool(services.recordings.path, name)
-    try:
-        report = await asyncio.wrap_future(services.checks.submit(check_kept_recording, path, joint_count))
-    except BrokenExecutor:
-        text = f"{name}: the process that looked into it ended unexpectedly; is the file damaged, or far too large?"
-        raise ProblemError("worker-lost", text) from None
+    report = await services.reading.call(request, check_kept_recording, path, joint_count)
     return RecordingReportAnswer.model_validate(report)
 
 
@@ -92,21 +87,17 @@ async def report_on_recording(
     response_class=Response,
     responses={
         200: {"content": {"application/octet-stream": {}}, "description": "columns of 32-bit floats behind a header"},
-        **problem_responses("not-found", "recording", "worker-lost"),
+        **problem_responses("not-found", "recording", *READING),
     },
 )
-async def get_samples(name: Name, services: ServicesDep, most: MostSamples = 100_000) -> Response:
+async def get_samples(request: Request, name: Name, services: ServicesDep, most: MostSamples = 100_000) -> Response:
     """Time, positions and torques; of more samples than asked for, those that keep every column's look.
 
     Length of the header (4 bytes, little-endian), the header (JSON: `columns`, `joint_count`, `effort`, `samples`,
     `shown`), then each column as little-endian 32-bit floats; time counts from the first sample.
     """
     path = await run_in_threadpool(services.recordings.path, name)
-    try:
-        content = await asyncio.wrap_future(services.checks.submit(read_kept_samples, path, most))
-    except BrokenExecutor:
-        text = f"{name}: the process that read it ended unexpectedly; is the file damaged, or far too large?"
-        raise ProblemError("worker-lost", text) from None
+    content = await services.reading.call(request, read_kept_samples, path, most)
     return Response(content, media_type="application/octet-stream")
 
 

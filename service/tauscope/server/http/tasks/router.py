@@ -16,6 +16,7 @@ from tauscope.robot.robot_file import LARGEST_ROBOT_FILE
 from tauscope.robot.xml_text import LARGEST_XML
 from tauscope.server.http.leases.router import LeaseToken
 from tauscope.server.http.openapi import Examples
+from tauscope.server.http.reading import READING
 from tauscope.server.http.robots.files import check_received_robot
 from tauscope.server.http.robots.models import RobotReportAnswer
 from tauscope.server.http.services import Services, ServicesDep
@@ -166,17 +167,17 @@ def make_router(resource: Resource) -> APIRouter:
         "/{identifier}/robot",
         name=f"get_robot_of_{singular}",
         summary=f"Fetch the robot of {noun}",
-        responses=problem_responses("not-found", "damaged", "robot-file"),
+        responses=problem_responses("not-found", "damaged", "robot-file", *READING),
     )
-    def get_robot(identifier: Identifier, services: ServicesDep) -> JobRobotAnswer:
+    async def get_robot(request: Request, identifier: Identifier, services: ServicesDep) -> JobRobotAnswer:
         """Its joints, limits and frames, and the very files that were sent: they can be handed in again."""
-        workspace = resource.find(services, identifier)
-        folder, order = workspace.robot, workspace.read_order()
+        workspace = await run_in_threadpool(resource.find, services, identifier)
+        folder, order = workspace.robot, await run_in_threadpool(workspace.read_order)
         if order is None:
             raise ProblemError("damaged", f"files of {identifier} are missing or damaged; it has no robot any more")
-        report = RobotReportAnswer.of(check_received_robot(folder, order.robot_file))
-        files = [path for path in sorted(folder.iterdir()) if path.is_file() and not path.is_symlink()]
-        return JobRobotAnswer(report=report, robot_file=order.robot_file, files=[_read(path) for path in files])
+        report = await services.reading.call(request, check_received_robot, folder, order.robot_file)
+        files = await run_in_threadpool(_read_files, folder)
+        return JobRobotAnswer(report=RobotReportAnswer.of(report), robot_file=order.robot_file, files=files)
 
     add_events_route(router, noun, resource.followed)
     return router
@@ -313,8 +314,12 @@ def _lease_header(_lease: LeaseToken = None) -> None:
     """The lease that a request comes with; `permit_of` reads it."""
 
 
-def _read(path: FilePath) -> RobotFileAnswer:
-    """A text file, as far as such a file may be long."""
-    with path.open("rb") as file:
-        content = file.read(max(LARGEST_ROBOT_FILE, LARGEST_XML))
-    return RobotFileAnswer(name=path.name, content=content.decode("utf-8", errors="replace"))
+def _read_files(folder: FilePath) -> list[RobotFileAnswer]:
+    """Text files of a folder, as far as such a file may be long."""
+    answers = []
+    for path in sorted(folder.iterdir()):
+        if path.is_file() and not path.is_symlink():
+            with path.open("rb") as file:
+                content = file.read(max(LARGEST_ROBOT_FILE, LARGEST_XML))
+            answers.append(RobotFileAnswer(name=path.name, content=content.decode("utf-8", errors="replace")))
+    return answers
