@@ -30,6 +30,7 @@ from tauscope.server.history.model_registry import DriftMonitor, ModelRegistry
 from tauscope.server.history.retention import RetentionRule, RetentionSweeper
 from tauscope.server.http.heartbeat import Heartbeat
 from tauscope.server.http.metrics import Metrics, TimedExecutor
+from tauscope.server.http.readiness import Clock, Readiness, ReadyMetrics, check_database, check_disk
 from tauscope.server.http.reading import WIDTH, ReadingQueue
 from tauscope.server.http.repeated_answers import Answers, MemoryAnswers, StoredAnswers
 from tauscope.server.http.settings import Settings
@@ -70,12 +71,13 @@ class Services:
     answers: Answers
     lease_answers: Answers
     metrics: Metrics
+    readiness: Readiness
     heartbeat: Heartbeat
     index: Indexer
     models: ModelRegistry
     schedules: Scheduler
+    closing: threading.Event
     followers: CapacityLimiter = field(default_factory=lambda: CapacityLimiter(4))
-    closing: threading.Event = field(default_factory=threading.Event)
 
     def begin_to_close(self) -> None:
         """Stop every arm, and let go of whoever follows events; returns at once."""
@@ -180,7 +182,7 @@ def _assemble(ground: _Ground, executor: Executor | None, readers: Executor, sta
     else:
         jobs = new_queue(slots=settings.workers)
     audit = AuditTrail(AuditLog(settings.data_folder))
-    claims = DeviceClaims(settings.max_arms)
+    claims, closing = DeviceClaims(settings.max_arms), threading.Event()
     leases = Leases(claims, settings.data_folder / "lease-number", on_end=partial(_note_end, audit))
     start = start or partial(start_control, sim_socket=settings.sim_socket)
     runs = RunManager(items["run"], recordings, start, claims, heartbeat.is_alive, metrics.run_ended)
@@ -207,11 +209,33 @@ def _assemble(ground: _Ground, executor: Executor | None, readers: Executor, sta
         answers=StoredAnswers(settings.data_folder / "idempotency"),
         lease_answers=MemoryAnswers(),
         metrics=metrics,
+        readiness=Readiness(_checks(ground, jobs, readers, audit, closing)),
+        closing=closing,
         heartbeat=heartbeat,
         index=index,
         models=models,
         schedules=Scheduler(ScheduleRepository(database, site, new_boot()), repeater, settings.data_folder),
     )
+
+
+def _checks(
+    ground: _Ground, jobs: JobQueue, readers: Executor, audit: AuditTrail, closing: threading.Event
+) -> dict[str, Callable[[], str | None]]:
+    """What `/readyz` asks."""
+
+    def check_workers() -> str | None:
+        if not jobs.can_work():
+            return "the Dask cluster does not answer, and jobs wait for it"
+        return readers.obstacle if isinstance(readers, WorkerPool) else None
+
+    return {
+        "service": lambda: "the service is ending" if closing.is_set() else None,
+        "database": partial(check_database, ground.database.check),
+        "disk": partial(check_disk, ground.settings.data_folder),
+        "workers": check_workers,
+        "clock": Clock().check,
+        "audit log": lambda: f"{audit.lost} entries of the audit log were lost" if audit.lost else None,
+    }
 
 
 def open_readers(settings: Settings) -> Executor:
@@ -257,6 +281,7 @@ def _watch(services: Services, drift: DriftMonitor) -> None:
     metrics, folder = services.metrics, services.settings.data_folder
     metrics.loops.live = services.runs.list_live
     metrics.watch_drift(drift)
+    metrics.registry.register(ReadyMetrics(services.readiness))
     metrics.watch("tauscope_jobs_waiting", "Jobs that wait", services.jobs.waiting)
     metrics.watch("tauscope_leases", "Leases that hold", lambda: len(services.leases.active()))
     metrics.watch("tauscope_audit_lost", "Entries that the audit log did not take", lambda: services.audit.lost)

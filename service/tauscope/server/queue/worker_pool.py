@@ -59,6 +59,8 @@ class WorkerPool(Executor):
         self._is_closed = False
         self._threads = [threading.Thread(target=self._serve, daemon=True) for _ in range(workers)]
         self._has_begun = False
+        self.obstacle: str | None = None
+        """Why the last process that was needed did not start; None where it did."""
 
     def submit(
         self, fn: Callable[Arguments, Result], /, *args: Arguments.args, **kwargs: Arguments.kwargs
@@ -124,7 +126,8 @@ class WorkerPool(Executor):
         try:
             worker = self._take_worker()
         except OSError as error:
-            return _settle(task.future, BrokenProcessPool(f"no process could be started ({error.strerror})"))
+            self.obstacle = f"no worker process can be started ({error.strerror})"
+            return _settle(task.future, BrokenProcessPool(self.obstacle))
         # A cancelled future is done at once: whatever works on it is of no use any more.
         task.future.add_done_callback(lambda done: worker.kill() if done.cancelled() else None)
         outcome = self._call(worker, task)
@@ -151,9 +154,11 @@ class WorkerPool(Executor):
         try:
             worker.begin(task.call)
         except (OSError, EOFError):
-            return _Outcome(BrokenProcessPool("the process ended before its work began"), is_clean=False)
+            self.obstacle = "worker processes end before their work begins"
+            return _Outcome(BrokenProcessPool(self.obstacle), is_clean=False)
         except Exception as error:  # what cannot be pickled
             return _Outcome(error)
+        self.obstacle = None
         try:
             if not worker.connection.poll(self._deadline_s):
                 text = f"took longer than the {self._deadline_s:g} s that are given to it here; send less at once"
