@@ -60,6 +60,7 @@ _KINDS = (
     ProblemKind("not-finished", HTTPStatus.CONFLICT, "The job has not ended yet"),
     ProblemKind("cancelled", HTTPStatus.CONFLICT, "The job was cancelled"),
     ProblemKind("interrupted", HTTPStatus.CONFLICT, "The service ended before the job did"),
+    ProblemKind("in-use", HTTPStatus.CONFLICT, "An active model or a reference rests on it"),
     ProblemKind("damaged", HTTPStatus.CONFLICT, "Files of this item are missing or damaged"),
     ProblemKind("not-ready", HTTPStatus.SERVICE_UNAVAILABLE, "The service cannot work now"),
     ProblemKind("queue-full", HTTPStatus.TOO_MANY_REQUESTS, "Too much is waiting already"),

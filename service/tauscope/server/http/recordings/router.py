@@ -8,6 +8,7 @@ from fastapi.responses import FileResponse
 from starlette.concurrency import run_in_threadpool
 
 from tauscope.server.http.documents import file_answer, media_type, refuse_media_type
+from tauscope.server.http.evidence import require_no_evidence
 from tauscope.server.http.form import FORM, PartRule, receive_form
 from tauscope.server.http.openapi import binary_part, form_body
 from tauscope.server.http.reading import READING
@@ -115,9 +116,16 @@ def get_content(name: Name, services: ServicesDep) -> FileResponse:
     return file_answer(services.recordings.path(name), name)
 
 
-@router.delete("/{name}", status_code=204, summary="Remove a recording", responses=problem_responses("not-found"))
+@router.delete(
+    "/{name}",
+    status_code=204,
+    summary="Remove a recording",
+    responses=problem_responses("not-found", "in-use", "store"),
+)
 def remove_recording(name: Name, services: ServicesDep) -> None:
-    """Identifications that wait for it will fail."""
+    """Identifications that wait for it will fail; one that a model in use rests on stays."""
+    services.recordings.path(name)
+    require_no_evidence(services, name)
     services.recordings.remove(name)
 
 

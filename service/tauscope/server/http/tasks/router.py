@@ -14,6 +14,7 @@ from tauscope.export.formats import ExportFile, ExportFormat
 from tauscope.robot.messages import nearest, one_line, shown
 from tauscope.robot.robot_file import LARGEST_ROBOT_FILE
 from tauscope.robot.xml_text import LARGEST_XML
+from tauscope.server.http.evidence import require_no_model
 from tauscope.server.http.leases.router import LeaseToken
 from tauscope.server.http.openapi import Examples
 from tauscope.server.http.reading import READING
@@ -84,6 +85,10 @@ class Folder(Protocol):
 
     def read_order(self) -> Any:
         """What was asked for; None where that is damaged."""
+        ...
+
+    def has_ended(self) -> bool:
+        """Whether nothing more will happen."""
         ...
 
 
@@ -190,10 +195,12 @@ def add_cancelling(router: APIRouter, resource: Resource, kind: Callable[[Servic
         "/{identifier}",
         summary=f"Cancel or remove {resource.noun}",
         response_model=resource.models[1],
-        responses={204: {"description": "it had ended, and was removed"}, **problem_responses("not-found")},
+        responses={204: {"description": "it had ended, and was removed"}, **problem_responses("not-found", "in-use")},
     )
     def cancel_or_remove(request: Request, identifier: Identifier, services: ServicesDep) -> BaseModel | Response:
-        """One that waits or runs is cancelled; one that has ended is removed with all its files."""
+        """One that waits or runs is cancelled; one that has ended is removed, unless it is a model in use."""
+        if resource.find(services, identifier).has_ended():
+            require_no_model(services, identifier)
         if services.jobs.cancel_or_remove(kind(services), identifier):
             return Response(status_code=204)
         return resource.describe(services, identifier, collection(request, 2))

@@ -206,6 +206,13 @@ class Index:
             uses = session.execute(query)
             return frozenset(name for kind, identifier, name in uses if (kind, identifier) not in except_by)
 
+    def list_users(self, recording: str) -> frozenset[str]:
+        """Identifiers of the items of this site that were made from or judged by a recording on the server."""
+        query = select(Item.identifier).join(RecordingUse).where(Item.site == self.site)
+        query = query.where(RecordingUse.origin == "server", RecordingUse.name == recording)
+        with self._database.reading() as session:
+            return frozenset(session.scalars(query))
+
     def search(self, query: ItemQuery) -> list[ItemEntry]:
         """Items of all sites, the newest first."""
         statement = select(Item).outerjoin(Robot)
