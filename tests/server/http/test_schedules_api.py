@@ -1,5 +1,6 @@
 """Schedules over HTTP: made from something that was done, done when asked, and told."""
 
+import shutil
 from pathlib import Path
 from typing import Any
 

@@ -25,7 +25,7 @@ def require_no_evidence(services: Services, recording: str) -> None:
     ProblemError
         if one was
     """
-    services.index.sync()
+    services.index.refresh()
     _require_free(services, recording, services.index.index.list_users(recording))
 
 

@@ -190,7 +190,6 @@ def _assemble(ground: _Ground, executor: Executor | None, readers: Executor, sta
     campaigns = CampaignManager(items["campaign"], dependencies)
     models = ModelRegistry(ModelHistory(database), site, items)
     index = open_index(Index(database, site), items, recordings, settings.data_folder.name)
-    models.judge_new()
     # What a schedule moves has no lease: it waits for its next time where somebody has one.
     repeater = Repeater(dependencies, campaigns, partial(leases.permit, token=None, owner="schedule", is_needed=False))
     return Services(
@@ -273,7 +272,15 @@ def _retention(services: Services) -> list[Callable[[], object]]:
         services.audit.note("service", "pruned", subject=name, kind=kind)
 
     history = services.models.history
-    return [RetentionSweeper(rule, services.index, history, services.recordings, removers, note).tidy]
+    sweeper = RetentionSweeper(rule, services.index, history, services.recordings, removers, note)
+
+    def prune() -> None:
+        # What was not judged yet may become the active model, which stays.
+        services.index.sync()
+        services.models.judge_new()
+        sweeper.tidy()
+
+    return [prune]
 
 
 def _watch(services: Services, drift: DriftMonitor) -> None:

@@ -150,6 +150,8 @@ class Database:
         try:
             with self._own_words():
                 upgrade(self._engine)
+                if self._engine.url.get_backend_name() == "sqlite":
+                    _check_file(self._engine.url)
         except BaseException:
             self._engine.dispose()
             raise
