@@ -20,7 +20,8 @@ def test_a_damaged_database_is_one_line(tmp_path: Path, damage: str) -> None:
     start = 0 if damage == "header" else 4096
     content[start:] = b"garbage!" * ((len(content) - start) // 8)
     path.write_bytes(content)
-    ended = subprocess.run([*SERVE, str(tmp_path)], cwd=REPOSITORY, capture_output=True, text=True, timeout=60)
+    command = [*SERVE, str(tmp_path)]
+    ended = subprocess.run(command, check=False, cwd=REPOSITORY, capture_output=True, text=True, timeout=60)
     assert (ended.returncode, ended.stdout) == (1, "")
     assert len(ended.stderr.splitlines()) == 1, ended.stderr
     assert f"{FILE_NAME}: is damaged" in ended.stderr

@@ -269,6 +269,7 @@ router = make_router(CAMPAIGNS)
 
 @router.get(
     "/{identifier}/result",
+    name="get_result_of_campaigns",
     summary="Fetch the result",
     responses=problem_responses(
         "not-found",

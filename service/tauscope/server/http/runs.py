@@ -442,6 +442,7 @@ add_stopping(
 
 @router.get(
     "/{identifier}/recording",
+    name="get_recording_of_run",
     summary="Fetch the recording of a run",
     response_class=FileResponse,
     responses={

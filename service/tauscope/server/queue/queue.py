@@ -333,20 +333,20 @@ class JobQueue:
         """How a job ended by what came of its work."""
         try:
             problem = self._problem_of(job, future)
-        except ClusterUnavailableError as error:
+        except (ClusterUnavailableError, BrokenExecutor) as error:
             return self._end_of_lost(job, error)
         return _End(JobState.SUCCEEDED if problem is None else JobState.FAILED, problem)
 
-    def _end_of_lost(self, job: QueuedJob, error: ClusterUnavailableError) -> _End:
-        """A job that was lost with its cluster waits again, unless that happened too often: it may be the cause."""
+    def _end_of_lost(self, job: QueuedJob, error: Exception) -> _End:
+        """A job that was lost with its worker waits again, unless that happened too often: it may be the cause."""
         if job.attempts() >= MOST_ATTEMPTS:
-            _log.error("job %s: lost with its cluster %d times", job.identifier, MOST_ATTEMPTS)
+            _log.error("job %s: lost with its worker %d times", job.identifier, MOST_ATTEMPTS)
             return _End(JobState.FAILED, WORKER_LOST)
         _log.warning("job %s waits again: %s", job.identifier, error)
         return _End(JobState.QUEUED, None)
 
     def _problem_of(self, job: QueuedJob, future: "Future[JobProblem | None]") -> JobProblem | None:
-        """Why the work of a job has no result; None where it has one. Raises ClusterUnavailableError."""
+        """Why the work of a job has no result; None where it has one. Raises an error where its worker was lost."""
         try:
             return future.result()
         except ClusterUnavailableError:
@@ -358,8 +358,7 @@ class JobQueue:
         except BrokenExecutor:
             if self._is_closed:  # its process was ended with the service
                 return INTERRUPTED
-            _log.error("job %s: its worker process ended unexpectedly", job.identifier)
-            return WORKER_LOST
+            raise
         except Exception:
             _log.exception("job %s failed for an unforeseen reason", job.identifier)
             return INTERNAL

@@ -63,6 +63,7 @@ def add_events_route(router: APIRouter, noun: str, find: Callable[[Services, str
 
     @router.get(
         "/{identifier}/events",
+        name=f"follow_events_of_{router.prefix.strip('/')}",
         summary=f"Follow the events of {noun}",
         response_class=Response,
         responses={

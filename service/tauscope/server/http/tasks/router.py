@@ -137,6 +137,7 @@ def make_router(resource: Resource) -> APIRouter:
 
     @router.post(
         "",
+        name=f"create_{singular}",
         status_code=202,
         summary=resource.summary,
         description=resource.words,
@@ -193,6 +194,7 @@ def add_cancelling(router: APIRouter, resource: Resource, kind: Callable[[Servic
 
     @router.delete(
         "/{identifier}",
+        name=f"cancel_or_remove_{resource.singular}",
         summary=f"Cancel or remove {resource.noun}",
         response_model=resource.models[1],
         responses={204: {"description": "it had ended, and was removed"}, **problem_responses("not-found", "in-use")},
@@ -258,7 +260,7 @@ def add_document_route(
 
     @router.get(
         f"/{{identifier}}/{document.name}",
-        name=f"get_{document.name.replace('-', '_')}",
+        name=f"get_{document.name.replace('-', '_')}_of_{router.prefix.strip('/')}",
         summary=document.summary,
         description=document.description,
         response_class=Response,
@@ -289,6 +291,7 @@ def add_export_route(
 
     @router.get(
         "/{identifier}/exports/{format}",
+        name=f"get_export_of_{router.prefix.strip('/')}",
         summary="Fetch an export",
         description=words,
         response_class=Response,
