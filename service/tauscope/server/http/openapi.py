@@ -64,7 +64,7 @@ def resolve_reference(document: Mapping[str, Any], node: dict[str, Any]) -> dict
     """A part of a document, or that to which it refers."""
     while "$ref" in node:
         _, *steps = node["$ref"].split("/")
-        node = reduce(getitem, steps, document)  # type: ignore[arg-type]
+        node = reduce(getitem, steps, document)
     return node
 
 
