@@ -19,7 +19,7 @@ from tauscope.runtime.record import RunProblem
 from tauscope.runtime.states import RunState
 from tauscope.server.control.run import RunWorkspace
 from tauscope.server.http import Settings, create_app
-from tauscope.server.http.tasks import events as event_routes
+from tauscope.server.http.tasks import event_feeds
 from tauscope.server.queue.excitation import ExcitationWorkspace
 from tauscope.server.store.files import KeptFile
 from tauscope.server.store.recordings import RecordingStore, StoredRecording
@@ -114,7 +114,7 @@ def test_the_events_of_a_run(arm: TestClient, controls: HandControls) -> None:
 def test_the_end_is_told_when_everything_is_in_its_place(
     arm: TestClient, controls: HandControls, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(event_routes, "LAST_WAIT_S", 0.0)
+    monkeypatch.setattr(event_feeds, "LAST_WAIT_S", 0.0)
     keep, go_on = RecordingStore.keep, threading.Event()
 
     def slowly(self: RecordingStore, file: KeptFile) -> tuple[StoredRecording, bool]:

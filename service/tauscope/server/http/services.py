@@ -34,6 +34,7 @@ from tauscope.server.http.readiness import Clock, Readiness, ReadyMetrics, check
 from tauscope.server.http.reading import WIDTH, ReadingQueue
 from tauscope.server.http.repeated_answers import Answers, MemoryAnswers, StoredAnswers
 from tauscope.server.http.settings import Settings
+from tauscope.server.http.tasks.event_feeds import EventFeeds
 from tauscope.server.queue.cluster_executor import ClusterExecutor
 from tauscope.server.queue.diagnosis import run_diagnosis
 from tauscope.server.queue.excitation import run_excitation
@@ -77,6 +78,7 @@ class Services:
     models: ModelRegistry
     schedules: Scheduler
     closing: threading.Event
+    feeds: EventFeeds
     followers: CapacityLimiter = field(default_factory=lambda: CapacityLimiter(4))
 
     def begin_to_close(self) -> None:
@@ -210,6 +212,7 @@ def _assemble(ground: _Ground, executor: Executor | None, readers: Executor, sta
         metrics=metrics,
         readiness=Readiness(_checks(ground, jobs, readers, audit, closing)),
         closing=closing,
+        feeds=EventFeeds(closing),
         heartbeat=heartbeat,
         index=index,
         models=models,

@@ -22,7 +22,8 @@ from tauscope.server.http.robots.files import check_received_robot
 from tauscope.server.http.robots.models import RobotReportAnswer
 from tauscope.server.http.services import Services, ServicesDep
 from tauscope.server.http.tasks.answers import require_document
-from tauscope.server.http.tasks.events import Told, add_events_route
+from tauscope.server.http.tasks.event_feeds import Told
+from tauscope.server.http.tasks.events import add_events_route
 from tauscope.server.http.tasks.routes import ENDINGS, MOTION, SUBMISSION, Identifier, Limit, collection
 from tauscope.server.http.tasks.submission import RobotRequest, request_body
 from tauscope.server.models import AnswerModel
