@@ -28,7 +28,7 @@ def test_a_recording_is_kept_with_its_hash(client: TestClient, settings: Setting
     assert answer.headers["location"] == f"{RECORDINGS}/log%201.csv"
     entry = client.get(answer.headers["location"]).json()
     assert (entry["name"], entry["size"], entry["sha256"]) == ("log 1.csv", len(CSV), hashlib.sha256(CSV).hexdigest())
-    assert client.get(RECORDINGS).json() == {"recordings": [entry]}
+    assert client.get(RECORDINGS).json() == {"recordings": [entry], "next": None}
     assert (settings.recordings_folder / "log 1.csv").read_bytes() == CSV
     assert {file.name for file in settings.recordings_folder.iterdir()} == {".sha256", "log 1.csv"}
 

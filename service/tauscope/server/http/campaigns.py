@@ -26,7 +26,7 @@ from tauscope.server.http.tasks.answers import JobAnswer, damaged_fields, job_fi
 from tauscope.server.http.tasks.router import Resource, add_stopping, make_router
 from tauscope.server.http.tasks.routes import ENDINGS, Identifier, collection
 from tauscope.server.http.tasks.submission import RobotRequest, keep_robot, receive_request
-from tauscope.server.models import AnswerModel
+from tauscope.server.models import AnswerModel, PageAnswer
 from tauscope.server.problems import ProblemError, problem_responses
 from tauscope.server.queue.record import JobState
 from tauscope.tasks.campaign import CampaignOptions
@@ -86,7 +86,7 @@ class CampaignAnswer(JobAnswer):
     links: CampaignLinksAnswer = Field(description="where to go on")
 
 
-class CampaignListAnswer(AnswerModel):
+class CampaignListAnswer(PageAnswer):
     """Campaigns that are kept."""
 
     campaigns: list[CampaignAnswer] = Field(description="the newest first")

@@ -16,7 +16,7 @@ from tauscope.server.http.tasks.queued import QueuedTask
 from tauscope.server.http.tasks.router import JobDocument
 from tauscope.server.http.tasks.routes import ENDINGS, Identifier
 from tauscope.server.http.tasks.submission import RobotRequest
-from tauscope.server.models import AnswerModel
+from tauscope.server.models import AnswerModel, PageAnswer
 from tauscope.server.problems import problem_responses
 from tauscope.server.queue.excitation import ExcitationWorkspace, write_trajectory_piece
 from tauscope.server.queue.stored import read_bytes
@@ -58,7 +58,7 @@ class ExcitationAnswer(JobAnswer):
     links: ExcitationLinks = Field(description="where to go on")
 
 
-class ExcitationListAnswer(AnswerModel):
+class ExcitationListAnswer(PageAnswer):
     """Excitations that are kept."""
 
     excitations: list[ExcitationAnswer] = Field(description="the newest first")

@@ -36,7 +36,7 @@ from tauscope.server.http.tasks.answers import shown_problem
 from tauscope.server.http.tasks.router import Resource, add_stopping, make_router
 from tauscope.server.http.tasks.routes import Identifier
 from tauscope.server.http.tasks.submission import Received, RobotRequest, keep_robot, receive_request
-from tauscope.server.models import AnswerModel
+from tauscope.server.models import AnswerModel, PageAnswer
 from tauscope.server.problems import Problem, ProblemError, make_problem, problem_responses
 from tauscope.server.queue.excitation import ExcitationOrder, ExcitationWorkspace, check_trajectory
 from tauscope.server.queue.task_job import submit_job
@@ -135,7 +135,7 @@ class RunAnswer(AnswerModel):
     links: RunLinks = Field(description="where to go on")
 
 
-class RunListAnswer(AnswerModel):
+class RunListAnswer(PageAnswer):
     """Runs that are kept."""
 
     runs: list[RunAnswer] = Field(description="the newest first")

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from starlette.testclient import TestClient
 
+from server.http.motions import ROBOT
 from server.http.problem_check import assert_problem
 
 DOCUMENT = json.loads((Path(__file__).parents[1] / "openapi.json").read_text(encoding="utf-8"))
@@ -44,3 +45,19 @@ def test_operations_have_names_of_their_own() -> None:
 def test_the_document_repeats_no_problem() -> None:
     """As it is sent: 285 kB, where every example stood at every operation it was 620 kB."""
     assert len(json.dumps(DOCUMENT, separators=(",", ":"))) < 300_000
+
+
+def test_lists_are_read_page_by_page(client: TestClient) -> None:
+    for number in range(5):
+        client.post("/api/v1/recordings", files={"file": (f"{number}.csv", b"t\n%d\n" % number)})
+        client.post("/api/v1/excitations", json={"robot": ROBOT})
+    for plural, key in (("recordings", "name"), ("excitations", "id")):
+        whole = [each[key] for each in client.get(f"/api/v1/{plural}").json()[plural]]
+        assert len(whole) == 5
+        found, after = [], None
+        for length in (2, 2, 1):
+            page = client.get(f"/api/v1/{plural}", params={"limit": 2} | ({"after": after} if after else {})).json()
+            assert len(page[plural]) == length
+            found += [each[key] for each in page[plural]]
+            after = page["next"]
+        assert (found, after) == (whole, None)

@@ -14,6 +14,7 @@ from tauscope.server.http.openapi import binary_part, form_body
 from tauscope.server.http.reading import READING
 from tauscope.server.http.recordings.models import RecordingAnswer, RecordingListAnswer, RecordingReportAnswer
 from tauscope.server.http.services import ServicesDep
+from tauscope.server.http.tasks.routes import After
 from tauscope.server.problems import ProblemError, problem_responses
 from tauscope.server.queue.kept_recordings import check_kept_recording, read_kept_samples
 from tauscope.server.store.recordings import StoredRecording
@@ -23,6 +24,8 @@ router = APIRouter(prefix="/recordings", tags=["recordings"], responses=problem_
 Name = Annotated[str, Path(description="name of the recording", examples=["log-2026-11-03.csv"])]
 JointCount = Annotated[int | None, Query(gt=0, le=1000, description="joints that the recording must have")]
 MostSamples = Annotated[int, Query(ge=2, le=1_000_000, description="samples to return, about")]
+
+RecordingLimit = Annotated[int, Query(ge=1, le=10_000, description="most entries of the list")]
 
 _BODY = form_body({"file": binary_part("the recording: CSV, Parquet, MCAP or a rosbag2 database")}, required=["file"])
 
@@ -57,9 +60,11 @@ async def keep_recording(request: Request, response: Response, services: Service
 
 
 @router.get("", summary="List the recordings on the server")
-def list_recordings(services: ServicesDep) -> RecordingListAnswer:
+def list_recordings(services: ServicesDep, limit: RecordingLimit = 1000, after: After = None) -> RecordingListAnswer:
     """Sent ones, and those that the operator put into the folder."""
-    return RecordingListAnswer(recordings=[_answer(entry) for entry in services.recordings.entries()])
+    entries = [entry for entry in services.recordings.entries() if after is None or entry.name > after]
+    page = [_answer(entry) for entry in entries[:limit]]
+    return RecordingListAnswer(recordings=page, next=page[-1].name if len(entries) > limit else None)
 
 
 @router.get("/{name}", summary="Look a recording up", responses=problem_responses("not-found"))

@@ -1,6 +1,7 @@
 """One router for every resource that performs a task: handed in, listed, followed, its outputs fetched, removed."""
 
 from collections.abc import Awaitable, Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 from typing import Annotated, Any, Protocol
@@ -24,7 +25,7 @@ from tauscope.server.http.services import Services, ServicesDep
 from tauscope.server.http.tasks.answers import require_document
 from tauscope.server.http.tasks.event_feeds import Told
 from tauscope.server.http.tasks.events import add_events_route
-from tauscope.server.http.tasks.routes import ENDINGS, MOTION, SUBMISSION, Identifier, Limit, collection
+from tauscope.server.http.tasks.routes import ENDINGS, MOTION, SUBMISSION, After, Identifier, Limit, collection
 from tauscope.server.http.tasks.submission import RobotRequest, request_body
 from tauscope.server.models import AnswerModel
 from tauscope.server.problems import ProblemError, problem_responses
@@ -154,10 +155,15 @@ def make_router(resource: Resource) -> APIRouter:
         return answer
 
     @router.get("", name=f"list_{plural}", summary=f"List {plural}", response_model=list_model)
-    def list_items(request: Request, services: ServicesDep, limit: Limit = 100) -> BaseModel:
+    def list_items(request: Request, services: ServicesDep, limit: Limit = 100, after: After = None) -> BaseModel:
         """The newest first."""
-        root, identifiers = collection(request, 1), resource.items(services).identifiers()[:limit]
-        return list_model(**{plural: [resource.describe(services, each, root) for each in identifiers]})
+        root, found = collection(request, 1), resource.items(services).identifiers()
+        found = [each for each in found if after is None or each < after]
+        page = []
+        for each in found[:limit]:
+            with suppress(NotFoundError):  # it was removed a moment ago
+                page.append(resource.describe(services, each, root))
+        return list_model(**{plural: page}, next=found[limit - 1] if len(found) > limit else None)
 
     @router.get(
         "/{identifier}",
