@@ -7,7 +7,12 @@ from pathlib import Path
 import pytest
 
 from shared_data import REPOSITORY
+from tauscope.server.http import Settings
+from tauscope.server.http.services import require_data_folder
 from tauscope.server.store.database.database import FILE_NAME, Database
+
+OWN = 0o077
+"""Rights that only others have."""
 
 SERVE = [sys.executable, "-m", "tauscope.cli", "serve", "--port", "0", "--data"]
 
@@ -26,3 +31,14 @@ def test_a_damaged_database_is_one_line(tmp_path: Path, damage: str) -> None:
     assert len(ended.stderr.splitlines()) == 1, ended.stderr
     assert f"{FILE_NAME}: is damaged" in ended.stderr
     assert "restore a backup" in ended.stderr
+
+
+def test_what_is_made_is_for_its_owner_alone(tmp_path: Path) -> None:
+    folder = tmp_path / "data"
+    require_data_folder(Settings(data_folder=folder))
+    database = Database(folder / FILE_NAME)
+    try:
+        assert folder.stat().st_mode & OWN == 0
+        assert [path.name for path in folder.glob(f"{FILE_NAME}*") if path.stat().st_mode & OWN] == []
+    finally:
+        database.close()

@@ -100,6 +100,8 @@ ServicesDep = Annotated[Services, Depends(_services_of)]
 PRUNING_S = 3600.0
 """How often what is old is removed, where the operator asked for it [s]."""
 
+DAY_S = 86400.0
+
 REQUESTS_PER_S = 200.0
 """How often a key may call in the long run, where the operator says nothing [1/s]."""
 
@@ -115,7 +117,7 @@ def open_services(
     TauscopeError
         if another service works with the data folder, or its database cannot be used
     """
-    settings.data_folder.mkdir(parents=True, exist_ok=True)
+    settings.data_folder.mkdir(0o700, parents=True, exist_ok=True)
     access = _open_access(settings)
     lock = FolderLock(settings.data_folder)
     try:
@@ -310,7 +312,9 @@ def _open_access(settings: Settings) -> Access:
         hint = "make a key first (tauscope key add), or listen at 127.0.0.1"
         raise TauscopeError(f"host {settings.host!r}: others could reach it, and there is no valid API key; {hint}")
     rate = settings.requests_per_s or REQUESTS_PER_S
-    return Access(ring, RateLimit(rate, 2.0 * rate), limits_local=settings.requests_per_s is not None)
+    uploads = RateLimit(settings.max_bytes_per_day / DAY_S, settings.max_bytes_per_day)
+    limits_local = settings.requests_per_s is not None
+    return Access(ring, RateLimit(rate, 2.0 * rate), limits_local=limits_local, uploads=uploads)
 
 
 def require_data_folder(settings: Settings) -> None:
@@ -323,7 +327,7 @@ def require_data_folder(settings: Settings) -> None:
     """
     folder = settings.data_folder
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(0o700, parents=True, exist_ok=True)
         FolderLock(folder).release()
         _open_access(settings)
     except OSError as error:

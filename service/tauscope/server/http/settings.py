@@ -27,6 +27,9 @@ class Settings(BaseModel):
     host: str = Field(default="127.0.0.1", description="address to listen at")
     port: int = Field(default=8000, ge=0, le=65535, description="port to listen at; 0 takes any free one")
     max_upload_bytes: int = Field(default=256 * MEBIBYTE, gt=0, description="largest body of a request [bytes]")
+    max_bytes_per_day: int = Field(
+        default=20 * 1024 * MEBIBYTE, gt=0, description="what one key may send in forms in a day: 80 of the largest"
+    )
     max_document_bytes: int = Field(default=4 * MEBIBYTE, gt=0, description="largest JSON body or part [bytes]")
     max_recordings: int = Field(default=100, gt=0, description="most recordings of one request")
     max_waiting: int = Field(default=100, gt=0, description="most jobs that wait")

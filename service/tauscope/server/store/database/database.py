@@ -148,6 +148,8 @@ class Database:
         """
         self._engine = open_engine(address)
         try:
+            if isinstance(address, Path) and address.parent.is_dir():
+                address.touch(0o600)  # SQLite gives its further files the same rights
             with self._own_words():
                 upgrade(self._engine)
                 if self._engine.url.get_backend_name() == "sqlite":
