@@ -1,11 +1,11 @@
 """A worker process from its own side: it calls what it is sent, one after the other, and ends with its service."""
 
 import os
-import pickle
 import resource
 import signal
 import threading
 import traceback
+from collections.abc import Callable
 from multiprocessing import parent_process
 from multiprocessing.connection import Connection, wait
 from typing import Any
@@ -20,32 +20,31 @@ def serve_connection(connection: Connection, memory_bytes: int | None) -> None:
     connection.send(None)
     while True:
         try:
-            call = connection.recv_bytes()
+            call = connection.recv()
         except (EOFError, OSError):
             return
-        answer = _answer(call)
-        connection.send_bytes(answer)
+        except Exception as error:  # the function cannot be imported here
+            answer = _failure(error)
+        else:
+            answer = _answer(*call)
+        try:
+            connection.send(answer)
+        except Exception as error:  # what cannot be sent is described
+            connection.send((False, RuntimeError("".join(traceback.format_exception(error)))))
 
 
-def _answer(call: bytes) -> bytes:
-    """What comes of a call, as the other side reads it: whether it succeeded, and its result or exception."""
+def _answer(function: Callable[..., Any], arguments: tuple[Any, ...], options: dict[str, Any]) -> tuple[bool, Any]:
+    """What comes of a call: whether it succeeded, and its result or exception."""
     try:
-        function, arguments, options = pickle.loads(call)  # noqa: S301 - our own service wrote it
-        return pickle.dumps((True, function(*arguments, **options)))
+        return True, function(*arguments, **options)
     except BaseException as error:
-        error.add_note("".join(traceback.format_exception(error)))
-        return _packed(error)
+        return _failure(error)
 
 
-def _packed(error: BaseException) -> bytes:
-    """An exception that failed; one that cannot be sent is described."""
-    try:
-        content = pickle.dumps((False, error))
-        pickle.loads(content)  # noqa: S301 - written in the line before
-    except Exception:
-        described: Any = (False, RuntimeError("".join(traceback.format_exception(error))))
-        return pickle.dumps(described)
-    return content
+def _failure(error: BaseException) -> tuple[bool, BaseException]:
+    """What is sent of an exception: where it happened is part of it."""
+    error.add_note("".join(traceback.format_exception(error)))
+    return False, error
 
 
 def _end_with_service() -> None:
