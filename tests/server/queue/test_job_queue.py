@@ -63,6 +63,18 @@ def test_a_job_whose_worker_was_killed_is_done_again(items: ItemStore, executor:
     assert state_of(items, job) == "succeeded"
 
 
+def test_light_jobs_pass_heavy_ones(tmp_path: Path, executor: ManualExecutor) -> None:
+    heavy = JobKind(ItemStore(tmp_path / "heavy", "job"), succeed, is_heavy=True)
+    light = JobKind(ItemStore(tmp_path / "light", "job"), succeed)
+    queue = JobQueue([heavy, light], executor, slots=2, most_waiting=10)
+    first, second = (queue.submit(heavy, heavy.items.stage()) for _ in range(2))
+    quick = queue.submit(light, light.items.stage())
+    states = [state_of(heavy.items, first), state_of(heavy.items, second), state_of(light.items, quick)]
+    assert states == ["running", "queued", "running"]
+    executor.run()
+    assert [state_of(heavy.items, each) for each in (first, second)] == ["succeeded", "running"]
+
+
 def test_a_caller_has_so_many_jobs_and_others_have_room(items: ItemStore, executor: ManualExecutor) -> None:
     kind = JobKind(items, succeed)
     queue = JobQueue([kind], executor, slots=1, most_waiting=10, most_each=2)

@@ -253,7 +253,7 @@ def _kinds(settings: Settings, items: Mapping[str, ItemStore]) -> tuple[JobKind,
     where = {"server_recordings": settings.recordings_folder}
     return (
         JobKind(items["identification"], partial(run_identification, **where)),
-        JobKind(items["diagnosis"], partial(run_diagnosis, **where)),
+        JobKind(items["diagnosis"], partial(run_diagnosis, **where), is_heavy=True),
         JobKind(items["excitation"], run_excitation),
     )
 

@@ -30,10 +30,15 @@ TOO_OFTEN = JobProblem(
 
 @dataclass(frozen=True, eq=False)
 class JobKind:
-    """A kind of job: where its folders lie and what is done with them."""
+    """A kind of job: where its folders lie and what is done with them.
+
+    is_heavy : bool
+        whether its work takes minutes: where there are several slots, one stays free of such work
+    """
 
     items: ItemStore
     work: Work
+    is_heavy: bool = False
 
 
 @dataclass(frozen=True)
@@ -289,11 +294,19 @@ class JobQueue:
 
     def _fill_slots(self) -> None:
         """Hand waiting jobs to the executor while it has room."""
-        while self._waiting and len(self._running) < self._slots() and not self._is_closed and self._is_there():
-            is_wanted = self._waiting[0].move(JobState.RUNNING)
-            job = self._waiting.popleft()
+        while (job := self._find_next()) is not None and not self._is_closed and self._is_there():
+            is_wanted = job.move(JobState.RUNNING)
+            self._waiting.remove(job)
             if is_wanted:  # else it is damaged, or somebody removed it by hand
                 self._hand_over(job)
+
+    def _find_next(self) -> QueuedJob | None:
+        """The job that is begun next: light ones pass heavy ones that fill all slots but one."""
+        slots = self._slots()
+        if len(self._running) >= slots:
+            return None
+        has_room = sum(job.kind.is_heavy for job in self._running) < max(1, slots - 1)
+        return next((job for job in self._waiting if has_room or not job.kind.is_heavy), None)
 
     def _hand_over(self, job: QueuedJob) -> None:
         """Have the executor do a job."""
