@@ -95,7 +95,7 @@ def test_a_campaign_all_the_way(
     assert arm.get(campaign["links"]["self"]).json()["steps"][-1]["state"] == "gone"
     assert_problem(arm.get(status["links"]["result"]), "not-found", 404)
     wait_until(lambda: arm.delete(campaign["links"]["self"]).status_code == 204)
-    assert arm.get(CAMPAIGNS).json() == {"campaigns": []}
+    assert arm.get(CAMPAIGNS).json() == {"campaigns": [], "next": None}
 
 
 def test_stop_at_once_and_again(waiting_arm: TestClient) -> None:

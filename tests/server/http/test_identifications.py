@@ -73,7 +73,7 @@ def test_uploaded_files_all_the_way(client: TestClient, files: Files, paper_reco
     assert [entry["id"] for entry in client.get(IDENTIFICATIONS).json()["identifications"]] == [status["id"]]
     assert client.delete(here).status_code == 204
     assert_problem(client.get(here), "not-found", 404)
-    assert client.get(IDENTIFICATIONS).json() == {"identifications": []}
+    assert client.get(IDENTIFICATIONS).json() == {"identifications": [], "next": None}
 
 
 def test_recordings_on_the_server_and_an_inline_robot(

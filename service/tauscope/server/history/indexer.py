@@ -220,6 +220,7 @@ class Indexer:
         self._known: dict[str, dict[str, tuple[str, bool]]] = {}
         self._seen_recordings: object = None
         self._is_whole = False
+        self._is_closing = threading.Event()
 
     def sync(self, *, thorough: bool = False) -> None:
         """Bring the index up to date.
@@ -236,7 +237,11 @@ class Indexer:
             for kind, store in self._items.items():
                 self._sync_kind(kind, store, thorough=thorough)
             self._sync_recordings()
-            self._is_whole = True
+            self._is_whole = not self._is_closing.is_set()
+
+    def close(self) -> None:
+        """Have what is being indexed end after the present item."""
+        self._is_closing.set()
 
     def refresh(self) -> None:
         """Bring the index up to date, unless that takes long because somebody else is at it.
@@ -292,6 +297,8 @@ class Indexer:
                 del known[identifier]
         found: list[ItemMetadata] = []
         for identifier in reversed(present):
+            if self._is_closing.is_set():
+                break
             indexed = known.get(identifier)
             if indexed is not None and indexed[1] and not thorough:
                 continue

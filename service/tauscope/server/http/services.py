@@ -1,5 +1,6 @@
 """The services that the routes use: opened with the data folder, and closed in order."""
 
+import logging
 import shutil
 import threading
 from collections.abc import Callable, Iterator, Mapping
@@ -51,6 +52,8 @@ from tauscope.server.store.database.database import Database
 from tauscope.server.store.database.index import Index
 from tauscope.server.store.items import ItemStore
 from tauscope.server.store.recordings import RecordingStore
+
+_log = logging.getLogger("tauscope.jobs")
 
 
 @dataclass(frozen=True)
@@ -133,6 +136,9 @@ def open_services(
         [services.jobs.settle, services.runs.settle, services.index.sync, services.models.judge_new, drift.look]
     )
     clock = Housekeeping([services.schedules.tick])  # apart: an interlock may take its time
+    filling = threading.Thread(target=_fill_index, args=(services,), name="index", daemon=True)
+    filling.start()
+    filling.join(FILLING_S)
     housekeeping.start()
     pruning = Housekeeping(_retention(services), PRUNING_S)
     pruning.start()
@@ -154,9 +160,24 @@ def open_services(
     finally:
         services.jobs.close()
         readers.shutdown(wait=True, cancel_futures=True)
+        services.index.close()
+        filling.join()
         housekeeping.close()
         database.close()
         lock.release()
+
+
+FILLING_S = 1.0
+"""How long a start waits for the index; of a large folder that was never indexed it goes on beside the service [s]."""
+
+
+def _fill_index(services: Services) -> None:
+    """Index what is there, and judge its models; what fails is tried again by the housekeeping."""
+    try:
+        services.index.sync()
+        services.models.judge_new()
+    except (TauscopeError, OSError) as error:
+        _log.warning("the index is not filled: %s; it is tried again", error)
 
 
 @dataclass(frozen=True, eq=False)
