@@ -9,7 +9,8 @@ from typing import BinaryIO
 import numpy as np
 
 from tauscope.errors import RecordingError
-from tauscope.recording.columns import ColumnLayout, find_columns, require_joint_count
+from tauscope.recording.columns import ColumnLayout, map_columns, require_joint_count
+from tauscope.recording.csv_dialect import BLANK, Dialect, find_decimal_comma, find_delimiter
 from tauscope.recording.csv_numbers import Clock, is_number, parse_number, parse_quickly, shown
 from tauscope.recording.intake import RowIntake
 from tauscope.recording.recording import Array, Recording
@@ -20,7 +21,7 @@ _CHUNK_BYTES = 2**18
 _LONGEST_LINE_BYTES = 2**20
 _ROWS_WRITTEN_AT_ONCE = 8192
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
-_DELIMITERS = (b",", b";", b"\t")
+_SAMPLE_BYTES = 2**16
 
 
 def read_csv(
@@ -32,7 +33,7 @@ def read_csv(
 ) -> Recording:
     """Read a CSV recording, in time linear and in memory bounded in its number of lines.
 
-    Comma, semicolon or tab between the fields; an empty field or ``nan`` is a missed sample.
+    Comma, semicolon, tab, | or blanks between the fields; an empty field or ``nan`` is a missed sample.
 
     Parameters
     ----------
@@ -49,18 +50,32 @@ def read_csv(
         the file has another number of joints
     """
     with path.open("rb") as file:
-        header = _read_header(file, name)
+        header = _read_header(file, name, reading)
         require_joint_count(header.layout.joint_count, joint_count, name)
         layout = header.layout
         intake: RowIntake | None = None
         for chunk in _chunks(file, header.line + 1, name):
             block, lines = _parse_chunk(chunk, header, name, is_first=intake is None or not len(intake))
+            if layout.counts_rows:
+                block[:, 0] = np.arange(len(block)) + (0 if intake is None else len(intake))
             if intake is None:
                 expected = int(len(block) * os.fstat(file.fileno()).st_size / len(chunk.text) * 1.01) + 16
                 intake = RowIntake(name, layout.names, layout.effort_kind, reading, expected, spool_above_bytes)
             intake.add(block, lambda row, lines=lines: f"line {lines[row]}")
     intake = intake or RowIntake(name, layout.names, layout.effort_kind, reading)
-    return intake.finish(layout.joint_count, layout.ignored)
+    return intake.finish(layout.joint_count, layout.ignored, layout.notes)
+
+
+def read_csv_header(path: Path, name: str, reading: Reading = SI) -> list[str]:
+    """Names of a file's columns, or numbers from 1 where it has none.
+
+    Raises
+    ------
+    RecordingError
+        the file holds no line of text
+    """
+    with path.open("rb") as file:
+        return _read_names(file, name, reading).names
 
 
 def write_csv(recording: Recording, file: BinaryIO) -> None:
@@ -74,11 +89,20 @@ def write_csv(recording: Recording, file: BinaryIO) -> None:
 
 
 @dataclass(frozen=True)
-class _Header:
-    """The header line: its number, what separates the fields, and which column is which."""
+class _Names:
+    """The line before the first row, how fields are separated, and names of the columns."""
 
     line: int
-    delimiter: bytes
+    dialect: Dialect
+    names: list[str]
+
+
+@dataclass(frozen=True)
+class _Header:
+    """The line before the first row, how fields are separated, and which column is which."""
+
+    line: int
+    dialect: Dialect
     layout: ColumnLayout
     clock: Clock
 
@@ -92,9 +116,16 @@ class _Chunk:
     unterminated: bool
 
 
-def _read_header(file: BinaryIO, name: str) -> _Header:
-    """Read up to the first line that is neither blank nor a comment."""
-    number = 0
+def _read_header(file: BinaryIO, name: str, reading: Reading) -> _Header:
+    """Read the names of the columns and find those that are wanted."""
+    found = _read_names(file, name, reading)
+    return _Header(found.line, found.dialect, map_columns(found.names, reading, name), Clock())
+
+
+def _read_names(file: BinaryIO, name: str, reading: Reading) -> _Names:
+    """Read up to the first line that is neither blank nor a comment; leave the file at the first row."""
+    number, comment = 0, b""
+    at = 0
     while line := file.readline(_LONGEST_LINE_BYTES):
         number += 1
         if number == 1:
@@ -105,27 +136,38 @@ def _read_header(file: BinaryIO, name: str) -> _Header:
             )
         _require_text(line, number, name)
         if not _is_empty(line):
-            return _parse_header(line.strip(b"\r\n"), number, name)
+            return _parse_names(file, line.strip(b"\r\n"), number, at, comment, name, reading)
+        comment = line.strip(b"\r\n\t #") or comment
+        at = file.tell()
     raise RecordingError(f"{name}: the file is empty; expected a header line with the columns t, q1…, tau1…")
 
 
-def _parse_header(line: bytes, number: int, name: str) -> _Header:
+def _parse_names(
+    file: BinaryIO, line: bytes, number: int, at: int, comment: bytes, name: str, reading: Reading
+) -> _Names:
+    """Names of the columns: of the first line, of the comment before numbers, or numbers for want of names."""
     if b"\r" in line:
         raise RecordingError(f"{name}: the lines end with carriage returns alone; save the file with newlines")
-    delimiter = next((candidate for candidate in _DELIMITERS if candidate in line), b",")
-    fields = [field.strip(b' \t"') for field in line.split(delimiter)]
-    if any(is_number(field) for field in fields) and all(is_number(field) or not field for field in fields):
-        raise RecordingError(
-            f"{name}: line {number} holds numbers where the column names are expected; "
-            "add a header line such as t,q1,q2,tau1,tau2, without '#' in front"
+    sign = reading.delimiter_sign
+    dialect = Dialect(find_delimiter(line) if sign is None else sign.encode())
+    start = file.tell()
+    sample = [line, *file.read(_SAMPLE_BYTES).split(b"\n")[:-1]]
+    has_comma = find_decimal_comma(sample, dialect.delimiter) if reading.decimal is None else reading.decimal == ","
+    fields = dialect.split(line)
+    rows = Dialect(dialect.delimiter, has_comma)
+    numbers = rows.split(line)
+    if any(map(is_number, numbers)) and all(is_number(field) or not field for field in numbers):
+        start, number = at, number - 1
+        named = next(
+            (names for sign in (dialect, Dialect(BLANK)) if len(names := sign.split(comment)) == len(numbers)), None
         )
-    if len(fields) == 1 and len(line.split()) > 1:
-        raise RecordingError(f"{name}: line {number}: the columns are separated by blanks; separate them by commas")
+        fields = named if comment and named else [b"%d" % column for column in range(1, len(numbers) + 1)]
+    file.seek(start)
     try:
         header = [field.decode("utf-8") for field in fields]
     except UnicodeDecodeError as error:
         raise RecordingError(f"{name}: line {number}: the header is not UTF-8 text; save the file as UTF-8") from error
-    return _Header(number, delimiter, find_columns(header, name), Clock())
+    return _Names(number, rows, header)
 
 
 def _chunks(file: BinaryIO, line: int, name: str) -> Iterator[_Chunk]:
@@ -156,12 +198,13 @@ def _count_lines(text: bytes) -> int:
 def _parse_chunk(chunk: _Chunk, header: _Header, name: str, *, is_first: bool) -> tuple[Array, Sequence[int]]:
     """The rows of a chunk and the line on which each stands."""
     layout = header.layout
-    block = parse_quickly(chunk.text, header.delimiter, layout.width, layout.source)
+    normal = header.dialect.normalize(chunk.text)
+    block = parse_quickly(normal, header.dialect.separator, layout.width, layout.source)
     if block is not None:
         return block, range(chunk.first_line, chunk.first_line + len(block))
     rows: list[list[float]] = []
     lines: list[int] = []
-    text = chunk.text[:-1].split(b"\n")
+    text = normal[:-1].split(b"\n")
     for number, raw_line in enumerate(text, chunk.first_line):
         line = raw_line.rstrip(b"\r")  # two of them: text mode has translated a translated line end
         if _is_empty(line):
@@ -180,15 +223,15 @@ def _parse_chunk(chunk: _Chunk, header: _Header, name: str, *, is_first: bool) -
 def _split_line(line: bytes, number: int, header: _Header, name: str, *, is_truncated: bool) -> list[bytes]:
     """The fields of a line, as many as the header has."""
     _require_text(line, number, name)
-    fields = line.split(header.delimiter)
+    fields = line.split(header.dialect.separator)
     width = header.layout.width
     if len(fields) == width:
         return fields
     if is_truncated and len(fields) < width:
         hint = ": the last line is truncated; delete it or copy the file again"
-    elif header.delimiter == b"," and len(fields) > width and b";" in line:
+    elif header.dialect.delimiter == b"," and len(fields) > width and b";" in line:
         hint = "; separate all lines alike"
-    elif header.delimiter == b"," and len(fields) >= 2 * width - 1 and all(map(is_number, fields)):
+    elif header.dialect.delimiter == b"," and len(fields) >= 2 * width - 1 and all(map(is_number, fields)):
         hint = ": are these decimal commas? write decimals with a point"
     else:
         hint = "; complete or delete the line"

@@ -80,7 +80,9 @@ class RowIntake:
             self._builder.append(block[:split])
         self._tail = block[split:].copy()
 
-    def finish(self, joint_count: int, ignored: tuple[str, ...] = ()) -> Recording:
+    def finish(
+        self, joint_count: int, ignored: tuple[str, ...] = (), notes: tuple[ResultWarning, ...] = ()
+    ) -> Recording:
         """The recording of all rows.
 
         Raises
@@ -96,7 +98,7 @@ class RowIntake:
                 f" at t = {self._first_repeated:.6g} s; write t with more digits"
             )
         kind, table = self._conversion.effort_kind, self._builder.finish()
-        return Recording(self._file, joint_count, kind, table, ignored, tuple(self._warnings()))
+        return Recording(self._file, joint_count, kind, table, ignored, (*notes, *self._warnings()))
 
     def _convert(self, block: Array) -> Array:
         """Rows in SI."""

@@ -2,14 +2,15 @@
 
 import errno
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from tauscope.errors import RecordingError
 from tauscope.recording.columns import require_joint_count
-from tauscope.recording.csv_format import read_csv
+from tauscope.recording.csv_format import read_csv, read_csv_header
 from tauscope.recording.joint_state_topic import Choice
 from tauscope.recording.mcap_format import MCAP_MAGIC, read_mcap
-from tauscope.recording.parquet_format import PARQUET_MAGIC, read_parquet
+from tauscope.recording.parquet_format import PARQUET_MAGIC, read_parquet, read_parquet_header
 from tauscope.recording.recording import Recording
 from tauscope.recording.rosbag2_format import SQLITE_MAGIC, read_database, read_rosbag2
 from tauscope.recording.units import SI, Reading
@@ -54,6 +55,7 @@ def read_recording(
     """
     path, name = Path(path), printable(str(path), _LONGEST_PATH)
     names = tuple(joint_names) if joint_names is not None else None
+    reading = replace(reading, joint_names=names)
     if joint_count is None and names is not None:
         joint_count = len(names)
     try:
@@ -62,6 +64,27 @@ def read_recording(
         raise RecordingError(f"{name}: {_reason(error)}") from error
     require_joint_count(recording.joint_count, joint_count, name)
     return recording
+
+
+def read_header(path: Path) -> list[str]:
+    """Names of the columns of a CSV or Parquet file; numbers from 1 where there are none.
+
+    Raises
+    ------
+    RecordingError
+        the file cannot be read, or is a log, which names its joints itself
+    """
+    name = printable(str(path), _LONGEST_PATH)
+    try:
+        magic = b"" if path.is_dir() else first_bytes(path, name)
+        if path.is_dir() or magic.startswith((MCAP_MAGIC, SQLITE_MAGIC)):
+            raise RecordingError(f"{name}: a log names its joints itself; choose a topic with --topic")
+        if magic.startswith(PARQUET_MAGIC):
+            return read_parquet_header(path, name)
+        _refuse_foreign(magic, path, name)
+        return read_csv_header(path, name)
+    except OSError as error:
+        raise RecordingError(f"{name}: {_reason(error)}") from error
 
 
 def first_bytes(path: Path, name: str) -> bytes:
@@ -91,13 +114,18 @@ def _read(path: Path, name: str, joint_count: int | None, choice: Choice) -> Rec
         return read_mcap(path, choice)
     if magic.startswith(SQLITE_MAGIC):
         return read_database(path, choice)
+    _refuse_foreign(magic, path, name)
+    return read_csv(path, name, joint_count, reading=choice.reading)
+
+
+def _refuse_foreign(magic: bytes, path: Path, name: str) -> None:
+    """Refuse a file that is no text."""
     for start, words in _FOREIGN:
         if magic.startswith(start):
             raise RecordingError(f"{name}: {words}")
     if path.suffix.lower() in (".mcap", ".parquet", ".db3"):
         found = "is empty" if not magic else f"does not begin as a {path.suffix.lower()} file does"
         raise RecordingError(f"{name}: the file {found}; it is damaged or of another format")
-    return read_csv(path, name, joint_count, reading=choice.reading)
 
 
 def _reason(error: OSError) -> str:

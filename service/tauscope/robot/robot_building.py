@@ -76,7 +76,7 @@ def build_robot(document: RobotDocument, origin: DocumentOrigin, urdf_source: Ur
         urdf_links=chain.urdf.link_names if chain.urdf else (),
         findings=tuple(findings),
         repairs=repairs,
-        recording=RecordingLayout() if layout is None else RecordingLayout(layout.units, layout.rate_hz),
+        recording=RecordingLayout() if layout is None else layout.layout,
     )
 
 

@@ -1,14 +1,16 @@
 """Recordings as people bring them: read, mended, or refused with the option that mends them."""
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from recording.recording_files import message_of
 from shared_data import SHARED_CASES, SHARED_DATA, needs_shared_cases, needs_shared_data
 from tauscope.identification import document, identify
 from tauscope.recording import Reading, Recording, open_recording
-from tauscope.robot import Robot, read_robot
+from tauscope.robot import Robot, read_layout, read_robot
 
 RECORDINGS = SHARED_CASES / "recordings"
 
@@ -46,6 +48,51 @@ def test_a_case_is_as_good_as_the_sound_recording(name: str, ur5: Robot, held_ou
     fit = document(identify(ur5, [recording], [held_out])).fit.held_out
     assert fit is not None
     assert fit.relative_error < 0.0042  # 0.0040 of the sound recording
+
+
+LAYOUTS = {
+    "30-rtde.csv": ("rtde", {"commanded-effort"}),
+    "31-franka.csv": ("libfranka", set()),
+    "32-lerobot.parquet": ("lerobot", set()),
+    "33-plotjuggler.csv": ("plotjuggler", set()),
+    "34-decimal-comma.csv": (None, set()),
+    "39-zero-based.csv": ({"q": "q{0}", "tau": "tau{0}"}, set()),
+}
+
+
+@pytest.fixture(scope="module")
+def with_constants(ur5: Robot) -> Robot:
+    """The currents of 32-lerobot are torque by 10 Nm/A."""
+    joints = tuple(replace(joint, torque_constant=10.0, has_torque_constant=True) for joint in ur5.joints)
+    return replace(ur5, joints=joints)
+
+
+@needs_shared_cases
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_a_layout_of_another_tool_is_read(name: str, ur5: Robot, with_constants: Robot, held_out: Recording) -> None:
+    columns, codes = LAYOUTS[name]
+    robot = with_constants if "lerobot" in name else ur5
+    recording = open_recording(RECORDINGS / name, robot, Reading(columns=columns))
+    assert {warning.code for warning in recording.warnings} == codes
+    fit = document(identify(robot, [recording], [held_out])).fit.held_out
+    assert fit is not None
+    assert fit.relative_error < 0.0042
+
+
+@needs_shared_cases
+@pytest.mark.parametrize("name", [name for name, (columns, _) in LAYOUTS.items() if columns is not None])
+def test_the_mapping_of_a_refusal_works_when_pasted(
+    name: str, ur5: Robot, with_constants: Robot, tmp_path: Path
+) -> None:
+    robot = with_constants if "lerobot" in name else ur5
+    message = message_of(lambda: open_recording(RECORDINGS / name, robot))
+    (tmp_path / "map.yaml").write_text(message[message.index("recording: {") :], encoding="utf-8")
+    layout = read_layout(str(tmp_path / "map.yaml"))
+    reading = Reading(columns=layout.columns, units={"q": "deg"} if "lerobot" in name else {})
+    sound = open_recording(SHARED_CASES / "ur5" / "ur5.csv", ur5).samples()
+    found = open_recording(RECORDINGS / name, robot, reading)
+    assert np.allclose(found.samples().position, sound.position, atol=1e-6)
+    assert np.allclose(found.joint_torque(found.samples().effort, robot), sound.effort, atol=1e-4)
 
 
 @needs_shared_cases

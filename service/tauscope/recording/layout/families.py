@@ -1,0 +1,126 @@
+"""Families of columns: names that differ in a joint's number or in its name alone."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from tauscope.recording.layout.roles import role_of
+
+FROM_ZERO, FROM_ONE, BY_NAME = "{0}", "{1}", "{name}"
+"""What stands for the joint in a template: its number counted from 0 or from 1, or its name."""
+
+PLACEHOLDERS = (FROM_ZERO, FROM_ONE, BY_NAME)
+
+_WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[0-9]+")
+_JOINT = re.compile(r"\[[^\[\]]*\{(?:0|1|name)\}[^\[\]]*\]|\{(?:0|1|name)\}")
+_NUMBER = re.compile(r"[0-9]+")
+
+
+@dataclass(frozen=True)
+class Family:
+    """Columns of one quantity, one a joint.
+
+    template : str
+        name of the columns with a placeholder for the joint
+    joints : tuple of str
+        names of the joints, in the order of the robot or of the file; empty where they are numbered
+    columns : tuple of str
+        columns in the order of the joints
+    """
+
+    template: str
+    joints: tuple[str, ...]
+    columns: tuple[str, ...]
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """Words of the template in lower case, without its placeholder and the brackets around it."""
+        return words_of(_JOINT.sub(" ", self.template))
+
+
+def words_of(text: str) -> tuple[str, ...]:
+    """Words of a column's name, in lower case: at separators, at digits and where a capital begins one."""
+    return tuple(word.lower() for word in _WORD.findall(text))
+
+
+def find_families(header: Sequence[str], joint_names: Sequence[str] | None) -> list[Family]:
+    """Families of a header: named by the robot's joints, else numbered, else named by whatever the file says."""
+    named = _named_by(header, joint_names or ())
+    return [*named, *_numbered(header), *([] if named else _named_by_segments(header))]
+
+
+def fill_template(template: str, index: int, name: str | None) -> str:
+    """The column of a joint.
+
+    Parameters
+    ----------
+    index : int
+        counted from 0
+    """
+    filled = template.replace(FROM_ZERO, str(index)).replace(FROM_ONE, str(index + 1))
+    return filled if name is None else filled.replace(BY_NAME, name)
+
+
+def names_in(header: Sequence[str], template: str) -> list[str]:
+    """Joint names that a header has in place of a template's placeholder, in the order of the header."""
+    before, _, after = template.partition(BY_NAME)
+    pattern = re.compile(re.escape(before) + "(.+)" + re.escape(after))
+    return [match[1] for match in map(pattern.fullmatch, header) if match]
+
+
+def _numbered(header: Sequence[str]) -> list[Family]:
+    """Families in which a number runs from 0 or from 1 without a gap."""
+    groups: dict[tuple[str, str], dict[int, str]] = {}
+    for name in header:
+        for match in _NUMBER.finditer(name):
+            if match[0] == str(int(match[0])):
+                groups.setdefault((name[: match.start()], name[match.end() :]), {})[int(match[0])] = name
+    found = []
+    for (before, after), columns in groups.items():
+        first = 0 if 0 in columns else 1
+        if set(columns) == set(range(first, first + len(columns))):
+            template = before + (FROM_ZERO if first == 0 else FROM_ONE) + after
+            found.append(Family(template, (), tuple(columns[number] for number in sorted(columns))))
+    return found
+
+
+def _named_by(header: Sequence[str], joint_names: Sequence[str]) -> list[Family]:
+    """Families that name every joint of the robot."""
+    patterns = {
+        name: re.compile(f"(?<![A-Za-z0-9]){re.escape(name)}(?![A-Za-z0-9])")
+        for name in sorted(joint_names, key=len, reverse=True)
+    }
+    groups: dict[str, dict[str, str]] = {}
+    for column in header:
+        for name, pattern in patterns.items():
+            match = pattern.search(column)
+            if match:
+                groups.setdefault(column[: match.start()] + BY_NAME + column[match.end() :], {})[name] = column
+                break
+    return [
+        Family(template, tuple(joint_names), tuple(columns[name] for name in joint_names))
+        for template, columns in groups.items()
+        if len(columns) == len(joint_names)
+    ]
+
+
+def _named_by_segments(header: Sequence[str]) -> list[Family]:
+    """Families in which one segment of a path is the joint: ``/joint_states/elbow/position``, ``effort[elbow]``."""
+    groups: dict[str, dict[str, str]] = {}
+    for column in header:
+        for template, name in _segments(column):
+            groups.setdefault(template, {})[name] = column
+    return [Family(template, tuple(c), tuple(c.values())) for template, c in groups.items() if _is_named(c)]
+
+
+def _segments(column: str) -> list[tuple[str, str]]:
+    """The column with each of its last two segments left out, and that segment."""
+    cuts = [match.span() for match in re.finditer(r"[^/.\[\]:]+", column)][-2:]
+    if len(cuts) < 2:
+        return []
+    return [(column[:start] + BY_NAME + column[stop:], column[start:stop]) for start, stop in cuts]
+
+
+def _is_named(columns: Mapping[str, str]) -> bool:
+    """Whether keys are names rather than numbers or quantities."""
+    return not any(key.isdecimal() or role_of(words_of(key)) for key in columns)

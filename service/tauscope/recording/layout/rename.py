@@ -1,0 +1,144 @@
+"""A header's columns under the names of CONTRACT.md, as a mapping or a preset says."""
+
+import difflib
+import re
+from collections.abc import Mapping, Sequence
+
+from tauscope.errors import RecordingError, RecordingMismatchError
+from tauscope.recording.layout.families import BY_NAME, PLACEHOLDERS, fill_template, names_in
+from tauscope.recording.layout.guess import guess_layout
+from tauscope.recording.units import Reading
+from tauscope.recording.words import listed, printable
+from tauscope.robot.recording_layout import Source
+
+_TARGET = re.compile(r"([a-z]+)([0-9]*)")
+_EFFORTS = ("tau", "i")
+
+
+def rename_columns(header: Sequence[str], reading: Reading, file: str) -> list[str]:
+    """The header with the names of CONTRACT.md.
+
+    Raises
+    ------
+    RecordingError
+        the file has no column of a name that the mapping states
+    RecordingMismatchError
+        it names other joints than the robot, or numbers more of them
+    """
+    columns = reading.columns
+    if columns is None:
+        return list(header)
+    if isinstance(columns, str):
+        columns = _preset_columns(header, columns, reading, file)
+    target_of = _Mapping(header, reading, file).expand(columns)
+    groups = {_group(target) for target in target_of.values()}
+    groups |= {*_EFFORTS} if groups & {*_EFFORTS} else set()
+    # A column that the mapping leaves out keeps its name, unless the mapping has columns of its group.
+    return [target_of.get(name, f"{name} " if _group(name) in groups else name) for name in header]
+
+
+def _preset_columns(header: Sequence[str], preset: str, reading: Reading, file: str) -> Mapping[str, Source]:
+    """The mapping of a preset for this header."""
+    layout = guess_layout(header, reading.joint_names, preset=preset, prefers_torque=reading.prefers_torque)
+    if layout is None:
+        other = guess_layout(header, None, preset=preset)
+        if other is not None and reading.joint_names is not None and isinstance(other.columns, Mapping):
+            _Mapping(header, reading, file).expand(other.columns)  # names the joints that differ
+        raise RecordingError(
+            f"{file}: the columns are not as {preset} writes them ({listed(header)}); name them, as in "
+            "columns: {t: time, q: 'position_{1}', tau: 'torque_{1}'}"
+        )
+    assert isinstance(layout.columns, Mapping)  # noqa: S101 - a guess always is one
+    return layout.columns
+
+
+class _Mapping:
+    """Turns a mapping for all joints into one for each column."""
+
+    def __init__(self, header: Sequence[str], reading: Reading, file: str) -> None:
+        self._header, self._file, self._known = header, file, set(header)
+        self._robot = reading.joint_names
+        self._names: Sequence[str] | None = reading.joint_names
+
+    def expand(self, columns: Mapping[str, Source]) -> dict[str, str]:
+        """Column of CONTRACT.md by the file's."""
+        target_of: dict[str, str] = {}
+        for target, source in columns.items():
+            group, number = _split(target)
+            sources = [str(source)] if number or group in ("t", "period") else self._group(group, source)
+            for index, name in enumerate(sources):
+                if name not in self._known:
+                    raise RecordingError(f"{self._file}: columns: {target}: {self._absence(name)}")
+                if name in target_of:
+                    raise RecordingError(
+                        f"{self._file}: column {printable(name)} is mapped to {target_of[name]} and {target}; keep one"
+                    )
+                target_of[name] = target if sources == [str(source)] and number else _numbered(group, number, index)
+        return target_of
+
+    def _group(self, group: str, source: Source) -> Sequence[str]:
+        """One column a joint."""
+        if not isinstance(source, str | int):
+            return [str(name) for name in source]
+        template = str(source)
+        if not any(placeholder in template for placeholder in PLACEHOLDERS):
+            if template in self._known:
+                return [template]
+            element = next(
+                (f"{template}[{joint}]" for joint in ("{0}", BY_NAME) if self._fits(f"{template}[{joint}]")), ""
+            )
+            template = element or template
+        if BY_NAME in template:
+            return self._by_name(template)
+        if not any(placeholder in template for placeholder in PLACEHOLDERS):
+            return [template]
+        found = []
+        while (name := fill_template(template, len(found), None)) in self._known:
+            found.append(name)
+        wanted = None if self._robot is None else len(self._robot)
+        if wanted is not None and len(found) > wanted and group in ("q", *_EFFORTS):
+            raise RecordingMismatchError(
+                f"{self._file}: columns: {group}: {printable(template)} numbers {len(found)} joints, the robot has "
+                f"{wanted}; list the columns of its joints, as in [{listed(found[:wanted])}]"
+            )
+        return found or [fill_template(template, 0, None)]
+
+    def _by_name(self, template: str) -> Sequence[str]:
+        """One column a joint of the robot; of the file, in its order, where no robot is known."""
+        found = names_in(self._header, template)
+        if self._names is None:
+            self._names = found
+        missing = [name for name in self._names if name not in found]
+        if not found or missing:
+            raise RecordingMismatchError(
+                f"{self._file}: {printable(template)} names {len(found)} joints ({listed(found)}), the robot has "
+                f"{len(self._names)} ({listed(self._names)}); name the robot's joints as the recording does, or list "
+                "the columns in the order of the robot's joints"
+            )
+        return [fill_template(template, 0, name) for name in self._names]
+
+    def _fits(self, template: str) -> bool:
+        """Whether a list column of this name was unfolded."""
+        return bool(names_in(self._header, template.replace("{0}", BY_NAME)))
+
+    def _absence(self, name: str) -> str:
+        """A column that is not there, and those that are."""
+        near = difflib.get_close_matches(name, self._header, 1)
+        hint = f"did you mean {printable(near[0])}?" if near else f"the columns are {listed(self._header)}"
+        return f"no column is named {printable(name)}; {hint}"
+
+
+def _split(target: str) -> tuple[str, str]:
+    """Group and number of a column of CONTRACT.md."""
+    match = _TARGET.fullmatch(target)
+    return (match[1], match[2]) if match else (target, "")
+
+
+def _group(name: str) -> str:
+    """Group of a column, itself where it is not one of CONTRACT.md."""
+    return _split(name)[0]
+
+
+def _numbered(group: str, number: str, index: int) -> str:
+    """Column of a joint; time and period have no joint."""
+    return group if group in ("t", "period") else f"{group}{number or index + 1}"
