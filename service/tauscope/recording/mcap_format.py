@@ -8,6 +8,7 @@ walk over a chunk's messages is our own, which is much quicker.
 import os
 import struct
 import zlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -106,7 +107,7 @@ def recover_mcap(path: Path, choice: Choice) -> Salvage:
 class MessageSink(Protocol):
     """Whoever wants the messages of an MCAP file."""
 
-    def handler(self, topic: str, type_name: str, encoding: str) -> MessageHandler | None:
+    def handler(self, topic: str, type_name: str, encoding: str, schema: bytes = b"") -> MessageHandler | None:
         """Whoever takes the messages of a topic, None where nobody does."""
         ...
 
@@ -142,7 +143,7 @@ class _Scan:
     def __init__(self, file: BinaryIO, size: int, sink: MessageSink) -> None:
         self._file, self._size, self._sink = file, size, sink
         self._checksum = self._unpacked_bytes = self._messages = 0
-        self._schemas: dict[int, str] = {}
+        self._schemas: dict[int, Schema] = {}
         self._handlers: dict[int, MessageHandler | None] = {}
 
     def run(self) -> None:
@@ -218,12 +219,11 @@ class _Scan:
                 handler(log_time, data[start + _MESSAGE.size : stop])
         elif opcode == Opcode.SCHEMA:
             schema = Schema.read(ReadDataStream(BytesIO(data[start:stop])))
-            self._schemas[schema.id] = schema.name
+            self._schemas[schema.id] = schema
         elif opcode == Opcode.CHANNEL:
             channel = Channel.read(ReadDataStream(BytesIO(data[start:stop])))
             if channel.id not in self._handlers:
-                type_name = self._schemas.get(channel.schema_id, "")
-                self._handlers[channel.id] = self._sink.handler(channel.topic, type_name, channel.message_encoding)
+                self._handlers[channel.id] = _find_handler(self._sink, channel, self._schemas)
 
     def _read(self, length: int) -> bytes:
         data = self._file.read(length)
@@ -236,6 +236,13 @@ class _Scan:
         """Pass over a record of any size in small memory; the checksum wants its bytes."""
         while length > 0:
             length -= len(self._read(min(length, _COPY_BYTES)))
+
+
+def _find_handler(sink: MessageSink, channel: Channel, schemas: Mapping[int, Schema]) -> MessageHandler | None:
+    """The taker of a channel's messages."""
+    schema = schemas.get(channel.schema_id)
+    name, data = ("", b"") if schema is None else (schema.name, schema.data)
+    return sink.handler(channel.topic, name, channel.message_encoding, data)
 
 
 def _require_filled(index: bytes) -> None:

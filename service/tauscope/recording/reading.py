@@ -12,6 +12,7 @@ from tauscope.recording.joint_state_topic import Choice
 from tauscope.recording.mcap_format import MCAP_MAGIC, read_mcap
 from tauscope.recording.parquet_format import PARQUET_MAGIC, read_parquet, read_parquet_header
 from tauscope.recording.recording import Recording
+from tauscope.recording.ros1_bag import ROS1_MAGIC, read_ros1_bag
 from tauscope.recording.rosbag2_format import SQLITE_MAGIC, read_database, read_rosbag2
 from tauscope.recording.units import SI, Reading
 from tauscope.recording.words import printable
@@ -27,7 +28,7 @@ _FOREIGN = (
     (b"\x89HDF", "is an HDF5 or MATLAB file; export it as CSV"),
     (b"MATLAB 5.0", "is a MATLAB file; export it as CSV"),
     (b"\x93NUMPY", "is a NumPy file; make a CSV or use Recording.from_arrays"),
-    (b"#ROSBAG V", "is a ROS 1 bag; convert it with `rosbags-convert`"),
+    (b"#ROSBAG V1", "is a bag of ROS 0.x; run `rosbag fix` on it first"),
     (b"\xff\xfe", "is UTF-16 text; save it as UTF-8"),
     (b"\xfe\xff", "is UTF-16 text; save it as UTF-8"),
 )
@@ -39,7 +40,7 @@ def read_recording(
     joint_names: Sequence[str] | None = None,
     reading: Reading = SI,
 ) -> Recording:
-    """Read a recording: CSV, Parquet, MCAP, or a rosbag2 folder or database; told apart by content.
+    """Read a recording: CSV, Parquet, MCAP, a ROS 1 bag, or a rosbag2 folder or database; told apart by content.
 
     Parameters
     ----------
@@ -77,7 +78,7 @@ def read_header(path: Path) -> list[str]:
     name = printable(str(path), _LONGEST_PATH)
     try:
         magic = b"" if path.is_dir() else first_bytes(path, name)
-        if path.is_dir() or magic.startswith((MCAP_MAGIC, SQLITE_MAGIC)):
+        if path.is_dir() or magic.startswith((MCAP_MAGIC, SQLITE_MAGIC, ROS1_MAGIC)):
             raise RecordingError(f"{name}: a log names its joints itself; choose a topic with --topic")
         if magic.startswith(PARQUET_MAGIC):
             return read_parquet_header(path, name)
@@ -114,6 +115,8 @@ def _read(path: Path, name: str, joint_count: int | None, choice: Choice) -> Rec
         return read_mcap(path, choice)
     if magic.startswith(SQLITE_MAGIC):
         return read_database(path, choice)
+    if magic.startswith(ROS1_MAGIC):
+        return read_ros1_bag(path, choice)
     _refuse_foreign(magic, path, name)
     return read_csv(path, name, joint_count, reading=choice.reading)
 
@@ -123,7 +126,7 @@ def _refuse_foreign(magic: bytes, path: Path, name: str) -> None:
     for start, words in _FOREIGN:
         if magic.startswith(start):
             raise RecordingError(f"{name}: {words}")
-    if path.suffix.lower() in (".mcap", ".parquet", ".db3"):
+    if path.suffix.lower() in (".mcap", ".parquet", ".db3", ".bag"):
         found = "is empty" if not magic else f"does not begin as a {path.suffix.lower()} file does"
         raise RecordingError(f"{name}: the file {found}; it is damaged or of another format")
 

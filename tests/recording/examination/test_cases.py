@@ -26,6 +26,11 @@ def held_out(ur5: Robot) -> Recording:
 
 
 READ = {
+    "10-alphabetical-order": ({}, set()),
+    "13-gripper-without-effort": ({}, set()),
+    "14-second-publisher-zeros": ({}, {"other-publisher"}),
+    "21-zstd": ({}, set()),
+    "24-foxglove-jointstates.mcap": ({}, set()),
     "18-duplicate-stamp": ({}, {"time-stamps"}),
     "19-out-of-order": ({}, {"time-stamps"}),
     "35-time-iso.csv": ({}, set()),
@@ -123,6 +128,16 @@ def test_a_case_is_refused_with_evidence_and_remedy(name: str, ur5: Robot) -> No
     assert message.startswith(f"{RECORDINGS / name}: ")
     for words in REFUSED[name]:
         assert words in message
+
+
+@needs_shared_cases
+def test_joints_that_the_robot_does_not_have_are_listed() -> None:
+    robot = read_robot(SHARED_CASES / "ur5" / "ur5dh.yaml")
+    message = message_of(lambda: open_recording(RECORDINGS / "10-alphabetical-order", robot))
+    assert (
+        "(elbow_joint, shoulder_lift_joint, shoulder_pan_joint, wrist_1_joint, wrist_2_joint, wrist_3_joint)" in message
+    )
+    assert "the robot has 6 (joint1, joint2, joint3, joint4, joint5, joint6)" in message
 
 
 @needs_shared_cases
