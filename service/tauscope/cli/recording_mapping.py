@@ -10,7 +10,7 @@ import typer
 from tauscope.cli.output_files import write_file
 from tauscope.cli.terminal import output, plain
 from tauscope.recording.columns import map_columns
-from tauscope.recording.layout.guess import guess_layout, layout_text
+from tauscope.recording.layout.guess import guess_parts, layout_text
 from tauscope.recording.reading import read_header
 from tauscope.recording.units import Reading
 from tauscope.recording.words import listed
@@ -39,7 +39,7 @@ def map_recording(path: Path, robot_file: Path | None, out: Path | None, asks: b
     robot = None if robot_file is None else read_robot(robot_file)
     reading = Reading().for_robot(robot)
     header = read_header(path)
-    layout = guess_layout(header, reading.joint_names) or RecordingLayout(columns={})
+    layout = guess_parts(header, reading.joint_names, prefers_torque=reading.prefers_torque)
     if sys.stdin.isatty() if asks is None else asks:
         typer.echo(f"columns: {listed(header)}", err=True)
         layout = _ask(layout)

@@ -13,6 +13,7 @@ from tauscope.recording.samples import EffortKind
 from tauscope.recording.units import Reading
 from tauscope.recording.words import listed, printable
 from tauscope.result_warning import ResultWarning
+from tauscope.robot.recording_layout import RecordingLayout
 
 OPTIONAL_GROUPS = ("qd", "qdd", "qref", "taucmd", "temp", "qlink")
 """Columns of which a joint may have one, in the order in which a table keeps them."""
@@ -59,7 +60,9 @@ def map_columns(header: Sequence[str], reading: Reading, file: str) -> ColumnLay
     except RecordingError as error:
         if reading.columns is not None or isinstance(error, RecordingMismatchError):
             raise
-        guess = guess_layout(header, reading.joint_names, prefers_torque=reading.prefers_torque)
+        guess = _guess_sound(header, reading, file)
+        if guess is None and _is_ours(header):
+            raise
         if guess is None:
             raise RecordingError(f"{error}; `tauscope recording map` maps columns of other names") from error
         text = (
@@ -67,6 +70,23 @@ def map_columns(header: Sequence[str], reading: Reading, file: str) -> ColumnLay
         )
         layout = layout_text(replace(guess, decimal=reading.decimal, delimiter=reading.delimiter))
         raise RecordingError(f"{text}; if this maps them, give it as --columns FILE.yaml: {layout}") from error
+
+
+def _guess_sound(header: Sequence[str], reading: Reading, file: str) -> RecordingLayout | None:
+    """The mapping that the header suggests, None where a file with it would be refused again."""
+    guess = guess_layout(header, reading.joint_names, prefers_torque=reading.prefers_torque)
+    if guess is None:
+        return None
+    try:
+        find_columns(rename_columns(header, replace(reading, columns=guess.columns), file), file)
+    except RecordingError:
+        return None
+    return guess
+
+
+def _is_ours(header: Sequence[str]) -> bool:
+    """Whether columns have the names of CONTRACT.md, so that no mapping is missing."""
+    return "t" in header and "q1" in header
 
 
 def _note_command(header: Sequence[str], renamed: Sequence[str]) -> tuple[ResultWarning, ...]:

@@ -188,7 +188,13 @@ class CdrCursor:
         return value.decode("utf-8")
 
     def numbers(self) -> Array:
-        """A float64 sequence."""
+        """A sequence of numbers.
+
+        Returns
+        -------
+        (n,) float64
+            as the message has them
+        """
         count = self.length()
         if count:
             self._align(8)

@@ -34,7 +34,7 @@ class ReadingOptions(StrictModel):
     trust_units: bool = Field(
         default=False, description="whether a recording is used that can hardly be in the stated units"
     )
-    columns: str | dict[str, str | int | tuple[str | int, ...]] | None = Field(
+    columns: str | dict[str, str | int | list[str | int]] | None = Field(
         default=None,
         description="where the columns are found, where they have other names: a preset (rtde, libfranka, plotjuggler,"
         " lerobot, mujoco, isaac), or for t, q, tau, i, qd, … or one joint's, as q3, the file's column, its number from"

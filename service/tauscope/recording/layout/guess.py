@@ -35,6 +35,19 @@ def guess_layout(
     prefers_torque : bool
         whether commanded torques go before currents, because no torque constant is known
     """
+    found = guess_parts(header, joint_names, preset=preset, prefers_torque=prefers_torque)
+    columns = found.columns if isinstance(found.columns, Mapping) else {}
+    return found if {"t", "q"} <= set(columns) and {"tau", "i"} & set(columns) else None
+
+
+def guess_parts(
+    header: Sequence[str],
+    joint_names: Sequence[str] | None = None,
+    *,
+    preset: str | None = None,
+    prefers_torque: bool = False,
+) -> RecordingLayout:
+    """As much of a header's layout as its columns suggest; arguments as of `guess_layout`."""
     if is_numbered(header):
         return _guess_by_place(len(header), None if joint_names is None else len(joint_names))
     rank = role_of if preset is None else _preset_ranking(PRESET_OF[preset])
@@ -42,18 +55,20 @@ def guess_layout(
     time = _find_time(header, None if preset is None else PRESET_OF[preset].columns["t"])
     count = None if joint_names is None else len(joint_names)
     q = _choose(families, "q", count)
-    if q is None or time is None:
-        return None
-    count = count or len(q.columns)
+    count = count or (len(q.columns) if q else None)
     order = ("tau", "taucmd", "i") if prefers_torque else ("tau", "i", "taucmd")
-    effort = next((role for role in order if _choose(families, role, count)), None)
-    if effort is None:
-        return None
-    groups = {"i" if effort == "i" else "tau": _choose(families, effort, count)}
+    if joint_names is None:  # then nothing says which of more columns are the joints'
+        families = [(family, found) for family, found in families if len(family.columns) == count]
+    effort = next((role for role in order if _choose(families, role, count)), "tau")
+    groups = {"q": q, "i" if effort == "i" else "tau": _choose(families, effort, count)}
     groups |= {group: _choose(families, group, count) for group in _OPTIONAL if group != effort}
-    columns: dict[str, Source] = {"t": time, "q": _source(q, count)}
+    columns: dict[str, Source] = {} if time is None else {"t": time}
     columns |= {group: _source(family, count) for group, family in groups.items() if family is not None}
-    units = {"t": time_unit(words_of(time)), "q": unit_of(q.template), "tau": _unit(groups.get("i"))}
+    units = {
+        "t": None if time is None else time_unit(words_of(time)),
+        "q": None if q is None else unit_of(q.template),
+        "tau": _unit(groups.get("i")),
+    }
     return RecordingLayout({column: unit for column, unit in units.items() if unit}, columns=columns)
 
 
@@ -78,7 +93,7 @@ def is_numbered(header: Sequence[str]) -> bool:
     return list(header) == [str(number) for number in range(1, len(header) + 1)]
 
 
-def _guess_by_place(width: int, joint_count: int | None) -> RecordingLayout | None:
+def _guess_by_place(width: int, joint_count: int | None) -> RecordingLayout:
     """Time, positions, perhaps velocities, and efforts, side by side."""
     counts = [joint_count] if joint_count else [*_COMMON_JOINT_COUNTS, (width - 1) // 2]
     for n in counts:
@@ -86,7 +101,7 @@ def _guess_by_place(width: int, joint_count: int | None) -> RecordingLayout | No
             if n > 0 and width == len(groups) * n + 1:
                 places = {group: [2 + k * n + j for j in range(n)] for k, group in enumerate(groups)}
                 return RecordingLayout(columns={"t": 1, **places})
-    return None
+    return RecordingLayout(columns={})
 
 
 def _preset_ranking(preset: Preset) -> Ranking:
@@ -125,9 +140,9 @@ def _choose(families: Sequence[tuple[Family, tuple[str, int]]], role: str, count
     return min(fit, key=key, default=(None, 0))[0]
 
 
-def _source(family: Family, count: int) -> Source:
+def _source(family: Family, count: int | None) -> Source:
     """The family as a template, or as the columns of the first joints where it has more than the robot."""
-    return family.template if len(family.columns) == count else list(family.columns[:count])
+    return family.template if count in (None, len(family.columns)) else list(family.columns[:count])
 
 
 def _unit(current: Family | None) -> str | None:
