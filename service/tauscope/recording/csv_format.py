@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from tauscope.errors import RecordingError
 from tauscope.recording.columns import ColumnLayout, map_columns, require_joint_count
-from tauscope.recording.csv_dialect import BLANK, Dialect, find_decimal_comma, find_delimiter
+from tauscope.recording.csv_dialect import BLANK, Dialect, find_delimiter, find_first_row
 from tauscope.recording.csv_numbers import Clock, is_number, parse_number, parse_quickly, shown
 from tauscope.recording.intake import RowIntake
 from tauscope.recording.recording import Array, Recording
@@ -148,26 +148,52 @@ def _parse_names(
     """Names of the columns: of the first line, of the comment before numbers, or numbers for want of names."""
     if b"\r" in line:
         raise RecordingError(f"{name}: the lines end with carriage returns alone; save the file with newlines")
-    sign = reading.delimiter_sign
-    dialect = Dialect(find_delimiter(line) if sign is None else sign.encode())
+    sign = None if reading.delimiter_sign is None else reading.delimiter_sign.encode()
     start = file.tell()
-    sample = [line, *file.read(_SAMPLE_BYTES).split(b"\n")[:-1]]
-    has_comma = find_decimal_comma(sample, dialect.delimiter) if reading.decimal is None else reading.decimal == ","
-    fields = dialect.split(line)
-    rows = Dialect(dialect.delimiter, has_comma)
-    numbers = rows.split(line)
-    if any(map(is_number, numbers)) and all(is_number(field) or not field for field in numbers):
+    raw = file.read(_SAMPLE_BYTES).split(b"\n")[:-1]
+    sample = [line, *(each.strip(b"\r") for each in raw)]
+    first, dialect = find_first_row(sample, sign) or (1, Dialect(sign or find_delimiter(line)))
+    row = sample[first] if first < len(sample) else b""
+    named = _find_header(sample[:first], row, dialect)
+    if named is None and first:  # the lines differ: the first one says how they are meant
+        dialect = Dialect(sign or find_delimiter(line))
+    has_comma = dialect.shows_decimal_comma(sample[first:]) if reading.decimal is None else reading.decimal == ","
+    rows = replace(dialect, has_decimal_comma=has_comma)
+    if first == 0:
+        fields = _name_numbers(comment, rows.split(line), dialect)
         start, number = at, number - 1
-        named = next(
-            (names for sign in (dialect, Dialect(BLANK)) if len(names := sign.split(comment)) == len(numbers)), None
-        )
-        fields = named if comment and named else [b"%d" % column for column in range(1, len(numbers) + 1)]
+    else:
+        index = named or 0
+        fields = dialect.name_fields(sample[index], row)
+        start += sum(len(each) + 1 for each in raw[:index])
+        number += index
     file.seek(start)
+    return _Names(number, rows, [_decode(field) for field in fields])
+
+
+def _find_header(lines: Sequence[bytes], row: bytes, dialect: Dialect) -> int | None:
+    """The first line with as many names as the row has fields; lines before it say something else."""
+    cells = len(dialect.split(row))
+    for index, line in enumerate(lines):
+        if not _is_empty(line) and len(dialect.name_fields(line, row)) == cells:
+            return index
+    return None
+
+
+def _name_numbers(comment: bytes, row: Sequence[bytes], dialect: Dialect) -> list[bytes]:
+    """Names in the comment before a row, where it has as many; else numbers from 1."""
+    for sign in (dialect, Dialect(BLANK)):
+        if comment and len(names := sign.split(comment)) == len(row):
+            return names
+    return [b"%d" % column for column in range(1, len(row) + 1)]
+
+
+def _decode(field: bytes) -> str:
+    """A column's name, of a file in UTF-8 or in the code page of Windows."""
     try:
-        header = [field.decode("utf-8") for field in fields]
-    except UnicodeDecodeError as error:
-        raise RecordingError(f"{name}: line {number}: the header is not UTF-8 text; save the file as UTF-8") from error
-    return _Names(number, rows, header)
+        return field.decode("utf-8")
+    except UnicodeDecodeError:
+        return field.decode("cp1252", "replace")
 
 
 def _chunks(file: BinaryIO, line: int, name: str) -> Iterator[_Chunk]:

@@ -10,6 +10,7 @@ from tauscope.recording.columns import require_joint_count
 from tauscope.recording.csv_format import read_csv, read_csv_header
 from tauscope.recording.joint_state_topic import Choice
 from tauscope.recording.mcap_format import MCAP_MAGIC, read_mcap
+from tauscope.recording.npz_format import ZIP_MAGIC, read_npz, read_npz_header
 from tauscope.recording.parquet_format import PARQUET_MAGIC, read_parquet, read_parquet_header
 from tauscope.recording.recording import Recording
 from tauscope.recording.ros1_bag import ROS1_MAGIC, read_ros1_bag
@@ -24,10 +25,9 @@ _FOREIGN = (
     (b"\x28\xb5\x2f\xfd", "is compressed by zstd; unpack it first"),
     (b"BZh", "is compressed by bzip2; unpack it first"),
     (b"\xfd7zXZ", "is compressed by xz; unpack it first"),
-    (b"PK\x03\x04", "is a zip archive or a spreadsheet; unpack it, or export the sheet as CSV"),
     (b"\x89HDF", "is an HDF5 or MATLAB file; export it as CSV"),
     (b"MATLAB 5.0", "is a MATLAB file; export it as CSV"),
-    (b"\x93NUMPY", "is a NumPy file; make a CSV or use Recording.from_arrays"),
+    (b"\x93NUMPY", "is one NumPy array; save time, positions and torques by np.savez"),
     (b"#ROSBAG V1", "is a bag of ROS 0.x; run `rosbag fix` on it first"),
     (b"\xff\xfe", "is UTF-16 text; save it as UTF-8"),
     (b"\xfe\xff", "is UTF-16 text; save it as UTF-8"),
@@ -82,6 +82,8 @@ def read_header(path: Path) -> list[str]:
             raise RecordingError(f"{name}: a log names its joints itself; choose a topic with --topic")
         if magic.startswith(PARQUET_MAGIC):
             return read_parquet_header(path, name)
+        if magic.startswith(ZIP_MAGIC):
+            return read_npz_header(path, name)
         _refuse_foreign(magic, path, name)
         return read_csv_header(path, name)
     except OSError as error:
@@ -117,6 +119,8 @@ def _read(path: Path, name: str, joint_count: int | None, choice: Choice) -> Rec
         return read_database(path, choice)
     if magic.startswith(ROS1_MAGIC):
         return read_ros1_bag(path, choice)
+    if magic.startswith(ZIP_MAGIC):
+        return read_npz(path, name, joint_count, reading=choice.reading)
     _refuse_foreign(magic, path, name)
     return read_csv(path, name, joint_count, reading=choice.reading)
 

@@ -1,6 +1,6 @@
 """Files of other tools: any names, order, units and separators give the same recording, by preset, mapping or guess."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -251,3 +251,55 @@ def test_every_preset_is_offered() -> None:
 
     assert tuple(PRESET_OF) == NAMES
     assert SimpleNamespace(**dict.fromkeys(NAMES))
+
+
+def test_what_a_preset_does_not_find_is_named(tmp_path: Path) -> None:
+    header = ["timestamp", *(f"observation.state[{k}]" for k in range(3))]
+    path = write(tmp_path / "file.csv", header, np.column_stack([TIME, Q]))
+    message = message_of(lambda: read(path, read_layout("lerobot"), JOINTS))
+    assert "no column holds the effort, which lerobot calls observation_effort or observation_torque or" in message
+
+
+@pytest.mark.parametrize("saves", [np.savez, np.savez_compressed])
+def test_numpy_archives(tmp_path: Path, saves: Callable[..., None]) -> None:
+    path = tmp_path / "log.npz"
+    saves(path, time=TIME, qpos=Q, qvel=QD, qfrc_actuator=TAU, name=np.array("arm"), gains=np.ones(3))
+    recording = read(path, read_layout("mujoco"), JOINTS)
+    assert np.array_equal(rows_of(recording), np.column_stack([TIME, Q, TAU, QD]))
+    assert guess_of(message_of(lambda: read_recording(path))).columns == {
+        "t": "time",
+        "q": "qpos[{0}]",
+        "tau": "qfrc_actuator[{0}]",
+        "qd": "qvel[{0}]",
+    }
+    path.write_bytes(path.read_bytes()[:-300])
+    assert "not a readable NumPy archive" in message_of(lambda: read(path, read_layout("mujoco")))
+    np.savez(path, words=np.array(["a"]))
+    assert "no array holds a row a sample" in message_of(lambda: read(path, read_layout("mujoco")))
+    np.savez(path, time=np.array([object()]))
+    assert "not a readable NumPy archive" in message_of(lambda: read(path, read_layout("mujoco")))
+
+
+def test_lists_in_the_cells_of_a_csv(tmp_path: Path) -> None:
+    lines = ["timestamp,observation.state,observation.effort"]
+    rows = zip(TIME.tolist(), np.degrees(Q).tolist(), TAU.tolist(), strict=True)
+    lines += [f'{t},"{q}",[{" ".join(map(repr, tau))}]' for t, q, tau in rows]
+    path = tmp_path / "file.csv"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    samples = read(path, read_layout("lerobot"), JOINTS).samples()
+    assert np.allclose(samples.position, Q)
+    assert np.array_equal(samples.effort, TAU)
+
+
+def test_units_in_names(tmp_path: Path) -> None:
+    header = [
+        "Time [ms]",
+        *(f"J{k} Winkel position [°]" for k in (1, 2, 3)),
+        *(f"J{k} current (mA)" for k in (1, 2, 3)),
+    ]
+    path = write(tmp_path / "file.csv", header, np.column_stack([1e3 * TIME, np.degrees(Q), 1e3 * TAU]))
+    layout = guess_of(message_of(lambda: read_recording(path, joint_names=JOINTS)))
+    assert layout.units == {"t": "ms", "q": "deg", "tau": "mA"}
+    samples = read(path, layout, JOINTS).samples()
+    assert np.allclose(samples.position, Q)
+    assert np.allclose(samples.effort, TAU)

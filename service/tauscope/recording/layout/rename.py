@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 
 from tauscope.errors import RecordingError, RecordingMismatchError
 from tauscope.recording.layout.families import BY_NAME, PLACEHOLDERS, fill_template, names_in
-from tauscope.recording.layout.guess import guess_layout
+from tauscope.recording.layout.guess import guess_layout, guess_parts
+from tauscope.recording.layout.presets import PRESET_OF
 from tauscope.recording.units import Reading
 from tauscope.recording.words import listed, printable
 from tauscope.robot.recording_layout import Source
@@ -44,9 +45,14 @@ def _preset_columns(header: Sequence[str], preset: str, reading: Reading, file: 
         other = guess_layout(header, None, preset=preset)
         if other is not None and reading.joint_names is not None and isinstance(other.columns, Mapping):
             _Mapping(header, reading, file).expand(other.columns)  # names the joints that differ
+        parts = guess_parts(header, reading.joint_names, preset=preset).columns or {}
+        known = PRESET_OF[preset].columns
+        lacks, names = ("time", known["t"]) if "t" not in parts else ("position", known["q"])
+        if "t" in parts and "q" in parts:
+            lacks, names = "effort", [name for group in ("tau", "i", "taucmd") for name in known.get(group, ())]
         raise RecordingError(
-            f"{file}: the columns are not as {preset} writes them ({listed(header)}); name them, as in "
-            "columns: {t: time, q: 'position_{1}', tau: 'torque_{1}'}"
+            f"{file}: no column holds the {lacks}, which {preset} calls {' or '.join(names)}; the columns are "
+            f"{listed(header)}; record it, or name the columns by --columns FILE.yaml"
         )
     assert isinstance(layout.columns, Mapping)  # noqa: S101 - a guess always is one
     return layout.columns

@@ -26,7 +26,7 @@ _LEVELS: Mapping[str, int] = {"computed": 1, "force": 2, "theta": 2, "load": 2, 
 """Words that make a family second choice."""
 
 _TIMES = ("t", "time", "timestamp", "stamp", "sim_time", "time_s", "seconds", "sec", "clock", "elapsed", "duration")
-_UNIT = re.compile(r"(?<![A-Za-z])(deg(?:rees?)?|mA)(?![A-Za-z])")
+_UNIT = re.compile(r"(?<![A-Za-z])(deg(?:rees?)?|mA)(?![A-Za-z])|(°)")
 
 
 def role_of(words: Sequence[str]) -> tuple[str, int] | None:
