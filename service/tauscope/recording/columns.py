@@ -1,11 +1,11 @@
 """Which column of a recording file means what: names of CONTRACT.md, their order, and what is wrong with a header."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from tauscope.errors import RecordingError, RecordingMismatchError
-from tauscope.recording.layout.families import words_of
+from tauscope.recording.layout.families import BY_NAME, words_of
 from tauscope.recording.layout.guess import guess_layout, is_numbered, layout_text
 from tauscope.recording.layout.rename import rename_columns
 from tauscope.recording.layout.roles import role_of
@@ -64,6 +64,8 @@ def map_columns(header: Sequence[str], reading: Reading, file: str) -> ColumnLay
         if guess is None and _is_ours(header):
             raise
         if guess is None:
+            _require_known_names(header, reading, file)
+        if guess is None:
             raise RecordingError(f"{error}; `tauscope recording map` maps columns of other names") from error
         text = (
             f"{file}: the first row holds numbers where the column names are expected" if is_numbered(header) else error
@@ -82,6 +84,13 @@ def _guess_sound(header: Sequence[str], reading: Reading, file: str) -> Recordin
     except RecordingError:
         return None
     return guess
+
+
+def _require_known_names(header: Sequence[str], reading: Reading, file: str) -> None:
+    """Refuse columns that name other joints than the robot's: the message lists both."""
+    named = guess_layout(header) if reading.joint_names is not None else None
+    if named is not None and isinstance(named.columns, Mapping) and BY_NAME in str(named.columns["q"]):
+        rename_columns(header, replace(reading, columns=named.columns), file)
 
 
 def _is_ours(header: Sequence[str]) -> bool:

@@ -172,7 +172,7 @@ def test_a_mapping_may_name_a_part_of_the_columns(tmp_path: Path) -> None:
 
 WRONG = {
     "no such column": ({"t": "tim", "q": "q{1}"}, "columns: t: no column is named tim; did you mean time?"),
-    "twice": ({"t": "time", "q": ["q1", "q1", "q3"], "tau": "e{1}"}, "column q1 is mapped to q1 and q; keep one"),
+    "twice": ({"t": "time", "q": ["q1", "q1", "q3"], "tau": "e{1}"}, "column q1 is mapped to q1 and q2; keep one"),
     "more joints than the robot": ({"t": "time", "q": "q{1}"}, "numbers 3 joints, the robot has 2; list the columns"),
     "no template": ({"t": "time", "q": "q"}, "columns: q: no column is named q"),
 }

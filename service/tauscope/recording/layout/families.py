@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from tauscope.recording.layout.roles import role_of
+from tauscope.recording.layout.roles import is_joint_name
 
 FROM_ZERO, FROM_ONE, BY_NAME = "{0}", "{1}", "{name}"
 """What stands for the joint in a template: its number counted from 0 or from 1, or its name."""
@@ -13,6 +13,7 @@ PLACEHOLDERS = (FROM_ZERO, FROM_ONE, BY_NAME)
 
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[0-9]+")
 _JOINT = re.compile(r"\[[^\[\]]*\{(?:0|1|name)\}[^\[\]]*\]|\{(?:0|1|name)\}")
+_SEGMENT = re.compile(r"[^/.\[\]:]+")
 _NUMBER = re.compile(r"[0-9]+")
 
 
@@ -22,15 +23,18 @@ class Family:
 
     template : str
         name of the columns with a placeholder for the joint
-    joints : tuple of str
-        names of the joints, in the order of the robot or of the file; empty where they are numbered
     columns : tuple of str
-        columns in the order of the joints
+        columns in the order of the joints: by number, of the robot, or of the file
+    is_regular : bool
+        whether the template gives the columns; zeros in front of a number it does not
+    is_guessed : bool
+        whether the joints' names are any part of the columns' names
     """
 
     template: str
-    joints: tuple[str, ...]
     columns: tuple[str, ...]
+    is_regular: bool = True
+    is_guessed: bool = False
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -73,14 +77,15 @@ def _numbered(header: Sequence[str]) -> list[Family]:
     groups: dict[tuple[str, str], dict[int, str]] = {}
     for name in header:
         for match in _NUMBER.finditer(name):
-            if match[0] == str(int(match[0])):
-                groups.setdefault((name[: match.start()], name[match.end() :]), {})[int(match[0])] = name
+            groups.setdefault((name[: match.start()], name[match.end() :]), {})[int(match[0])] = name
     found = []
     for (before, after), columns in groups.items():
         first = 0 if 0 in columns else 1
         if set(columns) == set(range(first, first + len(columns))):
             template = before + (FROM_ZERO if first == 0 else FROM_ONE) + after
-            found.append(Family(template, (), tuple(columns[number] for number in sorted(columns))))
+            names = tuple(columns[number] for number in sorted(columns))
+            is_regular = all(fill_template(template, k, None) == name for k, name in enumerate(names))
+            found.append(Family(template, names, is_regular))
     return found
 
 
@@ -98,29 +103,31 @@ def _named_by(header: Sequence[str], joint_names: Sequence[str]) -> list[Family]
                 groups.setdefault(column[: match.start()] + BY_NAME + column[match.end() :], {})[name] = column
                 break
     return [
-        Family(template, tuple(joint_names), tuple(columns[name] for name in joint_names))
+        Family(template, tuple(columns[name] for name in joint_names))
         for template, columns in groups.items()
         if len(columns) == len(joint_names)
     ]
 
 
 def _named_by_segments(header: Sequence[str]) -> list[Family]:
-    """Families in which one segment of a path is the joint: ``/joint_states/elbow/position``, ``effort[elbow]``."""
+    """Families in which one segment is the joint: ``/states/elbow/position``, ``effort[elbow]``, ``elbow_pos``."""
     groups: dict[str, dict[str, str]] = {}
     for column in header:
         for template, name in _segments(column):
             groups.setdefault(template, {})[name] = column
-    return [Family(template, tuple(c), tuple(c.values())) for template, c in groups.items() if _is_named(c)]
+    return [Family(template, tuple(c.values()), is_guessed=True) for template, c in groups.items() if _is_named(c)]
 
 
 def _segments(column: str) -> list[tuple[str, str]]:
-    """The column with each of its last two segments left out, and that segment."""
-    cuts = [match.span() for match in re.finditer(r"[^/.\[\]:]+", column)][-2:]
-    if len(cuts) < 2:
-        return []
-    return [(column[:start] + BY_NAME + column[stop:], column[start:stop]) for start, stop in cuts]
+    """The column with a placeholder for each part that may be a joint's name, and that part."""
+    spans = [match.span() for match in _SEGMENT.finditer(column)][-2:]
+    spans = spans if len(spans) > 1 else []
+    first, last = column.find("_"), column.rfind("_")
+    if first > 0 and last < len(column) - 1 and not spans:
+        spans = [(0, last), (first + 1, len(column))]
+    return [(column[:start] + BY_NAME + column[stop:], column[start:stop]) for start, stop in spans]
 
 
 def _is_named(columns: Mapping[str, str]) -> bool:
     """Whether keys are names rather than numbers or quantities."""
-    return not any(key.isdecimal() or role_of(words_of(key)) for key in columns)
+    return not any(key.isdecimal() or not is_joint_name(words_of(key)) for key in columns)

@@ -134,15 +134,19 @@ def _choose(families: Sequence[tuple[Family, tuple[str, int]]], role: str, count
     fit = [
         (family, rank) for family, (found, rank) in families if found == role and len(family.columns) >= (count or 1)
     ]
-    if count is None:
-        return min(fit, key=lambda entry: (-len(entry[0].columns), entry[1]), default=(None, 0))[0]
-    key = lambda entry: (len(entry[0].columns) != count, entry[1], len(entry[0].template))  # noqa: E731
-    return min(fit, key=key, default=(None, 0))[0]
+
+    def unfitness(entry: tuple[Family, int]) -> tuple[object, ...]:
+        family, rank = entry
+        size = -len(family.columns) if count is None else len(family.columns) != count
+        return size, rank, family.is_guessed, len(family.template)
+
+    return min(fit, key=unfitness, default=(None, 0))[0]
 
 
 def _source(family: Family, count: int | None) -> Source:
     """The family as a template, or as the columns of the first joints where it has more than the robot."""
-    return family.template if count in (None, len(family.columns)) else list(family.columns[:count])
+    is_whole = family.is_regular and count in (None, len(family.columns))
+    return family.template if is_whole else list(family.columns[:count])
 
 
 def _unit(current: Family | None) -> str | None:

@@ -35,7 +35,7 @@ def rename_columns(header: Sequence[str], reading: Reading, file: str) -> list[s
     groups = {_group(target) for target in target_of.values()}
     groups |= {*_EFFORTS} if groups & {*_EFFORTS} else set()
     # A column that the mapping leaves out keeps its name, unless the mapping has columns of its group.
-    return [target_of.get(name, f"{name} " if _group(name) in groups else name) for name in header]
+    return [target_of.get(index, f"{name} " if _group(name) in groups else name) for index, name in enumerate(header)]
 
 
 def _preset_columns(header: Sequence[str], preset: str, reading: Reading, file: str) -> Mapping[str, Source]:
@@ -66,26 +66,36 @@ class _Mapping:
         self._robot = reading.joint_names
         self._names: Sequence[str] | None = reading.joint_names
 
-    def expand(self, columns: Mapping[str, Source]) -> dict[str, str]:
-        """Column of CONTRACT.md by the file's."""
-        target_of: dict[str, str] = {}
+    def expand(self, columns: Mapping[str, Source]) -> dict[int, str]:
+        """Column of CONTRACT.md by the index of the file's."""
+        target_of: dict[int, str] = {}
         for target, source in columns.items():
             group, number = _split(target)
-            sources = [str(source)] if number or group in ("t", "period") else self._group(group, source)
-            for index, name in enumerate(sources):
-                if name not in self._known:
-                    raise RecordingError(f"{self._file}: columns: {target}: {self._absence(name)}")
-                if name in target_of:
+            sources = [source] if number or group in ("t", "period") else self._group(group, source)
+            for joint, name in enumerate(sources):
+                index = self._find(name, target)
+                wanted = target if number or group in ("t", "period") else f"{group}{joint + 1}"
+                if index in target_of:
                     raise RecordingError(
-                        f"{self._file}: column {printable(name)} is mapped to {target_of[name]} and {target}; keep one"
+                        f"{self._file}: column {printable(str(name))} is mapped to {target_of[index]} and {wanted};"
+                        " keep one"
                     )
-                target_of[name] = target if sources == [str(source)] and number else _numbered(group, number, index)
+                target_of[index] = wanted
         return target_of
 
-    def _group(self, group: str, source: Source) -> Sequence[str]:
+    def _find(self, source: Source, target: str) -> int:
+        """Index of a column, by its name, or by its number from 1 where no column has that name."""
+        name = str(source)
+        if name in self._known:
+            return self._header.index(name)
+        if isinstance(source, int) and 0 < source <= len(self._header):
+            return source - 1
+        raise RecordingError(f"{self._file}: columns: {target}: {self._absence(name)}")
+
+    def _group(self, group: str, source: Source) -> Sequence[str | int]:
         """One column a joint."""
         if not isinstance(source, str | int):
-            return [str(name) for name in source]
+            return source
         template = str(source)
         if not any(placeholder in template for placeholder in PLACEHOLDERS):
             if template in self._known:
@@ -143,8 +153,3 @@ def _split(target: str) -> tuple[str, str]:
 def _group(name: str) -> str:
     """Group of a column, itself where it is not one of CONTRACT.md."""
     return _split(name)[0]
-
-
-def _numbered(group: str, number: str, index: int) -> str:
-    """Column of a joint; time and period have no joint."""
-    return group if group in ("t", "period") else f"{group}{number or index + 1}"

@@ -22,11 +22,19 @@ _FOREIGN = frozenset(
 ) | frozenset(("qfrc", "gravity", "error", "bias", "limit", "limits", "max", "min", "accelerometer", "imu"))
 """Words of quantities that belong to no joint, or are not its measurement."""
 
+_QUALIFIERS = frozenset(
+    ("present", "actual", "measured", "meas", "act", "raw", "filtered", "msr", "computed", "applied")
+)
 _LEVELS: Mapping[str, int] = {"computed": 1, "force": 2, "theta": 2, "load": 2, "state": 3}
 """Words that make a family second choice."""
 
 _TIMES = ("t", "time", "timestamp", "stamp", "sim_time", "time_s", "seconds", "sec", "clock", "elapsed", "duration")
 _UNIT = re.compile(r"(?<![A-Za-z])(deg(?:rees?)?|mA)(?![A-Za-z])|(°)")
+
+
+def is_joint_name(words: Sequence[str]) -> bool:
+    """Whether words may name a joint: none of them names a quantity, or says how it came about."""
+    return not any(word in _CORES or word in _COMMANDED or word in _QUALIFIERS for word in words)
 
 
 def role_of(words: Sequence[str]) -> tuple[str, int] | None:
