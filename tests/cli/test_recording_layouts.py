@@ -68,6 +68,7 @@ def test_the_robot_file_and_the_library_take_a_mapping(
     sound = tauscope.read_recording(files.train[0], files.robot).samples()
     for recording in (
         tauscope.read_recording(foreign, robot),
+        tauscope.read_recording(files.train[0], robot),  # its own columns: not as the robot file says
         tauscope.read_recording(foreign, files.robot, columns=mapping),
         tauscope.read_recording(foreign, files.robot, columns=COLUMNS, units={"q": "deg"}, decimal=",", delimiter=";"),
     ):

@@ -37,7 +37,7 @@ def test_whether_a_torque_constant_is_stated_is_kept(tmp_path: Path) -> None:
         ("{columns: rdte}", "'rdte' is no preset; use rtde, libfranka"),
         ("{columns: {x1: a}}", "'x1' is no column of a recording; use t, q, tau"),
         ("{columns: {q: 2}}", "q has one column a joint; list them"),
-        ("{columns: {t: [a, b]}}", "t is one column"),
+        ("{columns: {t: [a, b, c]}}", "t is one column"),
         ("{columns: {q1: 1.5}}", "1.5 is no column; write its name, or its number from 1"),
         ("{columns: {q: []}}", "must not be empty"),
         ("{decimal: '-'}", "'-' is no decimal sign"),

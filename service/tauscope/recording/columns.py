@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from tauscope.errors import RecordingError, RecordingMismatchError
 from tauscope.recording.layout.families import BY_NAME, words_of
 from tauscope.recording.layout.guess import guess_layout, is_numbered, layout_text
-from tauscope.recording.layout.rename import rename_columns
+from tauscope.recording.layout.rename import NANOSECONDS, rename_columns
 from tauscope.recording.layout.roles import role_of
 from tauscope.recording.samples import EffortKind
 from tauscope.recording.units import Reading
@@ -32,6 +32,7 @@ class ColumnLayout:
     effort_kind: EffortKind
     ignored: tuple[str, ...]
     counts_rows: bool = False
+    nanoseconds: int | None = None
     notes: tuple[ResultWarning, ...] = ()
 
 
@@ -143,6 +144,7 @@ def find_columns(header: Sequence[str], file: str, *, counts_rows: bool = False)
         effort_kind=effort_kind,
         ignored=tuple(name.strip() for name in header if name and name not in used),
         counts_rows=counts_rows,
+        nanoseconds=where.get(NANOSECONDS),
     )
 
 

@@ -9,6 +9,7 @@ from typing import BinaryIO
 import numpy as np
 
 from tauscope.errors import RecordingError
+from tauscope.recording.clocks import SplitClock
 from tauscope.recording.columns import ColumnLayout, map_columns, require_joint_count
 from tauscope.recording.csv_dialect import BLANK, Dialect, find_delimiter, find_first_row
 from tauscope.recording.csv_numbers import Clock, is_number, parse_number, parse_quickly, shown
@@ -51,6 +52,7 @@ def read_csv(
     """
     with path.open("rb") as file:
         header = _read_header(file, name, reading)
+        reading = header.reading
         require_joint_count(header.layout.joint_count, joint_count, name)
         layout = header.layout
         intake: RowIntake | None = None
@@ -104,7 +106,9 @@ class _Header:
     line: int
     dialect: Dialect
     layout: ColumnLayout
+    reading: Reading
     clock: Clock
+    split: SplitClock
 
 
 @dataclass(frozen=True)
@@ -119,7 +123,8 @@ class _Chunk:
 def _read_header(file: BinaryIO, name: str, reading: Reading) -> _Header:
     """Read the names of the columns and find those that are wanted."""
     found = _read_names(file, name, reading)
-    return _Header(found.line, found.dialect, map_columns(found.names, reading, name), Clock())
+    reading = reading.for_header(found.names)
+    return _Header(found.line, found.dialect, map_columns(found.names, reading, name), reading, Clock(), SplitClock())
 
 
 def _read_names(file: BinaryIO, name: str, reading: Reading) -> _Names:
@@ -224,10 +229,11 @@ def _count_lines(text: bytes) -> int:
 def _parse_chunk(chunk: _Chunk, header: _Header, name: str, *, is_first: bool) -> tuple[Array, Sequence[int]]:
     """The rows of a chunk and the line on which each stands."""
     layout = header.layout
+    source = layout.source if layout.nanoseconds is None else (*layout.source, layout.nanoseconds)
     normal = header.dialect.normalize(chunk.text)
-    block = parse_quickly(normal, header.dialect.separator, layout.width, layout.source)
+    block = parse_quickly(normal, header.dialect.separator, layout.width, source)
     if block is not None:
-        return block, range(chunk.first_line, chunk.first_line + len(block))
+        return _join_time(block, header), range(chunk.first_line, chunk.first_line + len(block))
     rows: list[list[float]] = []
     lines: list[int] = []
     text = normal[:-1].split(b"\n")
@@ -239,11 +245,19 @@ def _parse_chunk(chunk: _Chunk, header: _Header, name: str, *, is_first: bool) -
         fields = _split_line(line, number, header, name, is_truncated=is_truncated)
         if is_first and not rows:
             _refuse_units(fields, number, header, name)
-        time, *others = zip(layout.names, layout.source, strict=True)
+        time, *others = zip((*layout.names, "t"), source, strict=False)
         row = [parse_number(fields[index], name, number, column) for column, index in others]
         rows.append([header.clock.parse(fields[time[1]], name, number), *row])
         lines.append(number)
-    return np.array(rows, dtype=np.float64).reshape(len(rows), len(layout.names)), lines
+    return _join_time(np.array(rows, dtype=np.float64).reshape(len(rows), len(source)), header), lines
+
+
+def _join_time(block: Array, header: _Header) -> Array:
+    """Rows with one time, where seconds and nanoseconds have columns of their own."""
+    if header.layout.nanoseconds is None:
+        return block
+    block[:, 0] = header.split.join(block[:, 0], block[:, -1])
+    return block[:, :-1]
 
 
 def _split_line(line: bytes, number: int, header: _Header, name: str, *, is_truncated: bool) -> list[bytes]:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from tauscope.errors import RecordingError
+from tauscope.recording.clocks import SplitClock
 from tauscope.recording.columns import map_columns, require_joint_count
 from tauscope.recording.inflation import require_plausible_inflation
 from tauscope.recording.intake import RowIntake
@@ -43,9 +44,12 @@ def read_npz(
     """
     columns = _read_columns(path, name)
     header = list(columns)
+    reading = reading.for_header(header)
     layout = map_columns(header, reading, name)
     require_joint_count(layout.joint_count, joint_count, name)
     block = np.column_stack([columns[header[index]] for index in layout.source])
+    if layout.nanoseconds is not None:
+        block[:, 0] = SplitClock().join(block[:, 0], columns[header[layout.nanoseconds]])
     if layout.counts_rows:
         block[:, 0] = np.arange(len(block))
     intake = RowIntake(name, layout.names, layout.effort_kind, reading, len(block), spool_above_bytes)

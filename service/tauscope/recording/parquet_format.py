@@ -10,8 +10,8 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from tauscope.errors import RecordingError
+from tauscope.recording.clocks import EpisodeClock, SplitClock
 from tauscope.recording.columns import ColumnLayout, map_columns, require_joint_count
-from tauscope.recording.episodes import EpisodeClock
 from tauscope.recording.inflation import require_plausible_inflation
 from tauscope.recording.intake import RowIntake
 from tauscope.recording.parquet_columns import FileColumn, take_column, unfold_columns
@@ -55,16 +55,21 @@ def read_parquet(
         file = arrow.parquet.ParquetFile(stream, page_checksum_verification=True)
         found = unfold_columns(arrow, file, path, name)
         header = list(found)
+        reading = reading.for_header(header)
         layout = map_columns(header, reading, name)
         require_joint_count(layout.joint_count, joint_count, name)
         wanted = [found[header[index]] for index in layout.source]
+        nanoseconds = None if layout.nanoseconds is None else found[header[layout.nanoseconds]]
+        split = SplitClock()
         _require_numbers(file.schema_arrow, wanted, layout, name)
         unpacked_bytes = file.metadata.num_rows * len(layout.names) * 8
         require_plausible_inflation(path.stat().st_size, unpacked_bytes, name)
         rows, first_stamp = file.metadata.num_rows, None
         intake = RowIntake(name, layout.names, layout.effort_kind, reading, rows, spool_above_bytes)
         episodes = EpisodeClock(SECONDS.get(reading.units.get("t", "s"), 1.0)) if _EPISODE in found else None
-        read = sorted({column.column for column in wanted} | ({_EPISODE} if episodes else set()))
+        read = sorted(
+            {column.column for column in (*wanted, nanoseconds or wanted[0])} | ({_EPISODE} if episodes else set())
+        )
         for batch in file.iter_batches(batch_size=_ROWS_AT_ONCE, columns=read, use_threads=False):
             first = len(intake) + 1
             columns = [take_column(arrow, batch, column) for column in wanted]
@@ -74,6 +79,8 @@ def read_parquet(
                 time = arrow.compute.subtract(stamps, first_stamp or 0)
                 columns[0] = arrow.compute.multiply(time.cast("float64"), 1e-9)
             block = np.column_stack([_numbers(column) for column in columns])
+            if nanoseconds is not None:
+                block[:, 0] = split.join(block[:, 0], _numbers(take_column(arrow, batch, nanoseconds)))
             if layout.counts_rows:
                 block[:, 0] = np.arange(len(block)) + len(intake)
             elif episodes is not None:

@@ -42,6 +42,8 @@ class Reading:
         whether currents are of no use, because no torque constant is known
     columns, decimal, delimiter, topic
         as in `RecordingLayout`
+    is_usual : bool
+        whether the columns are those of the robot file: recordings that Tauscope made have their own
     """
 
     units: Mapping[str, str] = field(default_factory=dict)
@@ -54,6 +56,12 @@ class Reading:
     decimal: str | None = None
     delimiter: str | None = None
     topic: str | None = None
+    is_usual: bool = False
+
+    def for_header(self, header: Sequence[str]) -> "Reading":
+        """The same reading, or SI where the robot file describes other recordings than one that Tauscope made."""
+        is_own = {"t", "q1"} <= set(header) and bool({"tau1", "i1"} & set(header))
+        return replace(self, columns=None, units={}, rate_hz=None) if self.is_usual and is_own else self
 
     def for_robot(self, robot: Robot | None) -> "Reading":
         """The same reading, with the units of the robot file where this one states none.
@@ -76,6 +84,7 @@ class Reading:
             units=units,
             rate_hz=rate_hz,
             columns=columns,
+            is_usual=self.columns is None and columns is not None,
             decimal=self.decimal or layout.decimal,
             delimiter=self.delimiter or layout.delimiter,
             topic=self.topic or layout.topic,

@@ -23,7 +23,10 @@ DELIMITERS: Mapping[str, str] = {
 """What may stand between fields, by itself and by name; a blank stands for any number of blanks and tabs."""
 
 Source = str | int | Sequence[str | int]
-"""A column by name or by number from 1, one of them a joint, or a name with ``{0}``, ``{1}`` or ``{name}`` in it."""
+"""A column by name or by number from 1, one of them a joint, or a name with ``{0}``, ``{1}`` or ``{name}`` in it.
+
+Two of them for t are seconds and nanoseconds.
+"""
 
 _COLUMN = re.compile(r"(t|q|qd|tau)([1-9][0-9]{0,3})?")
 _TARGET = re.compile(r"t|period|(q|tau|i|qd|qdd|qref|taucmd|temp|qlink)([1-9][0-9]{0,3})?")
@@ -85,7 +88,8 @@ def find_column_fault(columns: Mapping[str, Source] | str | None) -> str | None:
         match = _TARGET.fullmatch(target)
         if match is None:
             return f"{target!r} is no column of a recording; use {_GROUPS}, or one joint's, as in q3"
-        if (target in ("t", "period") or match[2]) and not isinstance(source, str | int):
+        is_split = target == "t" and isinstance(source, Sequence) and len(source) == 2
+        if (target in ("t", "period") or match[2]) and not isinstance(source, str | int) and not is_split:
             return f"{target} is one column; give one name, or its number from 1"
         if isinstance(source, int) and not (target in ("t", "period") or match[2]):
             return f"{target} has one column a joint; list them, as in [2, 3, 4]"

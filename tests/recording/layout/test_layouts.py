@@ -1,5 +1,6 @@
 """Files of other tools: any names, order, units and separators give the same recording, by preset, mapping or guess."""
 
+import importlib.util
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -67,6 +68,7 @@ STYLES = {
     "numbered joints": ("t", "joint{1}_position", "joint{1}_velocity", "joint{1}_torque"),
     "kuka": ("time", "measured_joint_position_{0}", "measured_joint_velocity_{0}", "measured_torque_{0}"),
     "dynamixel": ("timestamp", "Present_Position_{1}", "Present_Velocity_{1}", "Present_Torque_{1}"),
+    "names in front": ("time", "{name}_position", "{name}_velocity", "{name}_effort"),
     "zero based": ("t", "q{0}", "qd{0}", "tau{0}"),
 }
 SEPARATORS = [(",", "."), (";", "."), (";", ","), ("\t", ","), (" ", "."), ("|", "."), (" ", ",")]
@@ -303,3 +305,29 @@ def test_units_in_names(tmp_path: Path) -> None:
     samples = read(path, layout, JOINTS).samples()
     assert np.allclose(samples.position, Q)
     assert np.allclose(samples.effort, TAU)
+
+
+def test_seconds_and_nanoseconds_in_two_columns(tmp_path: Path) -> None:
+    stamp = 1_700_000_000_999_000_000 + 10_000_000 * np.arange(40)
+    seconds, nanoseconds = stamp // 10**9, stamp % 10**9
+    rows = [
+        [str(s), str(n), "base", *JOINTS, *map(repr, q), *map(repr, tau)]
+        for s, n, q, tau in zip(seconds, nanoseconds, Q.tolist(), TAU.tolist(), strict=True)
+    ]
+    text = "\n".join(",".join(row) for row in rows)
+    (tmp_path / "echo.csv").write_text(text + "\n", encoding="utf-8")
+    np.savez(tmp_path / "log.npz", sec=seconds, nsec=nanoseconds, q=Q, tau=TAU)
+    by_number = layout_from_dict({"t": [1, 2], "q": [7, 8, 9], "tau": [10, 11, 12]})
+    by_name = layout_from_dict({"t": ["sec", "nsec"], "q": "q", "tau": "tau"})
+    recordings = [read(tmp_path / "echo.csv", by_number), read(tmp_path / "log.npz", by_name)]
+    if importlib.util.find_spec("pyarrow"):
+        from pyarrow import parquet, table
+
+        columns = {"sec": seconds, "nsec": nanoseconds, "q": Q.tolist(), "tau": TAU.tolist()}
+        parquet.write_table(table(columns), tmp_path / "log.parquet")
+        recordings.append(read(tmp_path / "log.parquet", by_name))
+    for recording in recordings:
+        samples = recording.samples()
+        assert np.allclose(np.diff(samples.time), 0.01, atol=1e-9)
+        assert np.array_equal(samples.position, Q)
+        assert np.array_equal(samples.effort, TAU)

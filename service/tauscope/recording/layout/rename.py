@@ -13,6 +13,9 @@ from tauscope.recording.words import listed, printable
 from tauscope.robot.recording_layout import Source
 
 _TARGET = re.compile(r"([a-z]+)([0-9]*)")
+NANOSECONDS = "t nanoseconds"
+"""Name of the column with the nanoseconds of each second."""
+
 _EFFORTS = ("tau", "i")
 
 
@@ -71,10 +74,12 @@ class _Mapping:
         target_of: dict[int, str] = {}
         for target, source in columns.items():
             group, number = _split(target)
-            sources = [source] if number or group in ("t", "period") else self._group(group, source)
+            is_one = number or group in ("t", "period")
+            sources = [source] if isinstance(source, str | int) and is_one else self._group(group, source)
             for joint, name in enumerate(sources):
                 index = self._find(name, target)
-                wanted = target if number or group in ("t", "period") else f"{group}{joint + 1}"
+                wanted = target if is_one else f"{group}{joint + 1}"
+                wanted = NANOSECONDS if target == "t" and joint else wanted
                 if index in target_of:
                     raise RecordingError(
                         f"{self._file}: column {printable(str(name))} is mapped to {target_of[index]} and {wanted};"

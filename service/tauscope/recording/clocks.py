@@ -1,4 +1,4 @@
-"""Episodes of one file, each with a clock of its own, one after another on one clock."""
+"""Clocks of other tools: seconds and nanoseconds in two columns, and episodes that each begin at zero."""
 
 import numpy as np
 
@@ -7,6 +7,31 @@ from tauscope.result_warning import ResultWarning
 
 PAUSE_S = 60.0
 """Between two episodes [s]: no filter and no fit bridges a gap of this length."""
+
+
+class SplitClock:
+    """Joins seconds and nanoseconds, from the first row on: a large count has no room for small parts of a second."""
+
+    def __init__(self) -> None:
+        """Start before the first row."""
+        self._first = np.nan
+
+    def join(self, seconds: Array, nanoseconds: Array) -> Array:
+        """Time since the first second.
+
+        Parameters
+        ----------
+        seconds, nanoseconds : (rows,) float64
+            parts of each stamp [s, ns]
+
+        Returns
+        -------
+        (rows,) float64
+            [s]
+        """
+        if len(seconds) and np.isnan(self._first):
+            self._first = seconds[0]
+        return (seconds - self._first) + 1e-9 * nanoseconds
 
 
 class EpisodeClock:
