@@ -110,6 +110,17 @@ def _note_command(header: Sequence[str], renamed: Sequence[str]) -> tuple[Result
     return (ResultWarning(code="commanded-effort", text=text, remedy=remedy),)
 
 
+def choose_reading(header: Sequence[str], reading: Reading, file: str) -> Reading:
+    """The reading of a file: in SI where Tauscope made it, and the robot file describes those of another tool."""
+    if not (reading.is_usual and _is_ours(header)):
+        return reading
+    try:
+        rename_columns(header, reading, file)
+    except RecordingError:
+        return replace(reading, columns=None, units={}, rate_hz=None)
+    return reading
+
+
 def find_columns(header: Sequence[str], file: str, *, counts_rows: bool = False) -> ColumnLayout:
     """Find the columns of CONTRACT.md in a header.
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from tauscope.errors import RecordingError
 from tauscope.recording.clocks import SplitClock
-from tauscope.recording.columns import ColumnLayout, map_columns, require_joint_count
+from tauscope.recording.columns import ColumnLayout, choose_reading, map_columns, require_joint_count
 from tauscope.recording.csv_dialect import BLANK, Dialect, find_delimiter, find_first_row
 from tauscope.recording.csv_numbers import Clock, is_number, parse_number, parse_quickly, shown
 from tauscope.recording.intake import RowIntake
@@ -123,7 +123,7 @@ class _Chunk:
 def _read_header(file: BinaryIO, name: str, reading: Reading) -> _Header:
     """Read the names of the columns and find those that are wanted."""
     found = _read_names(file, name, reading)
-    reading = reading.for_header(found.names)
+    reading = choose_reading(found.names, reading, name)
     return _Header(found.line, found.dialect, map_columns(found.names, reading, name), reading, Clock(), SplitClock())
 
 

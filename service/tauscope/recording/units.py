@@ -58,11 +58,6 @@ class Reading:
     topic: str | None = None
     is_usual: bool = False
 
-    def for_header(self, header: Sequence[str]) -> "Reading":
-        """The same reading, or SI where the robot file describes other recordings than one that Tauscope made."""
-        is_own = {"t", "q1"} <= set(header) and bool({"tau1", "i1"} & set(header))
-        return replace(self, columns=None, units={}, rate_hz=None) if self.is_usual and is_own else self
-
     def for_robot(self, robot: Robot | None) -> "Reading":
         """The same reading, with the units of the robot file where this one states none.
 
