@@ -1,9 +1,8 @@
 """From the JointState messages of one topic to a recording: which joints, which clock."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby
-from typing import TypeVar
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +26,9 @@ LONGEST_FROM_ZERO_NS = 10**12
 """A stamp of zero beside stamps above this is none [ns]; simulated time may begin at zero."""
 
 Decoded = TypeVar("Decoded")
+Rows: TypeAlias = NDArray[np.intp]
+Batch: TypeAlias = tuple[Rows, JointStates]
+"""Messages of one layout, and their places among those that were taken at once."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,7 @@ class JointStateTopic:
         self.fault: RecordingError | None = None
         self._decoder = decoder
         self._choice = choice
-        self._layout: JointStateLayout | None = None
+        self._layouts: dict[int, JointStateLayout] = {}
         self._pending: list[tuple[int, bytes]] = []
         self._rows: _Rows | None = None
         self._others = OtherPublishers()
@@ -85,17 +87,12 @@ class JointStateTopic:
         log_time = np.array([time for time, _ in pending], dtype=np.uint64).astype(np.int64)
         try:
             messages = [
-                self._decode_one(decompress_message, message, first + k) for k, (_, message) in enumerate(pending)
+                self._decode_one(decompress_message, message, first + row) for row, (_, message) in enumerate(pending)
             ]
-            own: list[tuple[JointStates, NDArray[np.intp]]] = []
-            for start, states in self._decode(messages, first):
-                if self._is_own(states, first + start):
-                    rows = np.arange(start, start + len(states.stamp))
-                    if own and _is_alike(own[-1][0], states):  # another publisher's messages came between
-                        own[-1] = (_concatenate(own[-1][0], states), np.append(own[-1][1], rows))
-                    else:
-                        own.append((states, rows))
-            for states, rows in own:
+            batches = sorted(self._decode(messages, first), key=lambda batch: batch[0][0])
+            own = [(rows, self._arrange(states)) for rows, states in batches if self._is_own(states, first + rows[0])]
+            if own:
+                rows, states = _merge(own)
                 self._take(states, log_time[rows], first + rows)
         except RecordingError as error:
             self.fault = error
@@ -131,16 +128,29 @@ class JointStateTopic:
         recording = self._rows.finish()
         return replace(recording, notes=(*recording.notes, *self._others.notes(self.topic)))
 
-    def _decode(self, messages: Sequence[bytes], first: int) -> Iterable[tuple[int, JointStates]]:
-        """Batches of equal layout and where they start; all at once where the publisher kept to one layout."""
-        if self._decoder is decode_cdr:
-            if self._layout is None:
-                self._layout = self._decode_one(JointStateLayout, messages[0], first)
-            if (states := self._layout.decode(messages)) is not None:
-                return [(0, states)]
-        decoded = [self._decode_one(self._decoder, message, first + index) for index, message in enumerate(messages)]
-        runs = groupby(enumerate(decoded), key=lambda entry: _layout_of(entry[1]))
-        return [(run[0][0], _stack([state for _, state in run])) for run in (list(group) for _, group in runs)]
+    def _decode(self, messages: Sequence[bytes], first: int) -> list[Batch]:
+        """Batches of equal layout; all of one size at once, where a publisher keeps to one layout."""
+        whole = np.arange(len(messages))
+        if self._decoder is not decode_cdr:
+            return self._decode_each(messages, whole, first)
+        sizes = np.array([len(message) for message in messages])
+        batches: list[Batch] = []
+        for size in dict.fromkeys(sizes.tolist()):
+            rows = whole[sizes == size]
+            alike = [messages[row] for row in rows]
+            if size not in self._layouts:
+                self._layouts[size] = self._decode_one(JointStateLayout, alike[0], first + rows[0])
+            states = self._layouts[size].decode(alike)
+            batches += [(rows, states)] if states is not None else self._decode_each(alike, rows, first)
+        return batches
+
+    def _decode_each(self, messages: Sequence[bytes], rows: Rows, first: int) -> list[Batch]:
+        """Batches of equal layout, decoded message by message."""
+        groups: dict[object, list[tuple[int, JointState]]] = {}
+        for row, message in zip(rows.tolist(), messages, strict=True):
+            state = self._decode_one(self._decoder, message, first + row)
+            groups.setdefault(_layout_of(state), []).append((row, state))
+        return [(np.array([row for row, _ in g]), _stack([state for _, state in g])) for g in groups.values()]
 
     def _decode_one(self, decode: Callable[[bytes], Decoded], message: bytes, number: int) -> Decoded:
         """`decode(message)`, its complaint turned into one that names the message."""
@@ -167,12 +177,22 @@ class JointStateTopic:
         self._wanted = wanted or names or None
         return True
 
-    def _take(self, states: JointStates, log_time: NDArray[np.int64], number: NDArray[np.intp]) -> None:
-        """Add a batch to the rows, in the order of the wanted joints."""
-        order = _joint_order(states.names, states.position.shape[1], self._wanted)
+    def _arrange(self, states: JointStates) -> JointStates:
+        """Messages with the wanted joints in their order."""
+        names = states.names
+        if self._wanted is None or not names or names == self._wanted:
+            return states
+        order = [names.index(name) for name in self._wanted]
+        has_velocity = states.velocity.shape[1] > 0
+        velocity = states.velocity[:, order] if has_velocity else states.velocity
+        return JointStates(states.stamp, self._wanted, states.position[:, order], velocity, states.effort[:, order])
+
+    def _take(self, states: JointStates, log_time: NDArray[np.int64], number: Rows) -> None:
+        """Add messages to the rows."""
         if self._rows is None:
-            self._rows = _Rows(self._choice, self.topic, len(order), has_velocity=states.velocity.shape[1] > 0)
-        self._rows.append(states, order, log_time, number)
+            count, has_velocity = states.position.shape[1], states.velocity.shape[1] > 0
+            self._rows = _Rows(self._choice, self.topic, count, has_velocity=has_velocity)
+        self._rows.append(states, log_time, number)
 
 
 class _Rows:
@@ -192,9 +212,7 @@ class _Rows:
     def __len__(self) -> int:
         return len(self._intake)
 
-    def append(
-        self, states: JointStates, order: Sequence[int], log_time: NDArray[np.int64], number: NDArray[np.intp]
-    ) -> None:
+    def append(self, states: JointStates, log_time: NDArray[np.int64], number: Rows) -> None:
         """Add messages; the clock is the header stamp, or the log's where the first batch has no stamps at all."""
         stamp = states.stamp
         unset = (stamp == 0) & (stamp.max() > LONGEST_FROM_ZERO_NS)
@@ -212,11 +230,11 @@ class _Rows:
             )
         clock = log_time if self._by_log_time else stamp
         time = (clock - self._origin).astype(np.float64) * 1e-9
-        parts = [time[:, None], states.position[:, order], states.effort[:, order]]
+        parts = [time[:, None], states.position, states.effort]
         self.has_effort = self.has_effort or bool(np.isfinite(parts[2]).any())
         if self._has_velocity:
             is_sent = states.velocity.shape[1] > 0
-            parts.append(states.velocity[:, order] if is_sent else np.full_like(parts[2], np.nan))
+            parts.append(states.velocity if is_sent else np.full_like(parts[2], np.nan))
         block = np.hstack(parts)
         self._intake.add(block, lambda row: f"topic {self._topic}, message {number[row]}")
 
@@ -245,17 +263,24 @@ def _stack(states: Sequence[JointState]) -> JointStates:
     return JointStates(stamp, states[0].names, *(np.array([getattr(s, field) for s in states]) for field in fields))
 
 
-def _is_alike(first: JointStates, second: JointStates) -> bool:
-    """Whether batches have one layout."""
-    shapes = [(b.names, b.position.shape[1], b.velocity.shape[1], b.effort.shape[1]) for b in (first, second)]
-    return shapes[0] == shapes[1]
-
-
-def _concatenate(first: JointStates, second: JointStates) -> JointStates:
-    """Batches of one layout as one."""
-    fields = ("position", "velocity", "effort")
-    arrays = (np.concatenate([getattr(first, field), getattr(second, field)]) for field in fields)
-    return JointStates(np.concatenate([first.stamp, second.stamp]), first.names, *arrays)
+def _merge(batches: Sequence[Batch]) -> Batch:
+    """Batches of one publisher in the order of its messages; velocities are NaN where some messages lack them."""
+    rows = np.concatenate([rows for rows, _ in batches])
+    order = np.argsort(rows)
+    states = [states for _, states in batches]
+    has_velocity = any(each.velocity.shape[1] for each in states)
+    velocity = [
+        each.velocity if each.velocity.shape[1] or not has_velocity else np.full_like(each.position, np.nan)
+        for each in states
+    ]
+    merged = JointStates(
+        np.concatenate([each.stamp for each in states])[order],
+        states[0].names,
+        np.concatenate([each.position for each in states])[order],
+        np.concatenate(velocity)[order],
+        np.concatenate([each.effort for each in states])[order],
+    )
+    return rows[order], merged
 
 
 def _require_equal(states: JointStates, place: str) -> None:
@@ -268,10 +293,3 @@ def _require_equal(states: JointStates, place: str) -> None:
             raise RecordingError(f"{place}: {joints} positions and {count} {field}")
     if len(set(states.names)) != len(states.names):
         raise RecordingError(f"{place}: a joint is named twice ({listed(states.names)})")
-
-
-def _joint_order(names: tuple[str, ...], count: int, wanted: tuple[str, ...] | None) -> Sequence[int]:
-    """Index of each wanted joint in a message."""
-    if wanted is None or not names:
-        return range(count)
-    return [names.index(name) for name in wanted]
