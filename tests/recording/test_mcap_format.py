@@ -220,6 +220,16 @@ def test_another_publisher_of_the_same_joints_without_efforts(tmp_path):
         assert f"{len(other)} messages hold no effort; left out" in recording.notes[0].text
 
 
+def test_a_gripper_without_efforts_is_none_of_the_arms_business(tmp_path):
+    arm = messages(names=("lift", "elbow"))
+    gripper = [(time - 1, joint_state(time - 1, [0.1], [], (), ["finger"])) for time, _ in arm]
+    path = log_file(tmp_path, {"/joint_states": gripper + arm})
+    for names in (("lift", "elbow"), None):
+        recording = read_recording(path, joint_names=names)
+        assert recording.notes == ()
+        assert np.array_equal(recording.samples().position, MOTION["position"])
+
+
 def test_messages_without_velocities_between_others(tmp_path):
     recording = read_recording(log_file(tmp_path, {"/joint_states": edited(4, velocity=[])}))
     velocity = recording.samples().velocity

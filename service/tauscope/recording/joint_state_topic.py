@@ -126,7 +126,7 @@ class JointStateTopic:
         if self._rows is None:
             raise self._others.error(f"{self._choice.file}: topic {self.topic}", self._choice.joint_names)
         recording = self._rows.finish()
-        return replace(recording, notes=(*recording.notes, *self._others.notes(self.topic)))
+        return replace(recording, notes=(*recording.notes, *self._others.notes(self.topic, self._wanted or ())))
 
     def _decode(self, messages: Sequence[bytes], first: int) -> list[Batch]:
         """Batches of equal layout; all of one size at once, where a publisher keeps to one layout."""
@@ -171,7 +171,7 @@ class JointStateTopic:
                 self._others.add(names or (f"{count} joints without names",), wanted, len(states.stamp))
                 return False
         if not (count and states.effort.shape[1]):
-            self._others.add_incomplete("effort" if count else "positions", len(states.stamp))
+            self._others.add_incomplete(names, "effort" if count else "positions", len(states.stamp))
             return False
         _require_equal(states, f"{self._choice.file}: topic {self.topic}, message {number}")
         self._wanted = wanted or names or None

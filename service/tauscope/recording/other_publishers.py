@@ -16,20 +16,25 @@ class OtherPublishers:
         """Start without any."""
         self._foreign: dict[tuple[str, ...], int] = {}
         self._partial: dict[tuple[str, ...], int] = {}
-        self._incomplete: dict[str, int] = {}
+        self._incomplete: dict[tuple[str, tuple[str, ...]], int] = {}
 
     def add(self, names: Sequence[str], wanted: Sequence[str], count: int) -> None:
         """Messages that lack some of the wanted joints, or all of them."""
         kind = self._partial if set(names) & set(wanted) else self._foreign
         kind[tuple(names)] = kind.get(tuple(names), 0) + count
 
-    def add_incomplete(self, missing: str, count: int) -> None:
-        """Messages of the wanted joints without positions, or without efforts."""
-        self._incomplete[missing] = self._incomplete.get(missing, 0) + count
+    def add_incomplete(self, names: Sequence[str], missing: str, count: int) -> None:
+        """Messages without positions, or without efforts."""
+        key = missing, tuple(names)
+        self._incomplete[key] = self._incomplete.get(key, 0) + count
 
-    def notes(self, topic: str) -> tuple[ResultWarning, ...]:
+    def notes(self, topic: str, wanted: Sequence[str]) -> tuple[ResultWarning, ...]:
         """Warnings about messages that name wanted joints; a gripper's own messages are none of the arm's business."""
-        texts = [f"{_messages(count)} no {missing}; left out" for missing, count in self._incomplete.items()]
+        texts = [
+            f"{_messages(count)} no {missing}; left out"
+            for (missing, names), count in self._incomplete.items()
+            if not names or set(names) & set(wanted)
+        ]
         texts += [
             f"{_messages(count)} only the joints {listed(names)}; left out" for names, count in self._partial.items()
         ]
@@ -40,7 +45,7 @@ class OtherPublishers:
     def error(self, place: str, wanted: Sequence[str] | None) -> RecordingError:
         """The reason why no message was of use."""
         if self._incomplete:
-            missing = next(iter(self._incomplete))
+            missing, _ = next(iter(self._incomplete))
             return RecordingError(f"{place}: carries no {missing}; record position and effort of every joint")
         found = max((*self._partial.items(), *self._foreign.items()), key=lambda entry: entry[1], default=((), 0))[0]
         names = wanted or ()
