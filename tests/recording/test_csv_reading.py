@@ -53,6 +53,8 @@ SAME = {
     "decimal commas": "\n".join(LINES).replace(",", ";").replace(".", ",") + "\n",
     "decimal commas and blanks": "\n".join(LINES).replace(",", " ").replace(".", ",") + "\n",
     "names in a comment, as numpy.savetxt writes": "# " + "\n".join(LINES) + "\n",
+    "a row of units": "\n".join([LINES[0], "s,rad,rad,Nm,Nm", *LINES[1:]]),
+    "a row of units in brackets": "\n".join([LINES[0], "[s],[rad],(m),[Nm],[N·m]", *LINES[1:]]),
     "every field in quotes": "\n".join(",".join(f'"{field}"' for field in line.split(",")) for line in LINES) + "\n",
     "decimal commas in quotes": "\n".join(
         ",".join(f'"{field}"'.replace(".", ",") for field in line.split(",")) for line in LINES
@@ -131,8 +133,8 @@ BAD = {
     "one row": ("\n".join(LINES[:2]), "holds only 1 sample"),
     "nine rows": ("\n".join(LINES[:10]), "holds only 9 samples"),
     "no header": ("\n".join(LINES[1:]), "the first row holds numbers where the column names are expected"),
-    "units row": (changed(1, LINES[0] + "\ns,rad,rad,Nm,Nm"), "line 2 looks like a row of units ('s,rad,rad,Nm,Nm')"),
-    "bracketed units": (changed(1, LINES[0] + "\n[s],[rad],[rad],[Nm],[Nm]"), "line 2 looks like a row of units"),
+    "units row": (changed(1, LINES[0] + "\ns,rad,rad,lb,lb"), "line 2 looks like a row of units ('s,rad,rad,lb,lb')"),
+    "torques in two units": (changed(1, LINES[0] + "\ns,rad,rad,Nm,mA"), "line 2 looks like a row of units"),
     "no time": (changed(1, "time,q1,q2,tau1,tau2"), "column t (time in seconds) is missing; the columns are time, q1"),
     "no position": (changed(1, "t,p1,p2,tau1,tau2"), "column q1 (position of joint 1) is missing"),
     "no effort": (changed(1, "t,q1,q2,a,b"), "column tau1 (or i1, torque or current of joint 1) is missing"),

@@ -17,6 +17,7 @@ from tauscope.recording.intake import RowIntake
 from tauscope.recording.recording import Array, Recording
 from tauscope.recording.table import SPOOL_ABOVE_BYTES
 from tauscope.recording.units import SI, Reading
+from tauscope.recording.units_row import read_units_row
 
 _CHUNK_BYTES = 2**18
 _LONGEST_LINE_BYTES = 2**20
@@ -124,7 +125,22 @@ def _read_header(file: BinaryIO, name: str, reading: Reading) -> _Header:
     """Read the names of the columns and find those that are wanted."""
     found = _read_names(file, name, reading)
     reading = choose_reading(found.names, reading, name)
-    return _Header(found.line, found.dialect, map_columns(found.names, reading, name), reading, Clock(), SplitClock())
+    layout = map_columns(found.names, reading, name)
+    at, line = file.tell(), file.readline(_LONGEST_LINE_BYTES)
+    units = _find_units(found.dialect.split(line.strip(b"\r\n")), layout)
+    if units is None:
+        file.seek(at)
+    else:  # what the user states goes before it
+        reading = replace(reading, units={**units, **reading.units})
+    number = found.line + (units is not None)
+    return _Header(number, found.dialect, layout, reading, Clock(), SplitClock())
+
+
+def _find_units(cells: Sequence[bytes], layout: ColumnLayout) -> dict[str, str] | None:
+    """Units in the row below the names, None where it is none."""
+    if len(cells) != layout.width or any(map(is_number, cells)):
+        return None
+    return read_units_row(layout.names, [_decode(cells[index]) for index in layout.source])
 
 
 def _read_names(file: BinaryIO, name: str, reading: Reading) -> _Names:

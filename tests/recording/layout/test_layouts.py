@@ -331,3 +331,20 @@ def test_seconds_and_nanoseconds_in_two_columns(tmp_path: Path) -> None:
         assert np.allclose(np.diff(samples.time), 0.01, atol=1e-9)
         assert np.array_equal(samples.position, Q)
         assert np.array_equal(samples.effort, TAU)
+
+
+def test_a_row_of_units_is_obeyed_and_options_go_before_it(tmp_path: Path) -> None:
+    header = ["t", *(f"{group}{k}" for group in ("q", "tau", "qd") for k in (1, 2, 3))]
+    rows = np.column_stack([1e3 * TIME, np.degrees(Q[:, 0]), Q[:, 1:], 1e3 * TAU, np.degrees(QD)])
+    path = write(tmp_path / "file.csv", header, rows)
+    lines = path.read_text(encoding="utf-8").splitlines()
+    lines.insert(1, "[ms],deg,rad,rad,mA,mA,mA,°/s,deg/s,°/s")
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    recording = read_recording(path)
+    samples = recording.samples()
+    assert recording.effort_kind == "i"
+    assert samples.velocity is not None
+    for found, expected in ((samples.position, Q), (samples.effort, TAU), (samples.velocity, QD)):
+        assert np.allclose(found, expected)
+    assert np.allclose(np.diff(samples.time), 0.01)
+    assert np.allclose(read_recording(path, reading=Reading({"tau": "Nm"})).samples().effort, 1e3 * TAU)
