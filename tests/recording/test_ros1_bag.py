@@ -1,5 +1,6 @@
 """ROS 1 bags, written by rosbags."""
 
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -43,3 +44,13 @@ def test_a_bag_that_was_cut_short_is_refused(tmp_path: Path) -> None:
     for length in np.linspace(20, len(data) - 1, 15).astype(int):
         path.write_bytes(data[:length])
         assert message_of(lambda: read_recording(path)).startswith(f"{path}: ")
+
+
+def test_a_chunk_that_unpacks_to_more_than_it_states_is_refused(tmp_path: Path) -> None:
+    path = write_bag(tmp_path / "file.bag", "BZ2")
+    data = path.read_bytes()
+    at = data.index(b"size=", data.index(b"compression=bz2")) if b"size=" in data else 0
+    path.write_bytes(data[: at + 5] + struct.pack("<I", 100) + data[at + 9 :])
+    assert "a chunk is not as large as it states" in message_of(lambda: read_recording(path))
+    path.write_bytes(data[: at + 5] + struct.pack("<I", 2**31) + data[at + 9 :])
+    assert "times its size" in message_of(lambda: read_recording(path))

@@ -57,7 +57,10 @@ Topic = Annotated[str | None, typer.Option(metavar="TOPIC", help="Topic of a log
 RecordingFile = Annotated[
     Path,
     typer.Argument(
-        metavar="FILE", exists=True, help="Recording: CSV, Parquet, MCAP, or a rosbag2 folder.", show_default=False
+        metavar="FILE",
+        exists=True,
+        help="Recording: CSV, Parquet, NumPy archive, MCAP, rosbag2 folder, or ROS 1 bag.",
+        show_default=False,
     ),
 ]
 

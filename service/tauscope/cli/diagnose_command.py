@@ -23,7 +23,7 @@ Recordings = Annotated[
     typer.Argument(
         metavar="RECORDING",
         exists=True,
-        help="Recordings of the real arm that are to be explained: CSV, Parquet, MCAP or rosbag2.",
+        help="Recordings of the real arm that are to be explained: CSV, Parquet, NumPy, MCAP or a bag.",
         show_default=False,
     ),
 ]

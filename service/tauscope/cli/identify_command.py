@@ -23,7 +23,7 @@ Recordings = Annotated[
     typer.Argument(
         metavar="RECORDING",
         exists=True,
-        help="Recordings that the model is made from: CSV, Parquet, MCAP or rosbag2.",
+        help="Recordings that the model is made from: CSV, Parquet, NumPy, MCAP or a bag.",
         show_default=False,
     ),
 ]

@@ -10,7 +10,7 @@ from tauscope.recording.inflation import require_plausible_inflation
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 """First bytes of a zstd frame; a CDR message begins with a zero byte, JSON with a bracket."""
 
-_LARGEST_MESSAGE_BYTES = 2**24
+_LARGEST_MESSAGE_BYTES = 2**17  # a thousand joints: a batch of bombs still fits into memory
 _COPY_BYTES = 2**20
 
 
