@@ -59,7 +59,8 @@ def map_columns(header: Sequence[str], reading: Reading, file: str) -> ColumnLay
         layout = find_columns(["t", *renamed] if counts_rows else renamed, file, counts_rows=counts_rows)
         return replace(layout, notes=_note_command(header, renamed))
     except RecordingError as error:
-        if reading.columns is not None or isinstance(error, RecordingMismatchError):
+        named = [name for name in header if name]
+        if reading.columns is not None or isinstance(error, RecordingMismatchError) or len(set(named)) < len(named):
             raise
         guess = _guess_sound(header, reading, file)
         if guess is None and _is_ours(header):

@@ -91,21 +91,32 @@ def columns_of(style: Sequence[str]) -> list[str]:
     separators=st.sampled_from(SEPARATORS),
     knows_robot=st.booleans(),
     extra=st.booleans(),
+    time=st.sampled_from([("s", 1.0), ("ms", 1e3), ("us", 1e6)]),
+    angle=st.sampled_from([("rad", 1.0), ("deg", 180.0 / np.pi)]),
 )
 def test_the_mapping_that_a_refusal_prints_works_when_pasted(
-    tmp_path: Path, style: str, order: list[int], separators: tuple[str, str], knows_robot: bool, extra: bool
+    tmp_path: Path,
+    style: str,
+    order: list[int],
+    separators: tuple[str, str],
+    knows_robot: bool,
+    extra: bool,
+    time: tuple[str, float],
+    angle: tuple[str, float],
 ) -> None:
-    header, rows = columns_of(STYLES[style]), np.column_stack([TIME, Q, QD, TAU])
+    header = columns_of(STYLES[style])
+    rows = np.column_stack([time[1] * TIME, angle[1] * Q, angle[1] * QD, TAU])
     header, rows = [header[index] for index in order], rows[:, order]
     if extra:
         header, rows = [*header, "actual_TCP_pose_0", "safety_mode"], np.column_stack([rows, TIME, TIME])
     path = write(tmp_path / "file.csv", header, rows, *separators)
     joints = JOINTS if knows_robot or "{name}" in STYLES[style][1] else None
     layout = guess_of(message_of(lambda: read_recording(path, joint_names=joints)))
-    recording = read(path, layout, joints)
+    recording = read(path, replace(layout, units={"t": time[0], "q": angle[0]}), joints)
     names = ("t", *(f"{group}{k}" for group in ("q", "tau", "qd") for k in (1, 2, 3)))
     assert recording.table.names == names
-    assert np.array_equal(rows_of(recording), np.column_stack([TIME, Q, TAU, QD]))
+    start = 0.0 if time[0] == "s" else TIME[0]
+    assert np.allclose(rows_of(recording), np.column_stack([TIME - start, Q, TAU, QD]), atol=1e-9)
 
 
 PRESETS = {
@@ -348,3 +359,14 @@ def test_a_row_of_units_is_obeyed_and_options_go_before_it(tmp_path: Path) -> No
         assert np.allclose(found, expected)
     assert np.allclose(np.diff(samples.time), 0.01)
     assert np.allclose(read_recording(path, reading=Reading({"tau": "Nm"})).samples().effort, 1e3 * TAU)
+
+
+def test_a_rig_with_one_joint(tmp_path: Path) -> None:
+    path = write(
+        tmp_path / "file.csv", ["Time", "Position (rad)", "Torque"], np.column_stack([TIME, Q[:, 0], TAU[:, 0]])
+    )
+    for joints in (None, ("j",)):
+        layout = guess_of(message_of(lambda joints=joints: read_recording(path, joint_names=joints)))
+        samples = read(path, layout, joints).samples()
+        assert np.array_equal(samples.position, Q[:, :1])
+        assert np.array_equal(samples.effort, TAU[:, :1])

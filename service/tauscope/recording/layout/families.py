@@ -48,9 +48,11 @@ def words_of(text: str) -> tuple[str, ...]:
 
 
 def find_families(header: Sequence[str], joint_names: Sequence[str] | None) -> list[Family]:
-    """Families of a header: named by the robot's joints, else numbered, else named by whatever the file says."""
+    """Families of a header: named by the robot's joints, numbered, or named by any word; single columns of one joint."""
     named = _named_by(header, joint_names or ())
-    return [*named, *_numbered(header), *([] if named else _named_by_segments(header))]
+    has_one = joint_names is None or len(joint_names) == 1
+    single = [Family(name, (name,), is_guessed=True) for name in header if has_one]
+    return [*named, *_numbered(header), *([] if named else _named_by_segments(header)), *single]
 
 
 def fill_template(template: str, index: int, name: str | None) -> str:
