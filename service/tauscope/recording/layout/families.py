@@ -48,7 +48,7 @@ def words_of(text: str) -> tuple[str, ...]:
 
 
 def find_families(header: Sequence[str], joint_names: Sequence[str] | None) -> list[Family]:
-    """Families of a header: named by the robot's joints, numbered, or named by any word; single columns of one joint."""
+    """Families of a header: named by the robot's joints, numbered, or named by any word; one joint has no number."""
     named = _named_by(header, joint_names or ())
     has_one = joint_names is None or len(joint_names) == 1
     single = [Family(name, (name,), is_guessed=True) for name in header if has_one]
