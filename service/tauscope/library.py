@@ -63,7 +63,7 @@ def read_recording(
         where the columns are found, as in ``{"t": "time", "q": "position_{1}", "tau": "effort_{1}"}``; a preset, or a
         file with such a mapping; None takes those of the robot file
     decimal, delimiter : str or None
-        of a CSV; None takes what it shows
+        of a CSV; None detects it
     topic : str or None
         of a log that has several with joint states
 

@@ -42,14 +42,12 @@ Columns = Annotated[
         show_default=False,
     ),
 ]
-Decimal = Annotated[
-    str | None, typer.Option(metavar=".|,", help="Decimal sign of a CSV; the one that it shows by default.")
-]
+Decimal = Annotated[str | None, typer.Option(metavar=".|,", help="Decimal sign of a CSV; detected by default.")]
 Delimiter = Annotated[
     str | None,
     typer.Option(
         metavar="SIGN",
-        help="What separates the fields of a CSV: comma, semicolon, tab, blank or |; what it shows by default.",
+        help="Delimiter of a CSV: comma, semicolon, tab, blank or |; detected by default.",
     ),
 ]
 Topic = Annotated[str | None, typer.Option(metavar="TOPIC", help="Topic of a log that has several with joint states.")]
@@ -74,7 +72,7 @@ def reading_fields(
     delimiter: str | None,
     topic: str | None,
 ) -> dict[str, Any]:
-    """Fields of `ReadingOptions`; what an option states goes before the file of ``--columns``.
+    """Fields of `ReadingOptions`; an option overrides the file of ``--columns``.
 
     Parameters
     ----------

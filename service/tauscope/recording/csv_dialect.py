@@ -1,4 +1,4 @@
-"""How a text file separates its fields and writes its decimals, by what it says or shows."""
+"""Delimiter, decimal sign, quotes and lists of a text file."""
 
 import csv
 import re
@@ -22,7 +22,7 @@ class Dialect:
 
     @property
     def separator(self) -> bytes:
-        """What separates the fields of normal text."""
+        """Delimiter of normal text."""
         return b"," if self.delimiter == BLANK else self.delimiter
 
     def normalize(self, text: bytes) -> bytes:

@@ -130,7 +130,7 @@ def _read_header(file: BinaryIO, name: str, reading: Reading) -> _Header:
     units = _find_units(found.dialect.split(line.strip(b"\r\n")), layout)
     if units is None:
         file.seek(at)
-    else:  # what the user states goes before it
+    else:  # stated units override it
         reading = replace(reading, units={**units, **reading.units})
     number = found.line + (units is not None)
     return _Header(number, found.dialect, layout, reading, Clock(), SplitClock())

@@ -39,7 +39,7 @@ class DamageError(Exception):
 
 
 class MessageSink(Protocol):
-    """Whoever wants the messages of an MCAP file."""
+    """Receiver of the messages of an MCAP file."""
 
     def handler(self, topic: str, type_name: str, encoding: str, schema: bytes = b"") -> MessageHandler | None:
         """The taker of a topic's messages, None where there is none."""

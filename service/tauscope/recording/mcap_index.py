@@ -39,7 +39,7 @@ _INDEX_ENTRY = struct.Struct("<QQ")
 
 @dataclass
 class _Summary:
-    """What the end of a file says about its chunks."""
+    """Schemas, channels and chunks, as the end of a file lists them."""
 
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)

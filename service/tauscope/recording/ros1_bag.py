@@ -76,7 +76,7 @@ def _ros1_name(type_name: str) -> str:
 
 
 def _require_plausible_chunks(path: Path, name: str) -> None:
-    """Refuse chunks that unpack to more than they state, or to implausibly much: rosbags unpacks whatever comes."""
+    """Refuse chunks that unpack to more than they state, or to implausibly much: rosbags has no limit."""
     unpacked, size = 0, path.stat().st_size
     with path.open("rb") as file:
         file.readline(64)

@@ -23,7 +23,7 @@ def read_units_row(names: Sequence[str], cells: Sequence[str]) -> dict[str, str]
     names : sequence of str
         columns of CONTRACT.md
     cells : sequence of str
-        what the row holds for each of them
+        cells of the row, one for each of them
     """
     units: dict[str, str] = {}
     for name, cell in zip(names, cells, strict=True):

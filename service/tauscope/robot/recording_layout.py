@@ -20,7 +20,7 @@ DELIMITERS: Mapping[str, str] = {
     **{sign: sign for sign in (",", ";", "\t", " ", "|")},
     **{"comma": ",", "semicolon": ";", "tab": "\t", "\\t": "\t", "blank": " "},
 }
-"""What may stand between fields, by itself and by name; a blank stands for any number of blanks and tabs."""
+"""Delimiters, as signs and by name; a blank stands for any number of blanks and tabs."""
 
 Source = str | int | Sequence[str | int]
 """A column by name or by number from 1, one of them a joint, or a name with ``{0}``, ``{1}`` or ``{name}`` in it.

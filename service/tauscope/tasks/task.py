@@ -41,10 +41,10 @@ class ReadingOptions(StrictModel):
         " 1, one of them a joint, or a name with {0}, {1} or {name} for the joint; null: as the robot file says",
         examples=[{"t": "timestamp", "q": "actual_q_{0}", "tau": "target_moment_{0}"}],
     )
-    decimal: str | None = Field(default=None, description="decimal sign of a CSV; null: the one that it shows")
+    decimal: str | None = Field(default=None, description="decimal sign of a CSV; null: detected")
     delimiter: str | None = Field(
         default=None,
-        description="what separates the fields of a CSV: comma, semicolon, tab, blank or |; null: what it shows",
+        description="delimiter of a CSV: comma, semicolon, tab, blank or |; null: detected",
     )
     topic: str | None = Field(default=None, description="topic of a log that has several with joint states")
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from tauscope.recording.layout.roles import is_joint_name
 
 FROM_ZERO, FROM_ONE, BY_NAME = "{0}", "{1}", "{name}"
-"""What stands for the joint in a template: its number counted from 0 or from 1, or its name."""
+"""Placeholders of a template: the joint's number from 0, its number from 1, its name."""
 
 PLACEHOLDERS = (FROM_ZERO, FROM_ONE, BY_NAME)
 

@@ -1,4 +1,4 @@
-"""What a family of columns holds, by the words of its name."""
+"""The quantity that a family of columns holds, by the words of its name."""
 
 import re
 from collections.abc import Mapping, Sequence
