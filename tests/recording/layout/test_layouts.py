@@ -176,6 +176,23 @@ def test_rows_are_counted_where_a_rate_is_stated(tmp_path: Path) -> None:
     assert np.array_equal(recording.samples().position, Q)
 
 
+def test_a_preset_of_another_arm_is_refused(tmp_path: Path) -> None:
+    path = write(tmp_path / "file.csv", columns_of(STYLES["rtde"]), np.column_stack([TIME, Q, QD, TAU]))
+    message = ""
+    for joints in (("a", "b", "c", "d"), ("a", "b")):
+        message = message_of(lambda joints=joints: read(path, read_layout("rtde"), joints))
+        assert f"the columns are of 3 joints, the robot has {len(joints)}; " in message
+    assert np.array_equal(read(path, guess_of(message), ("a", "b")).samples().position, Q[:, :2])
+
+
+def test_a_mapping_may_name_single_columns(tmp_path: Path) -> None:
+    header = ["clock", "q1", "elbow", "q3", "tau1", "tau2", "tau3", "x"]
+    path = write(tmp_path / "file.csv", header, np.column_stack([TIME, Q, TAU, TAU[:, 0]]))
+    recording = read(path, layout_from_dict({"t": "clock", "q2": "elbow", "tau3": "x"}))
+    assert np.array_equal(recording.samples().position, Q)
+    assert np.array_equal(recording.samples().effort, TAU[:, [0, 1, 0]])
+
+
 def test_a_mapping_may_name_a_part_of_the_columns(tmp_path: Path) -> None:
     header = ["clock", "q1", "q2", "q3", "tau1", "tau2", "tau3"]
     path = write(tmp_path / "file.csv", header, np.column_stack([TIME, Q, TAU]))

@@ -3,14 +3,15 @@
 import difflib
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from tauscope.errors import RecordingError, RecordingMismatchError
 from tauscope.recording.layout.families import BY_NAME, PLACEHOLDERS, fill_template, names_in
-from tauscope.recording.layout.guess import guess_layout, guess_parts
+from tauscope.recording.layout.guess import guess_layout, guess_parts, layout_text
 from tauscope.recording.layout.presets import PRESET_OF
 from tauscope.recording.units import Reading
 from tauscope.recording.words import listed, printable
-from tauscope.robot.recording_layout import Source
+from tauscope.robot.recording_layout import RecordingLayout, Source
 
 _TARGET = re.compile(r"([a-z]+)([0-9]*)")
 NANOSECONDS = "t nanoseconds"
@@ -35,19 +36,22 @@ def rename_columns(header: Sequence[str], reading: Reading, file: str) -> list[s
     if isinstance(columns, str):
         columns = _preset_columns(header, columns, reading, file)
     target_of = _Mapping(header, reading, file).expand(columns)
-    groups = {_group(target) for target in target_of.values()}
-    groups |= {*_EFFORTS} if groups & {*_EFFORTS} else set()
-    # A column that the mapping leaves out keeps its name, unless the mapping has columns of its group.
-    return [target_of.get(index, f"{name} " if _group(name) in groups else name) for index, name in enumerate(header)]
+    taken, whole = set(target_of.values()), {target for target in columns if not _split(target)[1]}
+    efforts = {_group(target) for target in columns} & {*_EFFORTS}
+    others = {*_EFFORTS} - efforts if efforts else set()
+
+    def is_replaced(name: str) -> bool:
+        return name in taken or _group(name) in whole | others
+
+    # A column that the mapping leaves out keeps its name, unless the mapping has another in its place.
+    return [target_of.get(index, f"{name} " if is_replaced(name) else name) for index, name in enumerate(header)]
 
 
 def _preset_columns(header: Sequence[str], preset: str, reading: Reading, file: str) -> Mapping[str, Source]:
     """The mapping of a preset for this header."""
     layout = guess_layout(header, reading.joint_names, preset=preset, prefers_torque=reading.prefers_torque)
+    _require_as_many(header, preset, layout, reading, file)
     if layout is None:
-        other = guess_layout(header, None, preset=preset)
-        if other is not None and reading.joint_names is not None and isinstance(other.columns, Mapping):
-            _Mapping(header, reading, file).expand(other.columns)  # names the joints that differ
         parts = guess_parts(header, reading.joint_names, preset=preset).columns or {}
         known = PRESET_OF[preset].columns
         lacks, names = ("time", known["t"]) if "t" not in parts else ("position", known["q"])
@@ -59,6 +63,26 @@ def _preset_columns(header: Sequence[str], preset: str, reading: Reading, file: 
         )
     assert isinstance(layout.columns, Mapping)  # noqa: S101 - a guess always is one
     return layout.columns
+
+
+def _require_as_many(
+    header: Sequence[str], preset: str, layout: RecordingLayout | None, reading: Reading, file: str
+) -> None:
+    """Refuse a preset's columns of other joints, or of more or fewer, than the robot has."""
+    found = None if reading.joint_names is None else guess_layout(header, None, preset=preset)
+    if found is None or reading.joint_names is None or not isinstance(found.columns, Mapping):
+        return
+    if layout is None:
+        _Mapping(header, reading, file).expand(found.columns)  # names the joints that differ
+    unnamed = replace(reading, joint_names=None)
+    targets = _Mapping(header, unnamed, file).expand(found.columns).values()
+    count, wanted = sum(_group(target) == "q" for target in targets), len(reading.joint_names)
+    is_by_name = layout is not None and isinstance(layout.columns, Mapping) and BY_NAME in str(layout.columns["q"])
+    if count != wanted and not is_by_name:
+        hint = "give the robot file and the recording of the same arm"
+        if layout is not None:
+            hint = f"if the first {wanted} are the robot's, give --columns FILE.yaml: {layout_text(layout)}"
+        raise RecordingMismatchError(f"{file}: the columns are of {count} joints, the robot has {wanted}; {hint}")
 
 
 class _Mapping:
