@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from tauscope.errors import RecordingError, RecordingMismatchError
 from tauscope.recording.layout.families import BY_NAME, words_of
 from tauscope.recording.layout.guess import guess_layout, is_numbered, layout_text
+from tauscope.recording.layout.presets import PRESET_OF
 from tauscope.recording.layout.rename import NANOSECONDS, rename_columns
 from tauscope.recording.layout.roles import role_of
 from tauscope.recording.samples import EffortKind
@@ -85,7 +86,17 @@ def _guess_sound(header: Sequence[str], reading: Reading, file: str) -> Recordin
         find_columns(rename_columns(header, replace(reading, columns=guess.columns), file), file)
     except RecordingError:
         return None
-    return guess
+    return replace(guess, units={**_units_of_tool(header, reading, guess), **guess.units})
+
+
+def _units_of_tool(header: Sequence[str], reading: Reading, guess: RecordingLayout) -> Mapping[str, str]:
+    """Units of the preset that reads the same columns, such as LeRobot's degrees."""
+    for name, preset in PRESET_OF.items():
+        if preset.units:
+            layout = guess_layout(header, reading.joint_names, preset=name, prefers_torque=reading.prefers_torque)
+            if layout is not None and layout.columns == guess.columns:
+                return preset.units
+    return {}
 
 
 def _require_known_names(header: Sequence[str], reading: Reading, file: str) -> None:

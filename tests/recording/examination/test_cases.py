@@ -93,7 +93,7 @@ def test_the_mapping_of_a_refusal_works_when_pasted(
     message = message_of(lambda: open_recording(RECORDINGS / name, robot))
     (tmp_path / "map.yaml").write_text(message[message.index("recording: {") :], encoding="utf-8")
     layout = read_layout(str(tmp_path / "map.yaml"))
-    reading = Reading(columns=layout.columns, units={"q": "deg"} if "lerobot" in name else {})
+    reading = Reading(columns=layout.columns, units=layout.units)
     sound = open_recording(SHARED_CASES / "ur5" / "ur5.csv", ur5).samples()
     found = open_recording(RECORDINGS / name, robot, reading)
     assert np.allclose(found.samples().position, sound.position, atol=1e-6)
