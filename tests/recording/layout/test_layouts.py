@@ -167,6 +167,9 @@ def test_a_file_without_names_is_mapped_by_numbers(tmp_path: Path) -> None:
     assert "the first row holds numbers where the column names are expected" in message
     assert "{t: 1, q: [2, 3, 4], qd: [5, 6, 7], tau: [8, 9, 10]}" in message
     assert np.array_equal(rows_of(read(path, guess_of(message), JOINTS)), np.column_stack([TIME, Q, TAU, QD]))
+    assert "no column holds the time, which rtde calls timestamp" in message_of(
+        lambda: read(path, read_layout("rtde"), JOINTS)
+    )
 
 
 def test_rows_are_counted_where_a_rate_is_stated(tmp_path: Path) -> None:

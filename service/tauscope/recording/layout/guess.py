@@ -48,6 +48,8 @@ def guess_parts(
     prefers_torque: bool = False,
 ) -> RecordingLayout:
     """As much of a header's layout as its columns suggest; arguments as of `guess_layout`."""
+    if is_numbered(header) and preset is not None:
+        return RecordingLayout(columns={})
     if is_numbered(header):
         return _guess_by_place(len(header), None if joint_names is None else len(joint_names))
     rank = role_of if preset is None else _preset_ranking(PRESET_OF[preset])
