@@ -282,3 +282,10 @@ def test_spooled_reading_gives_the_same_rows(tmp_path):
         assert np.array_equal(rows_of(spooled), rows_of(kept))
         assert np.array_equal(spooled.samples(777, 29_001).effort, kept.samples(777, 29_001).effort)
     assert [file.name for file in tmp_path.iterdir()] == ["long.csv"]
+
+
+def test_a_row_that_comes_nine_rows_early_is_refused_wherever_blocks_end(tmp_path):
+    lines = [*LINES[:6], field_changed(7, "t", "1").splitlines()[6], *LINES[7:16]]
+    assert "column t: time runs backwards" in message_of(lambda: read(tmp_path, "\n".join(lines)))
+    assert "column t: time runs backwards" in message_of(lambda: read(tmp_path, "\n".join(lines) + "\n"))
+    assert len(read(tmp_path, "\n".join(lines[:-1]) + "\n")) == 14
