@@ -88,6 +88,8 @@ def expected_rows(data: bytes) -> np.ndarray | None:
     lines = lines[first_line_of_names(lines) :]
     delimiter = next((mark for mark in ",;\t" if mark in lines[0]), ",")
     header = [name.strip(' \t\r"') for name in lines[0].split(delimiter)]
+    if header == list(COLUMNS) and lines[1:2] == ["s,rad,rad,Nm,Nm"]:
+        del lines[1]  # a row of units in SI
     rows = [line.split(delimiter) for line in lines[1:]]
     if not rows or any(header.count(name) != 1 for name in COLUMNS) or any(len(row) != len(header) for row in rows):
         return None

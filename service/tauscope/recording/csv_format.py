@@ -126,13 +126,15 @@ def _read_header(file: BinaryIO, name: str, reading: Reading) -> _Header:
     found = _read_names(file, name, reading)
     reading = choose_reading(found.names, reading, name)
     layout = map_columns(found.names, reading, name)
-    at, line = file.tell(), file.readline(_LONGEST_LINE_BYTES)
+    at, number, line = file.tell(), found.line, b"\n"
+    while line and _is_empty(line):
+        line, number = file.readline(_LONGEST_LINE_BYTES), number + 1
     units = _find_units(found.dialect.split(line.strip(b"\r\n")), layout)
     if units is None:
         file.seek(at)
+        number = found.line
     else:  # stated units override it
         reading = replace(reading, units={**units, **reading.units})
-    number = found.line + (units is not None)
     return _Header(number, found.dialect, layout, reading, Clock(), SplitClock())
 
 

@@ -119,8 +119,8 @@ class RowIntake:
         """Rows in order of time, the first of those with one stamp, and their numbers in the file."""
         time = block[:, 0]
         order = np.argsort(time, kind="stable")
-        late_by = np.maximum.accumulate(rows[order]) - rows[order]
-        if late_by.max() > LATE_ROWS or time[order[0]] < self._last:
+        place_in_file = np.arange(self._rows - len(block), self._rows)
+        if np.abs(rows[order] - place_in_file).max() > LATE_ROWS or time[order[0]] < self._last:
             row = int(np.argmax(np.diff(time, prepend=self._last) < 0))
             require_rising(
                 time[row:], self._last if row == 0 else float(time[row - 1]), self._file, lambda _: place(row)
