@@ -51,7 +51,7 @@ def find_families(header: Sequence[str], joint_names: Sequence[str] | None) -> l
     """Families of a header: named by the robot's joints, numbered, or named by any word; one joint has no number."""
     named = _named_by(header, joint_names or ())
     has_one = joint_names is None or len(joint_names) == 1
-    single = [Family(name, (name,), is_guessed=True) for name in header if has_one]
+    single = [Family(name, (name,), is_guessed=True) for name in header if has_one and not _NUMBER.search(name)]
     return [*named, *_numbered(header), *([] if named else _named_by_segments(header)), *single]
 
 
