@@ -9,7 +9,9 @@ from tauscope_drivers.canopen.bus import CanBus
 from tauscope_drivers.canopen.configuration import BusConfiguration, read_configuration
 from tauscope_drivers.canopen.data_sheet.device_file import DescribedObject, DeviceFile
 from tauscope_drivers.canopen.data_sheet.settings import settings_of
-from tauscope_drivers.canopen.node import MODES, DriveNode
+from tauscope_drivers.canopen.drive_modes import TARGETS
+from tauscope_drivers.canopen.node import DriveNode
+from tauscope_drivers.canopen.optional_objects import DOUBTFUL
 from tauscope_drivers.canopen.session import possible_rate_hz
 from tauscope_drivers.canopen.state_machine import POWERED
 from tauscope_drivers.drive_block import DriveJoint
@@ -89,10 +91,10 @@ def _examine_drive(node: DriveNode) -> list[Finding]:
     findings = [Finding(Severity.GOOD, node.place, f"{name}, firmware {version}, {torque:.4g} Nm a per mille")]
     if node.configuration.device_file is not None:
         findings += _examine_file(node.configuration.device_file, node.place)
-    missing = [str(mode) for mode in MODES if mode not in modes]
+    missing = [str(mode) for mode in TARGETS if mode not in modes]
     if missing:
         detail = f"has no cyclic synchronous {' and '.join(missing)} mode (0x6502)"
-        severity = Severity.FAILURE if len(missing) == len(MODES) else Severity.WARNING
+        severity = Severity.FAILURE if len(missing) == len(TARGETS) else Severity.WARNING
         findings.append(Finding(severity, node.place, detail, "run the arm in the other mode, or update its firmware"))
     node.read_now()
     for fault in node.faults():
@@ -100,10 +102,16 @@ def _examine_drive(node: DriveNode) -> list[Finding]:
     if node.state in POWERED:
         remedy = "none where it holds the arm; else support the arm and switch it off"
         findings.append(Finding(Severity.WARNING, node.place, f"is under power: {node.state}", remedy))
-    if dictionary.read_optional(objects.ABORT_CONNECTION) is None:
-        detail = "has no abort connection option (0x6007): it does not stop by itself when the host is gone"
-        findings.append(Finding(Severity.FAILURE, node.place, detail, "use a drive that has one, or an emergency stop"))
+    findings += [_remark(node.place, remark) for remark in node.remarks]
     return findings
+
+
+def _remark(place: str, remark: str) -> Finding:
+    """What a drive does not have, and the substitute: a warning where an operator has to try it."""
+    if any(str(entry) in remark for entry in DOUBTFUL):
+        detail, _, effect = remark.partition(": ")
+        return Finding(Severity.WARNING, place, detail, effect)
+    return Finding(Severity.GOOD, place, remark)
 
 
 def _examine_file(file: DeviceFile, place: str) -> list[Finding]:

@@ -5,7 +5,8 @@ from typing import Any
 
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.driver import PATIENCE, ArmDescription, BusDriver, Connection, Option
-from tauscope_drivers.inspection import Finding, FoundDevice, FrameRequest, PlannedFrame
+from tauscope_drivers.errors import DriverError
+from tauscope_drivers.inspection import Finding, FoundDevice, FrameRequest, PlannedFrame, failure
 
 
 class DynamixelDriver(BusDriver):
@@ -33,6 +34,16 @@ class DynamixelDriver(BusDriver):
         from tauscope_drivers.dynamixel.doctor import serial_adapters
 
         return serial_adapters()
+
+    def check_blocks(self, joints: Sequence[DriveJoint]) -> list[Finding]:
+        """Blocks: servo IDs, port and units."""
+        from tauscope_drivers.dynamixel.configuration import read_configuration
+
+        try:
+            read_configuration(joints)
+        except DriverError as error:
+            return [failure(self.name, str(error))]
+        return []
 
     def examine(self, joints: Sequence[DriveJoint]) -> list[Finding]:
         """Port, and every servo that the robot file names."""

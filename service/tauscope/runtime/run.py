@@ -101,7 +101,7 @@ class Run:
         metronome = Metronome(backend.clock, now + plan.period_ns, plan.period_ns, plan.cycles)
         arm = GuardedArm(backend, guard, state)
         self._cycles = Cycles(plan, arm, metronome, recorder, stops, control, self._each_cycle)
-        self._enter(RunState.RAMPING)
+        self._enter(RunState.RAMPING, drives=backend.capabilities.remarks)
         self._cycles.play()
 
     def _each_cycle(self, cycles: Cycles) -> None:
