@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauscope_drivers.backend import DriveLimits
+from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.errors import DriverError, DriverErrorKind, Fault
 from tauscope_drivers.state import Setpoint
 
@@ -28,6 +29,17 @@ PERSISTENCE = 2
 
 _TORQUE_REMEDY = "the arm was stopped; look for an obstacle or slow the motion down, then acknowledge"
 _REMEDY = "the arm was stopped; correct the commanded torque, then acknowledge"
+
+
+def stated_limits(joints: Sequence[DriveJoint]) -> DriveLimits:
+    """Limits that a robot file states; infinite where it states none."""
+    ranges = [joint.position_range or (-np.inf, np.inf) for joint in joints]
+    return DriveLimits(
+        position_low=np.array([low for low, _ in ranges]),
+        position_high=np.array([high for _, high in ranges]),
+        velocity=np.array([joint.velocity_limit or np.inf for joint in joints]),
+        torque=np.array([joint.torque_limit or np.inf for joint in joints]),
+    )
 
 
 def require_sensible(limits: DriveLimits, position: Array, labels: Sequence[str]) -> None:

@@ -41,6 +41,20 @@ def write_settings(node: DriveNode) -> bool:
     file = node.configuration.device_file
     if file is None:
         return False
+    missing = find_missing(node, file)
+    for setting in missing:
+        _give(node, file, setting)
+    return bool(missing)
+
+
+def find_missing(node: DriveNode, file: DeviceFile) -> list[Setting]:
+    """Values of a DCF file that a drive does not have yet; only reads.
+
+    Raises
+    ------
+    DriverError
+        ``refused``: it does not have their objects, or is under power; ``cannot-connect``: it does not answer
+    """
     missing = [one for one in settings_of(file).written if _kept(node, file, one) != one.data]
     if missing and decode_state(node.dictionary.read(objects.STATUSWORD)) in POWERED:
         raise DriverError(
@@ -48,9 +62,7 @@ def write_settings(node: DriveNode) -> bool:
             f"{node.place}: is under power, and {missing[0].entry} is not yet {missing[0].text} as {file.name} has it; "
             "support the arm and let go of it first",
         )
-    for setting in missing:
-        _give(node, file, setting)
-    return bool(missing)
+    return missing
 
 
 def _kept(node: DriveNode, file: DeviceFile, setting: Setting) -> bytes:

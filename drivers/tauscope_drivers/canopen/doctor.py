@@ -12,6 +12,7 @@ from tauscope_drivers.canopen.data_sheet.settings import settings_of
 from tauscope_drivers.canopen.drive_modes import TARGETS
 from tauscope_drivers.canopen.node import DriveNode
 from tauscope_drivers.canopen.optional_objects import DOUBTFUL
+from tauscope_drivers.canopen.rehearsal import rehearse
 from tauscope_drivers.canopen.session import possible_rate_hz
 from tauscope_drivers.canopen.state_machine import POWERED
 from tauscope_drivers.drive_block import DriveJoint
@@ -58,20 +59,22 @@ def examine(joints: Sequence[DriveJoint]) -> list[Finding]:
         return [failure(subject, str(error))]
     try:
         findings = [Finding(Severity.GOOD, subject, f"open, {configuration.bit_rate / 1e3:g} kbit/s")]
-        return findings + _examine_drives(bus, configuration, subject)
+        return findings + _examine_drives(bus, configuration, joints, subject)
     except DriverError as error:
         return [failure(subject, str(error))]
     finally:
         bus.close()
 
 
-def _examine_drives(bus: CanBus, configuration: BusConfiguration, subject: str) -> list[Finding]:
+def _examine_drives(
+    bus: CanBus, configuration: BusConfiguration, joints: Sequence[DriveJoint], subject: str
+) -> list[Finding]:
     findings: list[Finding] = []
     sound: list[DriveNode] = []
     for joint, wanted in enumerate(configuration.nodes, 1):
         node = DriveNode.on_bus(bus, wanted, joint)
         try:
-            findings += _examine_drive(node)
+            findings += _examine_drive(node, joints[joint - 1])
         except DriverError as error:
             findings.append(failure(node.place, str(error), f"node {wanted.node_id}"))
             continue
@@ -81,7 +84,7 @@ def _examine_drives(bus: CanBus, configuration: BusConfiguration, subject: str) 
     return findings
 
 
-def _examine_drive(node: DriveNode) -> list[Finding]:
+def _examine_drive(node: DriveNode, joint: DriveJoint) -> list[Finding]:
     """Name, modes, units, and what stands in the way of a run."""
     modes = node.identify()
     dictionary = node.dictionary
@@ -103,6 +106,7 @@ def _examine_drive(node: DriveNode) -> list[Finding]:
         remedy = "none where it holds the arm; else support the arm and switch it off"
         findings.append(Finding(Severity.WARNING, node.place, f"is under power: {node.state}", remedy))
     findings += [_remark(node.place, remark) for remark in node.remarks]
+    findings += rehearse(node, joint)
     return findings
 
 

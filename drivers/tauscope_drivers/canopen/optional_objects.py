@@ -24,7 +24,7 @@ SUBSTITUTES: Mapping[DriveObject, str] = {
 }
 """Optional objects, and what is done where one is absent."""
 
-WRITTEN = frozenset(SUBSTITUTES) - {objects.VELOCITY_ACTUAL, objects.ERROR_CODE, objects.INTERPOLATION_VALUE}
+WRITTEN = frozenset(SUBSTITUTES) - {objects.VELOCITY_ACTUAL, objects.ERROR_CODE}
 """Optional objects that the driver sets; one that is read-only counts as absent."""
 
 

@@ -84,7 +84,7 @@ def _write_pdo(node: DriveNode, pdo: Pdo, *, is_sent: bool) -> bool:
     identifier = identify(pdo.number, node.configuration.node_id)
     wanted = mapping_entries(pdo.layout.objects)
     if pdo.is_fixed:
-        if _read_mapping(node, places) != wanted:
+        if read_mapping(node, places) != wanted:
             _learn(node, pdo.number, places, is_sent=is_sent)
             return False
         _use_as_it_is(node, places, identifier, is_sent=is_sent)
@@ -124,7 +124,7 @@ def _use_as_it_is(node: DriveNode, places: PdoParameters, identifier: int, *, is
         dictionary.write(places.identifier, identifier)
 
 
-def _read_mapping(node: DriveNode, places: PdoParameters) -> list[int]:
+def read_mapping(node: DriveNode, places: PdoParameters) -> list[int]:
     """Mapping that a drive has."""
     count = min(node.dictionary.read_optional(places.count) or 0, _LONGEST_MAPPING)
     return [node.dictionary.read(replace(places.count, subindex=number, bits=32)) for number in range(1, count + 1)]
@@ -132,7 +132,7 @@ def _read_mapping(node: DriveNode, places: PdoParameters) -> list[int]:
 
 def _learn(node: DriveNode, number: int, places: PdoParameters, *, is_sent: bool) -> None:
     """Keep that a PDO is fixed, and what it holds; others that the drive has may be free."""
-    fixed = PdoSlot(number, decode_mapping(_read_mapping(node, places)) or ())
+    fixed = PdoSlot(number, decode_mapping(read_mapping(node, places)) or ())
     known = {slot.number: slot for slot in (node.slots.sent if is_sent else node.slots.received)}
     others = (known.get(other) or _find(node, other, is_sent=is_sent) for other in range(PDO_COUNT) if other != number)
     slots = tuple(sorted((fixed, *(slot for slot in others if slot)), key=lambda slot: slot.number))

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tauscope_drivers.dynamixel.bus import FACTORY_RETURN_DELAY_S, ServoBus
+from tauscope_drivers.dynamixel.bus import FACTORY_RETURN_DELAY_S, PATIENCE_S, ServoBus
 from tauscope_drivers.dynamixel.configuration import ServoConfiguration
 from tauscope_drivers.dynamixel.group import ServoGroup
 from tauscope_drivers.dynamixel.health import Health
 from tauscope_drivers.dynamixel.models import CURRENT_MODE, gear_ratio_of
-from tauscope_drivers.dynamixel.preparation import SETTINGS, RegisterWrite, commissioning_writes
+from tauscope_drivers.dynamixel.preparation import ANSWERS_ALL, SETTINGS, RegisterWrite, commissioning_writes
 from tauscope_drivers.dynamixel.servo import JointServo, make_servo
 from tauscope_drivers.errors import DriverError, DriverErrorKind
 
@@ -93,11 +93,8 @@ def open_session(bus: ServoBus, configurations: Sequence[ServoConfiguration]) ->
     """
     bus.return_delay_s = FACTORY_RETURN_DELAY_S
     servos = tuple(_reach(bus, number, servo) for number, servo in enumerate(configurations, 1))
-    settings = [read_items(bus, servo, SETTINGS) for servo in servos]
-    for servo in servos:
-        _require_delivered_gear(bus, servo)
-    session = Session(bus, servos, settings, ServoGroup(bus, servos), Health(servos))
-    session.read_health()
+    session = make_session(bus, servos, [read_settings(bus, servo) for servo in servos])
+    settings = session.settings
     for joint, servo in enumerate(servos):
         holds = bool(session.health.has_torque[joint])
         session.carry_out(joint, commissioning_writes(servo, settings[joint], holds=holds))
@@ -105,6 +102,27 @@ def open_session(bus: ServoBus, configurations: Sequence[ServoConfiguration]) ->
     bus.return_delay_s = max(SHORTEST_RETURN_DELAY_S, slowest)
     session.group.probe_fast()
     return session
+
+
+def make_session(bus: ServoBus, servos: Sequence[JointServo], settings: Sequence[dict[str, int]]) -> Session:
+    """The servos as they are, with their health; nothing is written."""
+    servos = tuple(servos)
+    session = Session(bus, servos, list(settings), ServoGroup(bus, servos), Health(servos))
+    session.read_health()
+    return session
+
+
+def read_settings(bus: ServoBus, servo: JointServo) -> dict[str, int]:
+    """Settings of a servo whose counts and speeds are those of its model's table.
+
+    Raises
+    ------
+    DriverError
+        ``cannot-connect``: it does not answer, or its gear is another one
+    """
+    settings = read_items(bus, servo, SETTINGS)
+    _require_delivered_gear(bus, servo)
+    return settings
 
 
 def _require_delivered_gear(bus: ServoBus, servo: JointServo) -> None:
@@ -143,4 +161,13 @@ def _reach(bus: ServoBus, number: int, configuration: ServoConfiguration) -> Joi
             f"joint {configuration.joint}: servo {configuration.servo} does not answer on {bus.port.path} at "
             f"{bus.port.baudrate} baud; check its power, cable, ID and baud rate",
         )
-    return make_servo(number, configuration, identity)
+    servo = make_servo(number, configuration, identity)
+    _let_answer(bus, servo)
+    return servo
+
+
+def _let_answer(bus: ServoBus, servo: JointServo) -> None:
+    """Let a servo answer every instruction that answers pings alone (Status Return Level 0)."""
+    level = servo.model.items["Status Return Level"]
+    if bus.read_once(servo.servo, level.address, level.size, PATIENCE_S) is None:
+        bus.sync_write([level], {servo.servo: [ANSWERS_ALL]})

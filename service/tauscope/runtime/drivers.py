@@ -193,6 +193,8 @@ def _to_drive_joint(driver: Driver, robot: Robot, joint: Joint) -> DriveJoint:
         gear_ratio=joint.gear_ratio or 1.0,
         torque_per_unit=constant,
         torque_limit=joint.limits.torque,
+        velocity_limit=joint.limits.velocity,
+        position_range=joint.limits.position,
     )
 
 

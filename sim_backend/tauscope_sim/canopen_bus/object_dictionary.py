@@ -97,7 +97,12 @@ class ObjectDictionary:
         AbortError
             there is no such entry
         """
-        entry = self._visible(index, subindex)
+        self._visible(index, subindex)
+        return self.encode(index, subindex)
+
+    def encode(self, index: int, subindex: int) -> bytes:
+        """Value of an entry as the drive itself sends it, little end first."""
+        entry = self._entry(index, subindex)
         return entry.value.to_bytes(entry.bytes, "little", signed=entry.signed)
 
     def write(self, index: int, subindex: int, data: bytes) -> None:

@@ -116,4 +116,4 @@ class ProcessData:
 
     def _sample(self, pdo: _Pdo) -> bytes:
         """Payload of a TPDO."""
-        return b"".join(self._dictionary.read(index, subindex) for index, subindex, _ in self._entries(pdo.mapping))
+        return b"".join(self._dictionary.encode(index, subindex) for index, subindex, _ in self._entries(pdo.mapping))

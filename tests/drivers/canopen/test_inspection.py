@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from emulated_can_bus import COUNTS_PER_TURN, GEAR, EmulatedBus
+from emulated_data_sheet import sections, write_file
 from tauscope_drivers import ControlMode, DriveLimits, DriverError
 from tauscope_drivers.canopen.doctor import can_interfaces, examine, scan_bus
 from tauscope_drivers.canopen.dry_run import plan_frames
@@ -30,12 +31,20 @@ JOINTS = [
 ]
 
 
-def test_sound_drives_have_nothing_to_be_mended() -> None:
-    with EmulatedBus() as bus:
+def test_sound_drives_have_nothing_to_be_mended(tmp_path: Path) -> None:
+    path = Path(write_file(tmp_path, sections()))
+    with EmulatedBus([path] * 3) as bus:
         findings = examine(bus.joints())
     assert {finding.severity for finding in findings} == {Severity.GOOD}
     assert sum("a per mille" in finding.detail for finding in findings) == 3
     assert "answered in" in findings[-1].detail
+
+
+def test_without_its_file_a_drive_is_sound_as_far_as_reading_tells() -> None:
+    with EmulatedBus() as bus:
+        doubts = [finding for finding in examine(bus.joints()) if finding.severity is not Severity.GOOD]
+    assert {finding.severity for finding in doubts} == {Severity.WARNING}
+    assert {finding.remedy for finding in doubts} == {"name its file as drive.eds"}
 
 
 def test_a_missing_drive_and_one_in_fault_are_told_with_a_remedy() -> None:
