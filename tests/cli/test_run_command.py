@@ -145,3 +145,11 @@ def test_ctrl_c_stops_the_arm_and_keeps_what_was_recorded(tmp_path: Path) -> Non
     assert f"wrote {out}\n" in printed
     assert len(read_recording(out)) > 0
     assert sorted(path.name for path in tmp_path.iterdir()) == ["long.json", "out.csv"]
+
+
+def test_the_limits_of_lost_samples_are_options(run: Run, short: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out.csv"
+    lenient = ["--stale-ms", "5", "--missed", "10", "--lost-s", "0.2", "--least-kept", "0.5"]
+    ended = run("run", PAPER_ROBOT, "--trajectory", short, "--out", out, "--rate", "200", START, *lenient)
+    assert (ended.status, ended.err) == (0, "")
+    assert "samples kept" in ended.out

@@ -1,5 +1,6 @@
 """A run in virtual time, from the first call to the last file."""
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -174,6 +175,36 @@ def test_an_answer_of_which_nobody_knows_the_instant_is_no_sample(tmp_path: Path
     assert record.timing is not None
     assert record.timing.stale_samples == (lost, lost)
     assert len(read_journal(tmp_path / "run" / "journal.mcap").rows) == len(arm.sent) - lost
+
+
+def late_answers(share: int) -> PointArm:
+    """An arm of whose answers one of so many is 2 ms late."""
+
+    def tamper(arm: PointArm, state: ArmState) -> ArmState:
+        return replace(state, late_ns=2_000_000) if len(arm.sent) % share == 0 else state
+
+    return PointArm(position=START, tamper=tamper)
+
+
+def test_a_run_that_keeps_too_few_samples_is_degraded_and_says_first_why(tmp_path: Path) -> None:
+    record, _, events = run(tmp_path / "run", late_answers(4))
+    assert record.state is RunState.DEGRADED
+    assert record.kept == pytest.approx(0.75, abs=0.01)
+    assert record.problem is not None
+    assert re.match(
+        r"\d+ answers came more than 1 ms later than usual: 75\.\d % of the motion's samples were kept, 98 %",
+        record.problem.detail,
+    )
+    assert "--least-kept" in record.problem.detail
+    assert record.recording is not None
+    assert record.recording.files
+    assert events[-1]["event"] == "end"
+
+
+@pytest.mark.parametrize(("share", "options"), [(100, {}), (4, {"least_kept": 0.7}), (4, {"stale_ms": 3.0})])
+def test_what_may_be_lost_is_an_option(tmp_path: Path, share: int, options: dict[str, float]) -> None:
+    record, _, _ = run(tmp_path / "run", late_answers(share), **options)
+    assert record.state is RunState.FINISHED
 
 
 def test_a_loop_that_is_late_skips_and_says_so(tmp_path: Path) -> None:

@@ -47,6 +47,7 @@ def power_up(session: Session, mode: ControlMode) -> tuple[ArmState, Array]:
         session.wait_for_next(state)
         state = session.step_until(lambda: all(node.has_answered for node in session.nodes), cycle, TRANSITION_S)
     _require_up(session, state)
+    session.learn_answer_time()
     return state, place
 
 

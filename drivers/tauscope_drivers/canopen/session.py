@@ -4,10 +4,10 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from statistics import median
 
 import numpy as np
 
+from tauscope_drivers.answer_time import AnswerTime
 from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.bus import NMT_PRE_OPERATIONAL, SYNC_ID, CanBus
@@ -20,29 +20,6 @@ from tauscope_drivers.canopen.state_machine import DriveState, Goal, decode_stat
 from tauscope_drivers.clock import Clock
 from tauscope_drivers.errors import Fault
 from tauscope_drivers.state import ArmState, Array, Setpoint
-
-REMEMBERED = 31
-"""Answers by which it is known what is usual: adapters take their time, each its own."""
-
-
-class AnswerTime:
-    """Compares how long each answer took with what is usual on this bus and adapter."""
-
-    def __init__(self) -> None:
-        """Nothing is known yet, and nothing is late."""
-        self._taken_ns: deque[int] = deque(maxlen=REMEMBERED)
-
-    def late_ns(self, taken_ns: int) -> int:
-        """How much later than usual an answer came [ns].
-
-        Parameters
-        ----------
-        taken_ns : int
-            from SYNC to the last frame of the answer [ns]
-        """
-        self._taken_ns.append(taken_ns)
-        return max(0, taken_ns - round(median(self._taken_ns)))
-
 
 BRAKING_S = 0.1
 """Time in which a joint is brought to rest by targets, as fast as it may come to its speed limit [s]."""
@@ -165,6 +142,12 @@ class Session:
             speed = np.array([node.last_velocity for node in self.nodes])
             self.brake = HostBrake(self.standstill().position, speed, now_ns)
         return stay_at(self.brake.targets(now_ns))
+
+    def learn_answer_time(self) -> None:
+        """Wait longer for answers from now on where this bus and adapter usually take most of the time for them."""
+        usual_ns = self.answer_time.usual_ns
+        if 2 * usual_ns > self.answer_ns:
+            self.answer_ns += usual_ns
 
     def standstill(self) -> Setpoint:
         """Targets where the joints are, by the last answer of each."""

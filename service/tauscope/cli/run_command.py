@@ -70,10 +70,16 @@ def run(
     following_error: Annotated[
         float | None, typer.Option(help="Allowed distance of arm and target; 0.2 rad or 0.05 m by default.")
     ] = None,
-    stale_misses: Annotated[int, typer.Option(help="Readings in a row that a joint may not fail to answer.")] = 3,
-    stale_s: Annotated[
+    missed: Annotated[int, typer.Option(help="Readings in a row that a joint may not fail to answer.")] = 3,
+    lost_s: Annotated[
         float, typer.Option(metavar="S", help="Time after which a joint that does not answer counts as lost.")
     ] = 0.05,
+    stale_ms: Annotated[
+        float, typer.Option(metavar="MS", help="How much later than usual an answer may come and be a sample.")
+    ] = 1.0,
+    least_kept: Annotated[
+        float, typer.Option(help="Share of the motion's samples below which the run ends as degraded.")
+    ] = 0.98,
     temperature_c: Annotated[float, typer.Option(metavar="C", help="Hottest motor that is allowed [°C].")] = 80.0,
     feed_forward: Annotated[
         bool, typer.Option("--feed-forward/--no-feed-forward", help="Give the drives the torque of the robot's model.")
@@ -113,8 +119,10 @@ def run(
         watchdog_s=watchdog_s,
         heartbeat_s=heartbeat_s,
         following_error=following_error,
-        stale_misses=stale_misses,
-        stale_s=stale_s,
+        stale_misses=missed,
+        stale_s=lost_s,
+        stale_ms=stale_ms,
+        least_kept=least_kept,
         temperature_c=temperature_c,
         feed_forward=feed_forward,
         bandwidth_rad_s=bandwidth_rad_s,

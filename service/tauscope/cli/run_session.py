@@ -72,7 +72,8 @@ def keep_recording(result: run.Result, out: Path) -> bool:
 def why_unfinished(record: RunRecord, recording: Path | None) -> str:
     """One line on a run that did not finish."""
     reason = record.stop if record.problem is None else record.problem.detail
-    kept = "nothing was recorded" if recording is None else f"what was recorded until then is in {recording}"
+    until = "" if record.state is RunState.DEGRADED else " until then"
+    kept = "nothing was recorded" if recording is None else f"what was recorded{until} is in {recording}"
     return one_line(f"the run {record.state}: {reason or 'no reason is known'}; {kept}")
 
 

@@ -43,6 +43,12 @@ class RunOptions(StrictModel, strict=False):
         default=3, ge=1, le=1000, description="readings in a row that a joint may not fail to answer"
     )
     stale_s: Positive = Field(default=0.05, description="time after which a joint that does not answer counts as lost")
+    stale_ms: Positive = Field(
+        default=1.0, le=1000, description="how much later than usual an answer may come and still be a sample"
+    )
+    least_kept: Annotated[FiniteFloat, Field(ge=0.0, le=1.0)] = Field(
+        default=0.98, description="share of the motion's samples that has to be kept, else the run ends as degraded"
+    )
     temperature_c: Positive = Field(default=80.0, description="hottest motor that is allowed")
     feed_forward: bool = Field(
         default=True, description="whether the drives get the torque that the robot's model predicts"

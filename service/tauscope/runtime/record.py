@@ -121,6 +121,7 @@ class RunRecord(StrictModel):
         default=(), description="what the drives do not have, and what is done in place of it; one line each"
     )
     played: float = Field(default=0.0, description="part of ramp and motion that was played, 0 to 1")
+    kept: float | None = Field(default=None, description="part of the motion's samples that was kept, 0 to 1")
     timing: Timing | None = Field(default=None, description="how well the run kept its time")
     real_time: RealTime | None = Field(default=None, description="what the loop was given of what it asked for")
     worst_following: tuple[float, ...] = Field(

@@ -100,7 +100,8 @@ class Run:
         )
         metronome = Metronome(backend.clock, now + plan.period_ns, plan.period_ns, plan.cycles)
         arm = GuardedArm(backend, guard, state)
-        self._cycles = Cycles(plan, arm, metronome, recorder, stops, control, self._each_cycle)
+        latest_ns = round(options.stale_ms * 1e6)
+        self._cycles = Cycles(plan, arm, metronome, recorder, stops, control, self._each_cycle, latest_ns)
         self._enter(RunState.RAMPING, drives=backend.capabilities.remarks)
         self._cycles.play()
 
@@ -145,9 +146,29 @@ class Run:
             problem = RunProblem(code=AcquisitionError.code, detail=self._unconfirmed)
         if problem is not None and end is RunState.FINISHED:
             end = RunState.FAILED
+        if end is RunState.FINISHED and (problem := self._loss()) is not None:
+            end = RunState.DEGRADED
         self._enter(end, problem=problem, recording=recording)
         self._tell(end_event(self.record))
         return self.record
+
+    def _loss(self) -> RunProblem | None:
+        """Why so many samples of a motion that was played are missing; None where there are enough."""
+        cycles, timing, options = self._cycles, self.record.timing, self._task.options
+        if cycles is None or timing is None or cycles.kept_share >= options.least_kept:
+            return None
+        late, stale = int(cycles.late.max()), int(cycles.arm.stale.max())
+        causes = {
+            f"{timing.missed_periods} cycles were left out because the loop was late": timing.missed_periods,
+            f"{stale} readings were not answered": stale,
+            f"{late} answers came more than {options.stale_ms:g} ms later than usual": late,
+        }
+        worst = [cause for cause, count in sorted(causes.items(), key=lambda one: -one[1]) if count]
+        kept = f"{100.0 * cycles.kept_share:.1f} % of the motion's samples were kept"
+        least = f"{100.0 * options.least_kept:g} % are asked for"
+        remedy = "use a quieter machine, a lower rate or a faster adapter, or allow it with --least-kept"
+        detail = f"{', '.join(worst) or 'samples were lost'}: {kept}, {least}; {remedy}"
+        return RunProblem(code=AcquisitionError.code, detail=detail)
 
     def _account(self) -> dict[str, Any]:
         """What the loop leaves behind."""
@@ -156,6 +177,7 @@ class Run:
             return {}
         return {
             "played": cycles.played,
+            "kept": cycles.kept_share,
             "timing": cycles.metronome.timing(cycles.arm.stale + cycles.late),
             "worst_following": tuple(float(value) for value in cycles.worst_following),
         }

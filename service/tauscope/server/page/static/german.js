@@ -370,6 +370,7 @@ export const NAMES = {
   "running": "läuft",
   "stopping": "stoppt",
   "finished": "beendet",
+  "degraded": "lückenhaft",
   "stopped": "gestoppt",
   "succeeded": "gelungen",
   "failed": "gescheitert",

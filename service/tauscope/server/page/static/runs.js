@@ -7,7 +7,7 @@ import { jobList } from "./lists.js";
 import { group, jointStyle, plot } from "./plots.js";
 import { named, t } from "./words.js";
 
-const ENDS = ["finished", "stopped", "failed", "interrupted", "damaged"];
+const ENDS = ["finished", "degraded", "stopped", "failed", "interrupted", "damaged"];
 const KEPT = 1500;
 const NEAR = 0.15;
 
