@@ -18,7 +18,7 @@ from tauscope_drivers.dynamixel.faults import hardware_faults, watchdog_fault
 from tauscope_drivers.dynamixel.health import Health
 from tauscope_drivers.dynamixel.models import WATCHDOG_MOST, WATCHDOG_STEP_S
 from tauscope_drivers.dynamixel.port import SerialPort, read_latency_timer_ms
-from tauscope_drivers.dynamixel.preparation import ANSWERS_ALL, drive_mode
+from tauscope_drivers.dynamixel.preparation import ANSWERS_ALL, drive_mode, operating_mode
 from tauscope_drivers.dynamixel.servo import JointServo, make_servo
 from tauscope_drivers.dynamixel.session import Session, make_session, read_items, read_settings
 from tauscope_drivers.errors import DriverError, DriverErrorKind
@@ -172,10 +172,14 @@ def _examine_servo(servo: JointServo, settings: dict[str, int]) -> list[Finding]
         find(Severity.WARNING, f"firmware {servo.firmware} is old", "update it with the DYNAMIXEL Wizard")
     if settings["Return Delay Time"]:
         delay = f"Return Delay Time {settings['Return Delay Time'] * 2} µs"
-        find(Severity.WARNING, delay, "none: the driver sets it to 0 when it connects")
+        find(Severity.WARNING, delay, "none: the driver sets it to 0, and puts it back as it lets go")
     if settings["Drive Mode"] != drive_mode(servo, settings["Drive Mode"]):
         mode = f"Drive Mode {settings['Drive Mode']}: profiles by time, or torque that a goal switches on"
-        find(Severity.WARNING, mode, "none: the driver clears these bits when it connects")
+        find(Severity.WARNING, mode, "none: the driver clears these bits, and puts them back as it lets go")
+    wanted = operating_mode(servo, ControlMode.POSITION)
+    if settings["Operating Mode"] != wanted:
+        change = f"Operating Mode {settings['Operating Mode']}: a run sets {wanted} in EEPROM"
+        findings.append(Finding(Severity.GOOD, servo.label, f"{change}, and puts it back when it lets go of the arm"))
     if settings["Status Return Level"] != ANSWERS_ALL:
         level = f"Status Return Level {settings['Status Return Level']}: it does not answer every instruction"
         find(Severity.WARNING, level, "none: the driver sets it to 2 when it connects")

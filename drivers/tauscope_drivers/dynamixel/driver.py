@@ -5,7 +5,7 @@ from typing import Any
 
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.driver import PATIENCE, ArmDescription, BusDriver, Connection, Option
-from tauscope_drivers.errors import DriverError
+from tauscope_drivers.errors import DriverError, DriverErrorKind
 from tauscope_drivers.inspection import Finding, FoundDevice, FrameRequest, PlannedFrame, failure
 
 
@@ -14,7 +14,11 @@ class DynamixelDriver(BusDriver):
 
     name = "dynamixel"
     titles = {"en": "Dynamixel servos", "de": "Dynamixel-Servos"}  # noqa: RUF012 - never changed
-    options = (Option("port", "serial device, in place of the robot file's"), PATIENCE)
+    options = (
+        Option("port", "serial device, in place of the robot file's"),
+        PATIENCE,
+        Option("keep_settings", "whether servos keep in EEPROM what a run changed", default=False),
+    )
     block_example = "{id: 1}"
     port_help = "serial device"
     bus_options = ("port",)
@@ -27,7 +31,12 @@ class DynamixelDriver(BusDriver):
         """The arm in real time."""
         from tauscope_drivers.dynamixel.arm import DynamixelArm
 
-        return Connection(DynamixelArm(arm.joints, slack_s=self.read_patience_s(settings)), is_real_time=True)
+        keeps = settings.get("keep_settings", False)
+        if not isinstance(keeps, bool):
+            text = f"backend {self.name}: keep_settings is {keeps!r:.60}; give true or false"
+            raise DriverError(DriverErrorKind.REFUSED, text)
+        servos = DynamixelArm(arm.joints, slack_s=self.read_patience_s(settings), keeps_settings=keeps)
+        return Connection(servos, is_real_time=True)
 
     def list_adapters(self) -> list[Finding]:
         """Serial ports of this machine."""

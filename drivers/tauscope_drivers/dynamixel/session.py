@@ -11,6 +11,7 @@ from tauscope_drivers.dynamixel.configuration import ServoConfiguration
 from tauscope_drivers.dynamixel.group import ServoGroup
 from tauscope_drivers.dynamixel.health import Health
 from tauscope_drivers.dynamixel.models import CURRENT_MODE, gear_ratio_of
+from tauscope_drivers.dynamixel.original_settings import CHANGED, OriginalSettings
 from tauscope_drivers.dynamixel.preparation import ANSWERS_ALL, SETTINGS, RegisterWrite, commissioning_writes
 from tauscope_drivers.dynamixel.servo import JointServo, make_servo
 from tauscope_drivers.errors import DriverError, DriverErrorKind
@@ -32,6 +33,7 @@ class Session:
     settings: list[dict[str, int]]
     group: ServoGroup
     health: Health
+    originals: tuple[OriginalSettings, ...] = ()
 
     def read(self, joint: int, names: Iterable[str]) -> dict[str, int]:
         """Items of one servo.
@@ -52,12 +54,43 @@ class Session:
             index of the joint, from 0
         """
         servo = self.servos[joint]
+        before = self.settings[joint].get(name)
+        if self.originals and name in CHANGED and before not in (None, value):
+            self.originals[joint].remember(name, before, value)
         try:
             self.bus.write(servo.servo, servo.model.items[name], value)
         except DriverError as error:
             raise DriverError(error.kind, f"{servo.label}: {error}") from error
         if name in self.settings[joint]:
             self.settings[joint][name] = value
+
+    def restore(self) -> None:
+        """Put back what was changed in EEPROM, on servos without torque; others keep it until they are let go.
+
+        Raises
+        ------
+        DriverError
+            a servo does not answer, or does not take it
+        """
+        for joint, kept in enumerate(self.originals):
+            before = kept.before
+            if not before or self.read(joint, ["Torque Enable"])["Torque Enable"]:
+                continue
+            for name in CHANGED:
+                if name in before:
+                    self.bus.write(self.servos[joint].servo, self.servos[joint].model.items[name], before[name])
+                    self.settings[joint][name] = before[name]
+            kept.forget()
+
+    @property
+    def changes(self) -> tuple[str, ...]:
+        """What was changed in EEPROM, one line a servo."""
+        return tuple(
+            f"joint {servo.joint}: in EEPROM until the arm is let go: "
+            + ", ".join(f"{name} {self.settings[joint][name]} in place of {value}" for name, value in before.items())
+            for joint, servo in enumerate(self.servos)
+            if self.originals and (before := self.originals[joint].before)
+        )
 
     def carry_out(self, joint: int, writes: Iterable[RegisterWrite]) -> None:
         """Write what a plan says, one after the other, each read back.
@@ -95,6 +128,9 @@ def open_session(bus: ServoBus, configurations: Sequence[ServoConfiguration]) ->
     servos = tuple(_reach(bus, number, servo) for number, servo in enumerate(configurations, 1))
     session = make_session(bus, servos, [read_settings(bus, servo) for servo in servos])
     settings = session.settings
+    session.originals = tuple(OriginalSettings(bus.port.path, servo.servo) for servo in servos)
+    for kept, present in zip(session.originals, settings, strict=True):
+        kept.check(present)
     for joint, servo in enumerate(servos):
         holds = bool(session.health.has_torque[joint])
         session.carry_out(joint, commissioning_writes(servo, settings[joint], holds=holds))

@@ -58,8 +58,11 @@ def run(
         ),
     ] = None,
     stop_policy: Annotated[
-        Literal["hold", "damp", "torque_off"] | None,
-        typer.Option(help="How the arm is stopped; as the robot file says by default, else hold."),
+        Literal["hold", "damp", "torque_off", "release"] | None,
+        typer.Option(
+            help="How the arm is stopped; as the robot file says by default, else hold. "
+            "release: hold, then let go once it stands still, where the robot file states that."
+        ),
     ] = None,
     watchdog_s: Annotated[
         float, typer.Option(metavar="S", help="Time without a cycle after which the device stops itself.")
@@ -90,6 +93,9 @@ def run(
     acknowledge_faults: Annotated[
         bool, typer.Option("--acknowledge-faults", help="Clear the faults that the drives have latched.")
     ] = False,
+    keep_settings: Annotated[
+        bool, typer.Option("--keep-settings", help="Leave in servos' EEPROM what the run changed; else it is put back.")
+    ] = False,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Show the frames that would be sent to the bus, and send none.")
     ] = False,
@@ -107,6 +113,7 @@ def run(
     """
     posture = parse_posture(start)
     given = {"scenario": scenario, "start": start, "time": None if time == "virtual" else time}
+    given["keep_settings"] = keep_settings or None
     require_options(backend, [name for name, value in given.items() if value is not None])
     from tauscope.cli.task_run import make_request
     from tauscope.runtime.options import RunOptions
@@ -119,8 +126,8 @@ def run(
         watchdog_s=watchdog_s,
         heartbeat_s=heartbeat_s,
         following_error=following_error,
-        stale_misses=missed,
-        stale_s=lost_s,
+        missed=missed,
+        lost_s=lost_s,
         stale_ms=stale_ms,
         least_kept=least_kept,
         temperature_c=temperature_c,
@@ -139,7 +146,7 @@ def run(
 
     request = task.Request(
         robot=str(robot),
-        backend=make_request(task.BackendChoice, name=backend, time=time, start=posture),
+        backend=make_request(task.BackendChoice, name=backend, time=time, start=posture, keep_settings=keep_settings),
         scenario=None if scenario is None else str(scenario),
         trajectory=None if trajectory is None else str(trajectory),
         seed=seed,

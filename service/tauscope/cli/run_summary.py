@@ -6,7 +6,13 @@ from tauscope.cli.terminal import plain, table
 from tauscope.number_text import ABSENT, counted, significant
 from tauscope.report.table import Table
 from tauscope.robot import JointType, Robot
+from tauscope.runtime.drivers import find_driver
 from tauscope.runtime.record import RunRecord
+
+HELD = (
+    "! The arm is under power where it stopped, and its watchdog is off. Support it, then let go of it with: tauscope "
+    "release."
+)
 
 
 def show_run(console: Console, record: RunRecord, robot: Robot) -> None:
@@ -17,6 +23,8 @@ def show_run(console: Console, record: RunRecord, robot: Robot) -> None:
         console.print(plain(f"! {line}."), soft_wrap=True)
     for warning in robot.warnings:
         console.print(plain(f"! {warning.sentence}."), soft_wrap=True)
+    if record.holds and not find_driver(record.backend).is_simulated:
+        console.print(plain(HELD), soft_wrap=True)
     console.print(table("Run", _whole(record)))
     if record.worst_following:
         console.print(table("Joints", _joints(record, robot)))

@@ -305,6 +305,7 @@ export const SENTENCES = {
   "at most {0} µs": "höchstens {0} µs",
   "Missed cycles": "Verpasste Zyklen",
   "of {0}": "von {0}",
+  "The arm is under power where it stopped. Support it, then let go of it with: tauscope release": "Der Arm steht unter Strom, wo er gehalten hat. Stützen Sie ihn, dann lassen Sie ihn los mit: tauscope release",
   "not played to its end": "nicht zu Ende gefahren",
   "complete": "vollständig",
   "Look at the recording": "Aufzeichnung ansehen",
