@@ -150,3 +150,13 @@ def test_speeds_beyond_the_servos_own_limit_are_not_asked_for() -> None:
     joint = DriveJoint("joint1", {"id": 1, "port": "wired"}, torque_per_unit=0.01, velocity_limit=30.0)
     assert starts([joint]) is None
     assert servo.memory.get("Profile Velocity") <= 20
+
+
+def test_a_second_id_makes_a_servo_follow_another_ones_goals() -> None:
+    """What doctor refuses does harm: the emulated servo does what the real one would."""
+    servos = WiredPort.wire(
+        [(ServoSpecification(1), 0.2), (ServoSpecification(2, registers={"Secondary(Shadow) ID": 1}), 0.2)]
+    )
+    joints = [DriveJoint("joint1", {"id": 1, "port": "wired"}, torque_per_unit=0.01)]
+    assert starts(joints) is None
+    assert servos[1].memory.get("Goal Position") == servos[0].memory.get("Goal Position")
