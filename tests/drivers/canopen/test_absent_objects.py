@@ -146,3 +146,13 @@ def test_targets_of_a_stop_come_to_rest() -> None:
     assert (np.diff(speed) <= 1e-9).all()
     assert way[-1] == pytest.approx(1.1)
     assert [brake.is_at_rest(int(time)) for time in (99_000_000, 100_000_000)] == [False, True]
+
+
+def test_a_drive_that_does_not_show_its_mode_is_told(bus: EmulatedBus) -> None:
+    bus.drives[1].dictionary.entries[0x6060, 0].hook = None
+    bus.drives[1].dictionary.put(0x6061, 1)
+    arm = enabled(bus)
+    assert arm.capabilities.remarks == (
+        "joint 2: Modes of operation display (0x6061:00) shows 1, not 8: it may not have changed its mode",
+    )
+    arm.disconnect()
