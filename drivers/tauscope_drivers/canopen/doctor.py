@@ -112,6 +112,8 @@ def _examine_drive(node: DriveNode, joint: DriveJoint) -> list[Finding]:
 
 def _remark(place: str, remark: str) -> Finding:
     """What a drive does not have, and the substitute: a warning where an operator has to try it."""
+    if "is taken in" in remark:
+        return Finding(Severity.WARNING, place, remark, "state drive.rated_torque_nm to settle it")
     if any(str(entry) in remark for entry in DOUBTFUL):
         detail, _, effect = remark.partition(": ")
         return Finding(Severity.WARNING, place, detail, effect)

@@ -46,21 +46,26 @@ def read_rated_torque(
     Raises
     ------
     ValueError
-        neither unit fits
+        neither unit fits, or it reads 0
     """
     milli, micro = value * _MILLI, value * _MICRO
     if value <= 0:
         raise ValueError("reads 0")
-    if torque_limit is not None and math.isfinite(torque_limit):
-        expected, evidence = torque_limit / abs(gear_ratio), f"the joint's torque limit of {torque_limit:g}"
-    elif rated_current_ma:
-        expected, evidence = _NM_PER_AMPERE * rated_current_ma * 1e-3, f"its rated current of {rated_current_ma} mA"
-    elif milli <= _LARGEST_NM:
+    expected, evidence = _expect(gear_ratio, torque_limit, rated_current_ma)
+    least, most = expected / _HALF_WAY, min(expected * _HALF_WAY, _LARGEST_NM)
+    if milli <= most and (milli >= least or math.isinf(expected)):
         return RatedTorque(milli)
-    else:
-        return RatedTorque(micro, f"is taken in µNm, {micro:g} Nm: no motor of an arm has {milli:g} Nm at its shaft")
-    if milli / expected < 1.0 / _HALF_WAY or micro / expected > _HALF_WAY:
-        raise ValueError(f"is {milli:g} Nm in mNm and {micro:g} Nm in µNm, and neither fits {evidence}")
-    if milli / expected > _HALF_WAY:
-        return RatedTorque(micro, f"is taken in µNm, {micro:g} Nm: in mNm it does not fit {evidence}")
-    return RatedTorque(milli)
+    if milli <= most:
+        return RatedTorque(milli, f"is taken in mNm, {milli:g} Nm, which is far below {evidence}; check both")
+    if micro <= most:
+        return RatedTorque(micro, f"is taken in µNm, {micro:g} Nm, for {milli:g} Nm in mNm does not fit {evidence}")
+    raise ValueError(f"is {milli:g} Nm in mNm and {micro:g} Nm in µNm, and neither fits {evidence}")
+
+
+def _expect(gear_ratio: float, torque_limit: float | None, rated_current_ma: int | None) -> tuple[float, str]:
+    """Torque that a motor may have at its shaft, infinite where nothing tells [Nm], and by which evidence."""
+    if torque_limit is not None and math.isfinite(torque_limit):
+        return torque_limit / abs(gear_ratio), f"the joint's torque limit of {torque_limit:g}"
+    if rated_current_ma:
+        return _NM_PER_AMPERE * rated_current_ma * 1e-3, f"its rated current of {rated_current_ma} mA"
+    return math.inf, "a motor of an arm"

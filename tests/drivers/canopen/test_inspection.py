@@ -124,3 +124,28 @@ def test_can_interfaces_of_the_machine(
         (tmp_path / name / "flags").write_text(f"{flags}\n")
     monkeypatch.setattr("tauscope_drivers.canopen.doctor._NETWORK", tmp_path)
     assert can_interfaces() == [Finding(severity, "can7", words, remedy)]
+
+
+def test_a_rated_torque_in_another_unit_is_told() -> None:
+    with EmulatedBus([None]) as bus:
+        bus.drives[0].dictionary.put(0x6076, 512_871)
+        (joint,) = bus.joints()
+        findings = examine([replace(joint, torque_limit=20.0)])
+    (doubt,) = [finding for finding in findings if "rated torque" in finding.detail]
+    assert doubt.severity is Severity.WARNING
+    assert "is taken in µNm, 0.512871 Nm" in doubt.detail
+    assert doubt.remedy == "state drive.rated_torque_nm to settle it"
+
+
+def test_limits_of_the_robot_file_are_checked_where_the_arm_stands() -> None:
+    with EmulatedBus([None]) as bus:
+        bus.drives[0].dictionary.put(0x6072, 0)
+        (joint,) = bus.joints()
+        failures = [
+            one.detail for one in examine([replace(joint, position_range=(1.0, 2.0))]) if one.severity == "failure"
+        ]
+    assert any("stands at 0.3, outside its limits 1 to 2" in detail for detail in failures)
+    assert not any("leaves no torque" in detail for detail in failures), "the first of the limits that fails"
+    with EmulatedBus([None]) as bus:
+        bus.drives[0].dictionary.put(0x6072, 0)
+        assert any("Max torque (0x6072:00) leaves no torque" in one.detail for one in examine(bus.joints()))

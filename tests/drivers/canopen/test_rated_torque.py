@@ -18,6 +18,7 @@ EPOS4 = 512_871
         (EPOS4, float("inf"), None, 0.512871),
         (310, None, 4_000, 0.31),
         (60_000, None, None, 60.0),
+        (EPOS4, 1000.0, None, 0.512871),
     ],
 )
 def test_the_unit_is_the_one_that_fits(value: int, limit: float | None, current_ma: int | None, nm: float) -> None:
@@ -26,7 +27,14 @@ def test_the_unit_is_the_one_that_fits(value: int, limit: float | None, current_
     assert ("is taken in µNm" in found.remark) == (value == EPOS4)
 
 
-@pytest.mark.parametrize(("value", "limit"), [(0, 20.0), (2, 100.0), (EPOS4, 0.5)])
+def test_a_limit_that_stands_for_none_is_told_and_does_not_change_the_unit() -> None:
+    """Descriptions of robots have limits of 1000 Nm in place of none."""
+    found = read_rated_torque(100, 50.0, 1000.0, None)
+    assert found.nm == pytest.approx(0.1)
+    assert found.remark.startswith("is taken in mNm, 0.1 Nm, which is far below the joint's torque limit of 1000")
+
+
+@pytest.mark.parametrize(("value", "limit"), [(0, 20.0), (EPOS4, 0.5)])
 def test_a_value_that_fits_neither_is_refused(value: int, limit: float) -> None:
     with pytest.raises(ValueError, match=r"reads 0|neither fits the joint's torque limit"):
         read_rated_torque(value, 50.0, limit, None)
