@@ -27,7 +27,8 @@ def rehearse(node: DriveNode, joint: DriveJoint) -> list[Finding]:
     """
     checks: tuple[Callable[[], list[Finding]], ...] = (
         lambda: _examine_settings(node),
-        lambda: _examine_limits(node, joint),
+        lambda: _examine_place(node, joint),
+        lambda: _examine_torque(node, joint),
         lambda: _examine_mapping(node),
         lambda: _examine_abort(node),
     )
@@ -47,11 +48,16 @@ def _examine_settings(node: DriveNode) -> list[Finding]:
     return []
 
 
-def _examine_limits(node: DriveNode, joint: DriveJoint) -> list[Finding]:
-    """Where the joint stands, and the torque that its drive allows."""
-    limits = stated_limits([joint])
+def _examine_place(node: DriveNode, joint: DriveJoint) -> list[Finding]:
+    """The joint stands within its range."""
     place = node.units.position(node.dictionary.read(objects.POSITION_ACTUAL))
-    require_sensible(limits, np.array([place]), [node.place])
+    require_sensible(stated_limits([joint]), np.array([place]), [node.place])
+    return []
+
+
+def _examine_torque(node: DriveNode, joint: DriveJoint) -> list[Finding]:
+    """The drive's limit and the joint's leave torque."""
+    limits = stated_limits([joint])
     if not node.has(objects.LARGEST_TORQUE):
         return []
     cap = node.dictionary.read(objects.LARGEST_TORQUE)
