@@ -2,8 +2,9 @@
 
 from collections.abc import Sequence
 
+from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.configuration import NodeConfiguration, read_configuration, read_node
-from tauscope_drivers.canopen.data_sheet.needs import present_objects
+from tauscope_drivers.canopen.data_sheet.needs import present_objects, states_rated_torque
 from tauscope_drivers.canopen.optional_objects import describe_absent
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.errors import DriverError
@@ -41,5 +42,9 @@ def _describe(place: str, node: NodeConfiguration) -> list[Finding]:
     if file is None:
         return []
     absent = describe_absent(present_objects(file))
+    doubts: list[Finding] = []
+    if node.rated_torque_nm is None and not states_rated_torque(file):
+        detail = f"{file.name} has no {objects.RATED_TORQUE}: torque in ‰ of it means nothing, and a run is refused"
+        doubts.append(Finding(Severity.WARNING, place, detail, "state drive.rated_torque_nm"))
     usable = Finding(Severity.GOOD, place, f"{file.name} describes all that the driver needs")
-    return [usable, *(Finding(Severity.GOOD, place, f"{file.name} {line}") for line in absent)]
+    return [usable, *doubts, *(Finding(Severity.GOOD, place, f"{file.name} {line}") for line in absent)]

@@ -35,11 +35,17 @@ def find_flaws(file: DeviceFile, *, reads_rated_torque: bool) -> list[str]:
     flaws += [flaw for entry in _WRITTEN if (flaw := _flaw(file, entry, is_written=True))]
     if flaw := _flaw(file, objects.CONSUMER_HEARTBEAT, is_written=True):
         flaws.append(f"{flaw}: the drive would not notice that the host is gone")
-    if reads_rated_torque and (flaw := _flaw(file, objects.RATED_TORQUE)):
-        flaws.append(f"{flaw}: give drive.rated_torque_nm")
     flaws += [flaw for entry in SUBSTITUTES if _find(file, entry) and (flaw := _flaw(file, entry))]
     flaws += [flaw for entry in MEASURED if (flaw := _flaw(file, entry, is_mapped=True))]
-    return flaws + _target_flaws(file, ControlMode.POSITION)
+    flaws += _target_flaws(file, ControlMode.POSITION)
+    if flaws and reads_rated_torque and not states_rated_torque(file):
+        flaws.append(f"{objects.RATED_TORQUE} is missing: give drive.rated_torque_nm")
+    return flaws
+
+
+def states_rated_torque(file: DeviceFile) -> bool:
+    """Whether a drive states its rated torque; else a run needs it from the robot file."""
+    return _flaw(file, objects.RATED_TORQUE) is None
 
 
 def require_needed(file: DeviceFile, *, reads_rated_torque: bool) -> None:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from emulated_data_sheet import GAIN, LABEL, OFFSET, Sections, sections, text_of, write_file
 from tauscope_drivers import ControlMode
 from tauscope_drivers.canopen import objects
+from tauscope_drivers.canopen.block_check import check_blocks
 from tauscope_drivers.canopen.configuration import (
     BusConfiguration,
     DriveJoint,
@@ -23,6 +24,7 @@ from tauscope_drivers.canopen.data_sheet.needs import pdo_slots, present_objects
 from tauscope_drivers.canopen.optional_objects import describe_absent
 from tauscope_drivers.canopen.pdo_plan import MEASURED_WHERE_THERE, plan_pdos
 from tauscope_drivers.errors import DriverError, DriverErrorKind
+from tauscope_drivers.inspection import Severity
 
 WHOLE = text_of(sections(VendorNumber="0x3A1", ProductNumber="", RevisionNumber="0x20005"))
 
@@ -63,7 +65,7 @@ def test_no_file_is_needed() -> None:
     assert configured(None).nodes[0].device_file is None
 
 
-NEEDED = ("1000", "1016", "1016sub1", "6040", "6041", "6060", "6061", "6064", "6076", "6077", "607A", "6502")
+NEEDED = ("1000", "1016", "1016sub1", "6040", "6041", "6060", "6061", "6064", "6077", "607A", "6502")
 OPTIONAL = ("1017", "6007", "603F", "605A", "605E", "606C", "6072", "607D", "60C2")
 
 
@@ -86,9 +88,11 @@ def test_a_missing_object_is_named(tmp_path: Path, section: str) -> None:
 def test_all_flaws_are_named_at_once(tmp_path: Path) -> None:
     content = sections()
     remove(content, *NEEDED)
+    remove(content, "6076")
     content["6072"]["DataType"] = "0x20"
     message = refusal(write_file(tmp_path, content))
-    assert message.count(" is missing") == len(NEEDED) - 1
+    assert message.count(" is missing") == len(NEEDED)
+    assert "Motor rated torque (0x6076:00) is missing: give drive.rated_torque_nm" in message
     assert "Max torque (0x6072:00) is DOMAIN" in message
 
 
@@ -101,6 +105,17 @@ def test_an_optional_object_may_be_absent(tmp_path: Path, section: str) -> None:
     lines = describe_absent(present_objects(file))
     assert len(lines) == 1
     assert f"(0x{section}:" in lines[0]
+
+
+@pytest.mark.parametrize(("stated", "doubts"), [({}, 1), ({"rated_torque_nm": 0.4}, 0)])
+def test_a_rated_torque_that_nobody_states_is_told(tmp_path: Path, stated: dict[str, float], doubts: int) -> None:
+    content = sections()
+    remove(content, "6076")
+    bus = {"interface": "virtual", "channel": "none", "node_id": 5, "counts_per_turn": 4096}
+    findings = check_blocks([DriveJoint("elbow", {**bus, "eds": write_file(tmp_path, content), **stated})])
+    told = [one for one in findings if one.remedy == "state drive.rated_torque_nm"]
+    assert len(told) == doubts
+    assert all(one.severity is not Severity.FAILURE for one in findings)
 
 
 def test_one_that_is_read_only_counts_as_absent(tmp_path: Path) -> None:
