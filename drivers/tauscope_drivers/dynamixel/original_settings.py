@@ -5,6 +5,7 @@ A run that holds the arm ends with servos under torque, whose EEPROM is locked: 
 
 import json
 import os
+import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -20,9 +21,8 @@ class OriginalSettings:
 
     def __init__(self, port: str, servo: int) -> None:
         """Read what is kept; nothing is kept where the file is missing or damaged."""
-        root = os.environ.get(FOLDER) or Path(os.environ.get("XDG_STATE_HOME") or "~/.local/state", "tauscope")
         name = f"{os.path.realpath(port).strip('/').replace('/', '-')}-{servo}.json"
-        self._path = Path(root).expanduser() / "servos" / name
+        self._path = _find_folder() / "servos" / name
         self._before: dict[str, int] = {}
         self._after: dict[str, int] = {}
         self._load()
@@ -66,3 +66,13 @@ class OriginalSettings:
             return
         if before.keys() == after.keys():
             self._before, self._after = before, after
+
+
+def _find_folder() -> Path:
+    """Where it is kept; an account without a home has the folder for temporary files."""
+    if named := os.environ.get(FOLDER):
+        return Path(named)
+    try:
+        return Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state") / "tauscope"
+    except RuntimeError:
+        return Path(tempfile.gettempdir()) / "tauscope"
