@@ -70,8 +70,9 @@ class OriginalSettings:
 
 def _find_folder() -> Path:
     """Where it is kept; an account without a home has the folder for temporary files."""
-    if named := os.environ.get(FOLDER):
-        return Path(named)
+    # systemd names the folder of a service, which has no other
+    if named := os.environ.get(FOLDER) or os.environ.get("STATE_DIRECTORY"):
+        return Path(named.partition(":")[0])
     try:
         return Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state") / "tauscope"
     except RuntimeError:

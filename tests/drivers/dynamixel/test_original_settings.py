@@ -93,3 +93,12 @@ def test_a_damaged_file_keeps_nothing(servo: EmulatedServo, content: str, tmp_pa
     path.write_text(content, encoding="utf-8")
     assert not OriginalSettings("wired", 1).before
     assert np.isfinite(held_arm().stop(StopPolicy.HOLD).position).all()
+
+
+def test_a_service_keeps_them_in_the_folder_that_systemd_names(
+    servo: EmulatedServo, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.delenv(FOLDER)
+    monkeypatch.setenv("STATE_DIRECTORY", f"{tmp_path / 'service'}:/elsewhere")
+    OriginalSettings("wired", 1).remember("Drive Mode", 4, 0)
+    assert list((tmp_path / "service").rglob("*.json"))
