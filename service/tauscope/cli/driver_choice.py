@@ -1,6 +1,7 @@
 """Options whose choices are the registered drivers: a command reads them when it is called or asked for its help."""
 
 from collections.abc import Collection
+from typing import Annotated
 
 import typer
 from typer.core import TyperArgument, TyperCommand, TyperOption
@@ -73,10 +74,21 @@ def require_options(backend: str, options: Collection[str]) -> None:
     for option in options:
         owners = [name for name in driver_names() if option in find_driver(name).option_names]
         if backend not in owners:
-            raise typer.BadParameter(f"--{option} belongs to --backend {' or '.join(owners)}")
+            raise typer.BadParameter(f"--{option.replace('_', '-')} belongs to --backend {' or '.join(owners)}")
 
 
 def _check(name: str, known: Collection[str]) -> str:
     if name not in known:
         raise typer.BadParameter(f"{name!r} is not one of {', '.join(map(repr, known))}.")
     return name
+
+
+BusOption = Annotated[
+    str | None,
+    typer.Option(
+        parser=check_bus,
+        metavar="[{buses}]",
+        help="Field bus; the one that the robot file's drives speak of by default.",
+    ),
+]
+"""Which bus, where a robot file's drives do not say it."""
