@@ -87,6 +87,12 @@ def test_uploaded_files_all_the_way(client: TestClient, files: Files, paper_reco
     assert list(status["refused_exports"]) == ["urdf"]
 
     assert [entry["id"] for entry in client.get(IDENTIFICATIONS).json()["identifications"]] == [status["id"]]
+    assert_problem(client.delete(here), "in-use", 409)  # it has become the active model
+
+
+def test_an_identification_is_removed(client: TestClient, files: Files) -> None:
+    here = client.post(IDENTIFICATIONS, files=files, data=form(QUICK)).headers["location"]
+    assert client.get(here).json()["state"] == "succeeded"
     assert client.delete(here).status_code == 204
     assert_problem(client.get(here), "not-found", 404)
     assert client.get(IDENTIFICATIONS).json() == {"identifications": [], "next": None}

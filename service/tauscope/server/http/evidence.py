@@ -14,6 +14,7 @@ def require_no_model(services: Services, identifier: str) -> None:
     ProblemError
         if it is one
     """
+    _judge_new(services)
     _require_free(services, identifier, {identifier})
 
 
@@ -25,13 +26,19 @@ def require_no_evidence(services: Services, recording: str) -> None:
     ProblemError
         if one was
     """
-    services.index.refresh()
+    _judge_new(services)
     _require_free(services, recording, services.index.index.list_users(recording))
+
+
+def _judge_new(services: Services) -> None:
+    """Judge every identification: one that ended a moment ago may become the active model."""
+    services.index.refresh()
+    services.models.judge_new()
 
 
 def _require_free(services: Services, name: str, users: Collection[str]) -> None:
     """Refuse to remove something while a model that is in use rests on it."""
     models = services.models.history.list_protected().intersection(users)
     if models:
-        hint = "make another model active, or the reference, first"
+        hint = "make another model active, and the reference, first; identify again where there is no other"
         raise ProblemError("in-use", f"{name}: model {min(models)} is in use and rests on it; {hint}")
