@@ -79,6 +79,8 @@ def write_csv_bombs() -> Iterator[tuple[str, str]]:
     yield "comments", "# x\n" * (SMALL // 4) + "t,q1,tau1\n0,0,0\n"
     yield "empty lines", "t,q1,tau1\n" + "\n" * SMALL
     yield "header", "t" * SMALL
+    yield "numbers in a name", "1a" * (SMALL // 2)
+    yield "digits in a name", "t,q1,tau1,q" + "1" * (SMALL // 2)
     yield "same names", ",".join(["q1"] * (SMALL // 3))
     yield "alike names", ",".join(f"actual_q_{n}" for n in range(SMALL // 14)) + "\n"
     yield "semicolons", "t;q1;tau1\n" + "0,1;0,2;0,3\n" * (SMALL // 12)
@@ -169,7 +171,7 @@ def write_parquet_bomb(path: Path) -> None:
     pyarrow.parquet.write_table(table, path, compression="zstd")
 
 
-def trajectory_bombs() -> Iterator[tuple[str, str]]:
+def write_trajectory_bombs() -> Iterator[tuple[str, str]]:
     """Documents that a trajectory reader may take long for."""
     yield "depth", "[" * SMALL
     yield (

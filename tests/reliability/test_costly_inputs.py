@@ -9,11 +9,11 @@ import pytest
 
 from reliability.costly_inputs import (
     mix,
-    trajectory_bombs,
     write_csv_bombs,
     write_mcap_bombs,
     write_parquet_bomb,
     write_rosbag_bomb,
+    write_trajectory_bombs,
     write_xml_bombs,
     write_yaml_bombs,
 )
@@ -36,7 +36,7 @@ SEEDS = 40
 def measure(kind: str, path: Path) -> tuple[float, int, str]:
     """Processor time, memory at its peak, and what came of it; in a worker process."""
     Path("/proc/self/clear_refs").write_text("5", encoding="ascii")  # the peak begins anew
-    before, began = resident("VmRSS"), time.process_time()
+    before, began = read_memory("VmRSS"), time.process_time()
     try:
         if kind == "robot":
             check_robot(path)
@@ -47,10 +47,10 @@ def measure(kind: str, path: Path) -> tuple[float, int, str]:
         outcome = "read"
     except TauscopeError as error:
         outcome = str(error)
-    return time.process_time() - began, resident("VmHWM") - before, outcome
+    return time.process_time() - began, read_memory("VmHWM") - before, outcome
 
 
-def resident(name: str) -> int:
+def read_memory(name: str) -> int:
     """Memory of this process, as the kernel counts it [bytes]."""
     lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
     return next(int(line.split()[1]) * 1024 for line in lines if line.startswith(f"{name}:"))
@@ -64,7 +64,7 @@ def pool() -> Iterator[WorkerPool]:
         yield pool
 
 
-def bombs() -> Iterator[tuple[str, str, bytes]]:
+def list_bombs() -> Iterator[tuple[str, str, bytes]]:
     """Kind, file name and content of every bomb of text or MCAP."""
     texts = {"yaml": list(write_yaml_bombs()), "urdf": list(write_xml_bombs()), "csv": list(write_csv_bombs())}
     for suffix, found in texts.items():
@@ -73,7 +73,7 @@ def bombs() -> Iterator[tuple[str, str, bytes]]:
             yield kind, f"{name}.{suffix}", text.encode()
         for seed in range(SEEDS):
             yield kind, f"mix {seed}.{suffix}", mix([text for _, text in found], seed).encode()
-    for name, text in trajectory_bombs():
+    for name, text in write_trajectory_bombs():
         yield "trajectory", f"{name}.{'csv' if name == 'csv' else 'json'}", text.encode()
     for name, content in write_mcap_bombs():
         yield "recording", f"{name}.mcap", content
@@ -81,8 +81,12 @@ def bombs() -> Iterator[tuple[str, str, bytes]]:
 
 def test_no_small_file_is_costly(pool: WorkerPool, tmp_path: Path) -> None:
     found: list[str] = []
-    files = [*((kind, name) for kind, name, _ in bombs()), ("recording", "bomb.db3"), ("recording", "bomb.parquet")]
-    for _, name, content in bombs():
+    files = [
+        *((kind, name) for kind, name, _ in list_bombs()),
+        ("recording", "bomb.db3"),
+        ("recording", "bomb.parquet"),
+    ]
+    for _, name, content in list_bombs():
         (tmp_path / name).write_bytes(content)
     write_rosbag_bomb(tmp_path / "bomb.db3")
     write_parquet_bomb(tmp_path / "bomb.parquet")
@@ -101,6 +105,6 @@ def test_the_measure_sees_memory(pool: WorkerPool) -> None:
 
 def hold(size: int) -> int:
     """Take memory, and tell how much the measure sees of it."""
-    before = resident("VmRSS")
+    before = read_memory("VmRSS")
     taken = bytearray(b"x") * size
-    return resident("VmHWM") - before if taken else 0
+    return read_memory("VmHWM") - before if taken else 0

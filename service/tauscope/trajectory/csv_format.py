@@ -43,11 +43,11 @@ def trajectory_csv(trajectory: Trajectory, rate_hz: float) -> str:
     rate_hz : float
         samples a second [Hz]
     """
-    starts = range(0, trajectory.sample_count(rate_hz), PIECE_ROWS)
-    return "".join(trajectory_csv_piece(trajectory, rate_hz, start) for start in starts)
+    starts = range(0, trajectory.count_samples(rate_hz), PIECE_ROWS)
+    return "".join(write_trajectory_rows(trajectory, rate_hz, start) for start in starts)
 
 
-def trajectory_csv_piece(trajectory: Trajectory, rate_hz: float, start: int) -> str:
+def write_trajectory_rows(trajectory: Trajectory, rate_hz: float, start: int) -> str:
     """`PIECE_ROWS` rows of the text from row `start` on; the header goes before the first ones.
 
     Parameters
@@ -55,7 +55,7 @@ def trajectory_csv_piece(trajectory: Trajectory, rate_hz: float, start: int) -> 
     rate_hz : float
         samples a second [Hz]
     """
-    stop = min(start + PIECE_ROWS, trajectory.sample_count(rate_hz))
+    stop = min(start + PIECE_ROWS, trajectory.count_samples(rate_hz))
     samples = trajectory.evaluate(np.arange(start, stop) / rate_hz)
     joints = range(1, trajectory.joint_count + 1)
     header = ["t", *(f"{group}{joint}" for group in GROUPS for joint in joints), "period"]

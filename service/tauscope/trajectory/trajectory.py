@@ -149,9 +149,9 @@ class Trajectory:
         ExcitationError
             for a rate that is not positive, or absurd
         """
-        return self.evaluate(np.arange(self.sample_count(rate_hz)) / rate_hz)
+        return self.evaluate(np.arange(self.count_samples(rate_hz)) / rate_hz)
 
-    def sample_count(self, rate_hz: float) -> int:
+    def count_samples(self, rate_hz: float) -> int:
         """How many samples it has at a constant rate [1/s].
 
         Raises

@@ -302,7 +302,7 @@ class Indexer:
             indexed = known.get(identifier)
             if indexed is not None and indexed[1] and not thorough:
                 continue
-            facts = self._changed(kind, store, identifier, indexed)
+            facts = self._read_changed(kind, store, identifier, indexed)
             if facts is not None:
                 found.append(facts)
             if len(found) == BATCH:
@@ -310,7 +310,7 @@ class Indexer:
                 found = []
         self._put(kind, found)
 
-    def _changed(
+    def _read_changed(
         self, kind: str, store: ItemStore, identifier: str, indexed: tuple[str, bool] | None
     ) -> ItemMetadata | None:
         """What one item shows, where its state is another than the indexed one."""

@@ -116,20 +116,20 @@ async def get_trajectory(
     workspace = await run_in_threadpool(EXCITATIONS.finished, services, identifier)
     if format_ == "json":
         content = require_document(await run_in_threadpool(read_bytes, workspace.trajectory), identifier)
-        return Response(content, headers=_disposition("json"), media_type="application/json")
+        return Response(content, headers=_name_file("json"), media_type="application/json")
     # The first piece is made before the answer begins: its problem is the answer's.
     first = await services.reading.call(request, write_trajectory_piece, workspace, rate_hz, 0)
 
-    async def pieces() -> AsyncIterator[bytes]:
+    async def write_pieces() -> AsyncIterator[bytes]:
         piece, start = first, 0
         while piece:
             yield piece
             start += PIECE_ROWS
             piece = await services.reading.call(request, write_trajectory_piece, workspace, rate_hz, start)
 
-    return StreamingResponse(pieces(), headers=_disposition("csv"), media_type="text/csv")
+    return StreamingResponse(write_pieces(), headers=_name_file("csv"), media_type="text/csv")
 
 
-def _disposition(suffix: str) -> dict[str, str]:
+def _name_file(suffix: str) -> dict[str, str]:
     """The header by which a browser saves a trajectory."""
     return {"Content-Disposition": f'attachment; filename="trajectory.{suffix}"'}

@@ -71,7 +71,7 @@ class ReadingQueue:
         self._waiting[caller] += 1
         try:
             turn = self._turns.setdefault(caller, asyncio.Lock())
-            return await _unless_gone(request, self._take_turn(turn, partial(function, *args, **kwargs)))
+            return await _await_unless_gone(request, self._take_turn(turn, partial(function, *args, **kwargs)))
         finally:
             self._waiting[caller] -= 1
             if not self._waiting[caller]:
@@ -88,7 +88,7 @@ class ReadingQueue:
                 raise ProblemError("worker-lost", text) from None
 
 
-async def _unless_gone(request: Request, answer: Coroutine[Any, Any, Result]) -> Result:
+async def _await_unless_gone(request: Request, answer: Coroutine[Any, Any, Result]) -> Result:
     """The answer to a request, unless its client goes."""
     task = asyncio.ensure_future(answer)
     try:

@@ -314,7 +314,7 @@ async def submit_run(request: Request, services: Services) -> str:
             await services.reading.call(
                 request, check_trajectory, workspace.trajectories, workspace.robot / wanted.robot_file
             )
-        return await run_in_threadpool(_hand_in, wanted, services, workspace, permit)
+        return await run_in_threadpool(_submit, wanted, services, workspace, permit)
     finally:
         await run_in_threadpool(items.discard, staged)
 
@@ -361,7 +361,7 @@ def _prepare(
     return _Wanted(document, robot_file, robot, backend, uploaded)
 
 
-def _hand_in(wanted: _Wanted, services: Services, workspace: RunWorkspace, permit: Permit) -> str:
+def _submit(wanted: _Wanted, services: Services, workspace: RunWorkspace, permit: Permit) -> str:
     """Settle what is moved, and how, and begin."""
     document, backend = wanted.document, wanted.backend
     device = backend.device(wanted.robot.name)

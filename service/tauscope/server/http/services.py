@@ -233,7 +233,7 @@ def _assemble(ground: _Ground, executor: Executor | None, readers: Executor, sta
         answers=StoredAnswers(settings.data_folder / "idempotency"),
         lease_answers=MemoryAnswers(),
         metrics=metrics,
-        readiness=Readiness(_checks(ground, jobs, readers, audit, closing)),
+        readiness=Readiness(_collect_checks(ground, jobs, readers, audit, closing)),
         closing=closing,
         feeds=EventFeeds(closing),
         heartbeat=heartbeat,
@@ -243,7 +243,7 @@ def _assemble(ground: _Ground, executor: Executor | None, readers: Executor, sta
     )
 
 
-def _checks(
+def _collect_checks(
     ground: _Ground, jobs: JobQueue, readers: Executor, audit: AuditTrail, closing: threading.Event
 ) -> dict[str, Callable[[], str | None]]:
     """What `/readyz` asks."""

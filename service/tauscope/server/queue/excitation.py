@@ -13,7 +13,7 @@ from tauscope.server.queue.task_job import TRAJECTORY, TaskOrder, TaskWorkspace,
 from tauscope.tasks import design_excitation
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
 from tauscope.trajectory import parse_trajectory_json, read_trajectory
-from tauscope.trajectory.csv_format import trajectory_csv_piece
+from tauscope.trajectory.csv_format import write_trajectory_rows
 
 MOST_ROWS = 2_000_000
 """Rows of the longest CSV that is made on request."""
@@ -76,8 +76,8 @@ def write_trajectory_piece(workspace: TaskWorkspace[Any], rate_hz: float, start:
     if rows > MOST_ROWS:
         hint = "ask for a lower rate, or for the document"
         raise LimitExceededError(f"{rows:.3g} rows are more than the {MOST_ROWS} that are made here; {hint}")
-    is_over = start >= trajectory.sample_count(rate_hz)
-    return b"" if is_over else trajectory_csv_piece(trajectory, rate_hz, start).encode()
+    is_over = start >= trajectory.count_samples(rate_hz)
+    return b"" if is_over else write_trajectory_rows(trajectory, rate_hz, start).encode()
 
 
 def check_trajectory(folder: Path, robot_file: Path) -> None:

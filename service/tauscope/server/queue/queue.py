@@ -347,10 +347,10 @@ class JobQueue:
         try:
             problem = self._problem_of(job, future)
         except (ClusterUnavailableError, BrokenExecutor) as error:
-            return self._end_of_lost(job, error)
+            return self._end_lost(job, error)
         return _End(JobState.SUCCEEDED if problem is None else JobState.FAILED, problem)
 
-    def _end_of_lost(self, job: QueuedJob, error: Exception) -> _End:
+    def _end_lost(self, job: QueuedJob, error: Exception) -> _End:
         """A job that was lost with its worker waits again, unless that happened too often: it may be the cause."""
         if job.attempts() >= MOST_ATTEMPTS:
             _log.error("job %s: lost with its worker %d times", job.identifier, MOST_ATTEMPTS)

@@ -205,7 +205,7 @@ class _Worker:
         self._is_ready = False
         self._process = context.Process(target=serve_connection, args=(theirs, memory_bytes))
         try:
-            with _one_thread_each():
+            with _limit_threads():
                 self._process.start()
         finally:
             theirs.close()  # the process has the only other end: when it dies, the connection does
@@ -239,7 +239,7 @@ class _Worker:
 
 
 @contextmanager
-def _one_thread_each() -> Iterator[None]:
+def _limit_threads() -> Iterator[None]:
     """What processes that are started meanwhile find in their environment; the user's own settings stay."""
     with _environment:
         added = [name for name in _THREAD_SETTINGS if name not in os.environ]

@@ -24,24 +24,24 @@ def serve_connection(connection: Connection, memory_bytes: int | None) -> None:
         except (EOFError, OSError):
             return
         except Exception as error:  # the function cannot be imported here
-            answer = _failure(error)
+            answer = _describe_failure(error)
         else:
-            answer = _answer(*call)
+            answer = _call(*call)
         try:
             connection.send(answer)
         except Exception as error:  # what cannot be sent is described
             connection.send((False, RuntimeError("".join(traceback.format_exception(error)))))
 
 
-def _answer(function: Callable[..., Any], arguments: tuple[Any, ...], options: dict[str, Any]) -> tuple[bool, Any]:
+def _call(function: Callable[..., Any], arguments: tuple[Any, ...], options: dict[str, Any]) -> tuple[bool, Any]:
     """What comes of a call: whether it succeeded, and its result or exception."""
     try:
         return True, function(*arguments, **options)
     except BaseException as error:
-        return _failure(error)
+        return _describe_failure(error)
 
 
-def _failure(error: BaseException) -> tuple[bool, BaseException]:
+def _describe_failure(error: BaseException) -> tuple[bool, BaseException]:
     """What is sent of an exception: where it happened is part of it."""
     error.add_note("".join(traceback.format_exception(error)))
     return False, error

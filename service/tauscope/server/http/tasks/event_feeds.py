@@ -18,7 +18,7 @@ LAST_WAIT_S = 3.0
 """How long the end event of a job that has ended is waited for [s]."""
 
 
-class Told(Protocol):
+class EventSource(Protocol):
     """Anything that has events."""
 
     @property
@@ -34,11 +34,11 @@ class Told(Protocol):
 class Feed:
     """The events of one job as far as they are read. Changed by the task that reads, within the event loop."""
 
-    def __init__(self, told: Told) -> None:
+    def __init__(self, source: EventSource) -> None:
         self.events: list[LoggedEvent] = []
         self.is_over = False
         self.followers = 0
-        self._told, self._log = told, told.events.follow()
+        self._source, self._log = source, source.events.follow()
         self._news = asyncio.Event()
         self._waited_s = 0.0
 
@@ -51,8 +51,8 @@ class Feed:
         return False
 
     def read(self) -> tuple[bool, list[LoggedEvent]]:
-        """Whether the job has ended, and then what was told until now; nothing is told behind the end."""
-        has_ended = self._told.has_ended()
+        """Whether the job has ended, and its events until now; none follows the end."""
+        has_ended = self._source.has_ended()
         events = self._log.read()
         ends = (place for place, event in enumerate(events, start=1) if event.content.get("kind") == "ended")
         return has_ended, events[: next(ends, None)]
@@ -61,14 +61,14 @@ class Feed:
         """Show what was read to all followers."""
         self.events += events
         self._waited_s += POLL_S if has_ended else 0.0
-        is_told = any(event.content.get("kind") == "ended" for event in events)
-        if is_told or self._waited_s > LAST_WAIT_S:
+        is_ended = any(event.content.get("kind") == "ended" for event in events)
+        if is_ended or self._waited_s > LAST_WAIT_S:
             self.end()
         elif events:
             self._wake()
 
     def end(self) -> None:
-        """Tell the followers that nothing more comes."""
+        """Let the followers go."""
         self.is_over = True
         self._wake()
 
@@ -87,12 +87,12 @@ class EventFeeds:
         self._task: asyncio.Task[None] | None = None
 
     @contextmanager
-    def follow(self, told: Told) -> Iterator[Feed]:
+    def follow(self, source: EventSource) -> Iterator[Feed]:
         """The feed of a job, which is read as long as somebody follows it."""
-        path = told.events.path
+        path = source.events.path
         feed = self._feeds.get(path)
         if feed is None or feed.is_over:
-            feed = self._feeds[path] = Feed(told)
+            feed = self._feeds[path] = Feed(source)
         feed.followers += 1
         if self._task is None or self._task.done():
             self._task = asyncio.create_task(self._read_all())

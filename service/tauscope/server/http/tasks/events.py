@@ -10,7 +10,7 @@ from fastapi.sse import KEEPALIVE_COMMENT, EventSourceResponse, format_sse_event
 from pydantic.json_schema import models_json_schema
 
 from tauscope.server.http.services import Services, ServicesDep
-from tauscope.server.http.tasks.event_feeds import EventFeeds, Told
+from tauscope.server.http.tasks.event_feeds import EventFeeds, EventSource
 from tauscope.server.http.tasks.routes import Identifier
 from tauscope.server.problems import problem_responses
 from tauscope.server.queue.record import EndedEvent, ProgressEvent, StateEvent, StepEvent
@@ -26,7 +26,7 @@ RETRY_MS = 1000
 
 
 PRESENCE_S = 1.0
-"""How often a client that nothing is told is looked for [s]."""
+"""How often a client without news is looked for [s]."""
 
 
 LastEvent = Annotated[
@@ -40,10 +40,10 @@ LastEvent = Annotated[
 ]
 
 
-def add_events_route(router: APIRouter, noun: str, find: Callable[[Services, str], Told]) -> None:
+def add_events_route(router: APIRouter, noun: str, find: Callable[[Services, str], EventSource]) -> None:
     """Give a collection of jobs the route ``/{identifier}/events``."""
 
-    def found(identifier: Identifier, services: ServicesDep) -> Told:
+    def find_source(identifier: Identifier, services: ServicesDep) -> EventSource:
         return find(services, identifier)
 
     @router.get(
@@ -56,35 +56,38 @@ def add_events_route(router: APIRouter, noun: str, find: Callable[[Services, str
                 "content": {"text/event-stream": {"schema": _stream_schema()}},
                 "description": "events, until its end",
             },
-            204: {"description": "the end was told before `Last-Event-ID`: do not connect again"},
+            204: {"description": "the job had ended before `Last-Event-ID`: do not connect again"},
             **problem_responses("not-found"),
         },
     )
     async def follow_events(
-        request: Request, services: ServicesDep, told: Annotated[Told, Depends(found)], after: LastEvent = 0
+        request: Request,
+        services: ServicesDep,
+        source: Annotated[EventSource, Depends(find_source)],
+        after: LastEvent = 0,
     ) -> Response:
         """Server-sent events of the kinds `state`, `step`, `progress` and `ended`, from the first one on.
 
         Every event has the number of its line as id: who was cut off goes on with `Last-Event-ID`, also after the
         service was started again. Comments keep a quiet connection alive. The stream ends after `ended`.
         """
-        first = await to_thread.run_sync(_end_number, told, limiter=services.followers)
+        first = await to_thread.run_sync(_find_end, source, limiter=services.followers)
         if first is not None and after >= first:
             return Response(status_code=204)
-        stream = _stream(request, services.feeds, told, after)
+        stream = _stream(request, services.feeds, source, after)
         return EventSourceResponse(stream, headers={"X-Accel-Buffering": "no"})
 
 
-async def _stream(request: Request, feeds: EventFeeds, told: Told, after: int) -> AsyncIterator[bytes]:
+async def _stream(request: Request, feeds: EventFeeds, source: EventSource, after: int) -> AsyncIterator[bytes]:
     """Everything that happens, as it is sent; ends with the job, the client or the service."""
     yield format_sse_event(retry=RETRY_MS)
     place, quiet_s = 0, 0.0
-    with feeds.follow(told) as feed:
+    with feeds.follow(source) as feed:
         while not await request.is_disconnected():
             events, place = feed.events[place:], len(feed.events)
             new = [event for event in events if event.number > after]
             if new:
-                yield b"".join(map(_formatted, new))
+                yield b"".join(map(_format_event, new))
                 quiet_s = 0.0
             if feed.is_over and place == len(feed.events):
                 return
@@ -95,15 +98,15 @@ async def _stream(request: Request, feeds: EventFeeds, told: Told, after: int) -
                 quiet_s = 0.0
 
 
-def _end_number(told: Told) -> int | None:
-    """Number of the end event; None where it was not told yet."""
-    if not told.has_ended():
+def _find_end(source: EventSource) -> int | None:
+    """Number of the end event; None where there is none yet."""
+    if not source.has_ended():
         return None
-    events = told.events.follow().read()
+    events = source.events.follow().read()
     return next((event.number for event in events if event.content.get("kind") == "ended"), None)
 
 
-def _formatted(event: LoggedEvent) -> bytes:
+def _format_event(event: LoggedEvent) -> bytes:
     """An event as it is sent."""
     kind = event.content.get("kind")
     return format_sse_event(

@@ -167,11 +167,11 @@ class QueuedTask:
             robot = await services.reading.call(request, read_received_robot, workspace.robot, robot_file)
             wanted = {"robot_file": robot_file, "robot_name": robot.name}
             caller = find_caller(request.scope).name
-            return await run_in_threadpool(self._hand_in, received, services, workspace, wanted, caller)
+            return await run_in_threadpool(self._submit, received, services, workspace, wanted, caller)
         finally:
             await run_in_threadpool(items.discard, staged)
 
-    def _hand_in(
+    def _submit(
         self,
         received: Received[Any],
         services: Services,

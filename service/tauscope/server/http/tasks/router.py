@@ -23,7 +23,7 @@ from tauscope.server.http.robots.files import check_received_robot
 from tauscope.server.http.robots.models import RobotReportAnswer
 from tauscope.server.http.services import Services, ServicesDep
 from tauscope.server.http.tasks.answers import require_document
-from tauscope.server.http.tasks.event_feeds import Told
+from tauscope.server.http.tasks.event_feeds import EventSource
 from tauscope.server.http.tasks.events import add_events_route
 from tauscope.server.http.tasks.routes import ENDINGS, MOTION, SUBMISSION, After, Identifier, Limit, collection
 from tauscope.server.http.tasks.submission import RobotRequest, request_body
@@ -116,7 +116,7 @@ class Resource:
     examples: Examples
     items: Callable[[Services], ItemStore]
     find: Callable[[Services, str], Folder]
-    followed: Callable[[Services, str], Told]
+    followed: Callable[[Services, str], EventSource]
     submit: Callable[[Request, Services], Awaitable[str]]
     describe: Callable[[Services, str, str], BaseModel]
     summary: str

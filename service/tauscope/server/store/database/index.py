@@ -139,7 +139,7 @@ class Index:
             known = [row.id for row in rows.values()]
             for table in (Artefact, RecordingUse) if known else ():
                 session.execute(delete(table).where(table.item_id.in_(known)))
-            robots = _robot_ids(session, facts)
+            robots = _find_robots(session, facts)
             for each in facts:
                 row = rows.get(each.identifier)
                 if row is None:
@@ -260,7 +260,7 @@ def _fill(row: Item, facts: ItemMetadata) -> None:
         setattr(row, column, facts.figures.get(column))
 
 
-def _robot_ids(session: Session, facts: Sequence[ItemMetadata]) -> dict[str, int]:
+def _find_robots(session: Session, facts: Sequence[ItemMetadata]) -> dict[str, int]:
     """The rows of the robots that items are about, made where they are missing."""
     seen: dict[str, list[datetime]] = {}
     for each in facts:
