@@ -28,6 +28,7 @@ NEEDED: dict[str, tuple[str, ...]] = {
     "service/tauscope/robot/": ("tests/robot", "tests/identification", "tests/excitation"),
     "service/tauscope/recording/": ("tests/recording", "tests/identification"),
     "service/tauscope/dynamics/": ("tests/identification", "tests/diagnosis"),
+    "service/tauscope/actuation/": ("tests/actuation",),
     "service/tauscope/trajectory/": ("tests/excitation", "tests/hardware_emulated"),
     "service/tauscope/excitation/": ("tests/excitation", "tests/diagnosis/test_next_experiment.py"),
     "service/tauscope/identification/": ("tests/identification", "tests/diagnosis", *QUICK_PROOF),

@@ -93,10 +93,11 @@ def identify(
         the data or the robot cannot answer
     """
     from tauscope import identification
+    from tauscope.actuation import make_efforts
     from tauscope.results import IdentificationResult
 
     arm = _robot(robot)
-    train, judge = _recordings(recordings, arm), _recordings(held_out, arm)
+    arm, train, judge = make_efforts(arm, _recordings(recordings, arm), _recordings(held_out, arm))
     options = identification.Options(identification.Estimator(estimator), cutoff_hz, rotor_inertia, prior)
     return IdentificationResult(identification.identify(arm, train, judge, options, progress), train, judge)
 
@@ -129,6 +130,7 @@ def diagnose(
         the data or the robot cannot answer
     """
     from tauscope import diagnosis
+    from tauscope.actuation import make_efforts
     from tauscope.diagnosis.next_experiment import planned_experiment
     from tauscope.export.model_file import read_extended_model
     from tauscope.identification import Options
@@ -138,7 +140,7 @@ def diagnose(
     is_saved = isinstance(against, str | Path) and Path(against).suffix.lower() == ".json"
     saved = read_extended_model(Path(str(against)), arm) if is_saved else None
     simulated = () if is_saved or against in ("identified", "model") else _recordings(against, arm)
-    train, judge = _recordings(recordings, arm), _recordings(held_out, arm)
+    arm, train, judge = make_efforts(arm, _recordings(recordings, arm), _recordings(held_out, arm))
     if headroom:
         from tauscope.headroom import measure_headroom, require_black_box
 

@@ -23,7 +23,7 @@ from tauscope.export.compensation import RecordingSource
 from tauscope.export.model import ExportModel, Origin, of_extended_model
 from tauscope.identification import Identification
 from tauscope.recording import EffortKind
-from tauscope.robot import Actuator, LinkInertia, Robot, robot_from_dict, robot_to_dict
+from tauscope.robot import LinkInertia, Robot, robot_from_dict, robot_to_dict
 from tauscope.robot.bounded_file import decode_utf8, read_bounded
 from tauscope.robot.messages import one_line
 from tauscope.strict_model import ResultModel
@@ -35,7 +35,6 @@ class ArmEntry(ResultModel):
     robot: dict[str, Any] = Field(description="as robot_to_dict writes it")
     segments: list[str] = Field(description="joints of the URDF or MJCF, one a segment")
     branches: list[list[float]] = Field(description="bodies on joints beside the chain: ten standard parameters a link")
-    actuators: list[list[Any] | None] = Field(description="kind, kp and kv of each joint's actuator in the user's MJCF")
     urdf: str | None = Field(description="the URDF, one character a byte; null where there is none")
     is_mjcf: bool = Field(description="whether the links' frames are bodies of an MJCF")
     effort: str = Field(description="torque or current")
@@ -56,10 +55,6 @@ def model_file(document: ModelDocument, robot: Robot, origin: Origin) -> ModelFi
         robot=robot_to_dict(robot),
         segments=list(robot.segment_names),
         branches=[[float(value) for value in link.to_vector()] for link in robot.branches],
-        actuators=[
-            None if each.actuator is None else [each.actuator.kind, each.actuator.kp, each.actuator.kv]
-            for each in robot.joints
-        ],
         urdf=None if origin.urdf is None else origin.urdf.decode("latin-1"),
         is_mjcf=origin.is_mjcf,
         effort=origin.effort_kind.value,
@@ -174,9 +169,5 @@ def read_export_model(path: Path) -> ExportModel:
 def _robot(arm: ArmEntry) -> Robot:
     """The robot of the block."""
     robot = robot_from_dict(arm.robot, "arm.robot")
-    actuators = [
-        None if each is None else Actuator(str(each[0]), float(each[1]), float(each[2])) for each in arm.actuators
-    ]
-    joints = tuple(replace(joint, actuator=each) for joint, each in zip(robot.joints, actuators, strict=True))
     branches = tuple(LinkInertia.from_vector(np.array(link)) for link in arm.branches)
-    return replace(robot, joints=joints, segment_names=tuple(arm.segments), branches=branches)
+    return replace(robot, segment_names=tuple(arm.segments), branches=branches)

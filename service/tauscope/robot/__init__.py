@@ -1,5 +1,6 @@
 """What the arm is: joints, chain, limits, and what the user's simulation believes; the robot file."""
 
+from tauscope.robot.actuator import SERVOS, Actuator, Servo
 from tauscope.robot.chain import Chain
 from tauscope.robot.check import JointSummary, RobotReport, check_robot
 from tauscope.robot.denavit_hartenberg import DenavitHartenbergRow, modified_segments, standard_segments
@@ -9,7 +10,6 @@ from tauscope.robot.physical import find_defect, nearest_body, pseudo_inertia
 from tauscope.robot.recording_layout import RecordingLayout, find_fault
 from tauscope.robot.robot import (
     STANDARD_PARAMETERS,
-    Actuator,
     Coupling,
     FrictionCoefficients,
     FrictionShape,
@@ -28,6 +28,7 @@ from tauscope.robot.robot_file import read_robot
 from tauscope.robot.urdf import read_urdf_chain
 
 __all__ = [
+    "SERVOS",
     "STANDARD_PARAMETERS",
     "Actuator",
     "Chain",
@@ -48,6 +49,7 @@ __all__ = [
     "Robot",
     "RobotReport",
     "Segment",
+    "Servo",
     "Severity",
     "check_robot",
     "find_defect",

@@ -1,7 +1,7 @@
 """Fields of the robot file: strict numbers and names, each refusal worded for the user."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, model_validator
@@ -82,6 +82,25 @@ def _name(value: Any) -> str:
     return value
 
 
+def _share(value: float) -> float:
+    """A number above 0, up to 1."""
+    if not 0.0 < value <= 1.0:
+        raise refusal(f"must be a share above 0 and up to 1, but is {value:g}")
+    return value
+
+
+def choice(key: str, known: Iterable[str]) -> BeforeValidator:
+    """Accepts one of several words, or nothing."""
+    words = tuple(known)
+
+    def check(value: Any) -> Any:
+        if value is not None and (not isinstance(value, str) or value not in words):
+            raise refusal(f"{shown(value)} is no {key} of an actuator; write one of {', '.join(words)}")
+        return value
+
+    return BeforeValidator(check)
+
+
 def _sign(value: Any) -> int:
     """1 or -1."""
     if isinstance(value, bool) or not isinstance(value, int) or value not in (1, -1):
@@ -153,6 +172,7 @@ def _plain_mapping(value: Any) -> dict[str, Any]:
 Number = Annotated[float, BeforeValidator(_number)]
 Positive = Annotated[Number, AfterValidator(_positive)]
 NotNegative = Annotated[Number, AfterValidator(_not_negative)]
+Share = Annotated[Number, AfterValidator(_share)]
 Nonzero = Annotated[Number, AfterValidator(_nonzero)]
 Name = Annotated[str, BeforeValidator(_name)]
 Motion = Annotated[JointType, BeforeValidator(_motion)]

@@ -6,6 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from tauscope.actuation import make_efforts
 from tauscope.diagnosis import (
     Diagnosis,
     DiagnosisDocument,
@@ -179,6 +180,7 @@ def perform(request: Request, files: Files, progress: Progress) -> Result:
     saved = None if request.model is None else read_extended_model(files.find("model", request.model), robot)
     recordings = read_recordings(files, "recordings", request.recordings, robot, request.options)
     held_out = read_recordings(files, "held_out", request.held_out, robot, request.options)
+    robot, recordings, held_out = make_efforts(robot, recordings, held_out)
     simulated = read_recordings(files, "simulated", request.simulated, robot, request.options)
     options = Options(cutoff_hz=request.options.cutoff_hz)
     found = diagnose(robot, recordings, held_out, options, progress)

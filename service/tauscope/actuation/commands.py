@@ -1,0 +1,147 @@
+"""Torque that a position or velocity loop makes of the recorded commands."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from tauscope.actuation.delay import Delay, command_torque, estimate_delays, shift_command
+from tauscope.errors import RecordingError
+from tauscope.recording.columns import table_columns
+from tauscope.recording.recording import Recording
+from tauscope.recording.samples import EffortKind
+from tauscope.recording.table import MemoryTable
+from tauscope.result_warning import ResultWarning
+from tauscope.robot import Actuator, Robot
+
+__all__ = ["make_efforts", "shift_command"]
+
+SATURATED_SHARE = 0.02
+"""Share of rows at the duty limit from which gain and torque per volt can be told from each other."""
+
+_KEPT = {"qd": "velocity", "qdd": "acceleration", "qref": "reference", "temp": "temperature", "qlink": "link_position"}
+
+
+def make_efforts(
+    robot: Robot, recordings: Sequence[Recording], held_out: Sequence[Recording] = ()
+) -> tuple[Robot, tuple[Recording, ...], tuple[Recording, ...]]:
+    """Make torque where recordings hold commands in its place; delays that nothing states are estimated.
+
+    Returns
+    -------
+    Robot
+        with the delays
+    tuple of Recording, tuple of Recording
+        training and held out, with torque
+
+    Raises
+    ------
+    RecordingError
+        a joint has no loop, or its loop lacks a voltage
+    """
+    commands = [each for each in recordings if each.effort_kind is EffortKind.COMMAND]
+    unseen = [each for each in held_out if each.effort_kind is EffortKind.COMMAND]
+    if not commands and not unseen:
+        return robot, tuple(recordings), tuple(held_out)
+    for recording in (*commands, *unseen):
+        _require_loops(robot, recording)
+    delays = estimate_delays(robot, commands or unseen)
+    joints = tuple(
+        joint if joint.actuator is None else replace(joint, actuator=replace(joint.actuator, delay=delay.value))
+        for joint, delay in zip(robot.joints, delays, strict=True)
+    )
+    driven = replace(robot, joints=joints)
+
+    def make(recording: Recording) -> Recording:
+        is_command = recording.effort_kind is EffortKind.COMMAND
+        return _make_effort(driven, recording, delays) if is_command else recording
+
+    return driven, tuple(map(make, recordings)), tuple(map(make, held_out))
+
+
+def _require_loops(robot: Robot, recording: Recording) -> None:
+    """Every joint has a loop, and its voltage is known."""
+    for number, joint in enumerate(robot.joints, 1):
+        loop = joint.actuator
+        if loop is None or not loop.has_loop:
+            raise RecordingError(
+                f"{recording.name}: column tau{number} is missing, and joint {number} ({joint.name}) has no loop that"
+                f" makes torque of qref{number}; state joints[{number - 1}].actuator with kind: position and kp"
+            )
+        if loop.unit == "register":
+            lacking = [
+                *(() if loop.supply_voltage or recording.has("volt") else ("supply_voltage",)),
+                *(() if loop.volt_torque is not None else ("torque_per_volt",)),
+            ]
+            if lacking:
+                place = f"joints[{number - 1}].actuator"
+                raise RecordingError(
+                    f"{recording.name}: {joint.name}: torque cannot be made of qref{number} without"
+                    f" {' and '.join(lacking)}; state {' and '.join(f'{place}.{key}' for key in lacking)}"
+                )
+
+
+def _make_effort(robot: Robot, recording: Recording, delays: Sequence[Delay]) -> Recording:
+    """The recording with torque in place of commands, and notes on what it is made of."""
+    samples = recording.samples()
+    effort = command_torque(robot, samples, [delay.value for delay in delays])
+    groups = {name: values for name, key in _KEPT.items() if (values := getattr(samples, key)) is not None}
+    columns = [samples.time[:, None], samples.position, effort * [joint.sign for joint in robot.joints]]
+    columns += groups.values()
+    names = list(table_columns(robot.joint_count, EffortKind.TORQUE))
+    names += [f"{group}{joint}" for group in groups for joint in range(1, robot.joint_count + 1)]
+    if samples.period is not None:
+        names, columns = [*names, "period"], [*columns, samples.period[:, None]]
+    loops = [joint.actuator for joint in robot.joints if joint.actuator is not None]
+    return replace(
+        recording,
+        effort_kind=EffortKind.TORQUE,
+        table=MemoryTable(tuple(names), np.hstack(columns)),
+        notes=(*recording.notes, *_describe(robot, effort, delays, samples.voltage)),
+        effort_std=tuple(loop.relative_std for loop in loops),
+    )
+
+
+def _describe(
+    robot: Robot, effort: np.ndarray, delays: Sequence[Delay], voltage: np.ndarray | None
+) -> list[ResultWarning]:
+    """What the torque is made of, and what these data cannot tell of it."""
+    notes = []
+    for index, (joint, delay) in enumerate(zip(robot.joints, delays, strict=True)):
+        loop = joint.actuator
+        if loop is None:
+            continue
+        late = "as stated" if delay.std is None else f"± {1e3 * delay.std:.1f} ms, estimated"
+        text = f"{joint.name}: torque is made of qref{index + 1} by a {loop.kind} loop, kp {loop.kp:g}"
+        if loop.unit == "register":
+            text += f" (register of {loop.servo or 'no stated servo: dynamixel-xl330 is assumed'})"
+        text += f"; delay {1e3 * delay.value:.1f} ms, {late}"
+        remedy = "record torque or current where the servo has them" + (
+            "" if loop.servo or loop.unit != "register" else ", or state the servo in joints[].actuator.servo"
+        )
+        notes.append(ResultWarning(code="made-effort", joint=joint.name, text=text, remedy=remedy))
+        notes.append(_separate(joint.name, loop, effort[:, index], voltage))
+    return notes
+
+
+def _separate(name: str, loop: Actuator, effort: np.ndarray, voltage: np.ndarray | None) -> ResultWarning:
+    """What of gain, torque per volt and friction the commands can tell from each other."""
+    known = f"stated to {100.0 * loop.relative_std:.3g} %" if loop.relative_std else "taken as exact"
+    if loop.unit == "Nm_per_rad":
+        text = f"the scale of the torque is that of kp, {known}: masses and friction are proportional to it"
+    else:
+        limit = loop.conversion.max_duty if loop.max_duty is None else loop.max_duty
+        supply = (loop.supply_voltage or 0.0) if voltage is None else np.nan_to_num(np.nanmax(voltage))
+        top = 0.999 * limit * (loop.volt_torque or 0.0) * float(supply)
+        share = float(np.mean(np.abs(effort) >= top)) if top > 0.0 else 0.0
+        own = (
+            f"kp and torque_per_volt separate only in the {100.0 * share:.0f} % of rows at the duty limit"
+            if share > SATURATED_SHARE
+            else "kp, supply and torque_per_volt count as one product"
+        )
+        text = f"{own}, {known}: masses and friction are proportional to it"
+    text += ". Back-EMF and kd are parts of viscous friction" if not (loop.back_emf or loop.kd) else ""
+    remedy = "weigh one known payload, or state a mass that is known, and set torque_per_volt so that both agree"
+    if loop.unit == "Nm_per_rad":
+        remedy = "weigh one known payload, or state a mass that is known, and set kp so that both agree"
+    return ResultWarning(code="effort-scale", joint=name, text=f"{name}: {text}", remedy=remedy)
