@@ -36,6 +36,7 @@ NEEDED: dict[str, tuple[str, ...]] = {
     "service/tauscope/diagnosis/": ("tests/effects", "tests/diagnosis", "tests/report", *QUICK_PROOF),
     "service/tauscope/headroom/": ("tests/headroom",),
     "service/tauscope/export/": ("tests/identification", "tests/diagnosis/test_extended_model.py"),
+    "service/tauscope/closed_loop/": ("tests/closed_loop",),
     "service/tauscope/number_text.py": ("tests/report",),
     "service/tauscope/report/": ("tests/report", "tests/browser/test_report_on_paper.py"),
     "service/tauscope/library.py": ("tests/library", "tests/examples"),

@@ -5,13 +5,19 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Literal, NoReturn, TypeAlias, Union
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Union
 
-from tauscope.errors import AcquisitionError, TauscopeError
+from tauscope.errors import AcquisitionError
 
 if TYPE_CHECKING:
     from tauscope.recording import Recording
-    from tauscope.results import DiagnosisResult, ExcitationResult, IdentificationResult, SimulationResult
+    from tauscope.results import (
+        DiagnosisResult,
+        ExcitationResult,
+        IdentificationResult,
+        RolloutResult,
+        SimulationResult,
+    )
     from tauscope.robot import Robot
     from tauscope.trajectory import Trajectory
 
@@ -254,15 +260,34 @@ def simulate(
         return SimulationResult(replace(recording, name=name, is_examined=True))
 
 
-def rollout(robot: RobotSource, recordings: Recordings) -> NoReturn:
-    """Simulate the closed loop on a recording's commands. Not available in this version.
+def rollout(
+    robot: RobotSource,
+    recordings: Recordings,
+    *,
+    model: str | Path | None = None,
+    progress: Callable[[str], None] = _ignore,
+) -> "RolloutResult":
+    """Close the loop in MuJoCo on a recording's commands, and compare real and simulated motion.
+
+    Parameters
+    ----------
+    model : path or None
+        what ``tauscope identify`` or ``diagnose`` wrote with ``--model``: rolled out without and with its findings
 
     Raises
     ------
     TauscopeError
-        always
+        the data, the robot or the model cannot answer
+    MissingExtraError
+        the sim extra is not installed
     """
-    raise TauscopeError("rollout is not available in this version; compare torques with tauscope.diagnose")
+    from tauscope.closed_loop import roll_out
+    from tauscope.export.model_file import read_export_models
+    from tauscope.results import RolloutResult
+
+    arm = _robot(robot)
+    exports = () if model is None else read_export_models(Path(model))
+    return RolloutResult(roll_out(arm, _recordings(recordings, arm), exports, progress))
 
 
 def _robot(source: RobotSource) -> "Robot":

@@ -37,6 +37,7 @@ from tauscope.cli.model_command import model
 from tauscope.cli.prove_command import prove
 from tauscope.cli.recording_command import recording
 from tauscope.cli.robot_command import robot
+from tauscope.cli.rollout_command import rollout
 from tauscope.cli.run_command import run
 from tauscope.cli.serve_command import serve
 from tauscope.cli.store_command import store
@@ -69,6 +70,7 @@ app = typer.Typer(
 )
 add_verb(app, identify, SeveralValuesCommand)
 add_verb(app, diagnose, SeveralValuesCommand)
+add_verb(app, rollout)
 add_verb(app, excite)
 add_verb(app, export)
 app.add_typer(robot, name="robot")

@@ -47,10 +47,13 @@ class ModelFile(ModelDocument):
     """An extended model and its arm."""
 
     arm: ArmEntry | None = Field(default=None, description="null in files of older versions")
+    plain: ModelDocument | None = Field(
+        default=None, description="the model that the same recordings give without findings; null where it is this one"
+    )
 
 
-def model_file(document: ModelDocument, robot: Robot, origin: Origin) -> ModelFile:
-    """A model's document with its arm."""
+def model_file(document: ModelDocument, robot: Robot, origin: Origin, plain: ModelDocument | None = None) -> ModelFile:
+    """A model's document with its arm, and beside it the model without findings where that is another."""
     arm = ArmEntry(
         robot=robot_to_dict(robot),
         segments=list(robot.segment_names),
@@ -62,7 +65,9 @@ def model_file(document: ModelDocument, robot: Robot, origin: Origin) -> ModelFi
         created=origin.created.isoformat(),
         version=origin.version,
     )
-    return ModelFile.model_construct(**{name: getattr(document, name) for name in ModelDocument.model_fields}, arm=arm)
+    return ModelFile.model_construct(
+        **{name: getattr(document, name) for name in ModelDocument.model_fields}, arm=arm, plain=plain
+    )
 
 
 def identified_document(result: Identification) -> ModelDocument:
@@ -139,7 +144,20 @@ def read_extended_model(path: Path, robot: Robot) -> ExtendedModel:
 
 
 def read_export_model(path: Path) -> ExportModel:
-    """The model of a file as exports need it.
+    """The model of a file as exports need it, findings included.
+
+    Raises
+    ------
+    ExportError
+        where the file has no arm
+    IdentificationError
+        naming the file and the key
+    """
+    return read_export_models(path)[-1]
+
+
+def read_export_models(path: Path) -> tuple[ExportModel, ...]:
+    """The models of a file as exports need them: without findings where the file has that, and with them.
 
     Raises
     ------
@@ -153,17 +171,20 @@ def read_export_model(path: Path) -> ExportModel:
     if arm is None:
         text = "the file has no block arm: it was written by an older version; write it again with --model"
         raise ExportError(one_line(f"{path}: {text}"))
+    urdf = None if arm.urdf is None else arm.urdf.encode("latin-1", errors="replace")
+    models = []
     try:
         robot = _robot(arm)
-        model = restored(document, robot)
         created = datetime.fromisoformat(arm.created)
         sources = tuple(RecordingSource(name, digest) for name, digest in arm.recordings)
-        effort = EffortKind(arm.effort)
+        origin = Origin(sources, EffortKind(arm.effort), created, urdf, arm.is_mjcf, arm.version)
+        for each in (document.plain, document):
+            if each is not None:
+                links = [LinkInertia.from_vector(np.array(link)) for link in each.links]
+                models.append(of_extended_model(restored(each, robot), links, origin))
     except (IdentificationError, RobotFileError, ValueError, TypeError) as error:
         raise IdentificationError(one_line(f"{path}: {error}")) from None
-    urdf = None if arm.urdf is None else arm.urdf.encode("latin-1", errors="replace")
-    links = [LinkInertia.from_vector(np.array(link)) for link in document.links]
-    return of_extended_model(model, links, Origin(sources, effort, created, urdf, arm.is_mjcf, arm.version))
+    return tuple(models)
 
 
 def _robot(arm: ArmEntry) -> Robot:

@@ -22,7 +22,7 @@ from tauscope.diagnosis.next_experiment import PlannedExperiment, planned_experi
 from tauscope.errors import ExcitationError, IdentificationError
 from tauscope.export.formats import CODE_FILES, EXPORT_FILES, ExportFormat, make_export
 from tauscope.export.model import Origin, of_diagnosis
-from tauscope.export.model_file import model_file, read_extended_model
+from tauscope.export.model_file import identified_document, model_file, read_extended_model
 from tauscope.export.simulation_files import improved_robot, scenario_text
 from tauscope.identification import Options
 from tauscope.recording import Recording
@@ -149,7 +149,9 @@ class Result:
         return make_export(export_format, of_diagnosis(self.diagnosis, self._origin))
 
     def _model(self) -> str:
-        return json_text(model_file(model_document(self.diagnosis), self.diagnosis.robot, self._origin))
+        found = self.diagnosis
+        plain = identified_document(found.identification) if found.findings else None
+        return json_text(model_file(model_document(found), found.robot, self._origin, plain))
 
     @property
     def _origin(self) -> Origin:
