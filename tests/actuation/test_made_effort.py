@@ -186,6 +186,32 @@ def test_file_of_positions_and_commands(tmp_path: Path) -> None:
         assert recording.notes == ()
 
 
+def test_commands_follow_the_unit_of_the_positions(tmp_path: Path) -> None:
+    """Degrees for both; a unit of torque that the robot file states changes no command."""
+    robot = _arm()
+    samples = _recordings(robot)[1].samples()
+    degrees = np.rad2deg(np.column_stack([samples.position, samples.effort]))
+    path = tmp_path / "log.csv"
+    header = "t,q1,q2,qref1,qref2"
+    np.savetxt(path, np.column_stack([samples.time, degrees]), delimiter=",", header=header, comments="")
+    recording = tauscope.read_recording(path, robot, units={"q": "deg", "tau": "mA"})
+    assert recording.effort_kind is EffortKind.COMMAND
+    np.testing.assert_allclose(recording.samples().effort, samples.effort)
+
+
+def test_a_delay_that_the_motion_does_not_tell_is_not_claimed() -> None:
+    robot = _arm()
+    time = np.arange(0.0, 4.0, 0.01)
+    still = np.zeros((len(time), 2))
+    rng = np.random.default_rng(0)
+    recording = Recording.from_arrays(
+        "still", time, still + rng.normal(0.0, 1e-4, still.shape), still, effort_kind=EffortKind.COMMAND
+    )
+    driven, (made,), _ = make_efforts(robot, [recording])
+    assert all(joint.actuator and joint.actuator.delay is not None for joint in driven.joints)
+    assert np.isfinite(made.samples().effort).all()
+
+
 def test_file_of_commands_without_actuator_says_what_to_state(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     time = np.arange(0.0, 4.0, 0.01)

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tauscope.actuation.delay import Delay, command_torque, estimate_delays, shift_command
+from tauscope.actuation.delay import FOUND_STD_S, Delay, command_torque, estimate_delays, shift_command
 from tauscope.errors import RecordingError
 from tauscope.recording.columns import table_columns
 from tauscope.recording.recording import Recording
@@ -111,7 +111,10 @@ def _describe(
         loop = joint.actuator
         if loop is None:
             continue
-        late = "as stated" if delay.std is None else f"± {1e3 * delay.std:.1f} ms, estimated"
+        late = "as stated"
+        if delay.std is not None:
+            is_found = delay.std < FOUND_STD_S
+            late = f"± {1e3 * delay.std:.1f} ms, estimated" if is_found else "which these data do not tell"
         text = f"{joint.name}: torque is made of qref{index + 1} by a {loop.kind} loop, kp {loop.kp:g}"
         if loop.unit == "register":
             text += f" (register of {loop.servo or 'no stated servo: dynamixel-xl330 is assumed'})"
