@@ -5,7 +5,17 @@ from typing import Annotated, Any
 
 import typer
 
-from tauscope.cli.arguments import Rate, RobotFile, TrustUnits, Units, parse_unit_option
+from tauscope.cli.arguments import (
+    Columns,
+    Decimal,
+    Delimiter,
+    Rate,
+    RobotFile,
+    Topic,
+    TrustUnits,
+    Units,
+    reading_fields,
+)
 from tauscope.cli.identify_command import Cutoff, HeldOut, parse_cutoff
 
 Recordings = Annotated[
@@ -13,7 +23,7 @@ Recordings = Annotated[
     typer.Argument(
         metavar="RECORDING",
         exists=True,
-        help="Recordings of the real arm that are to be explained: CSV, Parquet, MCAP or rosbag2.",
+        help="Recordings of the real arm that are to be explained: CSV, Parquet, NumPy, MCAP or a bag.",
         show_default=False,
     ),
 ]
@@ -47,6 +57,10 @@ def diagnose(
     units: Units = None,
     rate: Rate = None,
     trust_units: TrustUnits = False,
+    columns: Columns = None,
+    decimal: Decimal = None,
+    delimiter: Delimiter = None,
+    topic: Topic = None,
     headroom: Annotated[
         bool, typer.Option("--headroom", help="Train a black box, and say what it still predicts of held-out motion.")
     ] = False,
@@ -78,7 +92,8 @@ def diagnose(
     rate : float or None
         samples a second where t counts samples [Hz]
     """
-    cutoff_hz, unit_of = parse_cutoff(cutoff), parse_unit_option(units)
+    cutoff_hz = parse_cutoff(cutoff)
+    fields = reading_fields(columns, units, rate, trust_units, decimal, delimiter, topic)
     if next_trajectory is not None and next_trajectory.suffix.lower() not in TRAJECTORIES:
         text = f"{str(next_trajectory)!r}: a trajectory file ends in .json or .csv"
         raise typer.BadParameter(text, param_hint="--next-trajectory")
@@ -95,9 +110,7 @@ def diagnose(
         cutoff_hz=cutoff_hz,
         next_trajectory=next_trajectory is not None,
         headroom=headroom,
-        units=unit_of,
-        rate_hz=rate,
-        trust_units=trust_units,
+        **fields,
     )
     held, compared = held_out or [], [*simulated, *([] if saved is None else [saved])]
     request = task.Request(

@@ -36,6 +36,7 @@ from tauscope.cli.key_command import key
 from tauscope.cli.model_command import model
 from tauscope.cli.prove_command import prove
 from tauscope.cli.recording_command import recording
+from tauscope.cli.release_command import release
 from tauscope.cli.robot_command import robot
 from tauscope.cli.rollout_command import rollout
 from tauscope.cli.run_command import run
@@ -77,6 +78,7 @@ app.add_typer(robot, name="robot")
 app.add_typer(recording, name="recording")
 add_verb(app, run, DriverCommand)
 add_verb(app, campaign, DriverCommand)
+add_verb(app, release, DriverCommand)
 add_verb(app, doctor, DriverCommand)
 app.add_typer(bus, name="bus")
 add_verb(app, serve, DriverCommand)

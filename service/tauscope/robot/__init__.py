@@ -7,7 +7,14 @@ from tauscope.robot.denavit_hartenberg import DenavitHartenbergRow, modified_seg
 from tauscope.robot.finding import Finding, Severity
 from tauscope.robot.kinematics import homogeneous, link_placements
 from tauscope.robot.physical import find_defect, nearest_body, pseudo_inertia
-from tauscope.robot.recording_layout import RecordingLayout, find_fault
+from tauscope.robot.recording_layout import (
+    PRESETS,
+    RecordingLayout,
+    find_column_fault,
+    find_fault,
+    find_separator_fault,
+)
+from tauscope.robot.recording_layout_file import layout_from_dict, read_layout
 from tauscope.robot.robot import (
     STANDARD_PARAMETERS,
     Coupling,
@@ -28,6 +35,7 @@ from tauscope.robot.robot_file import read_robot
 from tauscope.robot.urdf import read_urdf_chain
 
 __all__ = [
+    "PRESETS",
     "SERVOS",
     "STANDARD_PARAMETERS",
     "Actuator",
@@ -52,13 +60,17 @@ __all__ = [
     "Servo",
     "Severity",
     "check_robot",
+    "find_column_fault",
     "find_defect",
     "find_fault",
+    "find_separator_fault",
     "homogeneous",
+    "layout_from_dict",
     "link_placements",
     "modified_segments",
     "nearest_body",
     "pseudo_inertia",
+    "read_layout",
     "read_robot",
     "read_urdf_chain",
     "robot_from_dict",

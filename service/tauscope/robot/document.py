@@ -2,7 +2,7 @@
 
 from typing import Annotated, Self, get_args
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from tauscope.robot.actuator import SERVOS, ActuatorKind, GainUnit
 from tauscope.robot.document_fields import (
@@ -18,15 +18,19 @@ from tauscope.robot.document_fields import (
     Rotation,
     Share,
     Sign,
+    Text,
     Vector,
+    check_source,
     choice,
     refusal,
 )
 from tauscope.robot.messages import shown
-from tauscope.robot.recording_layout import find_fault
+from tauscope.robot.recording_layout import RecordingLayout, Source, find_column_fault, find_fault, find_separator_fault
 from tauscope.robot.robot import JointType
 
 MOST_JOINTS = 100
+
+Columns = Annotated[Source, BeforeValidator(check_source)]
 
 
 class DenavitHartenbergRowDocument(Document):
@@ -253,16 +257,31 @@ class RecordingDocument(Document):
         samples a second where t counts samples [Hz]
     """
 
+    columns: dict[Name, Columns] | Name | None = None
     units: dict[Name, Name] = Field(default_factory=dict)
     rate_hz: Positive | None = None
+    decimal: Text | None = None
+    delimiter: Text | None = None
+    topic: Name | None = None
 
     @model_validator(mode="after")
-    def _check_units(self) -> Self:
-        """Units that are known."""
+    def _check_layout(self) -> Self:
+        """Columns, units and separators that are known."""
+        columns = find_column_fault(self.columns)
+        if columns is not None:
+            raise refusal(columns, "columns")
         fault = find_fault(self.units, self.rate_hz)
         if fault is not None:
             raise refusal(fault[1], None if fault[0] == "rate_hz" else "units")
+        separator = find_separator_fault(self.decimal, self.delimiter)
+        if separator is not None:
+            raise refusal(separator[1], separator[0])
         return self
+
+    @property
+    def layout(self) -> RecordingLayout:
+        """The same for those who read."""
+        return RecordingLayout(self.units, self.rate_hz, self.columns, self.decimal, self.delimiter, self.topic)
 
 
 class RobotDocument(Document):

@@ -101,6 +101,25 @@ def choice(key: str, known: Iterable[str]) -> BeforeValidator:
     return BeforeValidator(check)
 
 
+def _text(value: Any) -> str:
+    """Text that may be blank."""
+    if not isinstance(value, str) or not value:
+        raise refusal(f"must be text, but is {shown(value)}; put it in quotes")
+    return value
+
+
+def check_source(value: Any) -> Any:
+    """A column by name or by number from 1, or a list of them."""
+    entries = value if isinstance(value, list) else [value]
+    for entry in entries:
+        is_number = isinstance(entry, int) and not isinstance(entry, bool) and entry > 0
+        if not (is_number or (isinstance(entry, str) and entry)):
+            raise refusal(f"{shown(entry)} is no column; write its name, or its number from 1")
+    if not entries:
+        raise refusal("must not be empty")
+    return value
+
+
 def _sign(value: Any) -> int:
     """1 or -1."""
     if isinstance(value, bool) or not isinstance(value, int) or value not in (1, -1):
@@ -175,6 +194,7 @@ NotNegative = Annotated[Number, AfterValidator(_not_negative)]
 Share = Annotated[Number, AfterValidator(_share)]
 Nonzero = Annotated[Number, AfterValidator(_nonzero)]
 Name = Annotated[str, BeforeValidator(_name)]
+Text = Annotated[str, BeforeValidator(_text)]
 Motion = Annotated[JointType, BeforeValidator(_motion)]
 Sign = Annotated[int, BeforeValidator(_sign)]
 Range = Annotated[list[Number], AfterValidator(_range)]

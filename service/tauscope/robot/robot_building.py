@@ -108,7 +108,7 @@ def build_robot(document: RobotDocument, origin: DocumentOrigin, file_source: Fi
         findings=tuple(findings),
         notes=chain.notes if chain else (),
         repairs=repairs,
-        recording=RecordingLayout() if layout is None else RecordingLayout(layout.units, layout.rate_hz),
+        recording=RecordingLayout() if layout is None else layout.layout,
     )
 
 

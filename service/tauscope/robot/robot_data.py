@@ -58,8 +58,7 @@ def robot_to_dict(robot: Robot) -> dict[str, Any]:
         "gravity": robot.gravity.tolist(),
         "joints": [_joint(joint) for joint in robot.joints],
     }
-    layout = robot.recording
-    recording = {"units": dict(layout.units), "rate_hz": layout.rate_hz} if layout.units else None
+    recording = {key: value for key, value in asdict(robot.recording).items() if value} or None
     return {**data, **_stated({"model": _model(robot.model) or None, "recording": recording})}
 
 
