@@ -199,6 +199,19 @@ def test_commands_follow_the_unit_of_the_positions(tmp_path: Path) -> None:
     np.testing.assert_allclose(recording.samples().effort, samples.effort)
 
 
+def test_lerobot_layout_without_effort_is_read(tmp_path: Path) -> None:
+    """``action`` is the command: a LeRobot data set of position servos has no effort."""
+    robot = _arm()
+    samples = _recordings(robot)[1].samples()
+    degrees = np.rad2deg(np.column_stack([samples.position, samples.effort]))
+    path = tmp_path / "episode.csv"
+    names = ["timestamp", *(f"{group}.{j - 1}" for group in ("observation.state", "action") for j in (1, 2))]
+    np.savetxt(path, np.column_stack([samples.time, degrees]), delimiter=",", header=",".join(names), comments="")
+    recording = tauscope.read_recording(path, robot, columns="lerobot")
+    assert recording.effort_kind is EffortKind.COMMAND
+    np.testing.assert_allclose(recording.samples().effort, samples.effort)
+
+
 def test_a_delay_that_the_motion_does_not_tell_is_not_claimed() -> None:
     robot = _arm()
     time = np.arange(0.0, 4.0, 0.01)

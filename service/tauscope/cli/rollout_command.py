@@ -5,7 +5,17 @@ from typing import Annotated
 
 import typer
 
-from tauscope.cli.arguments import Rate, RobotFile, TrustUnits, Units, parse_unit_option
+from tauscope.cli.arguments import (
+    Columns,
+    Decimal,
+    Delimiter,
+    Rate,
+    RobotFile,
+    Topic,
+    TrustUnits,
+    Units,
+    reading_fields,
+)
 
 Recordings = Annotated[
     list[Path],
@@ -34,6 +44,10 @@ def rollout(
     units: Units = None,
     rate: Rate = None,
     trust_units: TrustUnits = False,
+    columns: Columns = None,
+    decimal: Decimal = None,
+    delimiter: Delimiter = None,
+    topic: Topic = None,
     json: Annotated[
         Path | None, typer.Option(metavar="OUT", dir_okay=False, help="Write the result as JSON; - is standard output.")
     ] = None,
@@ -51,14 +65,14 @@ def rollout(
     rate : float or None
         samples a second where t counts samples [Hz]
     """
-    unit_of = parse_unit_option(units)
+    fields = reading_fields(columns, units, rate, trust_units, decimal, delimiter, topic)
     from tauscope.cli.rollout_summary import show_rollout
     from tauscope.cli.task_run import make_request, run_task
     from tauscope.cli.terminal import output
     from tauscope.tasks import rollout as task
     from tauscope.tasks.task import ReadingOptions
 
-    options = make_request(ReadingOptions, units=unit_of, rate_hz=rate, trust_units=trust_units)
+    options = make_request(ReadingOptions, **fields)
     request = task.Request(
         robot=str(robot),
         recordings=tuple(map(str, recordings)),
