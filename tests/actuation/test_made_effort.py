@@ -74,8 +74,9 @@ def test_delays_of_commands_are_estimated() -> None:
     found = [joint.actuator.delay or 0.0 for joint in driven.joints if joint.actuator]
     np.testing.assert_allclose(found, LATE_S, atol=2e-3)
     assert made.effort_kind is EffortKind.TORQUE
-    assert [note.code for note in made.notes] == ["made-effort", "effort-scale"] * 2
-    assert "estimated" in made.notes[0].text
+    assert [note.code for note in driven.notes] == ["made-effort", "effort-scale"] * 2
+    assert "estimated" in driven.notes[0].text
+    assert made.effort_std == (0.0, 0.0)
 
 
 def test_parameters_are_those_of_recorded_torque_within_their_errors() -> None:

@@ -13,6 +13,7 @@ from tauscope.recording.samples import EffortKind
 from tauscope.recording.table import MemoryTable
 from tauscope.result_warning import ResultWarning
 from tauscope.robot import Actuator, Robot
+from tauscope.robot.actuator import ASSUMED_SERVO
 
 __all__ = ["make_efforts", "shift_command"]
 
@@ -30,7 +31,7 @@ def make_efforts(
     Returns
     -------
     Robot
-        with the delays
+        with the delays, and with notes on what the torque is made of
     tuple of Recording, tuple of Recording
         training and held out, with torque
 
@@ -51,12 +52,10 @@ def make_efforts(
         for joint, delay in zip(robot.joints, delays, strict=True)
     )
     driven = replace(robot, joints=joints)
-
-    def make(recording: Recording) -> Recording:
-        is_command = recording.effort_kind is EffortKind.COMMAND
-        return _make_effort(driven, recording, delays) if is_command else recording
-
-    return driven, tuple(map(make, recordings)), tuple(map(make, held_out))
+    made = {id(each): _make_effort(driven, each, delays) for each in (*commands, *unseen)}
+    told = _describe(driven, delays, [made[id(each)] for each in commands or unseen], commands or unseen)
+    train, judge = (tuple(made.get(id(each), each) for each in given) for given in (recordings, held_out))
+    return replace(driven, notes=(*robot.notes, *told)), train, judge
 
 
 def _require_loops(robot: Robot, recording: Recording) -> None:
@@ -97,13 +96,12 @@ def _make_effort(robot: Robot, recording: Recording, delays: Sequence[Delay]) ->
         recording,
         effort_kind=EffortKind.TORQUE,
         table=MemoryTable(tuple(names), np.hstack(columns)),
-        notes=(*recording.notes, *_describe(robot, effort, delays, samples.voltage)),
         effort_std=tuple(loop.relative_std for loop in loops),
     )
 
 
 def _describe(
-    robot: Robot, effort: np.ndarray, delays: Sequence[Delay], voltage: np.ndarray | None
+    robot: Robot, delays: Sequence[Delay], made: Sequence[Recording], commands: Sequence[Recording]
 ) -> list[ResultWarning]:
     """What the torque is made of, and what these data cannot tell of it."""
     notes = []
@@ -115,36 +113,40 @@ def _describe(
         if delay.std is not None:
             is_found = delay.std < FOUND_STD_S
             late = f"± {1e3 * delay.std:.1f} ms, estimated" if is_found else "which these data do not tell"
-        text = f"{joint.name}: torque is made of qref{index + 1} by a {loop.kind} loop, kp {loop.kp:g}"
+        gain = "as recorded" if any(each.has("kp") for each in commands) else f"{loop.kp:g}"
+        text = f"{joint.name}: torque is made of qref{index + 1} by a {loop.kind} loop, kp {gain}"
         if loop.unit == "register":
-            text += f" (register of {loop.servo or 'no stated servo: dynamixel-xl330 is assumed'})"
+            text += f" (register of {loop.servo or f'no stated servo: {ASSUMED_SERVO} is assumed'})"
         text += f"; delay {1e3 * delay.value:.1f} ms, {late}"
         remedy = "record torque or current where the servo has them" + (
             "" if loop.servo or loop.unit != "register" else ", or state the servo in joints[].actuator.servo"
         )
         notes.append(ResultWarning(code="made-effort", joint=joint.name, text=text, remedy=remedy))
-        notes.append(_separate(joint.name, loop, effort[:, index], voltage))
+        limited = max(_limited_share(loop, *pair, index) for pair in zip(made, commands, strict=True))
+        notes.append(_separate(joint.name, loop, limited))
     return notes
 
 
-def _separate(name: str, loop: Actuator, effort: np.ndarray, voltage: np.ndarray | None) -> ResultWarning:
+def _limited_share(loop: Actuator, made: Recording, commands: Recording, joint: int) -> float:
+    """Share of rows in which the bridge is at its duty limit; zero for a loop in SI."""
+    if loop.unit != "register":
+        return 0.0
+    voltage = commands.samples().voltage
+    supply = loop.supply_voltage if voltage is None else voltage[:, joint]
+    limit = loop.conversion.max_duty if loop.max_duty is None else loop.max_duty
+    top = 0.999 * limit * (loop.volt_torque or 0.0) * np.asarray(supply)
+    return float(np.mean(np.abs(made.samples().effort[:, joint]) >= top))
+
+
+def _separate(name: str, loop: Actuator, limited: float) -> ResultWarning:
     """What of gain, torque per volt and friction the commands can tell from each other."""
     known = f"stated to {100.0 * loop.relative_std:.3g} %" if loop.relative_std else "taken as exact"
+    scale, scaled = "torque_per_volt", "kp, supply and torque_per_volt count as one product"
     if loop.unit == "Nm_per_rad":
-        text = f"the scale of the torque is that of kp, {known}: masses and friction are proportional to it"
-    else:
-        limit = loop.conversion.max_duty if loop.max_duty is None else loop.max_duty
-        supply = (loop.supply_voltage or 0.0) if voltage is None else np.nan_to_num(np.nanmax(voltage))
-        top = 0.999 * limit * (loop.volt_torque or 0.0) * float(supply)
-        share = float(np.mean(np.abs(effort) >= top)) if top > 0.0 else 0.0
-        own = (
-            f"kp and torque_per_volt separate only in the {100.0 * share:.0f} % of rows at the duty limit"
-            if share > SATURATED_SHARE
-            else "kp, supply and torque_per_volt count as one product"
-        )
-        text = f"{own}, {known}: masses and friction are proportional to it"
+        scale, scaled = "kp", "the scale of the torque is that of kp"
+    elif limited > SATURATED_SHARE:
+        scaled = f"kp and torque_per_volt separate only in the {100.0 * limited:.0f} % of rows at the duty limit"
+    text = f"{name}: {scaled}, {known}: masses and friction are proportional to it"
     text += ". Back-EMF and kd are parts of viscous friction" if not (loop.back_emf or loop.kd) else ""
-    remedy = "weigh one known payload, or state a mass that is known, and set torque_per_volt so that both agree"
-    if loop.unit == "Nm_per_rad":
-        remedy = "weigh one known payload, or state a mass that is known, and set kp so that both agree"
-    return ResultWarning(code="effort-scale", joint=name, text=f"{name}: {text}", remedy=remedy)
+    remedy = f"weigh one known payload, or state a mass that is known, and set {scale} so that both agree"
+    return ResultWarning(code="effort-scale", joint=name, text=text, remedy=remedy)
