@@ -14,7 +14,7 @@ from tauscope.dynamics import torque_regressor
 from tauscope.errors import RecordingError, RobotFileError
 from tauscope.recording import EffortKind, Recording
 from tauscope.recording.examination import examine_recording
-from tauscope.robot import Actuator, LinkInertia, Robot, robot_from_dict, robot_from_yaml, robot_to_dict
+from tauscope.robot import Actuator, LinkInertia, Model, Robot, robot_from_dict, robot_from_yaml, robot_to_dict
 
 RATE_HZ = 200.0
 STIFFNESS = (60.0, 25.0)
@@ -103,6 +103,23 @@ def test_uncertain_gains_make_uncertain_parameters() -> None:
     assert 0.1 < stds[1] < 0.4  # 20 % of both joints, in part averaged
 
 
+def test_stated_masses_tell_the_torque_per_volt() -> None:
+    """Servos of an unknown motor: gravity of the stated links, and not the joint whose motion it does not feel."""
+    bodies = LinkInertia(0.6, np.array([-0.09, 0.0, 0.0]), np.diag([1e-3, 0.02, 0.02]))
+    robot = _arm()
+    recording = _recordings(robot)[1]
+    unit = Actuator("position", 1.0, unit="register", servo="dynamixel-x", supply_voltage=12.0, torque_per_volt=1.0)
+    assert unit.stiffness is not None
+    loops = [replace(unit, kp=kp / unit.stiffness / 0.4, torque_per_volt=None, max_duty=1.0) for kp in STIFFNESS]
+    joints = tuple(replace(joint, actuator=loop) for joint, loop in zip(robot.joints, loops, strict=True))
+    robot = replace(robot, joints=joints, model=Model(links=(bodies, bodies)))
+    driven, (made,), _ = make_efforts(robot, [recording])
+    found = [joint.actuator.torque_per_volt or 0.0 for joint in driven.joints if joint.actuator]
+    np.testing.assert_allclose(found, 0.4, rtol=0.03)
+    assert made.effort_std == (0.1, 0.1)
+    assert "by the stated masses" in driven.notes[1].text
+
+
 def test_register_gain_saturates_at_the_supply() -> None:
     loop = Actuator(
         "position", 400, unit="register", servo="dynamixel-xl330", supply_voltage=7.4, torque_per_volt=0.0873
@@ -156,7 +173,8 @@ def test_refused_actuators_say_the_remedy(entry: str, words: str) -> None:
     [
         (None, r"joint 1 \(joint1\) has no loop that makes torque of qref1"),
         (Actuator("torque"), "has no loop"),
-        (Actuator("position", 4, unit="register", servo="dynamixel-x"), "supply_voltage and torque_per_volt"),
+        (Actuator("position", 4, unit="register", servo="dynamixel-x"), "actuator.supply_voltage, or record volt1"),
+        (Actuator("position", 4, unit="register", servo="dynamixel-x", supply_voltage=12.0), "torque_per_volt"),
     ],
 )
 def test_commands_without_a_loop_are_refused(actuator: Actuator | None, words: str) -> None:

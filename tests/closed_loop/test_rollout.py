@@ -165,3 +165,17 @@ def test_a_model_of_another_arm_is_refused() -> None:
     other = replace(robot, joints=tuple(replace(joint, name=f"other{joint.name}") for joint in robot.joints))
     with pytest.raises(TauscopeError, match="give the model of this arm"):
         roll_out(other, [_record(model, 0.2)], [model])
+
+
+@pytest.mark.parametrize(
+    ("loop", "words"),
+    [
+        (Actuator("position", 400, unit="register", servo="dynamixel-xl330"), "supply_voltage"),
+        (Actuator("position", 400, unit="register", servo="dynamixel-x", supply_voltage=12.0), "torque_per_volt"),
+    ],
+)
+def test_a_loop_that_makes_no_torque_is_refused(loop: Actuator, words: str) -> None:
+    model = _model(_robot())
+    robot = replace(_robot(), joints=tuple(replace(joint, actuator=loop) for joint in _robot().joints))
+    with pytest.raises(TauscopeError, match=words):
+        roll_out(robot, [_record(model, 0.2)], [model])

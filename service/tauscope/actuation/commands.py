@@ -6,6 +6,12 @@ from dataclasses import replace
 import numpy as np
 
 from tauscope.actuation.delay import FOUND_STD_S, Delay, command_torque, estimate_delays, shift_command
+from tauscope.actuation.scale import (
+    STATED_MASS_STD,
+    estimate_torque_per_volt,
+    is_open,
+    with_torque_per_volt,
+)
 from tauscope.errors import RecordingError
 from tauscope.recording.columns import table_columns
 from tauscope.recording.recording import Recording
@@ -15,7 +21,7 @@ from tauscope.result_warning import ResultWarning
 from tauscope.robot import Actuator, Robot
 from tauscope.robot.actuator import ASSUMED_SERVO
 
-__all__ = ["make_efforts", "shift_command"]
+__all__ = ["make_efforts", "require_loops", "shift_command"]
 
 SATURATED_SHARE = 0.02
 """Share of rows at the duty limit from which gain and torque per volt can be told from each other."""
@@ -45,21 +51,34 @@ def make_efforts(
     if not commands and not unseen:
         return robot, tuple(recordings), tuple(held_out)
     for recording in (*commands, *unseen):
-        _require_loops(robot, recording)
-    delays = estimate_delays(robot, commands or unseen)
+        require_loops(robot, recording)
+    given = commands or unseen
+    open_ = [place for place, joint in enumerate(robot.joints) if is_open(joint)]
+    in_volts = with_torque_per_volt(robot, dict.fromkeys(open_, 1.0))
+    delays = estimate_delays(in_volts, given)
+    if open_:
+        scales = estimate_torque_per_volt(in_volts, given, delays, open_)
+        _require_scales(robot, given[0], set(open_) - set(scales))
+        robot = with_torque_per_volt(robot, scales, STATED_MASS_STD)
     joints = tuple(
         joint if joint.actuator is None else replace(joint, actuator=replace(joint.actuator, delay=delay.value))
         for joint, delay in zip(robot.joints, delays, strict=True)
     )
     driven = replace(robot, joints=joints)
     made = {id(each): _make_effort(driven, each, delays) for each in (*commands, *unseen)}
-    told = _describe(driven, delays, [made[id(each)] for each in commands or unseen], commands or unseen)
-    train, judge = (tuple(made.get(id(each), each) for each in given) for given in (recordings, held_out))
+    told = _describe(driven, delays, [made[id(each)] for each in given], given, open_)
+    train, judge = (tuple(made.get(id(each), each) for each in some) for some in (recordings, held_out))
     return replace(driven, notes=(*robot.notes, *told)), train, judge
 
 
-def _require_loops(robot: Robot, recording: Recording) -> None:
-    """Every joint has a loop, and its voltage is known."""
+def require_loops(robot: Robot, recording: Recording) -> None:
+    """Refuse a robot without loops, or without the supply of one.
+
+    Raises
+    ------
+    RecordingError
+        naming the joint and the key
+    """
     for number, joint in enumerate(robot.joints, 1):
         loop = joint.actuator
         if loop is None or not loop.has_loop:
@@ -67,17 +86,20 @@ def _require_loops(robot: Robot, recording: Recording) -> None:
                 f"{recording.name}: column tau{number} is missing, and joint {number} ({joint.name}) has no loop that"
                 f" makes torque of qref{number}; state joints[{number - 1}].actuator with kind: position and kp"
             )
-        if loop.unit == "register":
-            lacking = [
-                *(() if loop.supply_voltage or recording.has("volt") else ("supply_voltage",)),
-                *(() if loop.volt_torque is not None else ("torque_per_volt",)),
-            ]
-            if lacking:
-                place = f"joints[{number - 1}].actuator"
-                raise RecordingError(
-                    f"{recording.name}: {joint.name}: torque cannot be made of qref{number} without"
-                    f" {' and '.join(lacking)}; state {' and '.join(f'{place}.{key}' for key in lacking)}"
-                )
+        if loop.unit == "register" and not (loop.supply_voltage or recording.has("volt")):
+            raise RecordingError(
+                f"{recording.name}: {joint.name}: torque cannot be made of qref{number} without its supply; state"
+                f" joints[{number - 1}].actuator.supply_voltage, or record volt{number}"
+            )
+
+
+def _require_scales(robot: Robot, recording: Recording, lacking: set[int]) -> None:
+    """Torque per volt is stated, or stated masses tell it."""
+    for place in sorted(lacking):
+        raise RecordingError(
+            f"{recording.name}: {robot.joints[place].name}: torque cannot be made of qref{place + 1} without its torque"
+            f" per volt, and stated masses do not tell it; state joints[{place}].actuator.torque_per_volt"
+        )
 
 
 def _make_effort(robot: Robot, recording: Recording, delays: Sequence[Delay]) -> Recording:
@@ -101,7 +123,11 @@ def _make_effort(robot: Robot, recording: Recording, delays: Sequence[Delay]) ->
 
 
 def _describe(
-    robot: Robot, delays: Sequence[Delay], made: Sequence[Recording], commands: Sequence[Recording]
+    robot: Robot,
+    delays: Sequence[Delay],
+    made: Sequence[Recording],
+    commands: Sequence[Recording],
+    weighed: Sequence[int],
 ) -> list[ResultWarning]:
     """What the torque is made of, and what these data cannot tell of it."""
     notes = []
@@ -123,7 +149,7 @@ def _describe(
         )
         notes.append(ResultWarning(code="made-effort", joint=joint.name, text=text, remedy=remedy))
         limited = max(_limited_share(loop, *pair, index) for pair in zip(made, commands, strict=True))
-        notes.append(_separate(joint.name, loop, limited))
+        notes.append(_separate(joint.name, loop, limited, is_weighed=index in weighed))
     return notes
 
 
@@ -138,7 +164,7 @@ def _limited_share(loop: Actuator, made: Recording, commands: Recording, joint: 
     return float(np.mean(np.abs(made.samples().effort[:, joint]) >= top))
 
 
-def _separate(name: str, loop: Actuator, limited: float) -> ResultWarning:
+def _separate(name: str, loop: Actuator, limited: float, *, is_weighed: bool) -> ResultWarning:
     """What of gain, torque per volt and friction the commands can tell from each other."""
     known = f"stated to {100.0 * loop.relative_std:.3g} %" if loop.relative_std else "taken as exact"
     scale, scaled = "torque_per_volt", "kp, supply and torque_per_volt count as one product"
@@ -146,6 +172,8 @@ def _separate(name: str, loop: Actuator, limited: float) -> ResultWarning:
         scale, scaled = "kp", "the scale of the torque is that of kp"
     elif limited > SATURATED_SHARE:
         scaled = f"kp and torque_per_volt separate only in the {100.0 * limited:.0f} % of rows at the duty limit"
+    if is_weighed:
+        scaled = f"torque per volt is {loop.volt_torque:.3g} Nm/V by the stated masses"
     text = f"{name}: {scaled}, {known}: masses and friction are proportional to it"
     text += ". Back-EMF and kd are parts of viscous friction" if not (loop.back_emf or loop.kd) else ""
     remedy = f"weigh one known payload, or state a mass that is known, and set {scale} so that both agree"

@@ -6,29 +6,18 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import qr
 
+from tauscope.actuation.smooth_motion import LONGEST_S, SmoothMotion
 from tauscope.dynamics import base_parameters, torque_regressor
 from tauscope.recording.conditioning.filters import smooth
 from tauscope.recording.recording import Recording
 from tauscope.recording.samples import Array, Samples
 from tauscope.robot import Robot
 
-LONGEST_S = 0.2
-"""Longest delay that is looked for [s]: buses of servos take 1 to 50 ms, a teleoperation loop up to 150 ms."""
-
 STEP_S = 2e-3
 """Step of the search [s]; a parabola refines it."""
 
-BAND_HZ = 10.0
-"""Band of the search [Hz]: position loops of servos pass no more, and steps of an encoder outweigh what is above."""
-
-MOST_ROWS = 20_000
-"""Rows of a recording that the search uses."""
-
 FOUND_STD_S = 0.02
 """Standard error above which a joint takes the delay of the others [s]."""
-
-REST = 0.02
-"""Speed relative to the fastest below which friction has no direction."""
 
 
 @dataclass(frozen=True)
@@ -81,11 +70,11 @@ def command_torque(robot: Robot, samples: Samples, delays: Sequence[float]) -> A
     """
     torque = np.full(samples.position.shape, np.nan)
     for joint, delay in enumerate(delays):
-        torque[:, joint] = _joint_torque(robot, samples, joint, delay)
+        torque[:, joint] = joint_torque(robot, samples, joint, delay)
     return torque
 
 
-def _joint_torque(robot: Robot, samples: Samples, joint: int, delay: float) -> Array:
+def joint_torque(robot: Robot, samples: Samples, joint: int, delay: float) -> Array:
     """Torque of one joint's loop, (N,)."""
     loop = robot.joints[joint].actuator
     time, position = samples.time, samples.position[:, joint]
@@ -143,32 +132,20 @@ def _least(grid: Array, squares: Array, rows: float) -> Delay:
 
 def _unexplained(robot: Robot, recording: Recording, joints: Sequence[int], grid: Array) -> tuple[Array, float]:
     """Squares of torque that bodies and friction leave, (joints, delays), and independent rows behind them."""
-    samples = recording.samples(0, MOST_ROWS)
-    rate = 1.0 / float(np.median(np.diff(samples.time)))
-    band = min(BAND_HZ, 0.2 * rate)
-    time = np.arange(samples.time[0], samples.time[-1], 1.0 / rate)
-
-    def onto(values: Array) -> Array:
-        known = np.isfinite(values)
-        return np.interp(time, samples.time[known], values[known])
-
-    position = smooth(np.stack([onto(column) for column in samples.position.T], axis=1), rate, 2.0 * band)
-    velocity = np.gradient(position, 1.0 / rate, axis=0)
-    acceleration = np.gradient(velocity, 1.0 / rate, axis=0)
+    motion = SmoothMotion.of(recording)
     columns = np.asarray(base_parameters(robot).independent_columns)
-    regressor = torque_regressor(robot, position, velocity, acceleration, columns=columns)
-    left, moving = np.zeros((len(joints), len(grid))), 0
+    regressor = torque_regressor(robot, motion.position, motion.velocity, motion.acceleration, columns=columns)
+    left, rows = np.zeros((len(joints), len(grid))), 0
     for place, joint in enumerate(joints):
-        speed = velocity[:, joint]
-        moves = np.abs(speed) > REST * np.abs(speed).max()
-        moves[: int(LONGEST_S * rate) + 1] = False  # before the first command is known at every delay
-        own = [regressor[:, joint], acceleration[:, [joint]], speed[:, None], np.sign(speed)[:, None]]
-        model = smooth(np.hstack([*own, np.ones((len(time), 1))]), rate, band)[moves]
-        made = [onto(_joint_torque(robot, samples, joint, float(delay))) for delay in grid]
-        target = smooth(np.stack(made, axis=1), rate, band)[moves]
+        moves = motion.moves(joint)
+        model = motion.reduce(np.hstack([regressor[:, joint], motion.acceleration[:, [joint]]]), joint)
+        if len(model) <= model.shape[1]:
+            continue
+        made = [motion.onto(joint_torque(robot, motion.samples, joint, float(delay))) for delay in grid]
+        target = smooth(np.stack(made, axis=1), motion.rate, motion.band)[moves]
         basis, triangle, _ = qr(model, mode="economic", pivoting=True)
         size = np.abs(np.diag(triangle))
         basis = basis[:, size > 1e-9 * size[0]]
         left[place] = np.sum((target - basis @ (basis.T @ target)) ** 2, axis=0)
-        moving = max(moving, int(moves.sum()))
-    return left, moving * 2.0 * band / rate
+        rows = max(rows, len(model))
+    return left, rows * motion.independent

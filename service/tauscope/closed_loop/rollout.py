@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tauscope.actuation import estimate_delays
+from tauscope.actuation import estimate_delays, is_open, require_loops
 from tauscope.closed_loop.drive import Drive, LoopDrive, RecordedMotion, TorqueDrive, record_motion
 from tauscope.closed_loop.measure import lag, reversal_error, rms_error, worst_error
 from tauscope.closed_loop.model import RolloutModel, rollout_model, stated_model
@@ -19,7 +19,7 @@ from tauscope.recording.columns import table_columns
 from tauscope.recording.recording import Array
 from tauscope.recording.table import MemoryTable
 from tauscope.result_warning import ResultWarning
-from tauscope.robot import Robot
+from tauscope.robot import Actuator, Robot
 
 HORIZONS_S = (0.1, 1.0, 10.0)
 """Times between restarts at the real state [s]: one command, one move, one task."""
@@ -153,17 +153,34 @@ def _complete_loops(robot: Robot, recordings: Sequence[Recording], known: Robot 
         return robot, False
     others = [None] * len(loops) if known is None else [joint.actuator for joint in known.joints]
     filled = [
-        loop if loop is None or loop.delay is not None or other is None else replace(loop, delay=other.delay)
-        for loop, other in zip(loops, others, strict=True)
+        loop if loop is None or other is None else _fill(loop, other) for loop, other in zip(loops, others, strict=True)
     ]
     joints = [replace(joint, actuator=loop) for joint, loop in zip(robot.joints, filled, strict=True)]
     robot = replace(robot, joints=tuple(joints))
+    for recording in recordings:
+        require_loops(robot, recording)
+    for number, joint in enumerate(robot.joints, 1):
+        if is_open(joint):
+            place = f"joints[{number - 1}].actuator.torque_per_volt"
+            raise RecordingMismatchError(
+                f"robot {robot.name}: {joint.name}: its loop has no torque per volt; state {place}, or give a model"
+                " that identify made from commands"
+            )
     delays = estimate_delays(robot, [each for each in commands if each is not None])
     done = [
         joint if joint.actuator is None else replace(joint, actuator=replace(joint.actuator, delay=delay.value))
         for joint, delay in zip(robot.joints, delays, strict=True)
     ]
     return replace(robot, joints=tuple(done)), True
+
+
+def _fill(loop: Actuator, known: Actuator) -> Actuator:
+    """A loop with what is not stated as the model's recordings gave it."""
+    return replace(
+        loop,
+        delay=known.delay if loop.delay is None else loop.delay,
+        torque_per_volt=known.torque_per_volt if loop.volt_torque is None else loop.torque_per_volt,
+    )
 
 
 def _as_commands(recording: Recording) -> Recording | None:
