@@ -188,7 +188,7 @@ def test_commands_without_a_loop_are_refused(actuator: Actuator | None, words: s
 
 
 def test_file_of_positions_and_commands(tmp_path: Path) -> None:
-    """Rest, repeats and zeros of a command are its own; a torque that is NaN throughout gives way to commands."""
+    """Rest, repeats and zeros of a command are its own; a torque of nothing but NaN or zero gives way to commands."""
     robot = _arm()
     samples = _recordings(robot)[1].samples()
     plain = np.column_stack([samples.time, samples.position, samples.effort])
@@ -196,6 +196,7 @@ def test_file_of_positions_and_commands(tmp_path: Path) -> None:
     for name, header, data in (
         ("plain", "t,q1,q2,qref1,qref2", plain),
         ("nan", "t,q1,q2,tau1,tau2,qref1,qref2", np.column_stack([plain[:, :3], nothing, plain[:, 3:]])),
+        ("zero", "t,q1,q2,tau1,tau2,qref1,qref2", np.column_stack([plain[:, :3], 0.0 * plain[:, 3:], plain[:, 3:]])),
     ):
         path = tmp_path / f"{name}.csv"
         np.savetxt(path, data, delimiter=",", header=header, comments="")

@@ -45,7 +45,7 @@ def examine_recording(recording: Recording, robot: Robot | None = None, *, trust
     if recording.is_examined:
         return recording
     missing = find_missing_effort(recording)
-    if missing is not None and robot is not None and _has_commands(recording, robot):
+    if robot is not None and _has_commands(recording, robot) and (missing is not None or _is_zero(recording)):
         recording, missing = _take_commands(recording), None
     if missing is not None:
         raise RecordingError(f"{recording.name}: {missing}")
@@ -67,6 +67,12 @@ def _has_commands(recording: Recording, robot: Robot) -> bool:
     loops = [joint.actuator for joint in robot.joints]
     named = all(f"qref{joint}" in recording.table.names for joint in range(1, recording.joint_count + 1))
     return named and all(loop is not None and loop.has_loop for loop in loops)
+
+
+def _is_zero(recording: Recording) -> bool:
+    """Whether the effort is exactly zero throughout, as position servos report what they do not measure."""
+    blocks = (recording.samples(start, start + BLOCK_ROWS) for start in range(0, len(recording), BLOCK_ROWS))
+    return not any(np.nan_to_num(block.effort).any() for block in blocks)
 
 
 def _take_commands(recording: Recording) -> Recording:
