@@ -130,6 +130,14 @@ def test_register_gain_saturates_at_the_supply() -> None:
     assert loop.stiffness == pytest.approx(10.0 * linear)
 
 
+def test_a_warm_motor_gives_less_torque_per_volt() -> None:
+    loop = Actuator("position", 400, unit="register", supply_voltage=7.4, torque_per_volt=0.1, temperature_slope=0.02)
+    error, still = np.full(4, 0.1), np.zeros(4)
+    cold = np.asarray(loop.torque(error, still))
+    warm = np.asarray(loop.torque(error, still, temperature=np.array([25.0, 75.0, np.nan, 0.0])))
+    np.testing.assert_allclose(warm / cold, [1.0, 0.5, 1.0, 2.0])
+
+
 def test_dead_band_of_a_feetech_servo() -> None:
     loop = Actuator("position", 16, unit="register", servo="feetech-sts3215", supply_voltage=7.4)
     np.testing.assert_array_equal(np.sign(loop.torque(np.array([1e-3, 2e-3]), np.zeros(2))), [0.0, 1.0])

@@ -83,7 +83,7 @@ def joint_torque(robot: Robot, samples: Samples, joint: int, delay: float) -> Ar
     velocity = np.gradient(position, time) if samples.velocity is None else samples.velocity[:, joint]
     command = shift_command(time, samples.effort[:, joint], delay, loop.rate_hz, time)
     error = command - position if loop.kind == "position" else np.gradient(command, time) - velocity
-    known = [None if each is None else each[:, joint] for each in (samples.voltage, samples.gain)]
+    known = [None if each is None else each[:, joint] for each in (samples.voltage, samples.gain, samples.temperature)]
     return np.asarray(loop.torque(error, velocity, *known))
 
 

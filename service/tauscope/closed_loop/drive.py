@@ -83,9 +83,9 @@ class LoopDrive:
         for joint, loop in enumerate(self._loops):
             command = shift_command(samples.time, reference[:, joint], loop.delay or 0.0, loop.rate_hz, time)
             self._command[:, joint] = command if loop.kind == "position" else np.gradient(command, STEP_S)
-        self._voltage, self._gain = (
+        self._voltage, self._gain, self._temperature = (
             None if values is None else np.stack([_onto(samples.time, column, time) for column in values.T], axis=1)
-            for values in (samples.voltage, samples.gain)
+            for values in (samples.voltage, samples.gain, samples.temperature)
         )
 
     def torque(self, step: int, position: Array, velocity: Array) -> Array:
@@ -104,6 +104,7 @@ class LoopDrive:
                 float(velocity[joint]),
                 None if self._voltage is None else float(self._voltage[step, joint]),
                 None if self._gain is None else float(self._gain[step, joint]),
+                None if self._temperature is None else float(self._temperature[step, joint]),
             )
         return out
 

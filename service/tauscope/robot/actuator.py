@@ -47,6 +47,9 @@ SERVOS = {
 ASSUMED_SERVO = "dynamixel-xl330"
 """Servo of register gains without a name."""
 
+ROOM_C = 25.0
+"""Temperature at which torque per volt is stated [°C]."""
+
 DATA_SHEET_STD = 0.2
 """Relative standard error of torque per volt from a data sheet: stall torque includes friction and a warm winding."""
 
@@ -78,6 +81,8 @@ class Actuator:
         from the recorded command to its torque [s]; None: estimated
     rate_hz : float or None
         rate at which the loop takes commands [Hz]; None: with every sample
+    temperature_slope : float
+        relative loss of torque per volt with the recorded temperature, κ / (1 + slope (T - 25 °C)) [1/K]
     scale_std : float or None
         relative standard error of the torque per position error; None: that of a data sheet, or zero in SI
     """
@@ -94,6 +99,7 @@ class Actuator:
     dead_band: float | None = None
     delay: float | None = None
     rate_hz: float | None = None
+    temperature_slope: float = 0.0
     scale_std: float | None = None
 
     @property
@@ -134,7 +140,12 @@ class Actuator:
         return own + self.back_emf * (self.volt_torque or 0.0)
 
     def torque(
-        self, error: Values, velocity: Values, voltage: Values | None = None, kp: Values | None = None
+        self,
+        error: Values,
+        velocity: Values,
+        voltage: Values | None = None,
+        kp: Values | None = None,
+        temperature: Values | None = None,
     ) -> Values:
         """Torque at the joint.
 
@@ -148,6 +159,8 @@ class Actuator:
             supply [V]; None: as stated
         kp : float or (N,) float64 or None
             gain in force; None: as stated
+        temperature : float or (N,) float64 or None
+            of the motor [°C]; None or NaN: 25
         """
         dead = self.conversion.dead_band if self.dead_band is None and self.unit == "register" else self.dead_band
         gain = self.kp if kp is None else kp
@@ -158,4 +171,6 @@ class Actuator:
         supply = self.supply_voltage if voltage is None else voltage
         limit = self.conversion.max_duty if self.max_duty is None else self.max_duty
         duty = np.clip(gain * self.conversion.duty_per_rad * error, -limit, limit)
-        return (self.volt_torque or 0.0) * (supply or 0.0) * duty - self.damping * velocity
+        warmth = 0.0 if temperature is None else np.nan_to_num(np.asarray(temperature) - ROOM_C)
+        volt_torque = (self.volt_torque or 0.0) / (1.0 + self.temperature_slope * warmth)
+        return volt_torque * (0.0 if supply is None else supply) * duty - self.damping * velocity

@@ -150,6 +150,8 @@ class ActuatorDocument(Document):
         [s]; None: estimated
     rate_hz : float or None
         [Hz]
+    temperature_slope : float
+        relative loss of torque per volt [1/K]
     scale_std : float or None
         relative standard error of the torque's scale
     """
@@ -166,6 +168,7 @@ class ActuatorDocument(Document):
     dead_band: NotNegative | None = None
     delay: NotNegative | None = None
     rate_hz: Positive | None = None
+    temperature_slope: NotNegative = 0.0
     scale_std: NotNegative | None = None
 
     @model_validator(mode="after")
