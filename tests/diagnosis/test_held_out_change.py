@@ -67,7 +67,7 @@ def test_a_joint_that_it_acts_on_gains_and_none_loses(
 
 
 @pytest.mark.parametrize(
-    ("gain", "loss", "expected"), [(-0.13, 0.0051, False), (-0.13, 0.03, True), (0.0, 0.0051, True)]
+    ("gain", "loss", "expected"), [(-0.13, 0.013, False), (-0.13, 0.015, True), (0.0, 0.0051, True)]
 )
 def test_a_small_loss_beside_a_large_gain_spills_over_through_the_links(
     gain: float, loss: float, expected: bool
