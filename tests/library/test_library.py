@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 import tauscope
 from cli.simulated_files import SimulatedFiles, write_files
-from tauscope.errors import MissingExtraError, RecordingMismatchError, TauscopeError
+from tauscope.errors import MissingExtraError, RecordingMismatchError
 from tauscope.library import RecordingSource
 from tauscope.results import DiagnosisResult, ExcitationResult, IdentificationResult, SimulationResult
 
@@ -122,6 +122,13 @@ def test_pandas_is_asked_for_in_one_line(identification: IdentificationResult, m
         identification.to_frame()
 
 
-def test_rollout_says_that_it_is_not_there(files: SimulatedFiles) -> None:
-    with pytest.raises(TauscopeError, match="rollout is not available in this version"):
-        tauscope.rollout(files.robot, files.train[0])
+def test_rollout(simulation: SimulationResult) -> None:
+    """Torque of the spring's arm drives one without it: the rollout sees the difference."""
+    from tauscope_sim.examples import example_robot
+
+    result = tauscope.rollout(example_robot("paper_arm"), simulation)
+    assert result.to_dict()["schema"] == "tauscope.rollout/1"
+    assert result.document.drive == "torque"
+    assert [entry.model for entry in result.document.summary] == ["stated"]
+    assert list(result.to_frame().columns) == ["recording", "model", "joint", "rms", "worst", "lag"]
+    assert len(result.plot().axes) == 3
