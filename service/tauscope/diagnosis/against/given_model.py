@@ -19,7 +19,7 @@ from tauscope.diagnosis.against.link_changes import stated_links
 from tauscope.diagnosis.against.simulated import fit_to_simulation
 from tauscope.diagnosis.against.wrong_values import attribute
 from tauscope.diagnosis.findings.diagnosed import Diagnosis, ParameterDifference
-from tauscope.diagnosis.findings.finding import Finding, FitSizes, sizes
+from tauscope.diagnosis.findings.finding import Finding, FitSizes
 from tauscope.diagnosis.findings.plain import with_plain_terms
 from tauscope.errors import IdentificationError
 from tauscope.identification import Options
@@ -190,7 +190,7 @@ def _given_sizes(diagnosis: Diagnosis, given: Given) -> FitSizes:
     if any(name not in given.values for name in names[: model.structure.base_count]):
         return diagnosis.before
     stated: Array = np.array([given.values.get(name, 0.0) for name in names])
-    return sizes(replace(model, parameters=stated), diagnosis.fitter, diagnosis.held_out)
+    return diagnosis.sizes(replace(model, parameters=stated))
 
 
 def is_wrong(difference: ParameterDifference, several: float) -> bool:

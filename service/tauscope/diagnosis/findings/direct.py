@@ -42,9 +42,7 @@ def with_direct_findings(
             probability=float(stats.norm.cdf(direct.value / direct.std)),
             alternatives=(),
             confirmed=_agree(direct, unseen.get(direct.joint)),
-            behind=None,
             as_law=1.0,
-            elsewhere=(),
         )
     seen = tuple(limit for each in measured if not each.is_open for limit in _limits(each))
     found = replace(diagnosis, findings=(), detectable=(*diagnosis.detectable, *seen))

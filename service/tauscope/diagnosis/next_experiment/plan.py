@@ -175,8 +175,8 @@ def _judge(diagnosis: Diagnosis) -> _Judge:
     for finding in diagnosis.findings:
         if finding.alternatives:
             options = finding.alternatives[: MOST_OPTIONS - 1]
-            places = (finding.place, *((o.candidate.effect.id, o.candidate.effect.joint) for o in options))
-            models = (final, *(option.fit.model for option in options))
+            places = (finding.place, *((each.term.effect.id, each.term.effect.joint) for each in options))
+            models = (final, *(each.model for each in options))
             tasks = tuple((model, tuple(other for other in models if other is not model)) for model in models)
             known = tuple(equations(model, diagnosis.fitter, others) for model, others in tasks)
             return _Judge(places, tasks, known, np.zeros(0), diagnosis.inflation)

@@ -5,12 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tauscope.diagnosis.model.term import Term
+from tauscope.diagnosis.model.term import Place, Term
 from tauscope.diagnosis.screening.refinement import POINTS, neighbours, spread
 from tauscope.diagnosis.screening.screen import SHAPES_AT_ONCE
 from tauscope.diagnosis.search.hypothesis import Hypothesis, Laboratory
 from tauscope.diagnosis.search.scoring import SIZES, Scored, Scorer
-from tauscope.diagnosis.selection.choice import Place, has_possible_values
 from tauscope.effects import Effect, Signals
 from tauscope.effects.computation import side_by_side
 from tauscope.identification.excitation import thin
@@ -52,7 +51,7 @@ class Proposal:
     @property
     def place(self) -> Place:
         """Which effect where."""
-        return self.term.effect.id, self.term.effect.joint
+        return self.term.place
 
 
 class Proposer:
@@ -115,7 +114,7 @@ class Proposer:
             found = self._extend(effect, shape, size, beside)
         term = replace(found.model.terms[-1], coefficients=found.posterior.mean[-len(size) :])
         k_v = None if effect.joint is None else at.model.structure.terms[effect.joint].k_v
-        if not (has_possible_values(term, k_v) and effect.is_consistent(term.coefficients, shape)):
+        if not (term.is_possible(k_v) and effect.is_consistent(term.coefficients, shape)):
             return None
         one_sided = sum(each.positive for each in effect.coefficients)
         # Where the effect is there, only the model that has it tells the noise.

@@ -1,16 +1,22 @@
 """From the nominal model to the most probable set of effects: one more, one less, until nothing helps."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tauscope.diagnosis.model.extended import ExtendedModel
+from tauscope.diagnosis.model.term import Place, Term
 from tauscope.diagnosis.search.held_out import Change, HeldOut
 from tauscope.diagnosis.search.hypothesis import Hypothesis, Laboratory
 from tauscope.diagnosis.search.proposals import Proposal, Proposer
 from tauscope.diagnosis.search.window import window_log_odds
-from tauscope.diagnosis.selection.choice import Place
 from tauscope.effects import Effect, TimeLocalEffect
 from tauscope.effects.computation import side_by_side
+from tauscope.recording.recording import Array
+
+MOST_EXCHANGES = 4
+"""Effects whose place another one takes at most."""
 
 MOST_EFFECTS = 12
 """Effects that are added at most."""
@@ -26,12 +32,14 @@ CATALOGUED = 3.0
 class Step:
     """An effect that was added or refused.
 
-    log_odds : float
-        posterior, that it is there
+    log_odds, trained_log_odds : float
+        posterior, that it is there, after all motion and after training
     rivals : tuple of Proposal
         other effects that were as good as looked at in its place
     change : Change or None
         on held-out motion; None where there is none
+    covariance : (p, p) float64
+        of the parameters with it
     """
 
     proposal: Proposal
@@ -39,15 +47,76 @@ class Step:
     rivals: tuple[Proposal, ...]
     change: Change | None
     is_confirmed: bool
+    before: ExtendedModel
+    after: ExtendedModel
+    covariance: Array
+    trained_log_odds: float
+
+    @property
+    def probability(self) -> float:
+        """Of the effect, against none."""
+        return float(1.0 / (1.0 + np.exp(-np.clip(self.log_odds, -700.0, 700.0))))
+
+
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """What may be in the place of a finding.
+
+    log_odds : float
+        posterior, against neither
+    """
+
+    term: Term
+    model: ExtendedModel
+    log_odds: float
+
+
+@dataclass(frozen=True, eq=False)
+class Weighed:
+    """Effects of one kind at one place beside all others.
+
+    places : tuple of int
+        of their terms in the model
+    without : Hypothesis
+        all others, at their most probable parameters
+    log_odds : float
+        posterior, that it is there
+    rivals : tuple of Rival
+        the most probable first
+    """
+
+    places: tuple[int, ...]
+    without: Hypothesis
+    log_odds: float
+    rivals: tuple[Rival, ...]
+    proposals: tuple[Proposal, ...]
+
+    @property
+    def lead(self) -> float:
+        """Log odds of the best rival against it."""
+        return self.rivals[0].log_odds - self.log_odds if self.rivals else -np.inf
+
+    @property
+    def probability(self) -> float:
+        """Share of all visited models that contain it (Madigan & Raftery 1994)."""
+        ahead = np.array([-self.log_odds, *(each.log_odds - self.log_odds for each in self.rivals)])
+        return float(1.0 / (1.0 + np.exp(np.clip(ahead, -700.0, 700.0)).sum()))
 
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What the search found."""
+    """Result of a search.
+
+    steps : tuple of Step
+        every effect that was tried, in the order of trial
+    weighed : tuple of Weighed
+        every effect of the hypothesis
+    """
 
     nominal: Hypothesis
     hypothesis: Hypothesis
     steps: tuple[Step, ...]
+    weighed: tuple[Weighed, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +139,58 @@ class Search:
                 break
             at = self._without_superfluous(found, len(nominal.model.terms))
             refused |= _places(found) - _places(at)
-        return Found(nominal, self._without_harm(at, nominal), tuple(steps))
+        at = self._without_harm(at, nominal)
+        at, weighed = self._exchange(at)
+        return Found(nominal, at, tuple(steps), weighed)
+
+    def _exchange(self, at: Hypothesis) -> tuple[Hypothesis, tuple[Weighed, ...]]:
+        """Each effect weighed beside all others, and a more probable one in its place where there is one."""
+        weighed = [self._weigh(at, places) for places in _groups(at.model)]
+        for _ in range(MOST_EXCHANGES):
+            best = max(weighed, key=lambda each: each.lead, default=None)
+            if best is None or best.lead <= 0.0 or len(best.places) > 1:
+                break
+            other = self._try_rival(best)
+            if other is None:
+                weighed[weighed.index(best)] = replace(best, rivals=best.rivals[1:])
+                continue
+            at = other
+            weighed = [self._weigh(at, places) for places in _groups(at.model)]
+        return at, tuple(each for each in weighed if each.log_odds > 0.0)
+
+    def _try_rival(self, weighed: Weighed) -> Hypothesis | None:
+        """The hypothesis with the best rival in the place of an effect, where that is more probable."""
+        rival, without = weighed.rivals[0], weighed.without
+        proposal = next(each for each in weighed.proposals if each.term.effect is rival.term.effect)
+        step, found = self._try(without, proposal, weighed.proposals)
+        return found if step.is_confirmed and step.log_odds > weighed.log_odds else None
+
+    def _weigh(self, at: Hypothesis, places: tuple[int, ...]) -> Weighed:
+        """An effect's odds against none and against others in its place."""
+        without, touched = at, at.model.terms[places[0]].effect.touched(len(at.scales))
+        for place in reversed(places):
+            without = self.laboratory.without_term(without, place)
+        without = self.laboratory.settle(without, touched)
+        before = self.laboratory.tune(self.laboratory.under(without, at.dependence, touched), touched)
+        effect, shared = at.model.terms[places[0]].effect, set(touched)
+        log_odds = at.log_evidence - before.log_evidence + self._prior_odds(effect)
+        log_odds += 0.0 if self.held_out is None else self.held_out.change(without, at).log_odds
+        own, others = (effect.id, effect.joint), _places(without)
+
+        def competes(each: Effect) -> bool:
+            place = each.id, each.joint
+            is_new = place != own and (each.repeats or place not in others)
+            return is_new and not shared.isdisjoint(each.touched(len(at.scales)))
+
+        proposals = self.proposer.propose(without, competes)
+        rivals = []
+        for proposal in (each for each in proposals if self._log_odds(each) > 0.0):
+            nearer = self.laboratory.approach(self._add(without, proposal))
+            odds = self._log_odds(proposal)
+            odds += 0.0 if self.held_out is None else self.held_out.change(without, nearer).log_odds
+            rivals.append(Rival(nearer.model.terms[-1], nearer.model, odds))
+        rivals.sort(key=lambda each: -each.log_odds)
+        return Weighed(places, without, log_odds, tuple(rivals), tuple(proposals))
 
     def _without_harm(self, at: Hypothesis, nominal: Hypothesis) -> Hypothesis:
         """The same without the effects at whose cost joints are predicted worse than by the nominal model."""
@@ -108,7 +228,7 @@ class Search:
     def _add(self, at: Hypothesis, proposal: Proposal) -> Hypothesis:
         return self.laboratory.with_term(self.laboratory.paint(at, proposal.found), proposal.term, proposal.size)
 
-    def _try(self, at: Hypothesis, proposal: Proposal, proposals: list[Proposal]) -> tuple[Step, Hypothesis]:
+    def _try(self, at: Hypothesis, proposal: Proposal, proposals: Sequence[Proposal]) -> tuple[Step, Hypothesis]:
         """A proposal in the model, and what held-out motion says of it."""
         touched = proposal.term.effect.touched(len(at.scales))
         found = self.laboratory.settle(self._add(at, proposal), touched)
@@ -121,7 +241,10 @@ class Search:
         contradicted = change is not None and (
             change.harm > 0.0 or bool((change.standard[list(touched)] > CONTRADICTED).any())
         )
-        return Step(proposal, log_odds, rivals, change, log_odds > 0.0 and not contradicted), found
+        confirmed = log_odds > 0.0 and not contradicted
+        covariance = found.posterior.covariance
+        trained = self._log_odds(proposal)
+        return Step(proposal, log_odds, rivals, change, confirmed, at.model, found.model, covariance, trained), found
 
     def _log_odds(self, proposal: Proposal) -> float:
         return proposal.log_factor + self._prior_odds(proposal.term.effect)
@@ -176,6 +299,14 @@ class _Wanted:
         return place not in self.refused and (effect.repeats or place not in self.present)
 
 
+def _groups(model: ExtendedModel) -> list[tuple[int, ...]]:
+    """Places of the terms of each effect and joint among all."""
+    groups: dict[Place, list[int]] = {}
+    for number, term in enumerate(model.terms):
+        groups.setdefault(term.place, []).append(number)
+    return [tuple(each) for each in groups.values()]
+
+
 def _places(at: Hypothesis) -> set[Place]:
     """Effects of a hypothesis, and where."""
-    return {(term.effect.id, term.effect.joint) for term in at.model.terms}
+    return {term.place for term in at.model.terms}
