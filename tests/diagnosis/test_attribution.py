@@ -63,11 +63,15 @@ def surplus(changes: dict[int, Change], seed: int) -> tuple[Array, Array]:
     return covariance @ (columns.T @ left.ravel()) / NOISE**2, np.asarray(covariance, dtype=np.float64)
 
 
-def explanations(changes: dict[int, Change], seed: int, links: Array | None = STATED) -> tuple[Explanation, ...]:
+def attribution(changes: dict[int, Change], seed: int, links: Array | None = STATED) -> Attribution:
     model = Model(tuple(LinkInertia.from_vector(row) for row in STATED.reshape(7, 10)), None)
     prior = plausible_prior(replace(ARM, model=model), np.zeros((1, 70)), np.zeros(1)).widen(2.0)
     believed = np.asarray(np.linalg.inv(prior.root.T @ prior.root), dtype=np.float64)
-    return Attribution(BASE, *surplus(changes, seed), links, believed).explain()
+    return Attribution(BASE, *surplus(changes, seed), links, believed)
+
+
+def explanations(changes: dict[int, Change], seed: int, links: Array | None = STATED) -> tuple[Explanation, ...]:
+    return attribution(changes, seed, links).explain()
 
 
 def titles(found: tuple[Explanation, ...]) -> list[set[str]]:
@@ -102,6 +106,15 @@ def test_where_all_bodies_are_wrong_each_is_one_number() -> None:
 def test_two_wrong_bodies_are_two_explanations() -> None:
     found = explanations({3: denser, 6: off_centre}, 1)
     assert {each.change.title for each in found} == {"mass of link 3", "centre of mass of link 6"}
+
+
+@pytest.mark.parametrize(
+    ("link", "change", "carried"), [(7, loaded, True), (7, heavier, False), (7, off_centre, False), (6, loaded, False)]
+)
+def test_a_payload_is_a_body_at_the_tool_that_no_single_number_explains(
+    link: int, change: Change, carried: bool
+) -> None:
+    assert (attribution({link: change}, link).payload() is not None) is carried
 
 
 def differences(real: Array, covariance: Array) -> list[ParameterDifference]:

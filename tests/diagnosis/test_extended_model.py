@@ -104,6 +104,8 @@ def test_a_model_of_another_arm_or_of_nothing_is_refused_in_one_line(tmp_path: P
     plain = model_document(sound())
     with pytest.raises(IdentificationError, match="other joints or links"):
         restored(ModelDocument.model_validate(plain.model_dump(by_alias=True) | {"joints": ["a"]}), paper_robot())
+    with pytest.raises(IdentificationError, match="covariance: is not square"):
+        restored(ModelDocument.model_validate(plain.model_dump(by_alias=True) | {"covariance": [[1.0]]}), paper_robot())
     path = tmp_path / "model.json"
     path.write_text('{"schema": "something/1"}')
     with pytest.raises(IdentificationError, match=r"model\.json") as refused:

@@ -8,6 +8,7 @@ from tauscope.diagnosis.against.given_model import CLEAR, Given, beside, compare
 from tauscope.diagnosis.findings.diagnosed import Diagnosis, ParameterDifference
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.model.torque_scale import on_the_arm
+from tauscope.recording.recording import Array
 
 TERMS = ("stiction", "stribeck", "viscous", "offset")
 
@@ -21,7 +22,7 @@ def against_saved(diagnosis: Diagnosis, saved: ExtendedModel) -> Diagnosis:
     )
     had = {(term.effect.id, term.effect.joint): term for term in saved.terms}
     missing = tuple(finding for finding in diagnosis.findings if finding.place not in had)
-    found = compared(beside(diagnosis, missing), Given(values, lacking), "model")
+    found = compared(beside(diagnosis, missing), Given(values, lacking, _in_columns_of(diagnosis, saved)), "model")
     differences: list[ParameterDifference] = []
     for finding in diagnosis.findings:
         if finding.place not in had:
@@ -40,3 +41,12 @@ def against_saved(diagnosis: Diagnosis, saved: ExtendedModel) -> Diagnosis:
     wrong = [each for each in differences if is_wrong(each, CLEAR)]
     before = diagnosis.sizes(saved)
     return replace(found, differences=ordered([*found.differences, *wrong]), before=before)
+
+
+def _in_columns_of(diagnosis: Diagnosis, saved: ExtendedModel) -> Array | None:
+    """Covariance of the saved parameters in the columns of the diagnosed model; None where they are exact."""
+    if saved.covariance is None:
+        return None
+    own, known = diagnosis.selection.fit.model.structure.names, saved.structure.names
+    place = np.array([[name == other for other in known] for name in own], dtype=np.float64)
+    return place @ saved.covariance @ place.T

@@ -16,6 +16,7 @@ from tauscope.dynamics import base_parameters
 from tauscope.effects import Effect, catalogue
 from tauscope.errors import IdentificationError
 from tauscope.identification.structure import JointTerms, ModelStructure
+from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 from tauscope.robot.bounded_file import decode_utf8, read_bounded
 from tauscope.robot.messages import one_line, shown
@@ -71,6 +72,11 @@ class ModelDocument(ResultModel):
     links: list[list[float]] = Field(description="nearest physically consistent standard parameters, ten a link")
     friction: list[JointFrictionEntry] = Field(description="one a joint")
     effects: list[EffectEntry] = Field(description="what the nominal model left out")
+    covariance: list[list[float]] = Field(
+        default=[],
+        description="of the base parameters, then of each joint's stiction, stribeck where it has one,"
+        " viscous and offset; empty where the values are exact",
+    )
 
 
 def model_document(diagnosis: Diagnosis) -> ModelDocument:
@@ -98,7 +104,15 @@ def model_document(diagnosis: Diagnosis) -> ModelDocument:
             for name, terms in zip(names, structure.terms, strict=True)
         ],
         effects=[_entry(term, names) for term in model.terms],
+        covariance=_covariance(diagnosis).tolist(),
     )
+
+
+def _covariance(diagnosis: Diagnosis) -> Array:
+    """Of the nominal parameters, (p, p)."""
+    fit = diagnosis.selection.fit
+    size = fit.model.structure.size
+    return fit.covariance[:size, :size] * diagnosis.inflation
 
 
 def read_model(path: Path, robot: Robot) -> ExtendedModel:
@@ -146,6 +160,12 @@ def restored(document: ModelDocument, robot: Robot) -> ExtendedModel:
         values = {"stiction": entry.stiction, "stribeck": entry.stribeck, "viscous": entry.viscous}
         known |= {f"{name} {entry.joint}": value for name, value in values.items() if value is not None}
         known[f"offset {entry.joint}"] = entry.offset
+    rows = document.covariance
+    if rows and [len(row) for row in rows] != [structure.size] * structure.size:
+        raise IdentificationError(
+            f"covariance: is not square with a row for each of {structure.size} parameters;"
+            " give a file that diagnose --model wrote"
+        )
     return ExtendedModel(
         structure=structure,
         parameters=np.array([known[name] for name in structure.names]),
@@ -153,6 +173,7 @@ def restored(document: ModelDocument, robot: Robot) -> ExtendedModel:
         constants=(),
         stated=(),
         terms=tuple(_term(entry, names) for entry in document.effects),
+        covariance=np.array(rows, dtype=np.float64) if rows else None,
     )
 
 

@@ -39,6 +39,8 @@ class ExtendedModel:
         shape constants of the friction curve that are estimated along, as logarithms
     stated : tuple of float or None
         for each of these the value that the robot file states, None where it states none
+    covariance : (p, p) float64 or None
+        of Θ in a model that was saved; None where a fit has it, or nothing does
     """
 
     structure: ModelStructure
@@ -48,6 +50,7 @@ class ExtendedModel:
     stated: tuple[float | None, ...]
     terms: tuple[Term, ...] = ()
     held: tuple[int, ...] = ()
+    covariance: Array | None = None
 
     @property
     def size(self) -> int:

@@ -152,7 +152,7 @@ function howMuchSection(result) {
   const p = result.constancy.p_value;
   return section("how-much", t`How much`,
     h("h3", { text: t`Residual rms at the recorded rate` }), table(t`Residual rms`, columns, rows),
-    result.parameter_differences.length ? [h("h3", { text: t`What the simulation has wrong` }), h("ul", { class: "plain", lang: "en" }, result.wrong_values.map((each) => h("li", { text: `${each}.` }))), bars(result.parameter_differences.map((each) => [each.parameter, each.difference_in_std, `${number(each.simulation)} → ${number(each.real)}`]))] : null,
+    result.parameter_differences.length ? [h("h3", { text: t`What the simulation has wrong` }), h("ul", { class: "plain", lang: "en" }, (result.wrong_values ?? []).map((each) => h("li", { text: `${each}.` }))), bars(result.parameter_differences.map((each) => [each.parameter, each.difference_in_std, `${number(each.simulation)} → ${number(each.real)}`]))] : null,
     result.parameter_shifts.length ? [h("h3", { text: t`What had been absorbed where` }), h("p", { class: "note", text: t`How far estimates moved when the findings were added, in standard errors; within the shaded part nothing has moved.` }),
       bars(result.parameter_shifts.slice(0, 14).map((each) => [each.parameter, each.shift_in_std, `${number(each.before)} → ${number(each.after)}`]))] : null,
     h("p", { class: "note", text: result.constancy.moved.length ? t`Parameters do not all hold from one recording to the next: ${result.constancy.moved.map((each) => each.parameter).join(", ")} (p = ${number(p, 2)}).` : t`The parameters hold from one recording to the next (p = ${number(p, 2)}).` }));
