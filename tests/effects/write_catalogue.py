@@ -24,6 +24,10 @@ the robot file declares friction and no constant (`torque_offset`).
 TAIL = """
 `unknown` is no effect but a verdict on one joint: significant, located (`mismatch`), and explained by nothing above.
 
+Where recordings hold `qlink`, `joint_elasticity` and `backlash` are measured from `q - qlink`, and are not searched in
+the torque of those joints. Where they hold `temp`, `friction_drift` follows it:
+`tau = (f sgn(qd) + w qd) (1 - exp(-r (T - T_0))) / r`.
+
 A plugin adds an effect: a subclass of `tauscope.effects.Effect`, entry point group `tauscope.effects`.
 """
 

@@ -4,8 +4,8 @@
 
 with c the compliance, b the play, and n what mounting and wiring of two encoders add: an offset, eccentricity
 e_1 sin q + e_2 cos q, a delay between the two, Δt q̇, friction behind the transmission that winds it up, f sgn(q̇), and
-a rotor that the fit counts among the link, -c J q̈. By Huber's regression; standard errors by stretches of motion, as
-errors of neighbouring rows are alike.
+a rotor that the fit counts among the link, -c J q̈. By Huber's regression with c and b not below zero; standard errors
+by stretches of motion, as errors of neighbouring rows are alike.
 """
 
 from collections.abc import Sequence
@@ -72,6 +72,8 @@ class MeasuredDeflection:
         index, from 0
     compliance, compliance_std : float
         c [rad/Nm or m/N]
+    compliance_noise : float
+        standard error of c as far as it decides whether there is any: what scales with c does not
     play, play_std : float
         b [rad or m]; the error is infinite where the load does not change its side often enough
     largest_load : float
@@ -83,6 +85,7 @@ class MeasuredDeflection:
     joint: int
     compliance: float
     compliance_std: float
+    compliance_noise: float
     play: float
     play_std: float
     largest_load: float
@@ -91,7 +94,7 @@ class MeasuredDeflection:
     @property
     def least_compliance(self) -> float:
         """Compliance above which the transmission certainly gives way [rad/Nm or m/N]."""
-        return max(CERTAIN * self.compliance_std, RESOLVED * self.resolution / self.largest_load)
+        return max(CERTAIN * self.compliance_noise, RESOLVED * self.resolution / self.largest_load)
 
     @property
     def least_play(self) -> float:
@@ -101,7 +104,7 @@ class MeasuredDeflection:
     @property
     def is_open(self) -> bool:
         """Whether the encoders show a deflection that may be their own error."""
-        by_load = self.compliance > CERTAIN * self.compliance_std and not self.is_compliant
+        by_load = self.compliance > CERTAIN * self.compliance_noise and not self.is_compliant
         return by_load or (self.play > CERTAIN * self.play_std and not self.has_play)
 
     @property
@@ -160,21 +163,27 @@ def _measure_joint(
     if not reverses:  # then the teeth's side is part of the encoders' offset
         columns[:, 1], spreads[1] = 0.0, 1.0
     first = _regress(columns, deflection, spreads, stretch)
+    impossible = first.values[:2] < 0.0
+    columns[:, :2] *= ~impossible
+    spreads[:2][impossible] = 1.0
     acceleration = np.concatenate([piece.acceleration for piece in pieces])[clear]
     deflection -= 0.5 * float(first.values[2]) ** 2 * acceleration  # the delay's second order looks like a load
-    rotor = pieces[0].inertia * acceleration
-    spread = ROTOR_SHARE * max(abs(float(first.values[0])), float(np.sqrt(first.covariance[0, 0])))
-    found = _regress(np.column_stack([columns, rotor]), deflection, np.append(spreads, spread), stretch)
+    noise = float(np.sqrt(first.covariance[0, 0]))
+    spread = ROTOR_SHARE * max(float(first.values[0]), noise)
+    columns = np.column_stack([columns, pieces[0].inertia * acceleration])
+    found = _regress(columns, deflection, np.append(spreads, spread), stretch)
     rigid = np.concatenate([piece.rigid for piece in pieces], axis=1)[:, clear]
     places = structure.joint_columns(joint)[: len(rigid)]
-    compliance, play = found.values[:2].tolist()
+    compliance, play = np.where(impossible, 0.0, found.values[:2]).tolist()
     by_load = compliance * (found.solver[:2] @ rigid.T)
     variances = np.diag(found.covariance[:2, :2] + by_load @ covariance[np.ix_(places, places)] @ by_load.T)
+    variances = np.where(impossible, np.diag(first.covariance)[:2], variances)
     wind_up = compliance * float(np.sqrt(np.mean(load**2)))
     return MeasuredDeflection(
         joint=joint,
         compliance=compliance,
         compliance_std=float(np.hypot(np.sqrt(variances[0]), LOAD_ERROR * compliance)),
+        compliance_noise=noise,
         play=play,
         play_std=float(np.sqrt(variances[1] + LOAD_ERROR**2 * (play**2 + wind_up**2))) if reverses else np.inf,
         largest_load=float(np.abs(load).max()),

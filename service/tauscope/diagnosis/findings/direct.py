@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from scipy import stats
 
-from tauscope.diagnosis.deflection.measured import MeasuredDeflection
+from tauscope.diagnosis.deflection.measured import CERTAIN, MeasuredDeflection
 from tauscope.diagnosis.deflection.terms import DirectTerm, direct_terms
 from tauscope.diagnosis.findings.detectability import Detectable
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
@@ -37,11 +37,12 @@ def with_direct_findings(
         known = findings.get(place)
         if known is None:
             known = Finding((direct.term,), (NO_SHAPE,), 0.0, 1.0, diagnosis.after, diagnosis.after)
+        agrees = _agree(direct, unseen.get(direct.joint))
         findings[place] = replace(
             known,
-            probability=float(stats.norm.cdf(direct.value / direct.std)),
+            probability=float(stats.norm.cdf(CERTAIN)),
             alternatives=(),
-            confirmed=_agree(direct, unseen.get(direct.joint)),
+            confirmed=known.confirmed if agrees is None else agrees,
             as_law=1.0,
         )
     seen = tuple(limit for each in measured if not each.is_open for limit in _limits(each))
