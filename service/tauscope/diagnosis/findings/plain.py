@@ -90,7 +90,7 @@ def _column(effect: PlainTerm, diagnosis: Diagnosis) -> tuple[int, int]:
 
 
 def _without(fit: Fit, place: int) -> ExtendedModel:
-    """The model with one nominal parameter at zero, and those of the links and of friction as they then most likely are."""
+    """The model with one nominal parameter at zero, the others as they then most likely are."""
     covariance, size = fit.covariance, fit.model.structure.size
     parameters = (
         fit.model.parameters - fit.model.parameters[place] * covariance[:size, place] / covariance[place, place]

@@ -4,12 +4,19 @@ import numpy as np
 
 from tauscope.diagnosis.model.term import Term
 from tauscope.diagnosis.search.hypothesis import Hypothesis, Laboratory
+from tauscope.recording.recording import Array
 
 OPEN = 1e-3
 """Part of its largest row from which a row of an effect counts as inside its window."""
 
 STRETCHES = 12
-"""Parts of a window by which the standard error of its gain is known."""
+"""Parts of a window, at most, by which the standard error of its gain is known…"""
+
+SHORTEST = 8
+"""…and rows of each, at least: fewer agree because the effect was fitted to them."""
+
+FEWEST = 4
+"""Parts below which nothing is known."""
 
 MOST = 0.5
 """Part of what exceeds the rows outside that an effect explains inside its window, at least."""
@@ -21,7 +28,7 @@ def window_log_odds(before: Hypothesis, after: Hypothesis, term: Term, laborator
     signals = [after.model.signals(piece) for piece in rows.observations]
     white = rows.columns(term.effect, term.shape[None], signals)
     residuals = [rows.white.residual(each.model) for each in (before, after)]
-    gained, excess, of_stretch = 0.0, 0.0, np.zeros(STRETCHES)
+    gained, excess, gains = 0.0, 0.0, list[Array]()
     for joint in touched:
         strength = np.abs(rows.take(joint, white[joint][0], 1.0)).max(axis=0, initial=0.0)
         inside = strength > OPEN * strength.max(initial=np.finfo(float).tiny)
@@ -34,10 +41,12 @@ def window_log_odds(before: Hypothesis, after: Hypothesis, term: Term, laborator
         ranked = np.empty(len(instants), dtype=np.intp)
         ranked[np.lexsort((instants, recording))] = np.arange(len(instants))
         gain = (first - second)[inside]
-        of_stretch += np.bincount(ranked * STRETCHES // len(ranked), gain, minlength=STRETCHES)
+        gains.append(gain[np.argsort(ranked)])
         gained += float(gain.sum())
         excess += float(first[inside].sum()) - level * len(gain)
-    spread = float(np.sqrt(STRETCHES) * of_stretch.std(ddof=1))
-    if gained <= 0.0 or gained < MOST * excess or spread <= 0.0:
+    stretches = min(STRETCHES, min(map(len, gains), default=0) // SHORTEST)
+    if stretches < FEWEST or gained <= 0.0 or gained < MOST * excess:
         return -np.inf
-    return 2.0 * (gained / spread) ** 2
+    sums = np.sum([[part.sum() for part in np.array_split(each, stretches)] for each in gains], axis=0)
+    spread = float(np.sqrt(stretches) * sums.std(ddof=1))
+    return 2.0 * (gained / spread) ** 2 if spread > 0.0 else -np.inf
