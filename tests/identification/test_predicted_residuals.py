@@ -1,39 +1,21 @@
 """The residual that a result predicts for motion that it has not seen is the one that shows."""
 
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from identification.poor_motion import MOTIONS, poor_arm
-from shared_data import SHARED_CASES, SHARED_DATA, needs_shared_cases, needs_shared_data
+from identification.residual_ratios import ratios, within
+from shared_data import SHARED_CASES, needs_shared_cases
 from tauscope.identification import IdentificationDocument, Options, document, identify
 from tauscope.recording import read_recording
 from tauscope.robot import read_robot
-
-Array = NDArray[np.float64]
-
-SETS = ("emps", "kuka-lwr4", "franka-panda", "double-pendulum", "bam-xl330", "odrive-cogging", "staubli-tx40")
-
-
-def ratios(found: IdentificationDocument) -> Array:
-    """Held-out residual over the predicted one, (n,)."""
-    held_out = found.fit.held_out
-    assert held_out is not None
-    assert held_out.predicted_rms is not None
-    return np.array(held_out.rms) / np.array(held_out.predicted_rms)
 
 
 def poor(seed: int, kind: str, folder: Path) -> IdentificationDocument:
     robot, train, held_out = poor_arm(seed, kind, folder)
     return document(identify(robot, [train], [held_out]))
-
-
-def within(values: Array) -> float:
-    """Share that lies within a factor of two."""
-    return float(np.mean((values > 0.5) & (values < 2.0)))
 
 
 @pytest.mark.parametrize("kind", MOTIONS)
@@ -59,20 +41,6 @@ def test_two_hundred_poor_arms(tmp_path: Path) -> None:
     found = np.concatenate([ratios(poor(seed, kinds[seed % len(kinds)], tmp_path)) for seed in range(1000, 1200)])
     assert within(found) > 0.85
     assert np.mean(found >= 2.0) < 0.04
-
-
-@cache
-def real_ratios(name: str) -> Array:
-    folder = SHARED_DATA / name
-    train, held_out = (
-        [read_recording(path) for path in sorted(folder.glob(f"{kind}-*.csv"))] for kind in ("train", "held-out")
-    )
-    return ratios(document(identify(read_robot(folder / "robot.yaml"), train, held_out)))
-
-
-@needs_shared_data
-def test_real_arms() -> None:
-    assert within(np.concatenate([real_ratios(name) for name in SETS])) >= 0.95
 
 
 @needs_shared_cases

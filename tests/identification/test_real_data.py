@@ -13,6 +13,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import signal
 
+from identification.residual_ratios import ratios, within
 from pinocchio_arm import pinocchio_regressor
 from shared_data import SHARED_DATA, needs_shared_data
 from tauscope.identification import Identification, IdentificationDocument, Options, document, identify
@@ -219,3 +220,7 @@ def test_the_automatic_band_suits_the_data(name: str) -> None:
         cutoff, bound = HELD_OUT_BOUNDS[name]
         assert held_out_error(result, name, result.parameters, cutoff) <= bound, "in the README's own band"
     assert robot.joint_count == len(result.shapes)
+
+
+def test_the_residual_that_a_result_predicts_is_the_one_that_shows() -> None:
+    assert within(np.concatenate([ratios(document(identified(name))) for name in ALL_SETS])) >= 0.95

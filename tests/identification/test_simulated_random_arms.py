@@ -49,7 +49,7 @@ def identified(seed: int, joint_count: int, folder: Path) -> tuple[Robot, Identi
     """A random arm, run in virtual time, and identified from a robot file that has no model."""
     rng = np.random.default_rng(seed)
     robot = with_limits(modelled_arm(rng, joint_count), ROOMY)
-    series = resting_series(rng, joint_count)
+    series = resting_series(rng, joint_count, period_s=5.0)
     names = tuple(joint.name for joint in robot.joints)
     motion = Trajectory(robot.name, names, (FourierSegment(series, PERIODS, 0),))
     scenario = folder / "scenario.yaml"

@@ -88,7 +88,7 @@ def expected_rows(data: bytes) -> np.ndarray | None:
     delimiter = next((mark for mark in ",;\t" if mark in lines[0]), ",")
     header = [name.strip(' \t\r"') for name in lines[0].split(delimiter)]
     rows = [line.split(delimiter) for line in lines[1:]]
-    if any(header.count(name) != 1 for name in COLUMNS) or any(len(row) != len(header) for row in rows):
+    if not rows or any(header.count(name) != 1 for name in COLUMNS) or any(len(row) != len(header) for row in rows):
         return None
     try:
         table = np.array([[plain_number(row[header.index(name)]) for name in COLUMNS] for row in rows])

@@ -52,7 +52,7 @@ def find_columns(header: Sequence[str], file: str) -> ColumnLayout:
     joints = {prefix: _joints_of(prefix, where) for prefix in ("q", "tau", "i", *OPTIONAL_GROUPS)}
     effort_kind = EffortKind.TORQUE if joints["tau"] or not joints["i"] else EffortKind.CURRENT
     joint_count = _joint_count(joints, effort_kind, header, file)
-    names = _ordered_names(joints, effort_kind, joint_count, where, file)
+    names = _order_names(joints, effort_kind, joint_count, where, file)
     used = set(names)
     return ColumnLayout(
         names=names,
@@ -124,7 +124,7 @@ def _joint_count(joints: dict[str, list[int]], effort_kind: EffortKind, header: 
     return joint_count
 
 
-def _ordered_names(
+def _order_names(
     joints: dict[str, list[int]], effort_kind: EffortKind, joint_count: int, where: dict[str, int], file: str
 ) -> tuple[str, ...]:
     """Columns in the order in which a table keeps them."""

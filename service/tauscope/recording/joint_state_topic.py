@@ -113,15 +113,15 @@ class JointStateTopic:
         """Batches of equal layout and where they start; all at once where the publisher kept to one layout."""
         if self._is_cdr:
             if self._layout is None:
-                self._layout = self._decoded(JointStateLayout, messages[0], first)
+                self._layout = self._decode_one(JointStateLayout, messages[0], first)
             if (states := self._layout.decode(messages)) is not None:
                 return [(0, states)]
         decode = decode_cdr if self._is_cdr else decode_json
-        decoded = [self._decoded(decode, message, first + index) for index, message in enumerate(messages)]
+        decoded = [self._decode_one(decode, message, first + index) for index, message in enumerate(messages)]
         runs = groupby(enumerate(decoded), key=lambda entry: _layout_of(entry[1]))
-        return [(run[0][0], _stacked([state for _, state in run])) for run in (list(group) for _, group in runs)]
+        return [(run[0][0], _stack([state for _, state in run])) for run in (list(group) for _, group in runs)]
 
-    def _decoded(self, decode: Callable[[bytes], Decoded], message: bytes, number: int) -> Decoded:
+    def _decode_one(self, decode: Callable[[bytes], Decoded], message: bytes, number: int) -> Decoded:
         """`decode(message)`, its complaint turned into one that names the message."""
         try:
             return decode(message)
@@ -211,7 +211,7 @@ def _layout_of(state: JointState) -> tuple[tuple[str, ...], int, int, int]:
     return state.names, len(state.position), len(state.velocity), len(state.effort)
 
 
-def _stacked(states: Sequence[JointState]) -> JointStates:
+def _stack(states: Sequence[JointState]) -> JointStates:
     """Messages of one layout as one batch."""
     stamp = np.array([state.stamp for state in states], dtype=np.int64)
     fields = ("position", "velocity", "effort")

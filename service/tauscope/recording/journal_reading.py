@@ -87,11 +87,11 @@ def journal_recording(journal: Journal, name: str) -> Recording:
         rows["position"],
         _at_samples(rows, 1e9 / header.rate_hz) if is_held else rows["effort"],
         effort_kind=EffortKind.TORQUE if is_torque else EffortKind.CURRENT,
-        velocity=_reported(rows["velocity"]),
-        reference=_reported(rows["reference"]),
-        effort_command=_reported(rows["command"]),
-        temperature=_reported(rows["temperature"]),
-        period=_reported(rows["period"]),
+        velocity=_find_reported(rows["velocity"]),
+        reference=_find_reported(rows["reference"]),
+        effort_command=_find_reported(rows["command"]),
+        temperature=_find_reported(rows["temperature"]),
+        period=_find_reported(rows["period"]),
     )
 
 
@@ -123,8 +123,8 @@ class _Collector:
         rows = np.empty(count, dtype=journal_row_type(header.joint_count))
         if not count:
             return rows
-        measured = _decoded(self._messages[JOINT_STATE_TOPIC][:count])
-        asked = _decoded(self._messages[REFERENCE_TOPIC][:count])
+        measured = _decode(self._messages[JOINT_STATE_TOPIC][:count])
+        asked = _decode(self._messages[REFERENCE_TOPIC][:count])
         if not np.array_equal(measured.stamp, asked.stamp):
             raise RecordingError("its topics do not belong to the same cycles")
         rows["time_ns"] = measured.stamp - header.epoch_offset_ns
@@ -139,7 +139,7 @@ class _Collector:
         return rows
 
 
-def _decoded(messages: list[bytes]) -> JointStates:
+def _decode(messages: list[bytes]) -> JointStates:
     """Joint states that were all written with one layout."""
     states = JointStateLayout(messages[0]).decode(messages)
     if states is None:
@@ -160,6 +160,6 @@ def _at_samples(rows: NDArray[np.void], period_ns: float) -> Array:
     return 0.5 * (before + after)
 
 
-def _reported(column: Array) -> Array | None:
+def _find_reported(column: Array) -> Array | None:
     """A column, None where not one sample of it was reported."""
     return None if np.isnan(column).all() else column

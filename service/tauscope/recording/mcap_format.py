@@ -85,7 +85,7 @@ def add_mcap(path: Path, name: str, log: JointStateLog) -> None:
         samples = log.samples
         keeps = "`tauscope recording convert --recover` keeps them"
         way_out = keeps if samples >= MINIMUM_ROWS else "record or copy the file again"
-        raise RecordingError(f"{name}: {damage}; {_counted(samples)} before that point can be read: {way_out}")
+        raise RecordingError(f"{name}: {damage}; {_count(samples)} before that point can be read: {way_out}")
 
 
 def recover_mcap(path: Path, choice: Choice) -> Salvage:
@@ -99,7 +99,7 @@ def recover_mcap(path: Path, choice: Choice) -> Salvage:
     log = JointStateLog(choice)
     damage = scan_mcap(path, log)
     if damage is not None and log.samples < MINIMUM_ROWS:
-        raise RecordingError(f"{choice.file}: {damage}; {_counted(log.samples)} before that point: nothing to keep")
+        raise RecordingError(f"{choice.file}: {damage}; {_count(log.samples)} before that point: nothing to keep")
     return Salvage(log.finish(), damage)
 
 
@@ -131,7 +131,7 @@ class _DamageError(Exception):
     """The container cannot be read further; the message completes "file: "."""
 
 
-def _counted(samples: int) -> str:
+def _count(samples: int) -> str:
     """A count of samples in words."""
     return {0: "no sample", 1: "1 sample"}.get(samples, f"{samples} samples")
 

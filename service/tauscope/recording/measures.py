@@ -118,7 +118,7 @@ def measure_rows(recording: Recording) -> RowMeasures:
         if samples.period is not None:
             _measure_periods(running, samples.period if start == 0 else samples.period[1:])
     least, greatest = (np.where(np.isinf(values), np.nan, values) for values in (running.least, running.greatest))
-    clipped = _clipped(recording, running.least[n + 1 : 2 * n + 1], running.greatest[n + 1 : 2 * n + 1])
+    clipped = _find_clipped(recording, running.least[n + 1 : 2 * n + 1], running.greatest[n + 1 : 2 * n + 1])
     first = recording.samples(0, _ROWS_AT_ONCE)
     joints = tuple(
         JointMeasures(
@@ -201,7 +201,7 @@ def _position_step(position: Array) -> float | None:
     return float(np.median(moves[moves < 1.5 * step]))
 
 
-def _clipped(recording: Recording, least: Array, greatest: Array) -> list[tuple[tuple[float, int], ...]]:
+def _find_clipped(recording: Recording, least: Array, greatest: Array) -> list[tuple[tuple[float, int], ...]]:
     """Levels, of the two extremes of each joint's effort, at which it stays for several samples time and again."""
     levels = np.stack([least, greatest])
     counts = np.zeros(levels.shape, dtype=np.int64)

@@ -205,14 +205,14 @@ def _from_groups(
     period: Array | None,
 ) -> Recording:
     """Check the arguments one by one and lay them side by side."""
-    time = _checked("time", time, name, None)
-    position = _checked("position", position, name, (len(time), None))
+    time = _check("time", time, name, None)
+    position = _check("position", position, name, (len(time), None))
     shape = (len(time), position.shape[1])
-    columns = [time[:, None], position, _checked("effort", effort, name, shape)]
-    columns += [_checked(_ARGUMENTS[group], groups[group], name, shape) for group in OPTIONAL_GROUPS if group in groups]
+    columns = [time[:, None], position, _check("effort", effort, name, shape)]
+    columns += [_check(_ARGUMENTS[group], groups[group], name, shape) for group in OPTIONAL_GROUPS if group in groups]
     present = list(groups)
     if period is not None:
-        columns.append(_checked("period", period, name, (len(time),))[:, None])
+        columns.append(_check("period", period, name, (len(time),))[:, None])
         present.append("period")
     require_rows(len(time), name)
     names = table_columns(shape[1], effort_kind, present)
@@ -222,7 +222,7 @@ def _from_groups(
     return Recording(name, shape[1], effort_kind, MemoryTable(names, data))
 
 
-def _checked(argument: str, array: Array, name: str, shape: tuple[int | None, ...] | None) -> Array:
+def _check(argument: str, array: Array, name: str, shape: tuple[int | None, ...] | None) -> Array:
     """An argument as float64 of the expected shape, without infinite numbers; `shape` None is any vector."""
     try:
         checked = np.asarray(array, dtype=np.float64)

@@ -136,8 +136,8 @@ def headline(outcomes: Sequence[Outcome]) -> list[Figure]:
             f"held-out rms ≤ {AS_ORACLE} of a diagnosis that knows the form",
             [each.get("oracle_ratio", np.inf) <= AS_ORACLE for each in outcomes if _has_oracle(each)],
         ),
-        _promised("promised", PROMISED, outcomes, poor=False),
-        _promised("promised-poor", f"{PROMISED}, poor recordings", outcomes, poor=True),
+        _count_promised("promised", PROMISED, outcomes, poor=False),
+        _count_promised("promised-poor", f"{PROMISED}, poor recordings", outcomes, poor=True),
         share("failed", "trials that ended in an error", ["error" in each for each in outcomes], 0.0, at_least=False),
         _mean("size", "effects in a set that holds the truth (mean)", sizes(hidden)),
         _mean("time", "time of a diagnosis [s] (mean)", [each["seconds"] for each in outcomes if "seconds" in each]),
@@ -205,7 +205,7 @@ def _mean(id_: str, words: str, values: Sequence[float]) -> Figure:
     return Figure(id_, words, mean, mean - half, mean + half, count, None)
 
 
-def _promised(id_: str, words: str, outcomes: Sequence[Outcome], *, poor: bool) -> Figure:
+def _count_promised(id_: str, words: str, outcomes: Sequence[Outcome], *, poor: bool) -> Figure:
     """How often something is said to be there where the diagnosis would see the concealed size by its own word."""
     these = [each for each in done(outcomes) if (each["series"] in POOR_SERIES) == poor]
     return share(id_, words, [kept for each in these for kept in each["score"].get("promised", ())], 0.85)

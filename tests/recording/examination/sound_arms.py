@@ -25,14 +25,14 @@ class Sound:
     recording: Recording
 
 
-def sound_recording(seed: int, rows: int = 3000) -> Sound:
+def record_sound_arm(seed: int, rows: int = 3000) -> Sound:
     """A recording drawn from all that arms do: 30 Hz to 20 kHz, 50 g to 1 t, jogs, sweeps, fast turns and rest."""
     rng = np.random.default_rng(seed)
-    robot, parameters = _drawn_arm(rng)
+    robot, parameters = _draw_arm(rng)
     n = robot.joint_count
     rate = float(np.exp(rng.uniform(np.log(30.0), np.log(20_000.0))))
     time = np.arange(rows) / rate
-    q, qd, qdd = _drawn_motion(rng, time, robot)
+    q, qd, qdd = _draw_motion(rng, time, robot)
     torque = inverse_dynamics(robot, parameters, q, qd, qdd)
     level = np.maximum(np.abs(torque).max(axis=0), 1e-3)
     coulomb, viscous = rng.uniform(0.05, 0.4, n) * level, rng.uniform(0.0, 0.1, n) * level
@@ -56,7 +56,7 @@ def sound_recording(seed: int, rows: int = 3000) -> Sound:
     return Sound(robot, recording)
 
 
-def _drawn_arm(rng: np.random.Generator) -> tuple[Robot, Array]:
+def _draw_arm(rng: np.random.Generator) -> tuple[Robot, Array]:
     """An arm and the standard parameters that it really has, (10 n,)."""
     kind = rng.choice(["arm", "servo arm", "one-ton arm", "gantry", "motor", "pendulum"])
     if kind == "motor":
@@ -74,7 +74,7 @@ def _drawn_arm(rng: np.random.Generator) -> tuple[Robot, Array]:
             for _ in range(n)
         ]
         robot = arm(str(kind), rows)
-    links = [_link(rng, mass * rng.uniform(0.3, 1.0), size) for _ in robot.joints]
+    links = [_draw_link(rng, mass * rng.uniform(0.3, 1.0), size) for _ in robot.joints]
     stated = [
         LinkInertia(link.mass * f, link.first_moment * f, link.inertia * f)
         for link in links
@@ -85,14 +85,14 @@ def _drawn_arm(rng: np.random.Generator) -> tuple[Robot, Array]:
     return replace(robot, joints=joints, model=model), np.concatenate([link.to_vector() for link in links])
 
 
-def _link(rng: np.random.Generator, mass: float, size: float) -> LinkInertia:
+def _draw_link(rng: np.random.Generator, mass: float, size: float) -> LinkInertia:
     """A body of this mass and size."""
     points = rng.uniform(-size / 2, size / 2, (8, 3)) + rng.uniform(-size / 2, size / 2, 3)
     second = mass / 8 * points.T @ points
     return LinkInertia(mass, mass / 8 * points.sum(axis=0), np.trace(second) * np.eye(3) - second)
 
 
-def _drawn_motion(rng: np.random.Generator, time: Array, robot: Robot) -> tuple[Array, Array, Array]:
+def _draw_motion(rng: np.random.Generator, time: Array, robot: Robot) -> tuple[Array, Array, Array]:
     """Position, velocity and acceleration, each (N, n)."""
     n, rows, length = robot.joint_count, len(time), float(time[-1])
     turns = 20.0 if robot.name == "motor" else 1.0

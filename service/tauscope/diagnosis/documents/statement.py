@@ -1,13 +1,12 @@
 """A finding in words: the physics and its size first, then numbers, doubts, held-out motion, and what to do."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
 from tauscope.diagnosis.findings.finding import Finding
-from tauscope.diagnosis.findings.stand_in import DOUBTED
 from tauscope.effects import Effect, Quantity, TimeLocalEffect
 from tauscope.number_text import ABSENT, chance, significant, with_uncertainty
 
@@ -64,7 +63,7 @@ def state_finding(
     found = {each.name: each for each in quantities}
     effect = finding.terms[0].effect
     of_first = quantities[: len(quantities) // len(finding.terms)]
-    sentences = [numbers_text(of_first), *_doubts(finding)]
+    sentences = [numbers_text(of_first)]
     sentences += [_sentence(_held_out(finding, names, tentative=tentative))]
     if not tentative:
         sentences.append(_sentence(effect.advice(found)) if finding.probability >= LIKELY else UNLIKELY)
@@ -110,12 +109,6 @@ def _noun(rival: Effect, own: Effect, names: Sequence[str]) -> str:
     """A rival's name, with its place where that is another."""
     words = rival.id.replace("_", " ")
     return words if rival.joint == own.joint else f"{words} {rival.place(names) or 'of the whole arm'}"
-
-
-def _doubts(finding: Finding) -> Iterator[str]:
-    """Why it may be something else, beside its rivals."""
-    if finding.as_law < DOUBTED:
-        yield "Low confidence: unmodelled physics may be causing this"
 
 
 def _held_out(finding: Finding, names: Sequence[str], *, tentative: bool) -> str:

@@ -11,10 +11,9 @@ from tauscope.diagnosis.findings.diagnosed import Diagnosis, Selection
 from tauscope.diagnosis.findings.finding import Finding, FitSizes, in_order
 from tauscope.diagnosis.findings.location import locate
 from tauscope.diagnosis.findings.plain import states_friction
-from tauscope.diagnosis.findings.stand_in import certainty_as_law
 from tauscope.diagnosis.findings.unseen import Unseen
 from tauscope.diagnosis.fitting.fit import Fit, Fitter
-from tauscope.diagnosis.fitting.lack_of_fit import LackOfFit, lack_of_fit
+from tauscope.diagnosis.fitting.lack_of_fit import lack_of_fit
 from tauscope.diagnosis.fitting.regressor_noise import weightings_of_motion
 from tauscope.diagnosis.fitting.spilled_misfit import without_spilled
 from tauscope.diagnosis.model.extended import ExtendedModel
@@ -52,7 +51,7 @@ def conclude(identification: Identification, searched: Searched) -> Diagnosis:
     inflation = 1.0 if searched.pure_error else after.inflation()
     screen, level = Screen(rows, searched.effects), LEVEL / max(len(searched.effects), 1)
     sizes = FitSizes.of(final.model, rows, _rows(unseen))
-    findings = _findings(searched, selection, fitter, unseen, misfit_after, sizes)
+    findings = _findings(searched, selection, fitter, unseen, sizes)
     return Diagnosis(
         identification=identification,
         setting=searched.setting,
@@ -105,7 +104,7 @@ def _fit(at: Hypothesis, fitter: Fitter) -> Fit:
 
 
 def _findings(
-    searched: Searched, selection: Selection, fitter: Fitter, unseen: Unseen | None, left: LackOfFit, after: FitSizes
+    searched: Searched, selection: Selection, fitter: Fitter, unseen: Unseen | None, after: FitSizes
 ) -> tuple[Finding, ...]:
     """Every effect of the final hypothesis beside all others."""
     model, covariance = selection.fit.model, selection.fit.covariance
@@ -113,18 +112,16 @@ def _findings(
     for weighed in searched.found.weighed:
         terms = tuple(model.terms[place] for place in weighed.places)
         without = fitter.projected(weighed.without.model)
-        as_law = certainty_as_law(terms[0].effect, selection.nominal, selection.fit, without, left)
         found.append(
             Finding(
                 terms=terms,
                 covariances=tuple(_covariance(model, place, covariance) for place in weighed.places),
                 gain=without.energy - selection.fit.energy,
-                probability=weighed.probability * as_law,
+                probability=weighed.probability,
                 before=FitSizes.of(weighed.without.model, fitter.observations, _rows(unseen)),
                 after=after,
                 alternatives=_equivalent(weighed),
                 confirmed=None if unseen is None else True,
-                as_law=as_law,
             )
         )
     return in_order(found)

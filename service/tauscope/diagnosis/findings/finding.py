@@ -53,8 +53,6 @@ class Finding:
         effects that these data cannot tell from it
     confirmed : bool or None
         by motion that was not used; None where there was none
-    as_law : float
-        chance that it is a law of the catalogue, and not the nearest one to another
     """
 
     terms: tuple[Term, ...]
@@ -66,7 +64,6 @@ class Finding:
     alternatives: tuple[Rival, ...] = ()
     confirmed: bool | None = None
     in_model: bool = True
-    as_law: float = 1.0
 
     @property
     def place(self) -> Place:

@@ -45,7 +45,7 @@ def residual_rows(model: ExtendedModel, observations: Observations) -> list[list
 def raw_squares(model: ExtendedModel, observations: Observations) -> tuple[Array, Array]:
     """Squared errors at the recorded rate, (n, N), summed over repetitions, and samples of every joint, (n,).
 
-    Nothing is filtered; pieces follow each other, and what was not measured counts zero. Nor does a joint at rest count:
+    Nothing is filtered; pieces follow each other, and what was not measured counts zero. Nor does a joint at rest:
     there friction takes any value up to breakaway, and no model knows which.
     """
     count = observations.robot.joint_count

@@ -60,7 +60,7 @@ class Proposer:
     def __init__(self, laboratory: Laboratory, effects: Sequence[Effect]) -> None:
         self.laboratory, self.rows, self.effects = laboratory, laboratory.rows, tuple(effects)
 
-    def propose(self, at: Hypothesis, is_wanted: Callable[[Effect], bool]) -> list[Proposal]:
+    def propose(self, at: Hypothesis, is_wanted: Callable[[Effect], bool], most: int = LOOKED_AT) -> list[Proposal]:
         """Effects that make the data more probable, the most probable first."""
         independent = self.laboratory.under(at, [1.0] * len(at.scales), range(len(at.scales)))
         scorer = Scorer(self.rows, independent)
@@ -71,7 +71,7 @@ class Proposer:
         for kind in (0, 1):
             seen = set[Place]()
             for place in sorted(range(len(scored)), key=lambda place: -scored[place][kind].log_evidence):
-                if len(seen) == LOOKED_AT or scored[place][kind].log_evidence < WORTH_A_LOOK:
+                if len(seen) == most or scored[place][kind].log_evidence < WORTH_A_LOOK:
                     break
                 if _place(scored[place]) not in seen:
                     if place not in looked:

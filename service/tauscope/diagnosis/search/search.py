@@ -18,6 +18,9 @@ from tauscope.recording.recording import Array
 MOST_EXCHANGES = 4
 """Effects whose place another one takes at most."""
 
+WEIGHED = 3
+"""Rivals of a finding that are looked at."""
+
 MOST_EFFECTS = 12
 """Effects that are added at most."""
 
@@ -54,8 +57,9 @@ class Step:
 
     @property
     def probability(self) -> float:
-        """Of the effect, against none."""
-        return float(1.0 / (1.0 + np.exp(-np.clip(self.log_odds, -700.0, 700.0))))
+        """Of the effect, against none: no more than even where held-out motion contradicts it."""
+        log_odds = self.log_odds if self.is_confirmed else min(self.log_odds, 0.0)
+        return float(1.0 / (1.0 + np.exp(-np.clip(log_odds, -700.0, 700.0))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,18 +149,25 @@ class Search:
 
     def _exchange(self, at: Hypothesis) -> tuple[Hypothesis, tuple[Weighed, ...]]:
         """Each effect weighed beside all others, and a more probable one in its place where there is one."""
-        weighed = [self._weigh(at, places) for places in _groups(at.model)]
+        weighed = {own: self._weigh(at, places) for own, places in _groups(at.model).items()}
         for _ in range(MOST_EXCHANGES):
-            best = max(weighed, key=lambda each: each.lead, default=None)
-            if best is None or best.lead <= 0.0 or len(best.places) > 1:
+            own = max(weighed, key=lambda each: weighed[each].lead, default=None)
+            if own is None or weighed[own].lead <= 0.0 or len(weighed[own].places) > 1:
                 break
-            other = self._try_rival(best)
+            other = self._try_rival(weighed[own])
             if other is None:
-                weighed[weighed.index(best)] = replace(best, rivals=best.rivals[1:])
+                weighed[own] = replace(weighed[own], rivals=weighed[own].rivals[1:])
                 continue
-            at = other
-            weighed = [self._weigh(at, places) for places in _groups(at.model)]
-        return at, tuple(each for each in weighed if each.log_odds > 0.0)
+            at, new = other, other.model.terms[-1].place
+            kept = {each: weighed[each] for each in weighed if each not in (own, new)}
+            places = _groups(at.model)
+            weighed = {each: replace(kept[each], places=places[each]) for each in kept}
+            weighed[new] = self._weigh(at, places[new])
+        return at, tuple(each for each in weighed.values() if each.log_odds > self._least(at, each))
+
+    def _least(self, at: Hypothesis, weighed: Weighed) -> float:
+        """Log odds from which an effect is a finding: one that every arm has must stand out."""
+        return CATALOGUED if at.model.terms[weighed.places[0]].effect.is_expected else 0.0
 
     def _try_rival(self, weighed: Weighed) -> Hypothesis | None:
         """The hypothesis with the best rival in the place of an effect, where that is more probable."""
@@ -173,6 +184,7 @@ class Search:
         without = self.laboratory.settle(without, touched)
         before = self.laboratory.tune(self.laboratory.under(without, at.dependence, touched), touched)
         effect, shared = at.model.terms[places[0]].effect, set(touched)
+        lasts = not isinstance(effect, TimeLocalEffect)
         log_odds = at.log_evidence - before.log_evidence + self._prior_odds(effect)
         log_odds += 0.0 if self.held_out is None else self.held_out.change(without, at).log_odds
         own, others = (effect.id, effect.joint), _places(without)
@@ -180,9 +192,10 @@ class Search:
         def competes(each: Effect) -> bool:
             place = each.id, each.joint
             is_new = place != own and (each.repeats or place not in others)
-            return is_new and not shared.isdisjoint(each.touched(len(at.scales)))
+            is_like = lasts != isinstance(each, TimeLocalEffect)
+            return is_new and is_like and not shared.isdisjoint(each.touched(len(at.scales)))
 
-        proposals = self.proposer.propose(without, competes)
+        proposals = self.proposer.propose(without, competes, WEIGHED)
         rivals = []
         for proposal in (each for each in proposals if self._log_odds(each) > 0.0):
             nearer = self.laboratory.approach(self._add(without, proposal))
@@ -299,12 +312,12 @@ class _Wanted:
         return place not in self.refused and (effect.repeats or place not in self.present)
 
 
-def _groups(model: ExtendedModel) -> list[tuple[int, ...]]:
+def _groups(model: ExtendedModel) -> dict[Place, tuple[int, ...]]:
     """Places of the terms of each effect and joint among all."""
     groups: dict[Place, list[int]] = {}
     for number, term in enumerate(model.terms):
         groups.setdefault(term.place, []).append(number)
-    return [tuple(each) for each in groups.values()]
+    return {place: tuple(each) for place, each in groups.items()}
 
 
 def _places(at: Hypothesis) -> set[Place]:

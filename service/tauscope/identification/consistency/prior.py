@@ -130,7 +130,7 @@ def plausible_prior(robot: Robot, factor: Array, target: Array, friction: Fricti
     for index, (link, mass, length) in enumerate(zip(links, masses, lengths, strict=True)):
         own = slice(10 * index, 10 * index + 10)
         deviation = _deviation(link, mass, length)
-        root[own, own] = deviation / np.hypot(1.0, np.linalg.norm(deviation @ _repaired(robot, index)))
+        root[own, own] = deviation / np.hypot(1.0, np.linalg.norm(deviation @ _measure_repair(robot, index)))
     return Prior(mean, root, scale, masses)
 
 
@@ -147,7 +147,7 @@ def _expected_masses(links: Sequence[LinkInertia]) -> Array:
     return np.array([max(link.mass, _LIGHTEST * heaviest) or 1.0 for link in links])
 
 
-def _repaired(robot: Robot, index: int) -> Array:
+def _measure_repair(robot: Robot, index: int) -> Array:
     """What repairs added to the stated parameters of a link, (10,); nothing where these are no prior."""
     if index in far_reaching(robot):
         return np.zeros(10)

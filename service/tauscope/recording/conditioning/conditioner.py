@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from tauscope.errors import RecordingError
-from tauscope.recording.conditioning.motion import Motion, Trim, averaged_motion, transient_motion
+from tauscope.recording.conditioning.motion import Motion, Trim, average_motion, transient_motion
 from tauscope.recording.conditioning.motion_source import MotionSource, choose_sources
 from tauscope.recording.conditioning.period_runs import PeriodRun
 from tauscope.recording.conditioning.periods import Periods, repeats, split_periods, with_turns_removed
@@ -159,7 +159,7 @@ class Conditioner:
             missed += np.isnan(samples.effort, order="F").sum(axis=0)
             time = samples.time[samples.complete]
             resampled = resampled or bool(len(time) > 1 and uniform_grid(time - time[0], self.timing.rate_hz) is None)
-        groups = (self._averaged(group, cutoff_hz) for rows in self.timing.rows for group in self._groups(rows))
+        groups = (self._average(group, cutoff_hz) for rows in self.timing.rows for group in self._groups(rows))
         return ConditioningSummary(
             recording=self.recording.name,
             samples=self.timing.samples,
@@ -179,7 +179,7 @@ class Conditioner:
         cursor = rows[0]
         half = 0.5 / self.timing.rate_hz
         for group in self._groups(rows):
-            motion = self._averaged(group, cutoff_hz)
+            motion = self._average(group, cutoff_hz)
             if motion is not None:
                 begin, end = (row_at(self.recording, time - half, rows) for time in (group.start_s, group.stop_s))
                 yield from self._transients(cursor, begin, rows, cutoff_hz)
@@ -201,7 +201,7 @@ class Conditioner:
                 if last - first >= 2:
                     yield run.part(int(first), int(last))
 
-    def _averaged(self, group: PeriodRun, cutoff_hz: float | None) -> Motion | None:
+    def _average(self, group: PeriodRun, cutoff_hz: float | None) -> Motion | None:
         """The average of some periods; None where they do not repeat, or where torque is missing in all of them."""
         half = 0.5 / self.timing.rate_hz
         first, last = (row_at(self.recording, time - half, group.rows) for time in (group.start_s, group.stop_s))
@@ -210,7 +210,7 @@ class Conditioner:
         periods = self._repeating(read_stretch(self.recording, self.robot, first, last, timing), cutoff_hz)
         if periods is None:
             return None
-        motion = averaged_motion(periods, cutoff_hz, self.source.in_band(cutoff_hz))
+        motion = average_motion(periods, cutoff_hz, self.source.in_band(cutoff_hz))
         measured = np.asarray(motion.measured.any(axis=0))
         usable = motion.band.reduce_mask(measured.T).all(axis=1) | ~np.asarray(measured.any(axis=0))
         return motion if usable.all() else None

@@ -167,7 +167,7 @@ def transient_motion(stretch: Stretch, trim: Trim, source: MotionSource) -> Moti
     )
 
 
-def averaged_motion(periods: Periods, cutoff_hz: float | None, source: MotionSource) -> Motion:
+def average_motion(periods: Periods, cutoff_hz: float | None, source: MotionSource) -> Motion:
     """One period for all: positions averaged, differentiated by their Fourier series, torques kept apart.
 
     Parameters

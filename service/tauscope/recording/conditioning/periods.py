@@ -98,7 +98,7 @@ def split_periods(stretch: Stretch, refine: bool = False) -> Periods | None:
         count = int((last + 1 + LATE_SAMPLES - first) / length + WHOLE_SAMPLES)
         if count < 2 or length < 3:
             return None
-        periods = _aligned(stretch, first, length, count)
+        periods = _align(stretch, first, length, count)
         if not refine or periods is None:
             return periods
         lag = _lag(periods.position) * stretch.rate_hz / periods.rate_hz
@@ -109,13 +109,13 @@ def split_periods(stretch: Stretch, refine: bool = False) -> Periods | None:
     return periods
 
 
-def _aligned(stretch: Stretch, first: int, length: float, count: int) -> Periods | None:
+def _align(stretch: Stretch, first: int, length: float, count: int) -> Periods | None:
     """The periods by their samples where both fit, else by interpolation."""
     samples = round(length)
     fits = first + count * samples <= len(stretch.position)
     if fits and abs(length - samples) * count <= WHOLE_SAMPLES:
         return _whole(stretch, first, samples, count)
-    return _interpolated(stretch, first, length, count)
+    return _interpolate(stretch, first, length, count)
 
 
 def with_turns_removed(periods: Periods, joint_types: Sequence[JointType]) -> Periods | None:
@@ -230,7 +230,7 @@ def _whole(stretch: Stretch, first: int, samples: int, count: int) -> Periods:
     )
 
 
-def _interpolated(stretch: Stretch, first: int, length: float, count: int) -> Periods | None:
+def _interpolate(stretch: Stretch, first: int, length: float, count: int) -> Periods | None:
     """Periods whose length is no whole number of samples, brought onto a common grid of phases by cubic splines."""
     samples = round(length)
     while first + count * length > len(stretch.position) + LATE_SAMPLES + WHOLE_SAMPLES:

@@ -79,18 +79,18 @@ def read_stretch(recording: Recording, robot: Robot, start: int, stop: int, timi
     rows = slice(None) if complete.all() else complete
     time = samples.time[rows]
     elapsed = time - time[0]
-    groups = [None if group is None else _bridged(group[rows]) for group in (samples.velocity, samples.acceleration)]
+    groups = [None if group is None else _bridge(group[rows]) for group in (samples.velocity, samples.acceleration)]
     grid = uniform_grid(elapsed, timing.rate_hz)
     if grid is None:
         rate, begin = timing.rate_hz, 0.0
         at = np.arange(int(elapsed[-1] * rate + UNIFORM_TOLERANCE) + 1) / rate
         onto = _spline(elapsed, at)
-        filled, measured = _resampled_torque(elapsed, at, rate, torque[rows], onto)
+        filled, measured = _resample_torque(elapsed, at, rate, torque[rows], onto)
     else:
         rate, begin = grid.rate_hz, grid.start_s
         at = grid.start_s + np.arange(int(grid.index[-1]) + 1) / rate
         onto = _same if len(at) == len(elapsed) else _spline(grid.index, np.arange(len(at)))
-        filled, measured = _filled(_spread(torque[rows], grid.index, len(at)))
+        filled, measured = _fill(_spread(torque[rows], grid.index, len(at)))
     return Stretch(
         start_s=float(time[0] + begin),
         rate_hz=rate,
@@ -120,7 +120,7 @@ def uniform_grid(elapsed: Array, rate_hz: float) -> Grid | None:
         None where the stamps deviate by more than `UNIFORM_TOLERANCE` and half of their own last digit
     """
     tolerance = UNIFORM_TOLERANCE + 0.5 * _last_digit(elapsed) * rate_hz
-    fits = [_fitted(index, elapsed, rate_hz) for index in _possible_indices(elapsed * rate_hz)]
+    fits = [_fit_grid(index, elapsed, rate_hz) for index in _possible_indices(elapsed * rate_hz)]
     good = [(grid, deviation) for grid, deviation in fits if deviation <= tolerance]
     if not good:
         return None
@@ -138,7 +138,7 @@ def _possible_indices(position: Array) -> list[NDArray[np.int_]]:
     return [everything, counted, *([nearest] if (np.diff(nearest) > 0).all() else [])]
 
 
-def _fitted(index: NDArray[np.int_], elapsed: Array, rate_hz: float) -> tuple[Grid, float]:
+def _fit_grid(index: NDArray[np.int_], elapsed: Array, rate_hz: float) -> tuple[Grid, float]:
     """The grid for one numbering of the samples, and the largest deviation of a stamp from it [intervals]."""
     position = elapsed * rate_hz
     deviation = position - index
@@ -159,7 +159,7 @@ def _last_digit(elapsed: Array) -> float:
     return 0.0
 
 
-def _bridged(values: Array) -> Array:
+def _bridge(values: Array) -> Array:
     """Signals in which single samples were missed, up to `BRIDGED_VALUES` in a row, bridged by straight lines."""
     missed = np.isnan(values)
     if not missed.any():
@@ -203,18 +203,18 @@ def _spread(values: Array, index: NDArray[np.int_], count: int) -> Array:
     return spread
 
 
-def _resampled_torque(
+def _resample_torque(
     time: Array, at: Array, rate_hz: float, torque: Array, onto: Callable[[Array], Array]
 ) -> tuple[Array, Mask]:
     """Torque on the grid, and where it rests on samples close by on both sides."""
     left = np.clip(np.searchsorted(time, at, side="right") - 1, 0, max(len(time) - 2, 0))
     right = np.minimum(left + 1, len(time) - 1)
     nearby = np.minimum(np.abs(at - time[left]), np.abs(time[right] - at)) * rate_hz <= NEARBY
-    filled, finite = _filled(torque)
+    filled, finite = _fill(torque)
     return onto(filled), nearby[:, None] & finite[left] & finite[right]
 
 
-def _filled(torque: Array) -> tuple[Array, Mask]:
+def _fill(torque: Array) -> tuple[Array, Mask]:
     """Torque with NaN bridged by straight lines, and where it was measured; a joint never measured becomes zero."""
     measured = np.isfinite(torque)
     if measured.all():

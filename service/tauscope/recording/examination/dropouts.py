@@ -3,12 +3,13 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauscope.recording.examination.edits import Rows, find_runs
-from tauscope.recording.examination.effort_defects import STUCK_ROWS, USUAL_RUN, is_moving
+from tauscope.recording.examination.effort_defects import USUAL_RUN, is_moving
 from tauscope.recording.examination.scales import EffortScale
+from tauscope.recording.examination.sketch import BLOCK_ROWS
 from tauscope.recording.recording import Recording, Samples
+from tauscope.recording.samples import Array
 
 DROP = 10.0
 """Multiple of the usual change from row to row by which one joint's effort falls to zero, and comes back."""
@@ -17,7 +18,7 @@ COMMON_DROP = 2.0
 """The same of at least one joint, where the efforts of all joints are exactly zero at once."""
 
 COMMON_ROWS = 3
-"""Rows, at least, in which all efforts are exactly zero by no accident: one side of the drop is enough."""
+"""Rows, at least, in which noisy efforts of all joints are exactly zero by no accident."""
 
 OPEN_ROWS = 10
 """Rows of a dropout, at least, that reaches to the beginning or the end of the recording."""
@@ -60,41 +61,47 @@ class ZeroRuns:
         """Whether noise lets no effort stay at one value."""
         return any(0 < scale.run <= USUAL_RUN * scale.hold and scale.change > 0.0 for scale in self._scales)
 
-    def dropouts(self, recording: Recording) -> list[Rows]:
+    def find_dropouts(self, recording: Recording) -> list[Rows]:
         """Ranges of rows that are dropouts, of every joint, (k, 2)."""
+        change = np.array([scale.change for scale in self._scales])
         *own, common = ([] if len(runs) > MOST_RUNS else runs for runs in self._runs)
-        lost: list[set[tuple[int, int]]] = [set() for _ in own]
-        for run in common if len(own) > 1 else ():
-            drops = _drops(recording, run, common=True)
-            is_deep = any(drop > COMMON_DROP * scale.change for drop, scale in zip(drops, self._scales, strict=True))
-            is_closed = run[0] > 0 and run[1] < len(recording)
-            if is_deep or (is_closed and run[1] - run[0] >= STUCK_ROWS and self._is_noisy):
-                for ranges in lost:
-                    ranges.add(run)
-        for joint, (runs, scale) in enumerate(zip(own, self._scales, strict=True)):
-            shared = list(lost[joint])
+        shared = [
+            run
+            for run in (common if len(own) > 1 else ())
+            if (self._is_noisy and run[1] - run[0] >= COMMON_ROWS and _is_gap(recording, run))
+            or (_measure_drops(recording, run) > COMMON_DROP * change).any()
+        ]
+        lost = [set(shared) for _ in own]
+        for joint, runs in enumerate(own):
             for run in runs:
                 overlaps = any(run[0] < stop and start < run[1] for start, stop in shared)
-                if not overlaps and _drops(recording, run)[joint] > DROP * scale.change:
+                if not overlaps and _measure_drops(recording, run)[joint] > DROP * change[joint]:
                     lost[joint].add(run)
         return [np.array(sorted(ranges), dtype=np.int64).reshape(-1, 2) for ranges in lost]
 
 
-def _drops(recording: Recording, run: tuple[int, int], *, common: bool = False) -> NDArray[np.float64]:
-    """By how much every joint's effort falls to zero and comes back, the lesser of both, (n,); 0 where it changes sign.
+def _is_gap(recording: Recording, run: tuple[int, int]) -> bool:
+    """Whether a run has efforts on both sides, or the arm stands still in it, as on its brakes.
 
-    A run that is open on one side counts where the arm stands still in it, as on its brakes: an arm that moves without
-    effort swings freely.
+    An arm that moves without effort at the beginning or the end swings freely.
     """
     start, stop = run
-    sides = [row for row in (start - 1, stop) if 0 <= row < len(recording)]
-    none = np.zeros(recording.joint_count)
-    if not sides:
-        return none
-    if len(sides) == 1 and (stop - start < OPEN_ROWS or is_moving(recording.samples(start, stop).position)):
-        return none
+    if start > 0 and stop < len(recording):
+        return True
+    is_whole = start == 0 and stop == len(recording)
+    return not is_whole and stop - start >= OPEN_ROWS and not _moves(recording, run)
+
+
+def _moves(recording: Recording, run: tuple[int, int]) -> bool:
+    """Whether the arm moves in a run, read block by block."""
+    blocks = (recording.samples(row, min(row + BLOCK_ROWS, run[1])) for row in range(*run, BLOCK_ROWS))
+    return any(is_moving(block.position) for block in blocks)
+
+
+def _measure_drops(recording: Recording, run: tuple[int, int]) -> Array:
+    """Distance of zero beyond the range of every joint's efforts before and after a run, (n,); at most 0 within it."""
+    if not _is_gap(recording, run):
+        return np.zeros(recording.joint_count)
+    sides = [row for row in (run[0] - 1, run[1]) if 0 <= row < len(recording)]
     efforts = np.array([recording.samples(row, row + 1).effort[0] for row in sides])
-    if common and stop - start >= COMMON_ROWS:
-        return np.nan_to_num(np.abs(efforts).max(axis=0), nan=0.0)
-    drops = np.where(efforts[0] * efforts[-1] > 0.0, np.abs(efforts).min(axis=0), 0.0)
-    return np.nan_to_num(drops, nan=0.0)
+    return np.nan_to_num(np.maximum(efforts.min(axis=0), -efforts.max(axis=0)), nan=0.0)

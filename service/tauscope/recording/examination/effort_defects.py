@@ -48,11 +48,11 @@ def find_stuck(rows: Numbers, effort: Array, position: Array, scale: EffortScale
         return NO_NUMBERS
     change = np.diff(effort, prepend=np.nan)
     same = (change == 0.0) & (effort > scale.low) & (effort < scale.high)  # a clipped value is not stuck
-    found = _stuck_rows(np.arange(len(effort)), same, position, max(STUCK_ROWS, STUCK_RUNS * scale.run))
-    return rows[_without_turns(found, change)]
+    found = _find_stuck_rows(np.arange(len(effort)), same, position, max(STUCK_ROWS, STUCK_RUNS * scale.run))
+    return rows[_leave_turns_out(found, change)]
 
 
-def _without_turns(stuck: Numbers, change: Array) -> Numbers:
+def _leave_turns_out(stuck: Numbers, change: Array) -> Numbers:
     """Rows of values that end with a jump: one that goes on by a single step of the drive's was turning, not stuck.
 
     Parameters
@@ -84,10 +84,10 @@ def find_all_stuck(rows: Numbers, effort: Array, position: Array, scales: Sequen
     if len(scales) < 2 or not any(0 < scale.run <= USUAL_RUN * scale.hold for scale in scales):
         return NO_NUMBERS
     same = np.concatenate([[False], (effort[1:] == effort[:-1]).all(axis=1) & (effort[1:] != 0.0).any(axis=1)])
-    return _stuck_rows(rows, same, position, max(STUCK_ROWS, *(STUCK_RUNS * scale.hold for scale in scales)))
+    return _find_stuck_rows(rows, same, position, max(STUCK_ROWS, *(STUCK_RUNS * scale.hold for scale in scales)))
 
 
-def _stuck_rows(rows: Numbers, same: NDArray[np.bool_], position: Array, least: int) -> Numbers:
+def _find_stuck_rows(rows: Numbers, same: NDArray[np.bool_], position: Array, least: int) -> Numbers:
     """Rows that repeat a value, where it stands in `least` rows or more while the arm moves; the first was measured."""
     runs = find_runs(same)
     long = runs[runs[:, 1] - runs[:, 0] >= least - 1]

@@ -8,15 +8,13 @@ import numpy as np
 from tauscope.errors import RecordingError
 from tauscope.recording.examination.mending import mend_recording
 from tauscope.recording.examination.plausibility import find_implausible
-from tauscope.recording.examination.sketch import joint_types
+from tauscope.recording.examination.sketch import BLOCK_ROWS, joint_types
 from tauscope.recording.link_encoders import link_warnings
 from tauscope.recording.reading import read_recording
 from tauscope.recording.recording import Recording
 from tauscope.recording.units import SI, Reading
 from tauscope.result_warning import ResultWarning
 from tauscope.robot.robot import Robot
-
-ROWS_AT_ONCE = 1 << 15
 
 TRUST = "go on with --trust-units"
 
@@ -64,8 +62,8 @@ def find_missing_effort(recording: Recording) -> str | None:
     """The columns of effort that are NaN throughout, and what to do; None where every joint has an effort."""
     n, kind = recording.joint_count, recording.effort_kind.value
     seen = np.zeros(n, dtype=bool)
-    for start in range(0, len(recording), ROWS_AT_ONCE):
-        seen |= np.isfinite(recording.samples(start, start + ROWS_AT_ONCE).effort).any(axis=0)
+    for start in range(0, len(recording), BLOCK_ROWS):
+        seen |= np.isfinite(recording.samples(start, start + BLOCK_ROWS).effort).any(axis=0)
         if seen.all():
             return None
     many = not seen.any() and n > 1

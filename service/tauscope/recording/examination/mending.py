@@ -21,30 +21,30 @@ def mend_recording(recording: Recording, robot: Robot | None = None) -> Recordin
     """Mask or repair the samples of a recording that were never measured, and say so in its notes."""
     names = [None] * recording.joint_count if robot is None else [joint.name for joint in robot.joints]
     defects = find_defects(recording, joint_types(recording, robot))
-    edits = _edits(recording, defects)
+    edits = _build_edits(recording, defects)
     if not edits:
         return recording
-    notes = (*recording.notes, *_warnings(recording, defects, names))
+    notes = (*recording.notes, *_describe_defects(recording, defects, names))
     return replace(recording, table=EditedTable(recording.table, edits), notes=notes)
 
 
-def _edits(recording: Recording, defects: Defects) -> dict[int, ColumnEdit]:
+def _build_edits(recording: Recording, defects: Defects) -> dict[int, ColumnEdit]:
     """Edits by column."""
     edits: dict[int, ColumnEdit] = {}
     n = recording.joint_count
     for joint, found in enumerate(defects.joints):
         # A row without one joint's position is left out as a whole.
-        position = found.position_edit(len(recording), defects.lost if joint == 0 else NO_NUMBERS)
+        position = found.position_edit(len(recording), defects.bunched if joint == 0 else NO_NUMBERS)
         if len(position.blank) or len(position.jumps):
             edits[1 + joint] = position
-        hold = found.effort_hold if found.effort_hold > 1 and not len(defects.paced) else 0
+        hold = found.effort_hold if found.effort_hold > 1 else 0
         effort = ColumnEdit(found.lost_efforts, hold=hold, fill=FILLED_ROWS if defects.alternate else 0)
         if len(effort.blank) or effort.hold or effort.fill:
             edits[1 + n + joint] = effort
     return edits
 
 
-def _warnings(recording: Recording, defects: Defects, joints: Sequence[str | None]) -> Iterator[ResultWarning]:
+def _describe_defects(recording: Recording, defects: Defects, joints: Sequence[str | None]) -> Iterator[ResultWarning]:
     """A warning about each kind of defect of each joint."""
 
     def begin(row: int) -> str:
@@ -62,8 +62,7 @@ def _warnings(recording: Recording, defects: Defects, joints: Sequence[str | Non
     kind = recording.effort_kind.value
     alike: dict[tuple[str, str, str | None], list[int]] = {}
     for number, joint in enumerate(defects.joints, 1):
-        way = "their rows are masked" if len(defects.paced) else "interpolated from change to change"
-        for column, code, text, remedy in _joint_texts(joint, begin, way):
+        for column, code, text, remedy in _describe_joint(joint, begin):
             alike.setdefault((code, f"{column}: {text}", remedy), []).append(number)
     for (code, text, remedy), numbers in alike.items():
         group, _, words = text.partition(": ")
@@ -73,8 +72,8 @@ def _warnings(recording: Recording, defects: Defects, joints: Sequence[str | Non
         yield ResultWarning(code=code, joint=joint, text=f"{many} {', '.join(columns)}: {words}", remedy=remedy)
 
 
-def _joint_texts(
-    joint: JointDefects, begin: Callable[[int], str], way: str
+def _describe_joint(
+    joint: JointDefects, begin: Callable[[int], str]
 ) -> Iterator[tuple[Literal["q", "effort"], str, str, str | None]]:
     """Column, code, text and remedy of each kind of defect of one joint."""
     if joint.wraps:
@@ -90,7 +89,7 @@ def _joint_texts(
         text = f"each value is held for about {joint.hold} rows; {_count(repeated)} masked"
         yield "q", "held-samples", text, slow
     if joint.effort_hold > 1:
-        text = f"each value is held for about {joint.effort_hold} rows; {way}"
+        text = f"each value is held for about {joint.effort_hold} rows; interpolated from change to change"
         yield "effort", "held-samples", text, slow
     masked: tuple[tuple[Literal["q", "effort"], str, str, str], ...] = (
         ("q", "spikes", "spikes", "away from the neighbours by a jump and back"),

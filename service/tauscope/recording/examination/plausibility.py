@@ -19,12 +19,9 @@ SLOWEST_RATE_HZ = 2.0
 FASTEST_RATE_HZ = 2e5
 """No drive is sampled this fast [Hz]."""
 
-LONGEST_SWEEP_S = 1000.0
-"""A joint that would need longer than this to cross its range at its own top speed is not moving [s]: slow friction
-sweeps take a few hundred."""
-
-SLOW_RATE_HZ, LONG_SWEEP_S = 10.0, 300.0
-"""Neither alone is strange, a rate below the one [Hz] or a sweep beyond the other [s]; both at once are."""
+SLOWEST = 30.0
+"""Time from row to row times the time to cross a joint's range at its own top speed [s²]: a slow friction sweep of
+300 s is sampled at 10 Hz or more. A clock in ms makes this product a million times larger."""
 
 LEAST_SWEEP = 0.05
 """A range below this is rest, whatever its speed [rad or m]."""
@@ -103,7 +100,9 @@ def _doubt_velocity(sketch: Sketch, types: list[JointType]) -> str | None:
         for v in speeds
     ]
     # Of equal ratios the one with fewest units other than SI: that of q and qd both in degrees is 1.
-    deviation, time, position, speed = min(fits, key=lambda f: (f[0] > SAME_RATIO, len(_foreign(*f[1:])), f[0]))
+    deviation, time, position, speed = min(
+        fits, key=lambda f: (f[0] > SAME_RATIO, len(_name_foreign_units(*f[1:])), f[0])
+    )
     evidence = f"Δq/Δt is {typical:.3g} times column qd{joint + 1}"
     if deviation <= SAME_RATIO:
         column = "t" if time != "s" else f"q{joint + 1}" if position not in SI_LENGTHS else f"qd{joint + 1}"
@@ -112,7 +111,9 @@ def _doubt_velocity(sketch: Sketch, types: list[JointType]) -> str | None:
         if position in ("deg", "mm") and speed in SI_LENGTHS:
             units.append(f"qd={speed}")
         return _doubt(
-            column, f"{evidence}, the ratio of {' and '.join(_foreign(time, position, speed))}", ",".join(units)
+            column,
+            f"{evidence}, the ratio of {' and '.join(_name_foreign_units(time, position, speed))}",
+            ",".join(units),
         )
     if abs(sketch.interval - 1.0) < 1e-9:
         text = f"rises by 1 from row to row, and {evidence}: it counts samples of about {1.0 / typical:.4g} Hz"
@@ -138,7 +139,7 @@ def _velocity_ratios(sketch: Sketch) -> np.ndarray:
     return ratios
 
 
-def _foreign(time: str, position: str, speed: str) -> list[str]:
+def _name_foreign_units(time: str, position: str, speed: str) -> list[str]:
     """The units that are not SI, in words."""
     words = (
         "" if time == "s" else f"{time} to s",
@@ -158,8 +159,7 @@ def _doubt_time(sketch: Sketch) -> str | None:
     moving &= sketch.top_speed > 0.0
     sweep = float(np.min(sketch.span[moving] / sketch.top_speed[moving])) if moving.any() else 0.0
     whole = "" if not moving.any() else f" and the fastest joint takes {sweep:.3g} s to cross its range"
-    is_slow = interval > 1.0 / SLOW_RATE_HZ and sweep > LONG_SWEEP_S
-    if interval >= 1.0 / SLOWEST_RATE_HZ or sweep > LONGEST_SWEEP_S or is_slow:
+    if interval >= 1.0 / SLOWEST_RATE_HZ or interval * sweep > SLOWEST:
         text = f"rows are {interval:.4g} s apart{whole}: this is hardly in seconds"
         if abs(interval - 1.0) < 1e-9:
             return _doubt("t", text, "t=ms where it counts ms, or --units t=index --rate HZ where it counts samples")

@@ -21,26 +21,20 @@ STEPS = 5.0
 LONGEST_SPIKE, LONGEST_GLITCH = 5, 32
 """Rows after which a position is back, where it was a spike; the second where it went as far as a jump."""
 
-LONGEST_STEP = 8.0
-"""Usual intervals beyond which nothing tells a jump from motion."""
-
 RETURN = 0.3
 """Largest difference between the way out and the way back of a spike, relative to them."""
 
 JUMP = 5.0
-"""Multiple of the largest usual step that a jump exceeds; a joint that hits an end stop does not."""
+"""Multiple of the way at the largest usual speed that a jump exceeds; a joint that hits an end stop does not."""
 
 LEAST_JUMP = 0.01
 """Smallest jump that is called one [rad or m]."""
 
-MAKES_UP = 1.6
-"""Largest step after frozen rows over the motion that it makes up for, by the speed before and after."""
+MAKES_UP = 0.6
+"""Largest error of the step after frozen rows, relative to the motion by the lower speed: a rest hides none."""
 
-CATCHES_UP = 1.5
-"""Least size of that step, relative to those that follow: a joint that starts to move goes on as it starts."""
-
-STOPS_AT = 0.3
-"""Least speed before frozen rows, relative to the speed after them: a joint that stops slows down first."""
+CHANGES = 3
+"""Changes on either side of frozen rows from which the speed is taken."""
 
 
 class PositionDefect(NamedTuple):
@@ -65,7 +59,7 @@ def scan_position(
     position : (N,) float64
         q [rad or m], finite
     interval : float
-        usual time from row to row [s]
+        longest usual time from row to row [s]
     core : (int, int)
         rows that this block answers for; the others are neighbours
     """
@@ -81,12 +75,14 @@ def scan_position(
         return
     surprise = steps - neighbours_median(steps)
     large = np.flatnonzero((np.abs(surprise) > least) & (steps != 0.0))  # a rest is judged by the step that ends it
-    whole = np.diff(time) < LONGEST_STEP * interval
+    # Across a gap in time a joint may go as far as its speed allows.
+    least_jump = np.maximum(JUMP * scale.move * np.maximum(np.diff(time) / interval, 1.0), LEAST_JUMP)
+    calm = np.where(np.abs(steps) > least_jump, 0.0, steps)
     index = 0
     while index < len(large):
         a = int(large[index])
-        frozen = _frozen_rows(steps, a)
-        is_jump = abs(surprise[a]) > max(JUMP * scale.move, LEAST_JUMP)
+        frozen = _count_frozen(steps, calm, a)
+        is_jump = abs(surprise[a]) > least_jump[a]
         reach = a + (LONGEST_GLITCH if is_jump else LONGEST_SPIKE)
         later = [int(b) for b in large[index + 1 : index + 4] if b <= reach and not frozen]
         partner = next((b for b in later if _returns(surprise, a, b)), None)
@@ -97,7 +93,7 @@ def scan_position(
             spikes = (int(row) for row in rows[a + 1 : partner + 1] if core[0] <= row < core[1])
             yield from (PositionDefect("spikes", row) for row in spikes)
             index = int(np.searchsorted(large, partner)) + 1
-        elif is_core[a] and is_jump and whole[a]:
+        elif is_core[a] and is_jump:
             yield PositionDefect("jumps", int(rows[a + 1]), float(surprise[a]))
 
 
@@ -107,15 +103,19 @@ def _returns(surprise: Array, a: int, b: int) -> bool:
     return abs(out + back) < RETURN * max(abs(out), abs(back))
 
 
-def _frozen_rows(steps: Array, k: int) -> int:
-    """Repeated rows before a step that makes up for them; 0 where it does not."""
-    moved = np.flatnonzero(steps[:k])
-    rest = k - 1 - (int(moved[-1]) if len(moved) else k)
-    if rest < 1:
+def _count_frozen(steps: Array, calm: Array, k: int) -> int:
+    """Repeated rows before a step that makes up for them; 0 where it does not.
+
+    Parameters
+    ----------
+    calm : (N,) float64
+        the steps without jumps, from which speeds are taken [rad or m]
+    """
+    before, after = np.flatnonzero(steps[:k])[-CHANGES:], k + 1 + np.flatnonzero(steps[k + 1 :])[:CHANGES]
+    if not len(before) or not len(after) or before[-1] == k - 1:
         return 0
-    sizes = np.abs(steps)
-    before, after, step = sizes[moved[-5:]], sizes[k + 1 : k + 6], float(sizes[k])
-    after = after[after > 0.0]
-    if not len(after) or before[-1] < STOPS_AT * np.median(after) or step < CATCHES_UP * np.median(after):
-        return 0
-    return rest if step <= MAKES_UP * (rest + 1) * max(np.median(before), np.median(after)) else 0
+    rest = k - 1 - int(before[-1])
+    # A coarse encoder's position changes in few rows: a speed is that of several changes.
+    speeds = calm[before[0] : before[-1] + 1].mean(), calm[k + 1 : after[-1] + 1].mean()
+    hidden = (rest + 1) * np.array(speeds)
+    return rest if abs(steps[k] - hidden.mean()) <= MAKES_UP * np.abs(hidden).min() else 0

@@ -24,8 +24,7 @@ HELD_SHARE = 0.5
 """Share of such moves followed by a rest above which the source holds its values."""
 
 FEWEST_MOVES = 30
-MOVING_SHARE = 0.2
-"""Least number of such moves, and their least share of all changes: noise makes some now and then."""
+"""Least number of such moves: noise makes some now and then."""
 
 LONGEST_HOLD = 64
 """Rows of the longest hold: a source of 30 Hz on a topic of 2 kHz."""
@@ -87,7 +86,9 @@ def measure_positions(sketch: Sketch, types: list[JointType]) -> list[PositionSc
     """Scales of every joint's position."""
     scales = []
     for joint, kind in enumerate(types):
-        pieces = [_steady(window.time, window.position[:, joint], sketch.interval) for window in sketch.windows]
+        pieces = [
+            _leave_stops_out(window.time, window.position[:, joint], sketch.interval) for window in sketch.windows
+        ]
         values = sketch.position[:, joint]
         values = values[np.isfinite(values)]
         low, high = np.percentile(values, [0.1, 99.9]) if len(values) else (0.0, 0.0)
@@ -185,7 +186,7 @@ def distance_beyond(windows: Array) -> Array:
     return np.maximum(np.maximum(values - others[:, -2], others[:, 1] - values), 0.0)
 
 
-def _steady(time: Array, values: Array, interval: float) -> Array:
+def _leave_stops_out(time: Array, values: Array, interval: float) -> Array:
     """A joint's known values without the rows before which the clock stands."""
     known = np.isfinite(values)
     time, values = time[known], values[known]
@@ -206,8 +207,7 @@ def _measure_holds(pieces: list[Array]) -> tuple[float, int, int]:
     bold = [sizes >= STEPS_OF_A_MOVE * step for sizes in steps]
     moves = np.concatenate([runs[large[:-1] & large[1:]] for runs, large in zip(lengths, bold, strict=True)])
     usual = int(np.percentile(np.concatenate(lengths), 99.0))
-    enough = len(moves) >= max(FEWEST_MOVES, MOVING_SHARE * sum(map(len, lengths)))
-    if not enough or np.mean(moves > 1) < HELD_SHARE:
+    if len(moves) < FEWEST_MOVES or np.mean(moves > 1) < HELD_SHARE:
         return step, usual, 1
     hold = int(np.median(moves))
     return step, usual, hold if hold <= LONGEST_HOLD else 1

@@ -18,12 +18,10 @@ from tauscope.recording.examination.edits import (
 from tauscope.recording.examination.effort_defects import find_all_stuck, find_spikes, find_stuck
 from tauscope.recording.examination.position_defects import scan_position
 from tauscope.recording.examination.scales import EffortScale, PositionScale, is_new, measure_efforts, measure_positions
-from tauscope.recording.examination.sketch import Sketch
+from tauscope.recording.examination.sketch import BLOCK_ROWS, Sketch
 from tauscope.recording.recording import Recording, Samples
 from tauscope.recording.samples import Array
 from tauscope.robot.robot import JointType
-
-BLOCK_ROWS = 1 << 15
 
 SPARE_ROWS = 512
 """Rows read beyond a block on either side: a run of one value that is longer is taken to end there."""
@@ -34,14 +32,8 @@ BUNCHED = 0.1
 MOST_BUNCHED = 0.1
 """Share of bunched stamps above which the source always sends in bursts: the conditioning counts its rows."""
 
-IN_STEP = 0.8
-"""Share of the repeated rows that all efforts have in common where they are held at once."""
-
 REST_HOLDS = 4
 """Holds of one value after which it is a rest, and no update that was lost."""
-
-MOST_JUMPS = 20
-"""Jumps of one joint above which it is no encoder that was reset."""
 
 
 @dataclass(eq=False)
@@ -74,7 +66,7 @@ class JointDefects:
         if self.jumps or self.wraps:
             where = np.unique([0, *(row for row, _ in (*self.jumps, *self.wraps))])
             # Whole turns matter to nobody: the longest piece is that between jumps.
-            offsets = _offsets(self.jumps, where, count) + _offsets(self.wraps, where, count)
+            offsets = _sum_jumps(self.jumps, where, count) + _sum_jumps(self.wraps, where, count)
         return ColumnEdit(self._ranges("spikes", "frozen", "repeated", lost=lost), jumps=where, offsets=offsets)
 
     @property
@@ -94,19 +86,11 @@ class Defects:
         rows whose stamp is that of a neighbour
     alternate : bool
         whether positions and efforts come in rows of their own
-    paced : (m,) int64
-        rows that repeat the efforts of all joints, where all are held at once and positions are not
     """
 
     joints: list[JointDefects]
     alternate: bool
     bunched: Numbers = field(default_factory=lambda: NO_NUMBERS)
-    paced: Numbers = field(default_factory=lambda: NO_NUMBERS)
-
-    @property
-    def lost(self) -> Numbers:
-        """Rows that are left out whole, (m,)."""
-        return np.union1d(self.bunched, self.paced)
 
 
 def find_defects(recording: Recording, types: list[JointType]) -> Defects:
@@ -122,7 +106,7 @@ def find_defects(recording: Recording, types: list[JointType]) -> Defects:
     joints = [JointDefects(q.hold, tau.hold) for q, tau in zip(positions, efforts, strict=True)]
     has_effort, has_position = np.isfinite(sketch.effort).any(axis=1), np.isfinite(sketch.position).all(axis=1)
     alternate = bool(has_effort.any() and has_position.any() and not (has_effort & has_position).any())
-    scan = _Scan(sketch.interval, positions, efforts, Defects(joints, alternate), ZeroRuns(efforts))
+    scan = _Scan(sketch, positions, efforts, Defects(joints, alternate), ZeroRuns(efforts))
     count = len(recording)
     for start in range(0, count, BLOCK_ROWS):
         stop = min(start + BLOCK_ROWS, count)
@@ -136,28 +120,18 @@ def find_defects(recording: Recording, types: list[JointType]) -> Defects:
 class _Scan:
     """One walk through a recording."""
 
-    interval: float
+    sketch: Sketch
     positions: list[PositionScale]
     efforts: list[EffortScale]
     defects: Defects
     zeros: ZeroRuns
     found: dict[tuple[int, str], list[Numbers]] = field(default_factory=dict)
 
-    @property
-    def pace(self) -> int:
-        """Rows for which all efforts are held, where positions are not; 1 where they are not."""
-        holds = [joint.effort_hold for joint in self.defects.joints]
-        is_held = min(holds) > 1 and all(joint.hold == 1 for joint in self.defects.joints)
-        return int(np.median(holds)) if is_held and not self.defects.alternate else 1
-
     def add(self, samples: Samples, first: int, core: tuple[int, int]) -> None:
         """Take a block, of which the rows of `core` are its own and the others neighbours."""
         rows = np.arange(first, first + len(samples.time))
-        close = _find_bunched(samples.time, self.interval)
+        close = _find_bunched(samples.time, self.sketch.interval)
         self._keep(0, "bunched", rows[close], core)
-        if self.pace > 1:
-            same = (samples.effort[1:] == samples.effort[:-1]).all(axis=1)
-            self._keep(0, "paced", rows[_find_repeated(np.concatenate([[False], same]), self.pace)], core)
         stuck = find_all_stuck(rows, samples.effort, samples.position, self.efforts)
         for joint, (place, scale) in enumerate(zip(self.defects.joints, self.positions, strict=True)):
             self._keep(joint, "stuck", stuck, core)
@@ -165,7 +139,7 @@ class _Scan:
             known = np.isfinite(position) & ~close
             if place.hold > 1:
                 known[known] = is_new(position[known])
-            interval = self.interval * place.hold
+            interval = self.sketch.longest_interval * place.hold
             for kind, row, height in scan_position(
                 rows[known], samples.time[known], position[known], scale, interval, core
             ):
@@ -189,18 +163,14 @@ class _Scan:
         defects = self.defects
         for (joint, name), parts in self.found.items():
             rows = np.unique(np.concatenate(parts))
-            if name in ("bunched", "paced"):
-                setattr(defects, name, rows)
+            if name == "bunched":
+                defects.bunched = rows
             else:
                 defects.joints[joint].rows[name] = rows
         if len(defects.bunched) > MOST_BUNCHED * len(recording):
             defects.bunched = NO_NUMBERS
-        if len(defects.paced) < IN_STEP * (1.0 - 1.0 / self.pace) * len(recording):
-            defects.paced = NO_NUMBERS
-        for joint, ranges in zip(defects.joints, self.zeros.dropouts(recording), strict=True):
+        for joint, ranges in zip(defects.joints, self.zeros.find_dropouts(recording), strict=True):
             joint.rows["zeros"] = row_numbers(ranges)
-            if len(joint.jumps) > MOST_JUMPS:
-                joint.jumps.clear()
         return defects
 
     def _keep(self, joint: int, name: str, rows: Numbers, core: tuple[int, int]) -> None:
@@ -210,7 +180,7 @@ class _Scan:
             self.found.setdefault((joint, name), []).append(own)
 
 
-def _offsets(jumps: list[tuple[int, float]], where: Numbers, count: int) -> Array:
+def _sum_jumps(jumps: list[tuple[int, float]], where: Numbers, count: int) -> Array:
     """Offset from each of some rows on, (m,): the sum of the jumps up to there, 0 in the longest piece between them.
 
     Parameters

@@ -9,6 +9,9 @@ from tauscope.recording.recording import Recording
 from tauscope.recording.samples import Array, Samples
 from tauscope.robot.robot import JointType, Robot
 
+BLOCK_ROWS = 1 << 15
+"""Rows that are read at once."""
+
 WINDOWS = 8
 WINDOW_ROWS = 1 << 13
 """Rows of one window; a recording of at most `WINDOWS` of them is looked at whole."""
@@ -39,11 +42,20 @@ class Sketch:
         return Sketch(tuple(recording.samples(int(start), int(start) + WINDOW_ROWS) for start in starts))
 
     @cached_property
+    def _steps(self) -> Array:
+        """Times from row to row, (N,) [s]."""
+        return np.concatenate([np.diff(window.time) for window in self.windows])
+
+    @cached_property
+    def longest_interval(self) -> float:
+        """Longest usual time from row to row [s]: their 99th percentile."""
+        return float(np.percentile(self._steps, 99.0))
+
+    @cached_property
     def interval(self) -> float:
         """Usual time from row to row [s]: the median, or where rows come in bursts the mean without gaps."""
-        steps = np.concatenate([np.diff(window.time) for window in self.windows])
-        median, longest = (float(value) for value in np.percentile(steps, [50.0, 99.0]))
-        mean = float(np.mean(steps[steps <= longest]))
+        median = float(np.median(self._steps))
+        mean = float(np.mean(self._steps[self._steps <= self.longest_interval]))
         return mean if median < BURST * mean else median
 
     @cached_property
