@@ -1,5 +1,6 @@
 """What a hypothesis predicts of motion that it has not seen, joint by joint."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,6 +57,10 @@ class Change:
         gain = np.log1p(self.relative)
         lost = float(gain[(self.standard > WORSE) & (gain > 0.0)].sum())
         return lost + SPILLED * float(np.minimum(gain, 0.0).sum()) if lost > 0.0 else 0.0
+
+    def loss(self, joints: Sequence[int]) -> float:
+        """Change of some joints together, in standard errors."""
+        return float(self.standard[list(joints)].sum() / np.sqrt(len(joints)))
 
     @property
     def log_odds(self) -> float:

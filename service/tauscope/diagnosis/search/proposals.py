@@ -112,7 +112,9 @@ class Proposer:
             beside = self.laboratory.paint(at, found)
             shape, size = self._zoom(effect, shape, size, beside, signals)
             found = self._extend(effect, shape, size, beside)
-        term = replace(found.model.terms[-1], coefficients=found.posterior.mean[-len(size) :])
+        term = found.model.terms[-1]
+        own = found.posterior.mean[found.model.term_places()[-1]]
+        term = replace(term, coefficients=own[: len(size)])
         k_v = None if effect.joint is None else at.model.structure.terms[effect.joint].k_v
         if not (term.is_possible(k_v) and effect.is_consistent(term.coefficients, shape)):
             return None

@@ -25,7 +25,7 @@ MOST_EFFECTS = 12
 """Effects that are added at most."""
 
 CONTRADICTED = 1.64
-"""…and by which a joint on which an effect acts is: one in twenty is so by chance."""
+"""Standard errors by which the joints on which an effect acts are predicted worse: one in twenty is so by chance."""
 
 CATALOGUED = 3.0
 """Log odds before the data that torque which is left out has a name: one in twenty laws is in no catalogue."""
@@ -251,9 +251,7 @@ class Search:
         if isinstance(proposal.term.effect, TimeLocalEffect):
             log_odds = min(log_odds, window_log_odds(at, found, found.model.terms[-1], self.laboratory))
         log_odds += 0.0 if change is None else change.log_odds
-        contradicted = change is not None and (
-            change.harm > 0.0 or bool((change.standard[list(touched)] > CONTRADICTED).any())
-        )
+        contradicted = change is not None and (change.harm > 0.0 or change.loss(touched) > CONTRADICTED)
         confirmed = log_odds > 0.0 and not contradicted
         covariance = found.posterior.covariance
         trained = self._log_odds(proposal)

@@ -9,6 +9,9 @@ from tauscope.recording.recording import Array
 OPEN = 1e-3
 """Part of its largest row from which a row of an effect counts as inside its window."""
 
+CHANCE = 2.0
+"""Standard deviations by which the excess of white rows may be larger by chance."""
+
 STRETCHES = 12
 """Parts of a window, at most, by which the standard error of its gain is known…"""
 
@@ -45,7 +48,8 @@ def window_log_odds(before: Hypothesis, after: Hypothesis, term: Term, laborator
         gained += float(gain.sum())
         excess += float(first[inside].sum()) - level * len(gain)
     stretches = min(STRETCHES, min(map(len, gains), default=0) // SHORTEST)
-    if stretches < FEWEST or gained <= 0.0 or gained < MOST * excess:
+    by_chance = CHANCE * np.sqrt(2.0 * sum(map(len, gains)))
+    if stretches < FEWEST or gained <= 0.0 or gained < MOST * (excess - by_chance):
         return -np.inf
     sums = np.sum([[part.sum() for part in np.array_split(each, stretches)] for each in gains], axis=0)
     spread = float(np.sqrt(stretches) * sums.std(ddof=1))
