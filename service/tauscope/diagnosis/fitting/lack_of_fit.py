@@ -29,9 +29,6 @@ relative to the largest."""
 LEVEL = 1e-3
 """Chance, over all joints and both tests, at which a mismatch is called significant."""
 
-RARE = 0.01
-"""Chance at one joint, by either test, from which it is worth to look for more there."""
-
 
 @dataclass(frozen=True, eq=False)
 class LackOfFit:
@@ -65,11 +62,6 @@ class LackOfFit:
         pairs = zip(self.significant, self.excess, self.measurable, strict=True)
         return [significant and bool(excess > least) for significant, excess, least in pairs]
 
-    @property
-    def worth_a_look(self) -> list[bool]:
-        """Per joint, whether so much is left rarely by chance: a search asks more of what it finds than this test."""
-        return [bool(min(a, b) < RARE) for a, b in zip(self.omnibus, self.pure_error, strict=True)]
-
 
 def lack_of_fit(fit: Fit, observations: Observations, *, pure_error: bool, seed: int = 0) -> LackOfFit:
     """Test what a model leaves."""
@@ -89,13 +81,12 @@ def lack_of_fit(fit: Fit, observations: Observations, *, pure_error: bool, seed:
         freedom = freedoms[joint]
         if omnibus[joint] < _level(joints):
             structured[joint] = max(beyond_chance, 0.0)
-        over = observations.noise[joint].over_repetitions
-        energy = float(residual @ residual) * over  # in what repetitions differ by
-        excess[joint] = max(energy - freedom, 0.0) / over
-        if pure_error and repeated[joint] > 0:  # else a saturated fit of the same rows says what noise is: any excess
+        energy = float(residual @ residual)
+        excess[joint] = max(energy - freedom, 0.0)
+        if pure_error and repeated[joint] > 0:  # else the same rows say what noise is: any excess
             measurable[joint] = MEASURABLE * np.sqrt(2.0 * freedom * (1.0 + freedom / repeated[joint]))
         means = freedom - repeated[joint]
-        if (pure_error or over > 1.0) and repeated[joint] > 0 and means > 1.0:
+        if pure_error and repeated[joint] > 0 and means > 1.0:
             ratio = max(energy - repeated[joint], 0.0) / means
             pure[joint] = float(stats.f.sf(ratio, means, repeated[joint]))
     return LackOfFit(omnibus, pure, excess, measurable, structured)
