@@ -10,7 +10,11 @@ from diagnosis.diagnosed_arm import at_joint, recordings
 from identification.simulated import Array, SimulatedArm, paper_robot
 from tauscope.diagnosis import diagnose, document
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
+from tauscope.diagnosis.fitting.fit import Fitter
 from tauscope.diagnosis.fitting.lack_of_fit import lack_of_fit
+from tauscope.diagnosis.fitting.regressor_noise import weightings_of_motion
+from tauscope.diagnosis.fitting.spilled_misfit import without_spilled
+from tauscope.diagnosis.noise.floor import with_pure_error
 
 pytestmark = pytest.mark.slow
 
@@ -33,9 +37,19 @@ def diagnosed(seed: int) -> Diagnosis:
 
 
 def test_what_the_fit_spreads_is_told_of_the_joint_that_is_wrong() -> None:
-    """With this noise the plain model leaves more than noise at the third joint too, where nothing is wrong."""
+    """By the noise of repetitions a fit of the plain model leaves more at the others too, where nothing is wrong."""
     found = diagnosed(5)
-    plain = lack_of_fit(found.selection.nominal, found.fitter.observations, pure_error=found.pure_error)
-    assert plain.significant == [False, True, True]
+    model = found.selection.nominal.model
+    rows = with_pure_error(found.fitter.observations, model)
+    assert rows is not None
+    fitter = Fitter(rows.with_weightings(weightings_of_motion(rows, model)))
+    fit = fitter.fit(model)
+    plain = lack_of_fit(fit, fitter.observations, pure_error=True)
+    assert plain.significant == [True, True, True]
+    assert without_spilled(plain, fit, fitter, pure_error=True).significant == [False, True, False]
+
+
+def test_a_diagnosis_names_the_joint_that_is_wrong_alone() -> None:
+    found = diagnosed(5)
     assert found.misfit_before.significant == [False, True, False]
     assert [(each.effect, each.joint) for each in document(found).findings] == [("unknown", "joint2")]

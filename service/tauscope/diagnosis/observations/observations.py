@@ -166,7 +166,7 @@ class Observations:
         robot: Robot,
         base: BaseParameters,
         cutoff_hz: float | None,
-        steepness: Array | None = None,
+        steepness: Array,
     ) -> "Observations":
         """Condition recordings in a band.
 
@@ -174,7 +174,7 @@ class Observations:
         ----------
         cutoff_hz : float or None
             the common band [Hz]; None for no filter
-        steepness : (n,) float64 or None
+        steepness : (n,) float64
             K_v of every joint's friction, for the band of the motion itself [s/rad or s/m]
         """
         starts = [float(c.recording.samples(0, 1).time[0]) for c in conditioners]
