@@ -14,7 +14,6 @@ from tauscope.diagnosis.observations.observations import Observations
 from tauscope.effects import Effect, Signals
 from tauscope.effects.computation import side_by_side
 from tauscope.effects.plain_terms import PlainTerm
-from tauscope.identification.excitation import thin
 
 POWER = 0.9
 """Chance at which an effect of the smallest size is found."""
@@ -66,14 +65,16 @@ def visibilities(fit: Fit, observations: Observations, effects: Sequence[Effect]
 def _visibility(
     fit: Fit, observations: Observations, effect: Effect, signals: Sequence[Signals], seed: int
 ) -> Visibility:
-    """One form, by shapes from all over its grid; those between them count as these do."""
-    shapes = thin(effect.grid, SHAPES_AT_ONCE)
+    """One form, by shapes drawn from its grid; all others count as these do."""
+    rng = np.random.default_rng(seed)
+    drawn = rng.permutation(len(effect.grid))[:SHAPES_AT_ONCE]
+    shapes = effect.grid[np.sort(drawn)]
     columns = white_columns(observations, effect, shapes, signals)
     found = moments(fit.projection, columns)
     visible = (found.shares > INVISIBLE).all(axis=1)
     if not visible.any():
         return Visibility(effect, 0.0, 1.0)
-    number = effective_number(found, columns, np.random.default_rng(seed)) if len(shapes) > 1 else 1.0
+    number = effective_number(found, columns, rng) if len(shapes) > 1 else 1.0
     information = float(np.median(found.gram[visible, 0, 0]))
     return Visibility(effect, information, number * len(effect.grid) / len(shapes))
 
