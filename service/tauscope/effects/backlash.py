@@ -47,17 +47,8 @@ DAMPING = 0.2
 """Damping ratio of teeth that touch, beside what they lose under load: where less is lost a link bounces on, but when
 it comes back hangs on everything that a recording does not show."""
 
-MORE_THAN_A_SPRING = 10.0
-"""What springy teeth have to explain more than plainer shapes, beside what tells two effects apart [noise variances]:
-together as much as an elastic joint's resonance."""
-
 SAME = 1.6
 """Factor between the gap that is crossed on springy teeth and the one that is found, up to which they are the same."""
-
-LEAST_MET = 0.4
-"""Part of the gap that is crossed by which a link moves at least as foreseen, where nothing else is missing: bounces at
-other instants than the model's add nothing, on simulated arms up to half of it. Beside others it is `SAME`: what a
-spring's or friction's formula leaves, at another joint too, is taken for teeth that a link meets half the time."""
 
 
 def place_between_teeth(load: Array, inertia: Array, gap: float, rate_hz: float) -> Array:
@@ -181,11 +172,6 @@ class Backlash(Deflection):
             made.append(cls(joint, mesh(gaps, bands), *bounds))
         return made
 
-    @classmethod
-    def farther_forms(cls, context: ArmContext) -> Sequence[Effect]:
-        """The same with teeth that give way, one a joint whose link has an inertia."""
-        return SpringyTeeth.forms(context)
-
     def quantities(
         self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
@@ -202,7 +188,7 @@ class Backlash(Deflection):
         """How wide."""
         return f"the transmission has {size_text(found['b'])} of backlash"
 
-    def is_consistent(self, coefficients: Array, shape: Array, *, alone: bool = False) -> bool:
+    def is_consistent(self, coefficients: Array, shape: Array) -> bool:
         """Whether the gap that the link flies over is the one by which it moves."""
         return bool(shape[0] <= FARTHEST_FLOWN * coefficients[0])
 
@@ -220,7 +206,6 @@ class SpringyTeeth(Backlash):
         Shape("swinging", "{q}/{tau}", logarithmic=True, reported=False),
         Shape("loss", "s/{q}", logarithmic=True, reported=False),
     )
-    swings = True
 
     @classmethod
     def forms(cls, context: ArmContext) -> Sequence[Effect]:
@@ -237,19 +222,9 @@ class SpringyTeeth(Backlash):
             made.append(cls(joint, grid, lower, upper))
         return made
 
-    @classmethod
-    def farther_forms(cls, context: ArmContext) -> Sequence[Effect]:
-        """None: these are."""
-        return ()
-
-    def reluctance(self, shapes: Array) -> Array:
-        """They must explain clearly more than a spring: with almost no gap they are one, with a resonance to choose."""
-        return np.full(len(shapes), MORE_THAN_A_SPRING)
-
-    def is_consistent(self, coefficients: Array, shape: Array, *, alone: bool = False) -> bool:
+    def is_consistent(self, coefficients: Array, shape: Array) -> bool:
         """Whether the gap that the link crosses is the one by which it moves."""
-        least = LEAST_MET if alone else 1.0 / SAME
-        return bool(least < coefficients[0] / shape[0] < SAME)
+        return bool(1.0 / SAME < coefficients[0] / shape[0] < SAME)
 
     def deflection(self, load: Array, inertia: Array, shape: Array, rate_hz: float) -> Array:
         """Place between and on the teeth; where no inertia is known that could swing, as on stiff ones."""

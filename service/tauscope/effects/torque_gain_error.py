@@ -24,7 +24,6 @@ class TorqueGainError(Effect):
     no_code = "it changes the recorded torque, not the arm's"
     revealing_motion = "fast motion of neighbouring joints that share inertia, or a known added mass"
     coefficients = (Coefficient("g", "1"),)
-    may_exceed_measured = True
 
     @classmethod
     def can_act(cls, context: ArmContext, joint: int) -> bool:

@@ -20,6 +20,9 @@ from tauscope.recording.recording import Array
 WITHIN = 0.9
 """Part of the way to the nearest body without volume that one step may take."""
 
+ROUNDING = 1e-10
+"""Added to the diagonal of a correlation matrix: what rounding takes off it."""
+
 _ROWS, _COLUMNS = np.array(UPPER_TRIANGLE).T
 _WEIGHT = np.where(_ROWS == _COLUMNS, 1.0, np.sqrt(2.0))
 _TRIANGLE = triangle_of_parameters()
@@ -105,7 +108,7 @@ class BodyPrior:
             precision[own, own] += _TRIANGLE.T @ congruence(inverse) @ _TRIANGLE
             slope[own] -= _TRIANGLE.T @ (_WEIGHT * inverse[_ROWS, _COLUMNS])
         scale = 1.0 / np.sqrt(np.diag(precision))
-        factor = cho_factor(scale[:, None] * precision * scale)
+        factor = cho_factor(scale[:, None] * precision * scale + ROUNDING * np.eye(len(scale)))
         centre = links - scale * cho_solve(factor, scale * slope)
         spread = scale[:, None] * cho_solve(factor, (self.base * scale).T)
         of_base = _inverse(self.base @ spread)
@@ -151,5 +154,5 @@ def _inverse(matrix: Array) -> Array:
     """Inverse of a positive definite matrix whose rows have different units."""
     scale = 1.0 / np.sqrt(np.diag(matrix))
     size = len(matrix)
-    factor = cho_factor(scale[:, None] * matrix * scale + 1e-12 * np.eye(size))
+    factor = cho_factor(scale[:, None] * matrix * scale + ROUNDING * np.eye(size))
     return np.asarray(scale[:, None] * cho_solve(factor, np.eye(size)) * scale)

@@ -16,10 +16,9 @@ from tauscope.diagnosis.evidence.moments import JointMoments
 from tauscope.diagnosis.evidence.scales import REST_BOUNDS, REST_SHARES
 from tauscope.diagnosis.fitting.projection import JointColumns
 from tauscope.diagnosis.fitting.regressor_noise import certainty, shared_errors
-from tauscope.diagnosis.fitting.white_columns import WhiteColumns
+from tauscope.diagnosis.fitting.white_columns import WhiteColumns, white_columns
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.observations.observations import Observations, Piece
-from tauscope.diagnosis.screening.screen import white_columns
 from tauscope.effects import Effect, Signals
 from tauscope.recording.recording import Array
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from tauscope.diagnosis.evidence.rows import weigh_rows
 from tauscope.diagnosis.findings.constancy import constancy
-from tauscope.diagnosis.findings.detectability import Detectable, detectable, detectable_parameters
+from tauscope.diagnosis.findings.detectability import Detectable, detectable, detectable_parameters, visibilities
 from tauscope.diagnosis.findings.diagnosed import Diagnosis, Selection
 from tauscope.diagnosis.findings.finding import Finding, FitSizes, in_order
 from tauscope.diagnosis.findings.location import locate
@@ -22,7 +22,6 @@ from tauscope.diagnosis.model.term import Place
 from tauscope.diagnosis.model.torque_scale import covariance_on_the_arm
 from tauscope.diagnosis.observations.observations import Observations
 from tauscope.diagnosis.observations.row_weighting import RowWeighting
-from tauscope.diagnosis.screening.screen import Screen
 from tauscope.diagnosis.search.from_recordings import Searched
 from tauscope.diagnosis.search.hypothesis import Hypothesis
 from tauscope.diagnosis.search.search import Rival, Step, Weighed
@@ -53,7 +52,7 @@ def conclude(identification: Identification, searched: Searched) -> Diagnosis:
         for fit, at in ((before, nominal), (after, final))
     )
     inflation = 1.0 if searched.pure_error else after.inflation()
-    screen, level = Screen(rows, searched.effects), LEVEL / max(len(searched.effects), 1)
+    level = LEVEL / max(len(searched.effects), 1)
     sizes = FitSizes.of(final.model, rows, _rows(unseen))
     findings = _findings(searched, selection, fitter, unseen, sizes)
     return Diagnosis(
@@ -67,7 +66,7 @@ def conclude(identification: Identification, searched: Searched) -> Diagnosis:
         misfit_after=misfit_after,
         constancy=constancy(fitter, after, None if unseen is None else unseen.fitter, inflation),
         detectable=(
-            *detectable(screen.candidates(before), level, inflation),
+            *detectable(visibilities(before, rows, searched.effects), level, inflation),
             *_detectable_constants(identification, after, level, inflation),
             Detectable(Payload.id, None, None, Payload.coefficients[0].unit, False),  # it is one with the last link
         ),
@@ -77,7 +76,6 @@ def conclude(identification: Identification, searched: Searched) -> Diagnosis:
         pure_error=searched.pure_error,
         level=level,
         cutoff_hz=searched.cutoff_hz,
-        screen=screen,
         fitter=fitter,
         held_out=unseen,
     )

@@ -15,7 +15,6 @@ from tauscope.diagnosis.findings.wrong_value import WrongValue
 from tauscope.diagnosis.fitting.fit import Fit, Fitter
 from tauscope.diagnosis.fitting.lack_of_fit import LackOfFit
 from tauscope.diagnosis.model.extended import ExtendedModel
-from tauscope.diagnosis.screening.screen import Screen
 from tauscope.effects import ArmContext
 from tauscope.identification import Identification
 from tauscope.identification.warnings import extrapolations
@@ -83,7 +82,6 @@ class Diagnosis:
     pure_error: bool
     level: float
     cutoff_hz: float
-    screen: Screen
     fitter: Fitter
     held_out: Unseen | None
     against: Literal["identified", "model", "simulation"] = "identified"

@@ -1,4 +1,4 @@
-"""How much better one model predicts held-out motion than another, joint by joint, and whether that confirms an effect.
+"""How much better one model predicts held-out motion than another, joint by joint.
 
 Errors of neighbouring samples are alike, so a standard error comes from sums over stretches of motion. With a_s and b_s
 the squared errors after and before, summed over stretch s of S, and ρ = Σ a_s / Σ b_s,
@@ -6,7 +6,6 @@ the squared errors after and before, summed over stretch s of S, and ρ = Σ a_s
     change of the rms = √ρ - 1,        σ(ρ) = √S std(a_s - ρ b_s) / Σ b_s.
 """
 
-from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,13 +78,3 @@ class HeldOutChange:
     def losing(self) -> list[int]:
         """Joints that are predicted worse."""
         return np.flatnonzero((self.standard > LOST) & (self.relative > SHOWN)).tolist()
-
-    def confirms(self, touched: Collection[int]) -> bool:
-        """Whether a joint on which an effect acts is predicted better and no joint worse.
-
-        Parameters
-        ----------
-        touched : collection of int
-            joints on which it acts, from 0
-        """
-        return bool((self.relative[list(touched)] < 0.0).any()) and not self.losing

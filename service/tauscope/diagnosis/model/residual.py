@@ -50,7 +50,7 @@ def raw_squares(model: ExtendedModel, observations: Observations) -> tuple[Array
     """
     count = observations.robot.joint_count
     squares, samples = [], np.zeros(count)
-    for piece in observations.as_measured or observations:
+    for piece in observations:
         signals, motion = _quiet(model.signals(piece), piece, model), piece.prepared.motion
         predicted = np.repeat(signals.torque[:, None], piece.repetitions, axis=1)
         for term in model.terms:

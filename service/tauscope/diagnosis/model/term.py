@@ -26,7 +26,6 @@ class Term:
     effect: Effect
     shape: Array
     coefficients: Array
-    displaced: tuple[int, ...] = ()
 
     @property
     def free_shapes(self) -> list[int]:

@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tauscope.diagnosis.fitting.white_columns import SHAPES_AT_ONCE
 from tauscope.diagnosis.model.term import Place, Term
-from tauscope.diagnosis.screening.refinement import POINTS, neighbours, spread
-from tauscope.diagnosis.screening.screen import SHAPES_AT_ONCE
 from tauscope.diagnosis.search.hypothesis import Hypothesis, Laboratory
+from tauscope.diagnosis.search.neighbourhood import POINTS, neighbours, spread
 from tauscope.diagnosis.search.scoring import SIZES, Scored, Scorer
 from tauscope.effects import Effect, Signals
 from tauscope.effects.computation import side_by_side

@@ -5,7 +5,7 @@ b ~ N(0, K) is what noise does to all columns at once; the tail of max_g bᵀ G_
 n_eff. No data are needed: it belongs to the design.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 from scipy import stats
@@ -14,23 +14,25 @@ from tauscope.diagnosis.fitting.projection import INVISIBLE, Moments
 from tauscope.recording.recording import Array
 
 DRAWS = 5000
+"""Draws: 250 of them lie beyond."""
+
 TAIL = 0.05
 """Share of the draws that lie beyond where the tails are compared."""
 
 
-def effective_number(found: Moments, columns: Sequence[Mapping[int, Array]], rng: np.random.Generator) -> float:
+def effective_number(found: Moments, columns: Mapping[int, Array], rng: np.random.Generator) -> float:
     """Effective number of shapes, at least 1.
 
     Parameters
     ----------
-    columns : sequence of mappings of int to (g_i, c, R_j) float64
-        the same shapes' whitened columns at every joint, in order
+    columns : mapping of int to (g, c, R_j) float64
+        the same shapes' whitened columns at every joint
     """
     shapes, count = found.target.shape
     inner = found.inner.reshape(shapes * count, -1)
     gram = -inner @ inner.T
-    for joint in columns[0]:
-        rows = np.concatenate([part[joint] for part in columns]).reshape(shapes * count, -1)
+    for own in columns.values():
+        rows = own.reshape(shapes * count, -1)
         gram += rows @ rows.T
     scale = np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
     values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
