@@ -137,3 +137,29 @@ def test_scales_of_highest_evidence_are_those_that_made_the_rows() -> None:
         (scales,) = model.most_probable([Scales.start(4.0)], [0])
         found.append([np.exp(scales.values[0]), np.exp(scales.values[1]), np.exp(scales.values[-1])])
     np.testing.assert_allclose(np.mean(found, axis=0), [2.0, 0.5, 3.0], rtol=0.08)
+
+
+@settings(max_examples=20)
+@given(SEEDS, st.floats(-3.0, 3.0))
+def test_a_parameter_that_is_held_keeps_its_value_and_tells_the_others_what_was_believed(
+    seed: int, value: float
+) -> None:
+    """Of the others, the conditional mean of the prior is believed."""
+    case = problem(seed)
+    held = case.model.hold(np.array([2]), np.array([value]))
+    mean, precision = case.model.mean, case.model.precision
+    others = np.array([0, 1, 3])
+    given = np.linalg.solve(precision[np.ix_(others, others)], precision[others, 2] * (value - mean[2]))
+    np.testing.assert_allclose(held.mean[others], mean[others] - given, atol=1e-4)
+    assert held.mean[2] == pytest.approx(value, abs=1e-4)
+    posterior = held.posterior(case.scales)
+    assert posterior.mean[2] == pytest.approx(value, abs=1e-3)
+    assert np.linalg.norm(posterior.spread[2]) < 1e-2
+
+
+@given(SEEDS)
+def test_to_hold_nothing_changes_nothing(seed: int) -> None:
+    model = problem(seed).model
+    held = model.hold(np.array([], dtype=np.intp), np.array([]))
+    np.testing.assert_allclose(held.mean, model.mean, atol=1e-9)
+    np.testing.assert_array_equal(held.precision, model.precision)
