@@ -32,8 +32,8 @@ class JointMoments:
         where each class begins
     products : (K, 1 + k + b, 1 + k + b) float64
         Z Zᵀ of each class
-    share : float
-        independent rows among all
+    counts : (K,) float64
+        independent rows of each class; one that tells less than a whole one counts as a part
     groups : (b,) int
         group of each feature; -1 for a column error of known size
     """
@@ -42,7 +42,7 @@ class JointMoments:
     rows: Array
     bounds: Index
     products: Array
-    share: float
+    counts: Array
     groups: Index
 
     @staticmethod
@@ -52,23 +52,18 @@ class JointMoments:
         columns: Array,
         features: Array,
         bounds: Index,
-        share: float,
+        counts: Array,
         groups: Index,
     ) -> "JointMoments":
         """From rows that are ordered by class."""
         rows = np.vstack([target[None], columns, features])
         products = np.stack([part @ part.T for part in _split(rows, bounds)])
-        return JointMoments(index, rows, bounds, products, share, groups)
+        return JointMoments(index, rows, bounds, products, counts, groups)
 
     @property
     def visible(self) -> int:
         """Rows of Z before the features: the target and the columns."""
         return 1 + len(self.index)
-
-    @property
-    def counts(self) -> Array:
-        """Independent rows of each class, (K,)."""
-        return self.share * np.diff(self.bounds)
 
     def against(self, columns: Array) -> tuple[Array, Array]:
         """Products of other columns with Z, (K, g, 1 + k + b), and of each with itself and its fellows, (K, s, c, c).
@@ -113,7 +108,7 @@ class JointMoments:
     def counting(self, share: float) -> "JointMoments":
         """The same rows, each counting as a share of one."""
         root = np.sqrt(share)
-        return replace(self, rows=root * self.rows, products=share * self.products, share=share * self.share)
+        return replace(self, rows=root * self.rows, products=share * self.products, counts=share * self.counts)
 
     def without(self, places: Index, values: Array) -> "JointMoments":
         """The same with some parameters held at a value.

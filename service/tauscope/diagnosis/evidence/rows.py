@@ -66,12 +66,11 @@ class EvidenceRows:
         order, certain, bounds, features, successions = [], [], [], [], []
         shared = 0
         for joint in range(observations.robot.joint_count):
-            near, stops = find_rest(observations, model, joint)
+            near, _ = find_rest(observations, model, joint)
             kinds = np.digitize(near, REST_BOUNDS)
             places = [np.flatnonzero(kinds == kind) for kind in range(len(REST_SHARES))]
             order.append(np.concatenate(places))
-            known = certainty(observations, model, joint, OPEN) * _weigh_stops(observations, model, joint, stops)
-            certain.append(known[order[-1]])
+            certain.append(weigh_rows(observations, model, joint)[order[-1]])
             bounds.append(np.cumsum([0, *map(len, places)]))
             smooth = smooth_features(observations, model, joint, reach)
             errors = shared_errors(observations, model, joint, np.ones(smooth.shape[1]))
@@ -134,9 +133,12 @@ class EvidenceRows:
         columns, smooth = self.take(joint, linear.rows, dependence), self.groups >= 0
         features = self.take(joint, self.features[joint], dependence)
         features[smooth] = beyond(columns[linear.index < plain], features[smooth])
-        share = self.observations.noise[joint].share / dependence
+        # Σ log(σ² + u²) over rows of uncertainty u grows with log σ² by 1 / (1 + u²/σ²) for each.
+        told = np.add.reduceat(np.append(self.certain[joint] ** 2, 0.0), self.bounds[joint][:-1])
+        told = np.where(np.diff(self.bounds[joint]) > 0, told, 0.0)
+        counts = told * self.observations.noise[joint].share / dependence
         target = self.take(joint, residual, dependence)
-        return JointMoments.of(linear.index, target, columns, features, self.bounds[joint], share, self.groups)
+        return JointMoments.of(linear.index, target, columns, features, self.bounds[joint], counts, self.groups)
 
     def dependence(self, joint: int, left: Array) -> float:
         """κ of what a model leaves beside its discrepancy.
@@ -185,6 +187,18 @@ def find_rest(observations: Observations, model: ExtendedModel, joint: int) -> t
         stops.append(np.where(own > 0, own + count, 0)[order:])
         count += int(own.max(initial=0))
     return near[kept], np.concatenate(stops)[kept]
+
+
+def weigh_rows(observations: Observations, model: ExtendedModel, joint: int) -> Array:
+    """How much every white row of a joint tells beside friction's step and at stops, (R,).
+
+    Parameters
+    ----------
+    joint : int
+        joint index, from 0
+    """
+    _, stops = find_rest(observations, model, joint)
+    return certainty(observations, model, joint, OPEN) * _weigh_stops(observations, model, joint, stops)
 
 
 def _weigh_stops(observations: Observations, model: ExtendedModel, joint: int, stops: NDArray[np.intp]) -> Array:

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from tauscope.diagnosis.evidence.rows import weigh_rows
 from tauscope.diagnosis.findings.constancy import constancy
 from tauscope.diagnosis.findings.detectability import Detectable, detectable, detectable_parameters
 from tauscope.diagnosis.findings.diagnosed import Diagnosis, Selection
@@ -14,12 +15,13 @@ from tauscope.diagnosis.findings.plain import states_friction
 from tauscope.diagnosis.findings.unseen import Unseen
 from tauscope.diagnosis.fitting.fit import Fit, Fitter
 from tauscope.diagnosis.fitting.lack_of_fit import lack_of_fit
-from tauscope.diagnosis.fitting.regressor_noise import weightings_of_motion
+from tauscope.diagnosis.fitting.regressor_noise import shared_errors
 from tauscope.diagnosis.fitting.spilled_misfit import without_spilled
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.model.term import Place
 from tauscope.diagnosis.model.torque_scale import covariance_on_the_arm
 from tauscope.diagnosis.observations.observations import Observations
+from tauscope.diagnosis.observations.row_weighting import RowWeighting
 from tauscope.diagnosis.screening.screen import Screen
 from tauscope.diagnosis.search.from_recordings import Searched
 from tauscope.diagnosis.search.hypothesis import Hypothesis
@@ -46,8 +48,10 @@ def conclude(identification: Identification, searched: Searched) -> Diagnosis:
     fitter, unseen = Fitter(rows), _unseen(searched, final, rows)
     before, after = _fit(nominal, fitter), _fit(final, fitter)
     selection = Selection(before, after)
-    misfit_before = lack_of_fit(before, rows, pure_error=searched.pure_error)
-    misfit_after = lack_of_fit(after, rows, pure_error=searched.pure_error)
+    misfit_before, misfit_after = (
+        lack_of_fit(fit, rows, None if searched.pure_error else at.dependence, pure_error=searched.pure_error)
+        for fit, at in ((before, nominal), (after, final))
+    )
     inflation = 1.0 if searched.pure_error else after.inflation()
     screen, level = Screen(rows, searched.effects), LEVEL / max(len(searched.effects), 1)
     sizes = FitSizes.of(final.model, rows, _rows(unseen))
@@ -83,15 +87,23 @@ def _with_noise(rows: Observations, at: Hypothesis) -> Observations:
     """Rows with the noise that a hypothesis finds, weighed by its friction."""
     pairs = zip(rows.noise, at.scales, strict=True)
     known = rows.with_noise([own.times(float(np.exp(scales.values[0]))) for own, scales in pairs])
-    return known.with_weightings(weightings_of_motion(known, at.model))
+    return _weigh(known, at)
+
+
+def _weigh(rows: Observations, at: Hypothesis) -> Observations:
+    """Rows as much as they tell by a hypothesis' friction."""
+    weightings = []
+    for joint in range(len(rows.noise)):
+        weights = weigh_rows(rows, at.model, joint)
+        weightings.append(RowWeighting.of(weights, shared_errors(rows, at.model, joint, weights)))
+    return rows.with_weightings(weightings)
 
 
 def _unseen(searched: Searched, at: Hypothesis, rows: Observations) -> Unseen | None:
     """Held-out rows under the noise of training."""
     if searched.unseen is None:
         return None
-    known = searched.unseen.with_noise(rows.noise)
-    return Unseen(known.with_weightings(weightings_of_motion(known, at.model)))
+    return Unseen(_weigh(searched.unseen.with_noise(rows.noise), at))
 
 
 def _rows(unseen: Unseen | None) -> Observations | None:

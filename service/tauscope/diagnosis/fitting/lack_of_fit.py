@@ -5,6 +5,7 @@ more of the residual's energy per direction than the rest does (F test: an error
 *Pure error*: the mean over repetitions differs from the model by no more than repetitions differ among themselves.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,8 +72,21 @@ class LackOfFit:
         return [bool(min(a, b) < RARE) for a, b in zip(self.omnibus, self.pure_error, strict=True)]
 
 
-def lack_of_fit(fit: Fit, observations: Observations, *, pure_error: bool, seed: int = 0) -> LackOfFit:
-    """Test what a model leaves."""
+def lack_of_fit(
+    fit: Fit,
+    observations: Observations,
+    dependence: Sequence[float] | None = None,
+    *,
+    pure_error: bool,
+    seed: int = 0,
+) -> LackOfFit:
+    """Test what a model leaves.
+
+    Parameters
+    ----------
+    dependence : sequence of float or None
+        number of rows of each joint that count as one; None where each does
+    """
     joints = observations.robot.joint_count
     omnibus, pure = np.ones(joints), np.ones(joints)
     excess, measurable, structured = np.zeros(joints), np.zeros(joints), np.zeros(joints)
@@ -80,10 +94,11 @@ def lack_of_fit(fit: Fit, observations: Observations, *, pure_error: bool, seed:
     share = fit.projection.spread.shape[1] / max(rows, 1.0)
     repeated = pure_error_rows(observations)
     freedoms = [
-        noise.share * len(residual) * (1.0 - share)
-        for noise, residual in zip(observations.noise, fit.projection.residual, strict=True)
+        observations.independent_rows(joint, residual) * (1.0 - share)
+        for joint, residual in enumerate(fit.projection.residual)
     ]
-    tests = side_by_side(lambda joint: _omnibus(fit, observations, joint, freedoms[joint], seed), range(joints))
+    independent = [freedom / rows for freedom, rows in zip(freedoms, dependence or [1.0] * joints, strict=True)]
+    tests = side_by_side(lambda joint: _omnibus(fit, observations, joint, independent[joint], seed), range(joints))
     for joint, residual in enumerate(fit.projection.residual):
         omnibus[joint], beyond_chance = tests[joint]
         freedom = freedoms[joint]

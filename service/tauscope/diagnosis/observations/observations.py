@@ -260,6 +260,19 @@ class Observations:
         counted = whitened if kept.all() else whitened[..., kept]
         return self.weightings[joint].applied(counted) if self.weightings else counted
 
+    def independent_rows(self, joint: int, rows: Array) -> float:
+        """Number of independent rows of a joint; one that tells less than a whole one counts as a part.
+
+        Parameters
+        ----------
+        joint : int
+            joint index, from 0
+        rows : (R,) float64
+            its white rows
+        """
+        told = float(np.sum(self.weightings[joint].weights ** 2)) if self.weightings else float(len(rows))
+        return self.noise[joint].share * told
+
     def kept(self, joint: int) -> BoolArray:
         """Mask of the whitened rows that count, (rows,).
 
