@@ -18,8 +18,12 @@ def coloured(correlation: float, seed: int, rows: int = ROWS) -> Array:
     return np.asarray(lfilter([1.0], [1.0, -correlation], np.random.default_rng(seed).standard_normal(rows)))
 
 
+def instants_of(rows: int) -> Array:
+    return np.arange(0, rows, dtype=np.float64) / 10.0
+
+
 def unbroken(rows: int) -> Succession:
-    return Succession.of(np.zeros(rows, dtype=np.intp), 0.1 * np.arange(rows))
+    return Succession.of(np.zeros(rows, dtype=np.intp), instants_of(rows))
 
 
 @pytest.mark.parametrize("correlation", [0.2, 0.5, 0.7])
@@ -60,7 +64,7 @@ def test_rows_that_are_nothing_count_as_one_each() -> None:
 
 @pytest.mark.parametrize("broken_by", ["recording", "gap", "going back"])
 def test_a_gap_breaks_a_stretch(broken_by: str) -> None:
-    recording, instants = np.zeros(100, dtype=np.intp), 0.1 * np.arange(100)
+    recording, instants = np.zeros(100, dtype=np.intp), instants_of(100)
     if broken_by == "recording":
         recording[40:] = 1
     elif broken_by == "gap":
@@ -72,5 +76,5 @@ def test_a_gap_breaks_a_stretch(broken_by: str) -> None:
 
 def test_rows_beyond_a_gap_are_no_neighbours() -> None:
     """Where each row is a stretch of its own, none resembles its predecessor."""
-    alone = Succession.of(np.arange(ROWS), 0.1 * np.arange(ROWS))
+    alone = Succession.of(np.arange(ROWS), instants_of(ROWS))
     assert alone.dependence(coloured(0.7, 3)) == 1.0

@@ -1,5 +1,7 @@
 """Rows of a stop: friction there is one unknown value up to breakaway, however long the stop is."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -56,3 +58,13 @@ def test_rows_that_count_as_one_another_tell_less_by_the_root_of_their_number() 
     white = rows.white.measured(JOINT)
     np.testing.assert_allclose(rows.take(JOINT, white, 4.0), rows.take(JOINT, white, 1.0) / 2.0)
     assert rows.measured_rms(JOINT, 4.0) == pytest.approx(rows.measured_rms(JOINT, 1.0) / 2.0)
+
+
+def test_a_row_that_tells_less_counts_as_a_part_of_one() -> None:
+    observations, model = nominal_rows()
+    rows = EvidenceRows.prepare(stopping(observations, JOINT, *STOPS), model)
+    moments = rows.moments(model, [2.0] * observations.robot.joint_count)
+    share = observations.noise[JOINT].share / 2.0
+    bounds, certain = rows.bounds[JOINT], rows.certain[JOINT]
+    expected = [share * float((certain[first:last] ** 2).sum()) for first, last in pairwise(bounds)]
+    np.testing.assert_allclose(moments[JOINT].counts, expected)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tauscope.diagnosis.search.window import FEWEST, SHORTEST, STRETCHES, window_log_odds
 
 Array = NDArray[np.float64]
+Inside = NDArray[np.bool_]
 ROWS = 600
 
 
@@ -29,7 +30,7 @@ class Labels:
         return np.zeros(self.rows, dtype=np.intp), np.arange(self.rows) / 25.0
 
 
-def log_odds(residual: Array, inside: Array, explained: Array, sigma: float = 1.0) -> float:
+def log_odds(residual: NDArray[Any], inside: Inside, explained: NDArray[Any], sigma: float = 1.0) -> float:
     """Of one joint, where an effect that is one inside its window takes this from a residual."""
     shuffled = np.random.default_rng(0).permutation(len(residual))
     left = {"before": [residual], "after": [residual - explained]}
@@ -48,7 +49,7 @@ def log_odds(residual: Array, inside: Array, explained: Array, sigma: float = 1.
     return window_log_odds(before, after, term, laboratory)
 
 
-def window(first: int, count: int) -> Array:
+def window(first: int, count: int) -> Inside:
     return (np.arange(ROWS) >= first) & (np.arange(ROWS) < first + count)
 
 
