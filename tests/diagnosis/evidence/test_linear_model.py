@@ -134,15 +134,7 @@ def test_scales_of_highest_evidence_are_those_that_made_the_rows() -> None:
         columns, features = draws.standard_normal((3, 1200)), draws.standard_normal((60, 1200))
         noise = 2.0 * draws.standard_normal(1200) * np.where(np.arange(1200) < 900, 1.0, np.sqrt(1.0 + 9.0))
         target = columns.sum(axis=0) + 0.5 * draws.standard_normal(60) @ features + noise
-        own = JointMoments.of(
-            np.arange(3),
-            target,
-            columns,
-            features,
-            bounds,
-            np.diff(bounds).astype(np.float64),
-            np.zeros(60, dtype=np.intp),
-        )
+        own = JointMoments.of(np.arange(3), target, columns, features, bounds, counts, groups)
         model = LinearModel((own,), np.zeros(3), np.eye(3))
         (scales,) = model.most_probable([Scales.start(4.0)], [0])
         found.append([np.exp(scales.values[0]), np.exp(scales.values[1]), np.exp(scales.values[-1])])
