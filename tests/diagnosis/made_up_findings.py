@@ -57,7 +57,7 @@ def finding(
 
 def rival(effect: Effect) -> Any:
     """What explains nearly as much."""
-    return SimpleNamespace(candidate=SimpleNamespace(effect=effect))
+    return SimpleNamespace(term=Term(effect, np.zeros(len(effect.shapes)), np.zeros(len(effect.coefficients))))
 
 
 def words_of(*findings: Finding) -> Diagnosis:
