@@ -144,9 +144,9 @@ def compared(diagnosis: Diagnosis, given: Given, kind: Literal["model", "simulat
     found = with_plain_terms(plain, given.lacking)
     fit = found.selection.fit
     size, structure = fit.model.structure.size, fit.model.structure
-    covariance = fit.covariance[:size, :size] * found.inflation
+    covariance = fit.free_covariance[:size, :size] * found.inflation
     covariance = covariance if given.covariance is None else covariance + given.covariance
-    names, real = list(structure.names), fit.model.parameters.copy()
+    names, real = list(structure.names), fit.free_parameters.copy()
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     count, several = structure.base_count, _several(len(given.values))
     explanations: list[Explanation] = []

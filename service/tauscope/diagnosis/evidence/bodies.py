@@ -108,11 +108,23 @@ class BodyPrior:
             precision[own, own] += _TRIANGLE.T @ congruence(inverse) @ _TRIANGLE
             slope[own] -= _TRIANGLE.T @ (_WEIGHT * inverse[_ROWS, _COLUMNS])
         scale = 1.0 / np.sqrt(np.diag(precision))
-        factor = cho_factor(scale[:, None] * precision * scale + ROUNDING * np.eye(len(scale)))
+        factor = _factor(scale[:, None] * precision * scale)
         centre = links - scale * cho_solve(factor, scale * slope)
         spread = scale[:, None] * cho_solve(factor, (self.base * scale).T)
         of_base = _inverse(self.base @ spread)
         return NormalBodies(centre, spread @ of_base, self.base @ centre, of_base)
+
+    def energy(self, links: Array) -> float:
+        """-2 log p of bodies, but for a constant.
+
+        Parameters
+        ----------
+        links : (10 n,) float64
+            standard parameters of bodies with volume
+        """
+        off = links - self.mean
+        volumes = sum(float(np.linalg.slogdet(pseudo_inertia(links[own]))[1]) for own in _each(links))
+        return float(off @ self.precision @ off) - 2.0 * volumes
 
     def share(self, links: Array, step: Array) -> float:
         """Part of a step that leaves every link its volume, at most 1.
@@ -150,9 +162,17 @@ def _each(links: Array) -> list[slice]:
     return [slice(first, first + 10) for first in range(0, len(links), 10)]
 
 
+def _factor(correlation: Array) -> tuple[Array, bool]:
+    """Cholesky factor of a correlation matrix, whose least eigenvalues rounding may have made negative."""
+    try:
+        return cho_factor(correlation)
+    except np.linalg.LinAlgError:
+        return cho_factor(correlation + ROUNDING * np.eye(len(correlation)))
+
+
 def _inverse(matrix: Array) -> Array:
     """Inverse of a positive definite matrix whose rows have different units."""
     scale = 1.0 / np.sqrt(np.diag(matrix))
     size = len(matrix)
-    factor = cho_factor(scale[:, None] * matrix * scale + ROUNDING * np.eye(size))
+    factor = _factor(scale[:, None] * matrix * scale)
     return np.asarray(scale[:, None] * cho_solve(factor, np.eye(size)) * scale)

@@ -54,6 +54,16 @@ class Fit:
         """Covariance of all parameters for white noise of the modelled size, (p, p)."""
         return self.spread @ self.spread.T
 
+    @property
+    def free_parameters(self) -> Array:
+        """Θ as the data alone have it, (p,)."""
+        return self.model.parameters + self.projection.step[: self.model.structure.size]
+
+    @property
+    def free_covariance(self) -> Array:
+        """Covariance of all parameters as the data alone have it, (p, p)."""
+        return self.projection.spread @ self.projection.spread.T
+
     def inflation(self) -> float:
         """Residual energy per degree of freedom, at least 1: by this factor more is left than the modelled noise."""
         return max(1.0, self.energy / self.projection.freedom)

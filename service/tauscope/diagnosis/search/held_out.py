@@ -1,7 +1,7 @@
 """What a hypothesis predicts of motion that it has not seen, joint by joint."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -11,7 +11,11 @@ from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.model.residual import residual_rows
 from tauscope.diagnosis.observations.observations import Observations
 from tauscope.diagnosis.search.hypothesis import Hypothesis
+from tauscope.effects.computation import LastFew
 from tauscope.recording.recording import Array
+
+MODELS_KEPT = 16
+"""Models whose errors are kept: each is compared with several others."""
 
 BLOCKS = 24
 """Stretches of motion by which the standard error of a change is told."""
@@ -77,6 +81,7 @@ class HeldOut:
     """Held-out recordings in the band of the training rows; their rows are not whitened."""
 
     observations: Observations
+    _known: LastFew[int, tuple[ExtendedModel, list[Array]]] = field(default_factory=lambda: LastFew(MODELS_KEPT))
 
     def change(self, before: Hypothesis, after: Hypothesis) -> Change:
         """What a second hypothesis predicts better than a first."""
@@ -90,6 +95,9 @@ class HeldOut:
 
     def _errors(self, model: ExtendedModel) -> list[Array]:
         """Measured less predicted torque of every joint, (R,)."""
+        return self._known.get(id(model), lambda: (model, self._make_errors(model)))[1]
+
+    def _make_errors(self, model: ExtendedModel) -> list[Array]:
         return [np.concatenate([rows[0] for rows in pieces]) for pieces in residual_rows(model, self.observations)]
 
     def _compare_joint(

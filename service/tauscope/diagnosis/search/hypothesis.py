@@ -35,6 +35,9 @@ LARGEST_SHAPE_STEP = 0.15
 HALVINGS = (1.0, 0.5, 0.25, 0.1)
 """Parts of a step that are tried until the data are more probable."""
 
+NEAR = 3
+"""Steps to parameters by which proposals are ranked."""
+
 STEPS = 8
 """Most steps to the most probable parameters."""
 
@@ -55,6 +58,8 @@ class Hypothesis:
         one entry a joint
     dependence : tuple of float
         κ of every joint
+    body_energy : float
+        -2 log probability of the links
     """
 
     model: ExtendedModel
@@ -63,6 +68,7 @@ class Hypothesis:
     bodies: NormalBodies
     scales: tuple[Scales, ...]
     dependence: tuple[float, ...]
+    body_energy: float
 
     @cached_property
     def posterior(self) -> Posterior:
@@ -77,7 +83,9 @@ class Hypothesis:
     @cached_property
     def misfit(self) -> float:
         """-2 log probability of data and parameters as they are, but for what depends on the scales alone."""
-        believed = float(self.linear.mean @ self.linear.precision @ self.linear.mean)
+        others = slice(len(self.bodies.mean), None)
+        off = self.linear.mean[others]
+        believed = self.body_energy + float(off @ self.linear.precision[others, others] @ off)
         pairs = zip(self.linear.joints, self.scales, strict=True)
         return believed + sum(float(own.weighted(scales).products[0, 0]) for own, scales in pairs)
 
@@ -162,25 +170,26 @@ class Laboratory:
         precision[diagonal, diagonal] = 1.0 / spread[plain:] ** 2
         linear = LinearModel(self.rows.moments(model, dependence, owned=owned), mean, precision)
         linear = _hold_impossible(linear, model, scales)
-        return Hypothesis(model, tuple(sizes), linear, bodies, tuple(scales), tuple(dependence))
+        energy = self.prior.bodies.energy(model.links)
+        return Hypothesis(model, tuple(sizes), linear, bodies, tuple(scales), tuple(dependence), energy)
 
     def settle(self, start: Hypothesis, joints: Collection[int]) -> Hypothesis:
         """The most probable parameters, and scales of highest evidence at some joints."""
         at = self.weigh(self.tune(start, joints), joints)
+        estimate = self.approach(at, STEPS)
+        return self.weigh(self.at(estimate.model, at.sizes, at.scales, at.dependence), joints)
+
+    def approach(self, at: Hypothesis, steps: int = NEAR) -> Hypothesis:
+        """The hypothesis after a few steps towards its most probable parameters, its effects believed."""
         estimate = self._own(at)
-        for _ in range(STEPS):
+        for _ in range(steps):
             nearer = self._nearer(estimate)
             if nearer is None:
                 break
             gained, estimate = estimate.misfit - nearer.misfit, nearer
             if gained < 2.0 * PROGRESS:
                 break
-        return self.weigh(self.at(estimate.model, at.sizes, at.scales, at.dependence), joints)
-
-    def approach(self, at: Hypothesis) -> Hypothesis:
-        """The hypothesis after one step towards its most probable parameters."""
-        estimate = self._own(at)
-        return self._nearer(estimate) or estimate
+        return estimate
 
     def _own(self, at: Hypothesis) -> Hypothesis:
         """The same with all effects believed, so that the discrepancy takes no part of them, and independent rows."""

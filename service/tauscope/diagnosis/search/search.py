@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cmp_to_key
 
 import numpy as np
 
@@ -185,8 +186,8 @@ class Search:
         before = self.laboratory.tune(self.laboratory.under(without, at.dependence, touched), touched)
         effect, shared = at.model.terms[places[0]].effect, set(touched)
         lasts = not isinstance(effect, TimeLocalEffect)
-        log_odds = at.log_evidence - before.log_evidence + self._prior_odds(effect)
-        log_odds += 0.0 if self.held_out is None else self.held_out.change(without, at).log_odds
+        trained = at.log_evidence - before.log_evidence + self._prior_odds(effect)
+        log_odds = trained + (0.0 if self.held_out is None else self.held_out.change(without, at).log_odds)
         own, others = (effect.id, effect.joint), _places(without)
 
         def competes(each: Effect) -> bool:
@@ -199,8 +200,8 @@ class Search:
         rivals = []
         for proposal in (each for each in proposals if self._log_odds(each) > 0.0):
             nearer = self.laboratory.approach(self._add(without, proposal))
-            odds = self._log_odds(proposal)
-            odds += 0.0 if self.held_out is None else self.held_out.change(without, nearer).log_odds
+            odds = log_odds - trained + self._log_odds(proposal)
+            odds += 0.0 if self.held_out is None else self.held_out.change(at, nearer).log_odds
             rivals.append(Rival(nearer.model.terms[-1], nearer.model, odds))
         rivals.sort(key=lambda each: -each.log_odds)
         return Weighed(places, without, log_odds, tuple(rivals), tuple(proposals))
@@ -223,20 +224,26 @@ class Search:
     def _best(self, at: Hypothesis, proposals: list[Proposal]) -> tuple[list[Step], Hypothesis | None]:
         """The most probable proposal that held-out motion does not contradict, after those that it does."""
         refusals: list[Step] = []
-        worth = [each for each in proposals if self._is_worth_a_try(each)]
-        for proposal in sorted(worth, key=lambda each: -self._foresee(at, each)) if len(worth) > 1 else worth:
+        for proposal in self._rank(at, [each for each in proposals if self._is_worth_a_try(each)]):
             step, found = self._try(at, proposal, proposals)
             if step.is_confirmed:
                 return [*refusals, step], found
             refusals.append(step)
         return refusals, None
 
-    def _foresee(self, at: Hypothesis, proposal: Proposal) -> float:
-        """Log odds of a proposal after all motion, at parameters one step from those at hand."""
-        if self.held_out is None:
-            return self._log_odds(proposal)
-        nearer = self.laboratory.approach(self._add(at, proposal))
-        return self._log_odds(proposal) + self.held_out.change(at, nearer).log_odds
+    def _rank(self, at: Hypothesis, proposals: Sequence[Proposal]) -> list[Proposal]:
+        """Proposals after all motion, the most probable first."""
+        if self.held_out is None or len(proposals) < 2:
+            return list(proposals)
+        held_out = self.held_out
+        nearer = {id(each): self.laboratory.approach(self._add(at, each)) for each in proposals}
+
+        def compare(one: Proposal, other: Proposal) -> float:
+            """Log odds of the other. What both predict alike says nothing: they are compared with each other."""
+            found = held_out.change(nearer[id(one)], nearer[id(other)]).log_odds
+            return found + self._log_odds(other) - self._log_odds(one)
+
+        return sorted(proposals, key=cmp_to_key(lambda one, other: int(np.sign(compare(one, other)))))
 
     def _add(self, at: Hypothesis, proposal: Proposal) -> Hypothesis:
         return self.laboratory.with_term(self.laboratory.paint(at, proposal.found), proposal.term, proposal.size)
