@@ -20,7 +20,7 @@ ORDER = 3
 """Predecessors that a row may resemble."""
 
 RIDGE = 0.01
-"""Part of the rows' power that is added to the autocovariance at lag 0: κ is no larger than the inverse of its root."""
+"""Part of the rows' power that is added to the autocovariance at lag 0, so that κ stays finite."""
 
 BROKEN = 1.5
 """Time between two rows, in usual ones, from which the second does not follow the first."""

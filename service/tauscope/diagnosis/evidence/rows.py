@@ -1,7 +1,7 @@
-"""The rows of a diagnosis as evidence sees them: those of stops left out, the others in classes of rest.
+"""The rows of a diagnosis as evidence sees them, in classes of rest.
 
 Near rest friction takes any value up to breakaway, which no curve of the velocity says: those rows have a variance of
-their own (`Scales`), and those of a stop, where friction holds with whatever torque there is, say nothing.
+their own (`Scales`). All rows of a stop count as one, whose friction is unknown up to breakaway.
 """
 
 from collections.abc import Sequence

@@ -18,6 +18,7 @@ from tauscope.diagnosis.fitting.lack_of_fit import lack_of_fit
 from tauscope.diagnosis.fitting.regressor_noise import shared_errors
 from tauscope.diagnosis.fitting.spilled_misfit import without_spilled
 from tauscope.diagnosis.model.extended import ExtendedModel
+from tauscope.diagnosis.model.nominal import delivered_model
 from tauscope.diagnosis.model.term import Place
 from tauscope.diagnosis.model.torque_scale import covariance_on_the_arm
 from tauscope.diagnosis.observations.observations import Observations
@@ -46,6 +47,8 @@ def conclude(identification: Identification, searched: Searched) -> Diagnosis:
     rows = _with_noise(searched.rows, final)
     fitter, unseen = Fitter(rows), _unseen(searched, final, rows)
     before, after = _fit(nominal, fitter), _fit(final, fitter)
+    if not final.model.terms:  # the best of possible bodies is the one that the identification delivers
+        before = after = replace(fitter.projected(delivered_model(identification)), spread=after.spread)
     selection = Selection(before, after)
     misfit_before, misfit_after = (
         lack_of_fit(fit, rows, None if searched.pure_error else at.dependence, pure_error=searched.pure_error)
@@ -53,7 +56,7 @@ def conclude(identification: Identification, searched: Searched) -> Diagnosis:
     )
     inflation = 1.0 if searched.pure_error else after.inflation()
     level = LEVEL / max(len(searched.effects), 1)
-    sizes = FitSizes.of(final.model, rows, _rows(unseen))
+    sizes = FitSizes.of(after.model, rows, _rows(unseen))
     findings = _findings(searched, selection, fitter, unseen, sizes)
     return Diagnosis(
         identification=identification,
@@ -70,7 +73,7 @@ def conclude(identification: Identification, searched: Searched) -> Diagnosis:
             *_detectable_constants(identification, after, level, inflation),
             Detectable(Payload.id, None, None, Payload.coefficients[0].unit, False),  # it is one with the last link
         ),
-        before=FitSizes.of(nominal.model, rows, _rows(unseen)),
+        before=FitSizes.of(before.model, rows, _rows(unseen)),
         after=sizes,
         noise_std=identification.residuals.noise_std,
         pure_error=searched.pure_error,
