@@ -9,7 +9,7 @@ from tauscope.diagnosis.fitting.white_columns import SHAPES_AT_ONCE
 from tauscope.diagnosis.model.term import Place, Term
 from tauscope.diagnosis.search.hypothesis import Hypothesis, Laboratory
 from tauscope.diagnosis.search.neighbourhood import POINTS, neighbours, spread
-from tauscope.diagnosis.search.scoring import SIZES, Scored, Scorer
+from tauscope.diagnosis.search.scoring import SIZES, Scored, Scorer, unnamed_log_odds
 from tauscope.effects import Effect, Signals
 from tauscope.effects.computation import side_by_side
 from tauscope.identification.excitation import thin
@@ -38,6 +38,8 @@ class Proposal:
         the same on the grid if nothing without a name were left out
     size : (c,) float64
         standard deviation believed of its coefficients
+    unnamed : float
+        log Bayes factor of torque without a name in its place
     found : Hypothesis
         with it, its coefficients at zero
     """
@@ -46,6 +48,7 @@ class Proposal:
     size: Array
     log_factor: float
     log_factor_alone: float
+    unnamed: float
     found: Hypothesis
 
     @property
@@ -124,7 +127,7 @@ class Proposer:
         sized = float(np.log(2.0)) * one_sided - float(np.log(len(SIZES)))
         before = self.laboratory.tune(self.laboratory.under(at, found.dependence, joints), joints)
         factor = found.log_evidence - before.log_evidence + averaged + sized
-        return Proposal(term, size, factor, alone.log_evidence, found)
+        return Proposal(term, size, factor, alone.log_evidence, unnamed_log_odds(at), found)
 
     def _extend(self, effect: Effect, shape: Array, size: Array, at: Hypothesis) -> Hypothesis:
         """A hypothesis with an effect of a given shape, under scales of highest evidence."""

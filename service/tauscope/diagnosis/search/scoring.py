@@ -130,6 +130,11 @@ def _factors(effect: Effect, shapes: Array, left: Array, outside: Array, mutual:
     return Scored(effect, shapes, np.where(possible, found, -np.inf), coefficients, sizes[best, every])
 
 
+def unnamed_log_odds(at: Hypothesis) -> float:
+    """Log Bayes factor of torque without a name, against none."""
+    return at.log_evidence - at.linear.evidence(_without_discrepancy(at))
+
+
 def _without_discrepancy(at: Hypothesis) -> tuple[Scales, ...]:
     """Scales of a covariance without discrepancy: its noise is all that the model leaves."""
     found = []

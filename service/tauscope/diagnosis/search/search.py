@@ -11,6 +11,7 @@ from tauscope.diagnosis.model.term import Place, Term
 from tauscope.diagnosis.search.held_out import Change, HeldOut
 from tauscope.diagnosis.search.hypothesis import Hypothesis, Laboratory
 from tauscope.diagnosis.search.proposals import Proposal, Proposer
+from tauscope.diagnosis.search.scoring import unnamed_log_odds
 from tauscope.diagnosis.search.window import window_log_odds
 from tauscope.effects import Effect, TimeLocalEffect
 from tauscope.effects.computation import side_by_side
@@ -186,7 +187,7 @@ class Search:
         before = self.laboratory.tune(self.laboratory.under(without, at.dependence, touched), touched)
         effect, shared = at.model.terms[places[0]].effect, set(touched)
         lasts = not isinstance(effect, TimeLocalEffect)
-        trained = at.log_evidence - before.log_evidence + self._prior_odds(effect)
+        trained = at.log_evidence - before.log_evidence + self._prior_odds(effect, unnamed_log_odds(before))
         log_odds = trained + (0.0 if self.held_out is None else self.held_out.change(without, at).log_odds)
         own, others = (effect.id, effect.joint), _places(without)
 
@@ -265,18 +266,23 @@ class Search:
         return Step(proposal, log_odds, rivals, change, confirmed, at.model, found.model, covariance, trained), found
 
     def _log_odds(self, proposal: Proposal) -> float:
-        return proposal.log_factor + self._prior_odds(proposal.term.effect)
+        return proposal.log_factor + self._prior_odds(proposal.term.effect, proposal.unnamed)
 
     def _is_worth_a_try(self, proposal: Proposal) -> bool:
         """Whether an effect is about as probable as torque without a name, and far more than none."""
-        alone = proposal.log_factor_alone + self._prior_odds(proposal.term.effect)
+        alone = proposal.log_factor_alone + self._prior_odds(proposal.term.effect, 0.0)
         return self._log_odds(proposal) > (-CATALOGUED if alone > CATALOGUED else 0.0)
 
-    def _prior_odds(self, effect: Effect) -> float:
-        """Log odds before the data: one effect at one place is missing, whichever."""
+    def _prior_odds(self, effect: Effect, unnamed: float) -> float:
+        """Log odds before the data, that one effect at one place is missing, whichever.
+
+        Torque without a name needs odds of its own: something is missing at one of the joints, and in no catalogue.
+        """
         if effect.is_expected:
             return 0.0
-        return -float(np.log(len({(each.id, each.joint) for each in self.proposer.effects})))
+        sites = len({(each.id, each.joint) for each in self.proposer.effects})
+        joints = self.laboratory.rows.observations.robot.joint_count
+        return float(np.clip(unnamed, 0.0, CATALOGUED + np.log(joints)) - np.log(sites))
 
     def _without_superfluous(self, at: Hypothesis, first: int) -> Hypothesis:
         """The same without effects that the later ones made superfluous.
@@ -302,7 +308,7 @@ class Search:
         steps[: len(term.coefficients)] = -term.coefficients
         reduced = at.linear.without(np.arange(own.start, own.stop), steps)
         scales = reduced.most_probable(at.scales, effect.touched(len(at.scales)))
-        return reduced.evidence(scales) - at.log_evidence - self._prior_odds(effect)
+        return reduced.evidence(scales) - at.log_evidence - self._prior_odds(effect, 0.0)
 
 
 @dataclass(frozen=True)
