@@ -44,7 +44,7 @@ LEVEL = 0.01
 def conclude(identification: Identification, searched: Searched) -> Diagnosis:
     """All that a search comes to."""
     nominal, final = searched.found.nominal, searched.found.hypothesis
-    rows = _with_noise(searched.rows, final)
+    rows = _weigh(searched.rows if searched.pure_error else _with_noise(searched.rows, final), final)
     fitter, unseen = Fitter(rows), _unseen(searched, final, rows)
     before, after = _fit(nominal, fitter), _fit(final, fitter)
     if not final.model.terms:  # the best of possible bodies is the one that the identification delivers
@@ -85,10 +85,9 @@ def conclude(identification: Identification, searched: Searched) -> Diagnosis:
 
 
 def _with_noise(rows: Observations, at: Hypothesis) -> Observations:
-    """Rows with the noise that a hypothesis finds, weighed by its friction."""
+    """Rows with the noise that a hypothesis finds."""
     pairs = zip(rows.noise, at.scales, strict=True)
-    known = rows.with_noise([own.times(float(np.exp(scales.values[0]))) for own, scales in pairs])
-    return _weigh(known, at)
+    return rows.with_noise([own.times(float(np.exp(scales.values[0]))) for own, scales in pairs])
 
 
 def _weigh(rows: Observations, at: Hypothesis) -> Observations:

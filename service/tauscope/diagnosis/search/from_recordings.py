@@ -72,7 +72,7 @@ def search(
     white = repeated or bare.with_noise(white_noise(bare, model, band_share(bare)))
     rows = EvidenceRows.prepare(white, model)
     progress("compare effects")
-    laboratory = Laboratory(rows, Prior.of(identification, model))
+    laboratory = Laboratory(rows, Prior.of(identification, model), repeated is not None)
     known = [*_rotors(identification, effects), *(each.term for each in direct_terms(deflections, setting))]
     nominal = _with_known(laboratory.start(model), laboratory, known)
     unseen = None

@@ -120,10 +120,15 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class Laboratory:
-    """Makes hypotheses about the same rows."""
+    """Makes hypotheses about the same rows.
+
+    repeated : bool
+        whether repetitions of the motion tell the noise
+    """
 
     rows: EvidenceRows
     prior: Prior
+    repeated: bool = False
 
     def start(self, model: ExtendedModel) -> Hypothesis:
         """The nominal model with bodies that have volume, under scales of highest evidence."""
@@ -135,7 +140,7 @@ class Laboratory:
         dependence = [1.0] * model.structure.robot.joint_count
         moments = self.rows.moments(nominal, dependence)
         levels = [float(np.sqrt(np.mean(own.rows[0] ** 2))) if own.rows.size else 1.0 for own in moments]
-        at = self.at(nominal, (), tuple(map(Scales.start, levels)), dependence)
+        at = self.at(nominal, (), tuple(Scales.start(level, repeated=self.repeated) for level in levels), dependence)
         return self.settle(self.settle(at, range(len(levels))), range(len(levels)))
 
     def at(

@@ -29,6 +29,9 @@ MOST_EFFECTS = 12
 CONTRADICTED = 1.64
 """Standard errors by which the joints on which an effect acts are predicted worse: one in twenty is so by chance."""
 
+NAMED = 3.0
+"""Log odds from which an effect is named: nineteen in twenty."""
+
 CATALOGUED = 3.0
 """Log odds before the data that torque which is left out has a name: one in twenty laws is in no catalogue."""
 
@@ -260,7 +263,7 @@ class Search:
             log_odds = min(log_odds, window_log_odds(at, found, found.model.terms[-1], self.laboratory))
         log_odds += 0.0 if change is None else change.log_odds
         contradicted = change is not None and (change.harm > 0.0 or change.loss(touched) > CONTRADICTED)
-        confirmed = log_odds > 0.0 and not contradicted
+        confirmed = log_odds > NAMED and not contradicted
         covariance = found.posterior.covariance
         trained = self._log_odds(proposal)
         return Step(proposal, log_odds, rivals, change, confirmed, at.model, found.model, covariance, trained), found
