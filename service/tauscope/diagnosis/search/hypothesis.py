@@ -205,10 +205,11 @@ class Laboratory:
         return replace(at, scales=at.linear.most_probable(at.scales, joints))
 
     def weigh(self, at: Hypothesis, joints: Collection[int]) -> Hypothesis:
-        """The same model under scales of highest evidence, rows counting as much as its own residual lets them."""
-        dependence, mean = list(at.dependence), at.posterior.mean
+        """The same model under scales of highest evidence, rows counting as much as its best residual lets them."""
+        independent = self.under(at, [1.0] * len(at.scales), range(len(at.scales)))
+        dependence, mean = list(at.dependence), independent.posterior.mean
         for joint in joints:
-            own = at.linear.joints[joint]
+            own = independent.linear.joints[joint]
             direction = np.concatenate([[1.0], -mean[own.index]])
             left = direction @ own.rows[: own.visible] - own.discrepancy(at.scales[joint], direction)
             dependence[joint] = self.rows.dependence(joint, left)
