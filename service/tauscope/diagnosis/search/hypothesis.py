@@ -35,6 +35,12 @@ LARGEST_SHAPE_STEP = 0.15
 HALVINGS = (1.0, 0.5, 0.25, 0.1)
 """Parts of a step that are tried until the data are more probable."""
 
+WEIGHINGS = 5
+"""Rounds of dependence and scales, at most…"""
+
+ALIKE = 0.5
+"""…which end where the logarithm of κ changes by less."""
+
 NEAR = 3
 """Steps to parameters by which proposals are ranked."""
 
@@ -206,6 +212,16 @@ class Laboratory:
 
     def weigh(self, at: Hypothesis, joints: Collection[int]) -> Hypothesis:
         """The same model under scales of highest evidence, rows counting as much as its best residual lets them."""
+        for _ in range(WEIGHINGS):
+            dependence = self._dependence(at, joints)
+            moved = max(abs(np.log(dependence[joint] / at.dependence[joint])) for joint in joints)
+            at = self.tune(self.under(at, dependence, joints), joints)
+            if moved < ALIKE:
+                break
+        return at
+
+    def _dependence(self, at: Hypothesis, joints: Collection[int]) -> list[float]:
+        """κ of every joint, of some by what the most probable parameters leave there if rows are independent."""
         independent = self.under(at, [1.0] * len(at.scales), range(len(at.scales)))
         dependence, mean = list(at.dependence), independent.posterior.mean
         for joint in joints:
@@ -213,7 +229,7 @@ class Laboratory:
             direction = np.concatenate([[1.0], -mean[own.index]])
             left = direction @ own.rows[: own.visible] - own.discrepancy(at.scales[joint], direction)
             dependence[joint] = self.rows.dependence(joint, left)
-        return self.tune(self.under(at, dependence, joints), joints)
+        return dependence
 
     def under(self, at: Hypothesis, dependence: Sequence[float], joints: Collection[int]) -> Hypothesis:
         """The same with another dependence of some joints' rows."""
