@@ -72,7 +72,7 @@ def link_warnings(
     recording: Recording, types: Sequence[JointType], joints: Sequence[str | None]
 ) -> list[ResultWarning]:
     """A warning about each column that is no encoder on a link."""
-    if not any(name.startswith("qlink") for name in recording.table.names):
+    if not recording.has("qlink"):
         return []
     found = find_link_encoders(recording.samples(), types)
     if found is None:

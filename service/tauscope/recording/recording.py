@@ -43,6 +43,10 @@ class Recording:
         """Warnings about its units and samples, each beginning with its name."""
         return tuple(note.model_copy(update={"text": f"{self.name}: {note.text}"}) for note in self.notes)
 
+    def has(self, group: str) -> bool:
+        """Whether any joint has a column of a group, such as ``qlink`` or ``temp``; no row is read."""
+        return any(name.rstrip("0123456789") == group for name in self.table.names)
+
     def samples(self, start: int = 0, stop: int | None = None) -> Samples:
         """Samples start:stop, as read-only views of the table where its columns allow.
 

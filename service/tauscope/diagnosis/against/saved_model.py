@@ -22,7 +22,7 @@ def against_saved(diagnosis: Diagnosis, saved: ExtendedModel) -> Diagnosis:
     )
     had = {(term.effect.id, term.effect.joint): term for term in saved.terms}
     missing = tuple(finding for finding in diagnosis.findings if finding.place not in had)
-    found = compared(beside(diagnosis, missing), Given(values, lacking, _in_columns_of(diagnosis, saved)), "model")
+    found = compared(beside(diagnosis, missing), Given(values, lacking, _align_covariance(diagnosis, saved)), "model")
     differences: list[ParameterDifference] = []
     for finding in diagnosis.findings:
         if finding.place not in had:
@@ -43,7 +43,7 @@ def against_saved(diagnosis: Diagnosis, saved: ExtendedModel) -> Diagnosis:
     return replace(found, differences=ordered([*found.differences, *wrong]), before=before)
 
 
-def _in_columns_of(diagnosis: Diagnosis, saved: ExtendedModel) -> Array | None:
+def _align_covariance(diagnosis: Diagnosis, saved: ExtendedModel) -> Array | None:
     """Covariance of the saved parameters in the columns of the diagnosed model; None where they are exact."""
     if saved.covariance is None:
         return None

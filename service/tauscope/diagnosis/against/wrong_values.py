@@ -47,13 +47,13 @@ def attribute(
     """
     places = {name: place for place, name in enumerate(names)}
     values = [
-        _of_link(each, None if links is None else links.reshape(-1, SIZE)[each.change.link]) for each in explanations
+        _name_link(each, None if links is None else links.reshape(-1, SIZE)[each.change.link]) for each in explanations
     ]
     causes: list[list[WrongValue]] = []
     for difference in differences:
         place = places.get(difference.parameter)
         if place is None:
-            causes.append(_of_joint(difference, joints))
+            causes.append(_name_joint(difference, joints))
             continue
         size = difference.real - difference.simulation
         effects = [float(each.effect[place]) for each in explanations]
@@ -73,7 +73,7 @@ def attribute(
     )
 
 
-def _of_joint(difference: ParameterDifference, joints: Sequence[Joint]) -> list[WrongValue]:
+def _name_joint(difference: ParameterDifference, joints: Sequence[Joint]) -> list[WrongValue]:
     """A coefficient of one joint, which explains itself."""
     term, _, name = difference.parameter.partition(" ")
     own = [place for place, joint in enumerate(joints) if joint.name == name]
@@ -85,7 +85,7 @@ def _of_joint(difference: ParameterDifference, joints: Sequence[Joint]) -> list[
     return [WrongValue(None, own[0], (quantity,))] if quantity.is_possible else []
 
 
-def _of_link(explained: Explanation, stated: Array | None) -> WrongValue:
+def _name_link(explained: Explanation, stated: Array | None) -> WrongValue:
     """The quantities of one link that differ clearly, or else the clearest; none where no body has it."""
     change = explained.change
     quantities = _quantities(explained, np.zeros(SIZE) if stated is None else stated)

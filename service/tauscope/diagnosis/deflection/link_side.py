@@ -120,6 +120,8 @@ def link_rows(
         of the common band [Hz]; None for no filter
     """
     robot, structure = model.structure.robot, model.structure
+    if not recording.has("qlink"):
+        return
     samples = recording.samples()
     encoders = find_link_encoders(samples, [joint.type for joint in robot.joints])
     if encoders is None or samples.link_position is None or not encoders.joints:

@@ -26,6 +26,8 @@ def read_temperature(conditioner: Conditioner, time: Array) -> Array | None:
     (n, P, N) float64 or None
         [°C]; NaN at joints without a sensor, None where there is none
     """
+    if not conditioner.recording.has("temp"):
+        return None
     parts = [(each.time, each.temperature) for each in conditioner.usable_samples() if each.temperature is not None]
     if not parts:
         return None
