@@ -10,7 +10,7 @@ from tauscope.diagnosis.findings.conclude import conclude
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
 from tauscope.diagnosis.findings.direct import with_direct_findings
 from tauscope.diagnosis.findings.finding import Finding, FitSizes
-from tauscope.diagnosis.findings.plain import undeclared_offsets, with_plain_terms
+from tauscope.diagnosis.findings.plain import undeclared_offsets, with_plain_terms, with_rivals_of_constants
 from tauscope.diagnosis.findings.wrong_sign import with_wrong_signs
 from tauscope.diagnosis.search.from_recordings import search
 from tauscope.identification import Options, identify
@@ -50,7 +50,7 @@ def diagnose(
     model = searched.found.nominal.model
     again = measure_deflection(held_out, identification, model, searched.cutoff_hz)
     found = with_direct_findings(found, searched.deflections, again)
-    found = with_plain_terms(found, undeclared_offsets(found))
+    found = with_rivals_of_constants(with_plain_terms(found, undeclared_offsets(found)), searched)
     return with_wrong_signs(found, wrong)
 
 

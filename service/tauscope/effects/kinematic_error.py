@@ -35,7 +35,6 @@ class KinematicError(Effect):
     revealing_motion = "none: measure the tool's place in several postures instead"
     coefficients = (Coefficient("d", "m", largest=LARGEST_M),)
     shapes = (Shape("link", "1", fixed=True), Shape("axis", "1", fixed=True))
-    of_motion_alone = True  # the consistent links, which no model of a diagnosis changes
 
     @classmethod
     def forms(cls, context: ArmContext) -> Sequence[Effect]:

@@ -38,12 +38,18 @@ class NormalBodies:
         dx/dΘ_L of the most probable links
     mean, precision : (m,), (m, m) float64
         of the base parameters
+    energy : float
+        -2 log p of the body, but for a constant
+    log_mass : float
+        log of the probability that the normal distribution stands for, alike: expanded elsewhere it is another
     """
 
     centre: Array
     gain: Array
     mean: Array
     precision: Array
+    energy: float
+    log_mass: float
 
     def links(self, base: Array) -> Array:
         """Most probable standard parameters of links with these base parameters, (10 n,).
@@ -109,19 +115,15 @@ class BodyPrior:
             slope[own] -= _TRIANGLE.T @ (_WEIGHT * inverse[_ROWS, _COLUMNS])
         scale = 1.0 / np.sqrt(np.diag(precision))
         factor = _factor(scale[:, None] * precision * scale)
-        centre = links - scale * cho_solve(factor, scale * slope)
+        step = scale * cho_solve(factor, scale * slope)
         spread = scale[:, None] * cho_solve(factor, (self.base * scale).T)
         of_base = _inverse(self.base @ spread)
-        return NormalBodies(centre, spread @ of_base, self.base @ centre, of_base)
+        centre, energy = links - step, self._energy(links)
+        determinant = 2.0 * float(np.sum(np.log(np.diag(factor[0])) - np.log(scale)))
+        log_mass = 0.5 * (float(slope @ step) - energy - determinant)
+        return NormalBodies(centre, spread @ of_base, self.base @ centre, of_base, energy, log_mass)
 
-    def energy(self, links: Array) -> float:
-        """-2 log p of bodies, but for a constant.
-
-        Parameters
-        ----------
-        links : (10 n,) float64
-            standard parameters of bodies with volume
-        """
+    def _energy(self, links: Array) -> float:
         off = links - self.mean
         volumes = sum(float(np.linalg.slogdet(pseudo_inertia(links[own]))[1]) for own in _each(links))
         return float(off @ self.precision @ off) - 2.0 * volumes

@@ -163,6 +163,12 @@ class EvidenceRows:
         """
         return white_columns(self.observations, effect, shapes, signals)
 
+    @property
+    def interval_s(self) -> float:
+        """Time between rows [s]."""
+        first = next(iter(self.observations)).row_times()
+        return float(first[1] - first[0])
+
     def measured_rms(self, joint: int, dependence: float) -> float:
         """Rms of a joint's white torque."""
         torque = self.take(joint, self.white.measured(joint), dependence)

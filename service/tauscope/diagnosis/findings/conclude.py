@@ -9,7 +9,7 @@ from tauscope.diagnosis.evidence.rows import weigh_rows
 from tauscope.diagnosis.findings.constancy import constancy
 from tauscope.diagnosis.findings.detectability import Detectable, detectable, detectable_parameters, visibilities
 from tauscope.diagnosis.findings.diagnosed import Diagnosis, Selection
-from tauscope.diagnosis.findings.finding import Finding, FitSizes, in_order
+from tauscope.diagnosis.findings.finding import Finding, FitSizes, equivalent, in_order
 from tauscope.diagnosis.findings.location import locate
 from tauscope.diagnosis.findings.plain import states_friction
 from tauscope.diagnosis.findings.unseen import Unseen
@@ -25,17 +25,11 @@ from tauscope.diagnosis.observations.observations import Observations
 from tauscope.diagnosis.observations.row_weighting import RowWeighting
 from tauscope.diagnosis.search.from_recordings import Searched
 from tauscope.diagnosis.search.hypothesis import Hypothesis
-from tauscope.diagnosis.search.search import Rival, Step, Weighed
+from tauscope.diagnosis.search.search import Step
 from tauscope.effects.payload import Payload
 from tauscope.effects.plain_terms import TorqueOffset
 from tauscope.identification import Identification
 from tauscope.recording.recording import Array
-
-EQUIVALENT = 5.0
-"""Log odds within which data do not tell two effects apart: a small error of the columns decides between them."""
-
-FORMULA_ERROR = 0.05
-"""Part of an effect's log odds that counts as nothing between two laws: no formula is exactly that of an arm."""
 
 LEVEL = 0.01
 """Chance that anything is named where nothing is missing, for limits of detection."""
@@ -132,17 +126,11 @@ def _findings(
                 probability=weighed.probability,
                 before=FitSizes.of(weighed.without.model, fitter.observations, _rows(unseen)),
                 after=after,
-                alternatives=_equivalent(weighed),
+                alternatives=equivalent(weighed.log_odds, weighed.rivals),
                 confirmed=None if unseen is None else True,
             )
         )
     return in_order(found)
-
-
-def _equivalent(weighed: Weighed) -> tuple[Rival, ...]:
-    """Rivals that the data cannot tell from an effect."""
-    margin = EQUIVALENT + FORMULA_ERROR * abs(weighed.log_odds)
-    return tuple(each for each in weighed.rivals if each.log_odds > weighed.log_odds - margin)
 
 
 def _tentative(steps: Sequence[Step], found: set[Place], fitter: Fitter, unseen: Unseen | None) -> tuple[Finding, ...]:

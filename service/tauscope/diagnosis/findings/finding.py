@@ -13,6 +13,12 @@ from tauscope.diagnosis.observations.observations import Observations
 from tauscope.diagnosis.search.search import Rival
 from tauscope.recording.recording import Array
 
+EQUIVALENT = 5.0
+"""Log odds within which data do not tell two effects apart: a small error of the columns decides between them."""
+
+FORMULA_ERROR = 0.05
+"""Part of an effect's log odds that counts as nothing between two laws: no formula is exactly that of an arm."""
+
 
 @dataclass(frozen=True, eq=False)
 class FitSizes:
@@ -81,3 +87,9 @@ class Finding:
 def in_order(found: Sequence[Finding]) -> tuple[Finding, ...]:
     """Findings, most explained energy first."""
     return tuple(sorted(found, key=lambda each: -each.gain))
+
+
+def equivalent(log_odds: float, rivals: Sequence[Rival]) -> tuple[Rival, ...]:
+    """Rivals that the data cannot tell from an effect."""
+    margin = EQUIVALENT + FORMULA_ERROR * abs(log_odds)
+    return tuple(each for each in rivals if each.log_odds > log_odds - margin)

@@ -13,10 +13,12 @@ import numpy as np
 from scipy import stats
 
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
-from tauscope.diagnosis.findings.finding import Finding
+from tauscope.diagnosis.findings.finding import Finding, equivalent
 from tauscope.diagnosis.fitting.fit import Fit
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.model.term import Term
+from tauscope.diagnosis.search.constant import weigh_constant
+from tauscope.diagnosis.search.from_recordings import Searched
 from tauscope.effects.plain_terms import CoulombFriction, PlainTerm, StribeckTerm, TorqueOffset, ViscousFriction
 from tauscope.robot import Robot
 
@@ -54,6 +56,17 @@ def with_plain_terms(diagnosis: Diagnosis, lacking: Lacking) -> Diagnosis:
                 finding = _finding(kind(joint), diagnosis)
                 added += [] if finding is None else [finding]
     return diagnosis.with_findings(added)
+
+
+def with_rivals_of_constants(diagnosis: Diagnosis, searched: Searched) -> Diagnosis:
+    """The same, each constant with what may be in its place."""
+    findings = [
+        replace(each, alternatives=equivalent(*weigh_constant(searched, each.terms[0].effect.joint or 0)))
+        if isinstance(each.terms[0].effect, TorqueOffset)
+        else each
+        for each in diagnosis.findings
+    ]
+    return replace(diagnosis, findings=tuple(findings))
 
 
 def _finding(effect: PlainTerm, diagnosis: Diagnosis) -> Finding | None:

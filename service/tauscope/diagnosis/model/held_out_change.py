@@ -6,6 +6,7 @@ the squared errors after and before, summed over stretch s of S, and ρ = Σ a_s
     change of the rms = √ρ - 1,        σ(ρ) = √S std(a_s - ρ b_s) / Σ b_s.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,10 +20,13 @@ SHORTEST = 8
 """Samples of a stretch, at least: errors of neighbouring samples are alike."""
 
 LOST = 2.0
-"""Standard errors from which another joint loses…"""
+"""Standard errors from which a joint loses…"""
 
 SHOWN = 0.005
 """…by a part of its rms that three digits show: a smaller loss changes no number that anybody reads."""
+
+SPILLED = 1.0 / 3.0
+"""Part of the gain of all joints that others may lose."""
 
 
 def sum_stretches(squares: Array) -> Array:
@@ -78,3 +82,27 @@ class HeldOutChange:
     def losing(self) -> list[int]:
         """Joints that are predicted worse."""
         return np.flatnonzero((self.standard > LOST) & (self.relative > SHOWN)).tolist()
+
+    @property
+    def harm(self) -> float:
+        """What joints lose beyond a small part of what all others gain [log rms].
+
+        All joints share the links. What is believed of these moves with an effect, and other joints with it.
+        """
+        gain = np.log1p(self.relative)
+        lost = float(gain[self.losing].sum())
+        return lost + SPILLED * float(np.minimum(gain, 0.0).sum()) if lost > 0.0 else 0.0
+
+    def log_odds(self, joints: Sequence[int] | None = None) -> float:
+        """Log odds that held-out motion adds to the second model, 2 z² of each joint.
+
+        Where a torque f is there, leaving it out costs Σ f² ± 2σ √(κ Σ f²) in white noise σ whose rows count as 1/κ:
+        z = √(Σ f²/κ) / 2σ, and Σ f² / 2κσ² is the log odds. So the noise need not be known.
+
+        Parameters
+        ----------
+        joints : sequence of int, optional
+            that count, from 0
+        """
+        own = self.standard if joints is None else self.standard[list(joints)]
+        return -2.0 * float(np.sum(own * np.abs(own)))

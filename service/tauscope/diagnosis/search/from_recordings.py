@@ -42,6 +42,7 @@ class Searched:
     """
 
     found: Found
+    laboratory: Laboratory
     effects: tuple[Effect, ...]
     setting: ArmContext
     rows: Observations
@@ -81,7 +82,7 @@ def search(
         unseen = Observations.prepare(others, robot, base, cutoff, model.steepness).apart()
     confirming = None if unseen is None else HeldOut(unseen.with_noise(white_noise(unseen, model)))
     found = Search(laboratory, Proposer(laboratory, effects), confirming).run(nominal)
-    return Searched(found, effects, setting, white, unseen, deflections, cutoff, repeated is not None)
+    return Searched(found, laboratory, effects, setting, white, unseen, deflections, cutoff, repeated is not None)
 
 
 def _rotors(identification: Identification, effects: Sequence[Effect]) -> list[Term]:

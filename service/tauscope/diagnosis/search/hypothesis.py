@@ -64,8 +64,6 @@ class Hypothesis:
         one entry a joint
     dependence : tuple of float
         κ of every joint
-    body_energy : float
-        -2 log probability of the links
     """
 
     model: ExtendedModel
@@ -74,7 +72,6 @@ class Hypothesis:
     bodies: NormalBodies
     scales: tuple[Scales, ...]
     dependence: tuple[float, ...]
-    body_energy: float
 
     @cached_property
     def posterior(self) -> Posterior:
@@ -84,14 +81,14 @@ class Hypothesis:
     @cached_property
     def log_evidence(self) -> float:
         """Log evidence of data and scales."""
-        return self.posterior.log_evidence - sum(each.penalty() for each in self.scales)
+        return self.bodies.log_mass + self.posterior.log_evidence - sum(each.penalty() for each in self.scales)
 
     @cached_property
     def misfit(self) -> float:
         """-2 log probability of data and parameters as they are, but for what depends on the scales alone."""
         others = slice(len(self.bodies.mean), None)
         off = self.linear.mean[others]
-        believed = self.body_energy + float(off @ self.linear.precision[others, others] @ off)
+        believed = self.bodies.energy + float(off @ self.linear.precision[others, others] @ off)
         pairs = zip(self.linear.joints, self.scales, strict=True)
         return believed + sum(float(own.weighted(scales).products[0, 0]) for own, scales in pairs)
 
@@ -181,8 +178,7 @@ class Laboratory:
         precision[diagonal, diagonal] = 1.0 / spread[plain:] ** 2
         linear = LinearModel(self.rows.moments(model, dependence, owned=owned), mean, precision)
         linear = _hold_impossible(linear, model, scales)
-        energy = self.prior.bodies.energy(model.links)
-        return Hypothesis(model, tuple(sizes), linear, bodies, tuple(scales), tuple(dependence), energy)
+        return Hypothesis(model, tuple(sizes), linear, bodies, tuple(scales), tuple(dependence))
 
     def settle(self, start: Hypothesis, joints: Collection[int]) -> Hypothesis:
         """The most probable parameters, and scales of highest evidence at some joints."""

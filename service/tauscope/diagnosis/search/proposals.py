@@ -9,10 +9,11 @@ from tauscope.diagnosis.fitting.white_columns import SHAPES_AT_ONCE
 from tauscope.diagnosis.model.term import Place, Term
 from tauscope.diagnosis.search.hypothesis import Hypothesis, Laboratory
 from tauscope.diagnosis.search.neighbourhood import POINTS, neighbours, spread
+from tauscope.diagnosis.search.position_noise import is_position_noise
 from tauscope.diagnosis.search.scoring import SIZES, Scored, Scorer, unnamed_log_odds
-from tauscope.effects import Effect, Signals
+from tauscope.effects import Effect, Signals, TimeLocalEffect
 from tauscope.effects.computation import side_by_side
-from tauscope.identification.excitation import thin
+from tauscope.effects.deflection import Deflection
 from tauscope.recording.recording import Array
 
 LOOKED_AT = 5
@@ -21,8 +22,14 @@ LOOKED_AT = 5
 WORTH_A_LOOK = 2.0
 """Log Bayes factor on the grid below which nothing comes of a closer look."""
 
-MOST_SHAPES = 200
+MOST_SHAPES = 600
 """Shapes of a grid of thousands that are looked at first."""
+
+KINDS = (0, 3)
+"""Shape parameters of a window that are no numbers: its recordings, and its profile."""
+
+EDGES = (1, 2)
+"""…and those that have many optima."""
 
 ZOOMS = 2
 """How often the neighbourhood of a shape parameter's best value is looked at."""
@@ -94,7 +101,7 @@ class Proposer:
         """Every shape of an effect's grid."""
         parts = [
             scorer.score(effect, shapes, self.columns(effect, shapes, signals, at.dependence))
-            for shapes in _parts(thin(effect.grid, MOST_SHAPES))
+            for shapes in _parts(_spread_over(effect.grid))
         ]
         beside, alone = ([part[kind] for part in parts] for kind in (0, 1))
         return _join(beside), _join(alone)
@@ -109,17 +116,23 @@ class Proposer:
             return None
         effect, place = on_grid.effect, on_grid.best
         joints = effect.touched(len(at.scales))
-        shape, size = self._zoom(effect, on_grid.shapes[place], on_grid.sizes[place], at, signals)
+        is_open = any(effect.is_free(each) for each in range(len(effect.shapes)))
+        shape, size = on_grid.shapes[place], on_grid.sizes[place]
+        if is_open:
+            shape, size = self.zoom(effect, shape, size, at, signals)
         found = self._extend(effect, shape, size, at)
-        if any(effect.is_free(each) for each in range(len(effect.shapes))):
+        if is_open:
             beside = self.laboratory.paint(at, found)
-            shape, size = self._zoom(effect, shape, size, beside, signals)
+            shape, size = self.zoom(effect, shape, size, beside, signals)
             found = self._extend(effect, shape, size, beside)
         term = found.model.terms[-1]
         own = found.posterior.mean[found.model.term_places()[-1]]
         term = replace(term, coefficients=own[: len(size)])
         k_v = None if effect.joint is None else at.model.structure.terms[effect.joint].k_v
         if not (term.is_possible(k_v) and effect.is_consistent(term.coefficients, shape)):
+            return None
+        rows = self.rows.observations
+        if isinstance(effect, Deflection) and is_position_noise(effect, shape, at.model, rows, signals):
             return None
         one_sided = sum(each.positive for each in effect.coefficients)
         # Where the effect is there, only the model that has it tells the noise.
@@ -135,25 +148,36 @@ class Proposer:
         added = self.laboratory.with_term(at, Term(effect, shape, np.zeros(len(size))), size)
         return self.laboratory.weigh(self.laboratory.tune(added, joints), joints)
 
-    def _zoom(
+    def zoom(
         self, effect: Effect, shape: Array, size: Array, at: Hypothesis, signals: Sequence[Signals]
     ) -> tuple[Array, Array]:
-        """One free shape parameter after the other between its neighbours on the grid."""
-        free = [place for place in range(len(effect.shapes)) if effect.is_free(place)]
-        if not free:
-            return shape, size
+        """One shape parameter after the other: a free one between neighbours on the grid, a window's kind in turn."""
         scorer = Scorer(self.rows, at)
-        for place in free:
+
+        def choose(values: Array, place: int) -> int | None:
+            """Which of some values of a parameter is the most probable, the last being the one at hand."""
+            nonlocal shape, size
+            shapes = np.tile(shape, (len(values) + 1, 1))
+            shapes[:-1, place] = values
+            found, _ = scorer.score(effect, shapes, self.columns(effect, shapes, signals, at.dependence))
+            if not np.isfinite(found.log_factors.max()):
+                return None
+            shape, size = found.shapes[found.best], found.sizes[found.best]
+            return found.best
+
+        if isinstance(effect, TimeLocalEffect):
+            for place in KINDS:
+                choose(np.unique(effect.grid[:, place]), place)
+            for place in EDGES:  # optima lie as close as the rows
+                choose(np.arange(*neighbours(effect, shape, place), self.rows.interval_s), place)
+            return shape, size
+        for place in (place for place in range(len(effect.shapes)) if effect.is_free(place)):
             low, high = neighbours(effect, shape, place)
             for _ in range(ZOOMS):
                 values = spread(low, high, effect.shapes[place].logarithmic)
-                shapes = np.tile(shape, (POINTS + 1, 1))
-                shapes[:POINTS, place] = values
-                found, _ = scorer.score(effect, shapes, self.columns(effect, shapes, signals, at.dependence))
-                if not np.isfinite(found.log_factors.max()):
+                best = choose(values, place)
+                if best is None:
                     break
-                best = found.best
-                shape, size = found.shapes[best], found.sizes[best]
                 if best < POINTS:
                     low, high = float(values[max(best - 1, 0)]), float(values[min(best + 1, POINTS - 1)])
         return shape, size
@@ -170,6 +194,11 @@ class Proposer:
         """
         white = self.rows.columns(effect, shapes, signals)
         return {joint: self.rows.take(joint, rows, dependence[joint]) for joint, rows in white.items()}
+
+
+def _spread_over(grid: Array) -> Array:
+    """Some of the shapes of a large grid; no fixed step, which would leave out all that alternate."""
+    return grid[np.unique(np.linspace(0, len(grid) - 1, min(len(grid), MOST_SHAPES)).round().astype(int))]
 
 
 def _parts(shapes: Array) -> Iterator[Array]:

@@ -8,7 +8,7 @@ The size S is not known: it is a share κ of the joint's torque, equally likely 
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import logsumexp
@@ -132,7 +132,7 @@ def _factors(effect: Effect, shapes: Array, left: Array, outside: Array, mutual:
 
 def unnamed_log_odds(at: Hypothesis) -> float:
     """Log Bayes factor of torque without a name, against none."""
-    return at.log_evidence - at.linear.evidence(_without_discrepancy(at))
+    return at.log_evidence - replace(at, scales=_without_discrepancy(at)).log_evidence
 
 
 def _without_discrepancy(at: Hypothesis) -> tuple[Scales, ...]:

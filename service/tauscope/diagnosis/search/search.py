@@ -7,8 +7,9 @@ from functools import cmp_to_key
 import numpy as np
 
 from tauscope.diagnosis.model.extended import ExtendedModel
+from tauscope.diagnosis.model.held_out_change import HeldOutChange
 from tauscope.diagnosis.model.term import Place, Term
-from tauscope.diagnosis.search.held_out import Change, HeldOut
+from tauscope.diagnosis.search.held_out import HeldOut
 from tauscope.diagnosis.search.hypothesis import Hypothesis, Laboratory
 from tauscope.diagnosis.search.proposals import Proposal, Proposer
 from tauscope.diagnosis.search.scoring import unnamed_log_odds
@@ -26,8 +27,8 @@ WEIGHED = 3
 MOST_EFFECTS = 12
 """Effects that are added at most."""
 
-CONTRADICTED = 1.64
-"""Standard errors by which the joints on which an effect acts are predicted worse: one in twenty is so by chance."""
+CLEAR = 1.64
+"""Standard errors by which joints on which an effect acts are predicted better or worse: one in twenty is by chance."""
 
 NAMED = 3.0
 """Log odds from which an effect is named: nineteen in twenty."""
@@ -44,7 +45,7 @@ class Step:
         posterior, that it is there, after all motion and after training
     rivals : tuple of Proposal
         other effects that were as good as looked at in its place
-    change : Change or None
+    change : HeldOutChange or None
         on held-out motion; None where there is none
     covariance : (p, p) float64
         of the parameters with it
@@ -53,7 +54,7 @@ class Step:
     proposal: Proposal
     log_odds: float
     rivals: tuple[Proposal, ...]
-    change: Change | None
+    change: HeldOutChange | None
     is_confirmed: bool
     before: ExtendedModel
     after: ExtendedModel
@@ -191,7 +192,7 @@ class Search:
         effect, shared = at.model.terms[places[0]].effect, set(touched)
         lasts = not isinstance(effect, TimeLocalEffect)
         trained = at.log_evidence - before.log_evidence + self._prior_odds(effect, unnamed_log_odds(before))
-        log_odds = trained + (0.0 if self.held_out is None else self.held_out.change(without, at).log_odds)
+        log_odds = trained + (0.0 if self.held_out is None else self.held_out.change(without, at).log_odds())
         own, others = (effect.id, effect.joint), _places(without)
 
         def competes(each: Effect) -> bool:
@@ -205,7 +206,7 @@ class Search:
         for proposal in (each for each in proposals if self._log_odds(each) > 0.0):
             nearer = self.laboratory.approach(self._add(without, proposal))
             odds = log_odds - trained + self._log_odds(proposal)
-            odds += 0.0 if self.held_out is None else self.held_out.change(at, nearer).log_odds
+            odds += 0.0 if self.held_out is None else self.held_out.change(at, nearer).log_odds()
             rivals.append(Rival(nearer.model.terms[-1], nearer.model, odds))
         rivals.sort(key=lambda each: -each.log_odds)
         return Weighed(places, without, log_odds, tuple(rivals), tuple(proposals))
@@ -244,7 +245,7 @@ class Search:
 
         def compare(one: Proposal, other: Proposal) -> float:
             """Log odds of the other. What both predict alike says nothing: they are compared with each other."""
-            found = held_out.change(nearer[id(one)], nearer[id(other)]).log_odds
+            found = held_out.change(nearer[id(one)], nearer[id(other)]).log_odds()
             return found + self._log_odds(other) - self._log_odds(one)
 
         return sorted(proposals, key=cmp_to_key(lambda one, other: int(np.sign(compare(one, other)))))
@@ -255,18 +256,31 @@ class Search:
     def _try(self, at: Hypothesis, proposal: Proposal, proposals: Sequence[Proposal]) -> tuple[Step, Hypothesis]:
         """A proposal in the model, and what held-out motion says of it."""
         touched = proposal.term.effect.touched(len(at.scales))
-        found = self.laboratory.settle(self._add(at, proposal), touched)
+        found = self._settle(self._add(at, proposal), touched)
         change = None if self.held_out is None else self.held_out.change(at, found)
         rivals = tuple(each for each in proposals if each is not proposal)
         log_odds = self._log_odds(proposal)
         if isinstance(proposal.term.effect, TimeLocalEffect):
             log_odds = min(log_odds, window_log_odds(at, found, found.model.terms[-1], self.laboratory))
-        log_odds += 0.0 if change is None else change.log_odds
-        contradicted = change is not None and (change.harm > 0.0 or change.loss(touched) > CONTRADICTED)
-        confirmed = log_odds > NAMED and not contradicted
+        log_odds += 0.0 if change is None else change.log_odds()
+        confirmed = log_odds > NAMED and (change is None or _agrees(change, proposal.term.effect, touched))
         covariance = found.posterior.covariance
         trained = self._log_odds(proposal)
         return Step(proposal, log_odds, rivals, change, confirmed, at.model, found.model, covariance, trained), found
+
+    def _settle(self, at: Hypothesis, touched: Sequence[int]) -> Hypothesis:
+        """The most probable parameters; the edges of a window, of which each has several, are looked for once more."""
+        found, last = self.laboratory.settle(at, touched), len(at.model.terms) - 1
+        term = found.model.terms[last]
+        if not isinstance(term.effect, TimeLocalEffect):
+            return found
+        without = self.laboratory.without_term(found, last)
+        signals = [without.model.signals(piece) for piece in self.laboratory.rows.observations]
+        shape, size = self.proposer.zoom(term.effect, term.shape, found.sizes[last], without, signals)
+        other = self.laboratory.with_term(without, replace(term, shape=shape), size)
+        other = self.laboratory.settle(other, touched)
+        compared = self.laboratory.under(other, found.dependence, touched)
+        return other if compared.log_evidence > found.log_evidence else found
 
     def _log_odds(self, proposal: Proposal) -> float:
         return proposal.log_factor + self._prior_odds(proposal.term.effect, proposal.unnamed)
@@ -311,7 +325,13 @@ class Search:
         steps[: len(term.coefficients)] = -term.coefficients
         reduced = at.linear.without(np.arange(own.start, own.stop), steps)
         scales = reduced.most_probable(at.scales, effect.touched(len(at.scales)))
-        return reduced.evidence(scales) - at.log_evidence - self._prior_odds(effect, 0.0)
+        return replace(at, linear=reduced, scales=scales).log_evidence - at.log_evidence - self._prior_odds(effect, 0.0)
+
+
+def _agrees(change: HeldOutChange, effect: Effect, touched: Sequence[int]) -> bool:
+    """Whether held-out motion shows an effect; a window in time is of its own recording, and has only to do no harm."""
+    least = 2.0 * CLEAR**2
+    return change.harm <= 0.0 and change.log_odds(touched) > (-least if isinstance(effect, TimeLocalEffect) else least)
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ CHANCE = 2.0
 STRETCHES = 12
 """Parts of a window, at most, by which the standard error of its gain is known…"""
 
-SHORTEST = 8
+SHORTEST = 4
 """…and rows of each, at least: fewer agree because the effect was fitted to them."""
 
 FEWEST = 4
