@@ -2,7 +2,7 @@
 
 from tauscope.effects.context import ArmContext, Signals
 from tauscope.effects.effect import Coefficient, Effect, Entry, Quantity, Shape
-from tauscope.effects.registry import catalogue, effect_class, possible_effects
+from tauscope.effects.registry import catalogue, effect_class, farther_effects, possible_effects
 from tauscope.effects.time_local import TimeLocalEffect
 
 __all__ = [
@@ -16,5 +16,6 @@ __all__ = [
     "TimeLocalEffect",
     "catalogue",
     "effect_class",
+    "farther_effects",
     "possible_effects",
 ]

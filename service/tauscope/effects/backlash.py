@@ -172,6 +172,11 @@ class Backlash(Deflection):
             made.append(cls(joint, mesh(gaps, bands), *bounds))
         return made
 
+    @classmethod
+    def farther_forms(cls, context: ArmContext) -> Sequence[Effect]:
+        """The same with teeth that give way, one a joint whose link has an inertia."""
+        return SpringyTeeth.forms(context)
+
     def quantities(
         self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
@@ -221,6 +226,11 @@ class SpringyTeeth(Backlash):
             lower[-1], upper[-1] = LOSSES[0], LOSSES[-1]
             made.append(cls(joint, grid, lower, upper))
         return made
+
+    @classmethod
+    def farther_forms(cls, context: ArmContext) -> Sequence[Effect]:
+        """None: these are."""
+        return ()
 
     def is_consistent(self, coefficients: Array, shape: Array) -> bool:
         """Whether the gap that the link crosses is the one by which it moves."""

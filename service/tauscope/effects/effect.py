@@ -152,6 +152,11 @@ class Effect(ABC):
         """Whether the motion of a joint, from 0, may show the effect: whether it moves."""
         return context.moves(joint)
 
+    @classmethod
+    def farther_forms(cls, context: ArmContext) -> "Sequence[Effect]":
+        """Forms that show in a small part of the motion: looked at where all others leave more than noise."""
+        return ()
+
     @abstractmethod
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """Torque per unit of each coefficient, for several shapes at once.

@@ -41,6 +41,12 @@ MOST_ORDERS = 220
 EVEN = 1e-9
 """Spread of steps, relative to one, up to which they are even: over a thousand orders no phase is off by as much."""
 
+FARTHER = 8.0
+"""Factor up to which orders are looked at where something is left: they reach the band near reversals only, in a
+twentieth of the time of a sine."""
+
+MOST_FARTHER_ORDERS = 800
+
 FEW = 2
 """Orders at once up to which sines are kept: one of a fit, and the two of its difference quotient."""
 
@@ -56,18 +62,35 @@ def possible_orders(context: ArmContext, joint: int) -> Array:
     joint : int
         joint index, from 0
     """
+    return _orders(context, joint, 1.0)[:MOST_ORDERS]
+
+
+def farther_orders(context: ArmContext, joint: int) -> Array:
+    """Orders beyond those, that show in a part of the motion only, (g,), ascending.
+
+    Parameters
+    ----------
+    joint : int
+        joint index, from 0
+    """
+    near = possible_orders(context, joint)
+    return _orders(context, joint, FARTHER)[len(near) :][:MOST_FARTHER_ORDERS]
+
+
+def _orders(context: ArmContext, joint: int, factor: float) -> Array:
+    """Orders whose frequency at rms speed reaches up to some times the band."""
     if not context.moves(joint):
         return np.zeros(0)
     reach = float(context.highest[joint] - context.lowest[joint])
     lowest = FEWEST_CYCLES * 2.0 * np.pi / reach
-    highest = BAND_SHARE * 2.0 * np.pi * context.cutoff_hz / float(context.speed[joint])
+    highest = factor * BAND_SHARE * 2.0 * np.pi * context.cutoff_hz / float(context.speed[joint])
     if _is_geared(context, joint):
         unit = abs(context.robot.joints[joint].gear_ratio or 1.0) * _pole_pairs(context, joint)
         lowest = min(lowest, unit) if reach >= 2.0 * np.pi / unit * FEWEST_CYCLES else lowest
         multiples = np.arange(max(1, int(np.ceil(lowest / unit - 1e-9))), int(highest / unit) + 1)
-        return np.asarray(unit * multiples[:MOST_ORDERS], dtype=np.float64)
+        return np.asarray(unit * multiples, dtype=np.float64)
     step = CYCLES_A_STEP * 2.0 * np.pi / reach
-    return np.asarray(np.arange(lowest, highest, step)[:MOST_ORDERS], dtype=np.float64)
+    return np.asarray(np.arange(lowest, highest, step), dtype=np.float64)
 
 
 def _pole_pairs(context: ArmContext, joint: int) -> int:
@@ -122,6 +145,11 @@ class _Periodic(Effect):
     def forms(cls, context: ArmContext) -> Sequence[Effect]:
         """One a joint whose motion covers enough cycles."""
         return cls._of_orders(context, possible_orders)
+
+    @classmethod
+    def farther_forms(cls, context: ArmContext) -> Sequence[Effect]:
+        """The same of orders that show near reversals only."""
+        return cls._of_orders(context, farther_orders)
 
     @classmethod
     def _of_orders(cls, context: ArmContext, orders: Callable[[ArmContext, int], Array]) -> Sequence[Effect]:

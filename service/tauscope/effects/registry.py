@@ -46,6 +46,11 @@ def possible_effects(context: ArmContext) -> Sequence[Effect]:
     return [form for effect in catalogue() if effect.screened for form in effect.forms(context)]
 
 
+def farther_effects(context: ArmContext) -> Sequence[Effect]:
+    """Every form that is worth a look only where something is left."""
+    return [form for effect in catalogue() if effect.screened for form in effect.farther_forms(context)]
+
+
 def _built_in() -> Iterator[type[Effect]]:
     for module in iter_modules([str(Path(__file__).parent)]):
         for each in vars(import_module(f"{__package__}.{module.name}")).values():

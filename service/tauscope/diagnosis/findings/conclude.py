@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from tauscope.diagnosis.evidence.rows import weigh_rows
 from tauscope.diagnosis.findings.constancy import constancy
 from tauscope.diagnosis.findings.detectability import Detectable, detectable, detectable_parameters, visibilities
 from tauscope.diagnosis.findings.diagnosed import Diagnosis, Selection
@@ -14,17 +13,15 @@ from tauscope.diagnosis.findings.location import locate
 from tauscope.diagnosis.findings.plain import states_friction
 from tauscope.diagnosis.findings.unseen import Unseen
 from tauscope.diagnosis.fitting.fit import Fit, Fitter
-from tauscope.diagnosis.fitting.lack_of_fit import lack_of_fit
-from tauscope.diagnosis.fitting.regressor_noise import shared_errors
 from tauscope.diagnosis.fitting.spilled_misfit import without_spilled
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.model.nominal import delivered_model
 from tauscope.diagnosis.model.term import Place
 from tauscope.diagnosis.model.torque_scale import covariance_on_the_arm
 from tauscope.diagnosis.observations.observations import Observations
-from tauscope.diagnosis.observations.row_weighting import RowWeighting
 from tauscope.diagnosis.search.from_recordings import Searched
 from tauscope.diagnosis.search.hypothesis import Hypothesis
+from tauscope.diagnosis.search.left import measure_lack, rows_under, weigh
 from tauscope.diagnosis.search.search import Step
 from tauscope.effects.payload import Payload
 from tauscope.effects.plain_terms import TorqueOffset
@@ -38,15 +35,14 @@ LEVEL = 0.01
 def conclude(identification: Identification, searched: Searched) -> Diagnosis:
     """All that a search comes to."""
     nominal, final = searched.found.nominal, searched.found.hypothesis
-    rows = _weigh(searched.rows if searched.pure_error else _with_noise(searched.rows, final), final)
+    rows = rows_under(final, searched.rows, pure_error=searched.pure_error)
     fitter, unseen = Fitter(rows), _unseen(searched, final, rows)
     before, after = _fit(nominal, fitter), _fit(final, fitter)
     if not final.model.terms:  # the best of possible bodies is the one that the identification delivers
         before = after = replace(fitter.projected(delivered_model(identification)), spread=after.spread)
     selection = Selection(before, after)
     misfit_before, misfit_after = (
-        lack_of_fit(fit, rows, None if searched.pure_error else at.dependence, pure_error=searched.pure_error)
-        for fit, at in ((before, nominal), (after, final))
+        measure_lack(fit, at, rows, pure_error=searched.pure_error) for fit, at in ((before, nominal), (after, final))
     )
     inflation = 1.0 if searched.pure_error else after.inflation()
     level = LEVEL / max(len(searched.effects), 1)
@@ -78,26 +74,11 @@ def conclude(identification: Identification, searched: Searched) -> Diagnosis:
     )
 
 
-def _with_noise(rows: Observations, at: Hypothesis) -> Observations:
-    """Rows with the noise that a hypothesis finds."""
-    pairs = zip(rows.noise, at.scales, strict=True)
-    return rows.with_noise([own.times(float(np.exp(scales.values[0]))) for own, scales in pairs])
-
-
-def _weigh(rows: Observations, at: Hypothesis) -> Observations:
-    """Rows as much as they tell by a hypothesis' friction."""
-    weightings = []
-    for joint in range(len(rows.noise)):
-        weights = weigh_rows(rows, at.model, joint)
-        weightings.append(RowWeighting.of(weights, shared_errors(rows, at.model, joint, weights)))
-    return rows.with_weightings(weightings)
-
-
 def _unseen(searched: Searched, at: Hypothesis, rows: Observations) -> Unseen | None:
     """Held-out rows under the noise of training."""
     if searched.unseen is None:
         return None
-    return Unseen(_weigh(searched.unseen.with_noise(rows.noise), at))
+    return Unseen(weigh(searched.unseen.with_noise(rows.noise), at))
 
 
 def _rows(unseen: Unseen | None) -> Observations | None:

@@ -15,9 +15,10 @@ from tauscope.diagnosis.observations.band import diagnosis_cutoff
 from tauscope.diagnosis.observations.observations import Observations
 from tauscope.diagnosis.search.held_out import HeldOut
 from tauscope.diagnosis.search.hypothesis import Hypothesis, Laboratory, Prior
+from tauscope.diagnosis.search.left import is_left
 from tauscope.diagnosis.search.proposals import Proposer
 from tauscope.diagnosis.search.search import Found, Search
-from tauscope.effects import ArmContext, Effect, possible_effects
+from tauscope.effects import ArmContext, Effect, farther_effects, possible_effects
 from tauscope.effects.rotor_inertia import RotorInertia
 from tauscope.identification import Identification
 from tauscope.recording.conditioning import Conditioner
@@ -81,7 +82,11 @@ def search(
         others = [Conditioner.survey(recording, robot) for recording in held_out]
         unseen = Observations.prepare(others, robot, base, cutoff, model.steepness).apart()
     confirming = None if unseen is None else HeldOut(unseen.with_noise(white_noise(unseen, model)))
-    found = Search(laboratory, Proposer(laboratory, effects), confirming).run(nominal)
+    near, far = Proposer(laboratory, effects), Proposer(laboratory, [*effects, *farther_effects(setting)])
+    found = Search(laboratory, near, confirming).run(nominal)
+    if is_left(found.hypothesis, white, pure_error=repeated is not None):
+        progress("look farther")
+        found = Search(laboratory, far, confirming).run(nominal, found)
     return Searched(found, laboratory, effects, setting, white, unseen, deflections, cutoff, repeated is not None)
 
 

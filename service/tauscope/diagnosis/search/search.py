@@ -137,9 +137,11 @@ class Search:
     proposer: Proposer
     held_out: HeldOut | None
 
-    def run(self, nominal: Hypothesis) -> Found:
-        """Add what makes the data most probable and held-out motion no worse."""
+    def run(self, nominal: Hypothesis, before: Found | None = None) -> Found:
+        """Add what makes the data most probable and held-out motion no worse, to what was found before."""
         at, steps, refused = nominal, list[Step](), set[Place]()
+        if before is not None:
+            at, steps = before.hypothesis, list(before.steps)
         while len(at.model.terms) - len(nominal.model.terms) < MOST_EFFECTS:
             proposals = self.proposer.propose(at, _Wanted(_places(at), refused))
             tried, found = self._best(at, proposals)
