@@ -27,9 +27,6 @@ WEIGHED = 3
 MOST_EFFECTS = 12
 """Effects that are added at most."""
 
-CLEAR = 1.64
-"""Standard errors by which joints on which an effect acts are predicted better or worse: one in twenty is by chance."""
-
 NAMED = 3.0
 """Log odds from which an effect is named: nineteen in twenty."""
 
@@ -332,8 +329,7 @@ class Search:
 
 def _agrees(change: HeldOutChange, effect: Effect, touched: Sequence[int]) -> bool:
     """Whether held-out motion shows an effect; a window in time is of its own recording, and has only to do no harm."""
-    least = 2.0 * CLEAR**2
-    return change.harm <= 0.0 and change.log_odds(touched) > (-least if isinstance(effect, TimeLocalEffect) else least)
+    return change.harm <= 0.0 and (isinstance(effect, TimeLocalEffect) or change.log_odds(touched) > 0.0)
 
 
 @dataclass(frozen=True)
