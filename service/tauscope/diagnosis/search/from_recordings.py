@@ -84,7 +84,8 @@ def search(
     confirming = None if unseen is None else HeldOut(unseen.with_noise(white_noise(unseen, model)))
     near, far = Proposer(laboratory, effects), Proposer(laboratory, [*effects, *farther_effects(setting)])
     found = Search(laboratory, near, confirming).run(nominal)
-    if is_left(found.hypothesis, white, pure_error=repeated is not None):
+    named = any(not term.effect.is_expected for term in found.hypothesis.model.terms)
+    if not named and is_left(found.hypothesis, white, pure_error=repeated is not None):
         progress("look farther")
         found = Search(laboratory, far, confirming).run(nominal, found)
     return Searched(found, laboratory, effects, setting, white, unseen, deflections, cutoff, repeated is not None)

@@ -279,7 +279,20 @@ class Search:
         other = self.laboratory.with_term(without, replace(term, shape=shape), size)
         other = self.laboratory.settle(other, touched)
         compared = self.laboratory.under(other, found.dependence, touched)
-        return other if compared.log_evidence > found.log_evidence else found
+        found = other if compared.log_evidence > found.log_evidence else found
+        return self._turn(found, touched)
+
+    def _turn(self, at: Hypothesis, touched: Sequence[int]) -> Hypothesis:
+        """The same effect outside its window where held-out motion says so: training cannot tell which of the two."""
+        last = len(at.model.terms) - 1
+        term = at.model.terms[last]
+        outside = term.effect.outside(term.shape) if isinstance(term.effect, TimeLocalEffect) else None
+        if outside is None or self.held_out is None:
+            return at
+        turned = replace(term, shape=outside, coefficients=-term.coefficients)
+        other = self.laboratory.with_term(self.laboratory.without_term(at, last), turned, at.sizes[last])
+        other = self.laboratory.settle(other, touched)
+        return other if self.held_out.change(at, other).log_odds() > 0.0 else at
 
     def _log_odds(self, proposal: Proposal) -> float:
         return proposal.log_factor + self._prior_odds(proposal.term.effect, proposal.unnamed)
